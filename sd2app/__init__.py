@@ -1,0 +1,1 @@
+"""SD² Studio's window: Qt views over the library ``sd2core``."""

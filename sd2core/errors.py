@@ -1,0 +1,31 @@
+"""The one error a user may see: a sentence, never a traceback."""
+
+from __future__ import annotations
+
+
+class Sd2Error(Exception):
+    """Something the user can act on.
+
+    Parameters
+    ----------
+    found : str
+        What was found, with the value and, where a file is at fault, its path.
+    expected : str
+        What was expected instead.
+    remedy : str
+        What to do about it.
+    """
+
+    def __init__(self, found: str, expected: str = "", remedy: str = "") -> None:
+        self.found = found
+        self.expected = expected
+        self.remedy = remedy
+        super().__init__(found, expected, remedy)
+
+    def __str__(self) -> str:
+        parts = [self.found]
+        if self.expected:
+            parts.append(f"Expected: {self.expected}")
+        if self.remedy:
+            parts.append(self.remedy)
+        return " ".join(part.rstrip(".") + "." for part in parts)

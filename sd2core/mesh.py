@@ -1,0 +1,106 @@
+"""A mesh (or point cloud) that moves: vertices, faces, times."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+from sd2core.timebase import Timebase
+
+
+class VertexArray(Protocol):
+    """What vertices need: a NumPy array, or a chunked array that stays on disk."""
+
+    @property
+    def shape(self) -> tuple[int, ...]: ...
+
+    @property
+    def dtype(self) -> Any: ...
+
+    def __getitem__(self, key: Any) -> Any: ...
+
+
+@dataclass(frozen=True, eq=False)
+class MeshSequence:
+    """Vertices through time with one topology.
+
+    Parameters
+    ----------
+    vertices : array, shape (T, V, 3)
+        Metres in the camera frame (x right, y down, z forward). May stay on
+        disk; read stretches with :meth:`read`.
+    faces : int32 array, shape (F, 3), or None
+        Counter-clockwise seen from outside. None makes it a point cloud, which
+        has no surface and takes visibility ``none`` only.
+    timebase : Timebase
+        One time per frame.
+    source : str
+        Where it came from, for provenance.
+    notes : tuple of str
+        What the reader found and repaired or wants the user to know.
+    """
+
+    vertices: VertexArray
+    faces: NDArray[np.int32] | None
+    timebase: Timebase
+    source: str = ""
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        shape = tuple(self.vertices.shape)
+        if len(shape) != 3 or shape[2] != 3 or 0 in shape:
+            raise Sd2Error(
+                f"{self.source or 'The mesh'}: vertices have shape {shape}",
+                "(frames, vertices, 3), none of them zero",
+            )
+        if shape[0] != len(self.timebase):
+            raise Sd2Error(
+                f"{self.source or 'The mesh'}: {shape[0]} frames but {len(self.timebase)} times",
+                "one time per frame",
+            )
+        if self.faces is None:
+            return
+        faces = np.ascontiguousarray(self.faces, dtype=np.int32)
+        if faces.ndim != 2 or faces.shape[1] != 3:
+            raise Sd2Error(
+                f"{self.source or 'The mesh'}: faces have shape {faces.shape}",
+                "(faces, 3): three vertex numbers per triangle",
+            )
+        if faces.size and not (0 <= faces.min() and faces.max() < shape[1]):
+            bad = faces.max() if faces.max() >= shape[1] else faces.min()
+            raise Sd2Error(
+                f"{self.source or 'The mesh'}: a face names vertex {bad}",
+                f"vertex numbers from 0 to {shape[1] - 1}",
+                "Give the faces that belong to this mesh (--faces)",
+            )
+        object.__setattr__(self, "faces", faces)
+
+    @property
+    def frame_count(self) -> int:
+        """Number of frames T."""
+        return int(self.vertices.shape[0])
+
+    @property
+    def vertex_count(self) -> int:
+        """Number of vertices V."""
+        return int(self.vertices.shape[1])
+
+    @property
+    def times_s(self) -> NDArray[np.float64]:
+        """Time of every frame, shape (T,)."""
+        return self.timebase.times_s
+
+    def read(self, start: int, stop: int) -> NDArray[Any]:
+        """Vertices of frames ``start`` to ``stop`` (exclusive) in memory, (n, V, 3)."""
+        if not 0 <= start < stop <= self.frame_count:
+            raise IndexError(f"frames {start} to {stop} of {self.frame_count}")
+        return np.asarray(self.vertices[start:stop])
+
+    def frame(self, index: int) -> NDArray[Any]:
+        """Vertices of one frame, (V, 3)."""
+        vertices: NDArray[Any] = self.read(index, index + 1)[0]
+        return vertices

@@ -1,0 +1,16 @@
+"""How long work reports where it is, and how it is stopped."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+Progress = Callable[[int, int], None]
+"""``progress(done, total)``; it may raise :class:`Cancelled` to stop the work."""
+
+
+class Cancelled(Exception):
+    """Raised by a progress callback: the caller no longer wants the result."""
+
+
+def silent(done: int, total: int) -> None:
+    """Report nothing."""

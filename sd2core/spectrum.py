@@ -1,0 +1,163 @@
+"""DopplerMap: energy per velocity bin and frame, with all one needs to read it."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.atomic import atomic_write
+from sd2core.errors import Sd2Error
+from sd2core.sensor import VelocityAxis
+from sd2core.timebase import Timebase
+
+MapKind = Literal["synthetic", "simulated", "real", "denoised"]
+"""synthetic: counted from a mesh; simulated: a computed radar signal; real: a capture."""
+
+FORMAT_VERSION = 1
+
+
+@dataclass(frozen=True, eq=False)
+class DopplerMap:
+    """Doppler energy on a velocity axis over time.
+
+    Parameters
+    ----------
+    values : float32 array, shape (bins, frames)
+        Not negative; velocity ascending, positive when approaching.
+    axis : VelocityAxis
+    timebase : Timebase
+        One time per frame.
+    kind : MapKind
+    unit : str
+        What a value of 1 means, e.g. ``"share of vertices"`` or ``"power"``.
+    null_bins : tuple of int
+        Bins that were set to zero on purpose.
+    unseen_bins : tuple of int
+        Bins that the radar cannot see because they lie beyond its v_max.
+    meta : dict
+        Provenance that fits into JSON: sensor, options, sources, version.
+    """
+
+    values: NDArray[np.float32]
+    axis: VelocityAxis
+    timebase: Timebase
+    kind: MapKind
+    unit: str = ""
+    null_bins: tuple[int, ...] = ()
+    unseen_bins: tuple[int, ...] = ()
+    meta: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        values = np.ascontiguousarray(self.values, dtype=np.float32)
+        if values.shape != (self.axis.bins, len(self.timebase)):
+            raise Sd2Error(
+                f"The Doppler map has shape {values.shape}",
+                f"({self.axis.bins} bins, {len(self.timebase)} frames)",
+            )
+        if self.kind not in get_args(MapKind):
+            raise Sd2Error(f"The map is of kind {self.kind!r}", f"one of {get_args(MapKind)}")
+        for name in ("null_bins", "unseen_bins"):
+            bins = tuple(sorted({int(index) for index in getattr(self, name)}))
+            if bins and not 0 <= bins[0] <= bins[-1] < self.axis.bins:
+                raise Sd2Error(f"{name} is {bins}", f"bins from 0 to {self.axis.bins - 1}")
+            object.__setattr__(self, name, bins)
+        object.__setattr__(self, "values", values)
+
+    @property
+    def times_s(self) -> NDArray[np.float64]:
+        """Time of every frame, shape (frames,)."""
+        return self.timebase.times_s
+
+    def shifted(self, offset_s: float) -> DopplerMap:
+        """The same map ``offset_s`` later."""
+        return replace(self, timebase=self.timebase.shifted(offset_s))
+
+    def mean_velocity_mps(self) -> NDArray[np.float64]:
+        """Energy-weighted mean velocity per frame; NaN where a frame is empty."""
+        values = self.values.astype(np.float64)
+        total = values.sum(axis=0)
+        moment = self.axis.centres_mps @ values
+        return np.divide(moment, total, out=np.full_like(total, np.nan), where=total > 0)
+
+    def peak_velocity_mps(self) -> NDArray[np.float64]:
+        """Velocity of the strongest bin per frame; NaN where a frame is empty."""
+        peak = self.axis.centres_mps[self.values.argmax(axis=0)]
+        return np.where(self.values.max(axis=0) > 0, peak, np.nan)
+
+    def save(self, path: Path) -> None:
+        """Write ``values``, ``velocity_mps``, ``times_s`` and ``meta`` to one ``.npz``."""
+        meta = {
+            "format": "sd2-doppler-map",
+            "version": FORMAT_VERSION,
+            "kind": self.kind,
+            "unit": self.unit,
+            "v_max_mps": self.axis.v_max_mps,
+            "null_bins": self.null_bins,
+            "unseen_bins": self.unseen_bins,
+            "provenance": self.meta,
+        }
+        with atomic_write(Path(path)) as stream:
+            np.savez_compressed(
+                stream,
+                values=self.values,
+                velocity_mps=self.axis.centres_mps,
+                times_s=self.times_s,
+                meta=json.dumps(meta),
+            )
+
+    @classmethod
+    def load(cls, path: Path) -> DopplerMap:
+        """Read what :meth:`save` wrote.
+
+        Raises
+        ------
+        Sd2Error
+            When the file is not a Doppler map or is damaged.
+        """
+        path = Path(path)
+        try:
+            with np.load(path, allow_pickle=False) as data:
+                arrays = {name: data[name] for name in data.files}
+        except (OSError, ValueError, zipfile.BadZipFile) as error:
+            raise Sd2Error(
+                f"{path} cannot be read as a Doppler map ({error})",
+                "an .npz written by `sd2 synth`",
+            ) from error
+        missing = {"values", "velocity_mps", "times_s", "meta"} - arrays.keys()
+        if missing:
+            raise Sd2Error(
+                f"{path} has no {', '.join(sorted(missing))}; it holds {', '.join(sorted(arrays))}",
+                "a Doppler map with values, velocity_mps, times_s and meta",
+            )
+        try:
+            meta = json.loads(str(arrays["meta"]))
+            version = meta.get("version", 0)
+            if meta.get("format") != "sd2-doppler-map" or version > FORMAT_VERSION:
+                raise Sd2Error(
+                    f"{path} is of format {meta.get('format')!r} version {version}",
+                    f"'sd2-doppler-map' up to version {FORMAT_VERSION}",
+                    "Open it with the version of SD² Studio that wrote it",
+                )
+            axis = VelocityAxis(len(arrays["velocity_mps"]), float(meta["v_max_mps"]))
+            if not np.allclose(axis.centres_mps, arrays["velocity_mps"], atol=1e-6):
+                raise Sd2Error(f"{path}: velocity_mps does not match v_max_mps {axis.v_max_mps}")
+            return cls(
+                values=arrays["values"],
+                axis=axis,
+                timebase=Timebase(arrays["times_s"]),
+                kind=meta["kind"],
+                unit=meta["unit"],
+                null_bins=tuple(meta["null_bins"]),
+                unseen_bins=tuple(meta["unseen_bins"]),
+                meta=meta["provenance"],
+            )
+        except (KeyError, TypeError, json.JSONDecodeError) as error:
+            raise Sd2Error(
+                f"{path}: its description is damaged ({error!r})", "the meta written by `sd2 synth`"
+            ) from error

@@ -1,0 +1,119 @@
+"""The only place that converts between time and frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sd2core.errors import Sd2Error
+
+_TOLERANCE_S = 1e-6
+"""Arithmetic on presentation times loses less than this; no camera is that fast."""
+
+
+@dataclass(frozen=True, eq=False)
+class Timebase:
+    """Presentation times of a sequence of frames, evenly spaced or not.
+
+    Frame ``k`` is on screen during the half-open span
+    ``[times_s[k], times_s[k + 1])``; the last one for a typical frame duration.
+
+    Parameters
+    ----------
+    times_s : array_like, shape (T,)
+        Strictly increasing times in seconds, at least one.
+
+    Raises
+    ------
+    Sd2Error
+        When a time is missing, not finite or not later than the one before.
+    """
+
+    times_s: NDArray[np.float64]
+
+    def __init__(self, times_s: ArrayLike) -> None:
+        times = np.array(times_s, dtype=np.float64)  # (T,)
+        if times.ndim != 1 or times.size == 0:
+            raise Sd2Error(
+                f"Frame times have shape {times.shape}", "one time per frame, at least one frame"
+            )
+        if not np.isfinite(times).all():
+            bad = int(np.flatnonzero(~np.isfinite(times))[0])
+            raise Sd2Error(f"The time of frame {bad} is {times[bad]}", "a finite time in seconds")
+        steps = np.diff(times)
+        if (steps <= 0).any():
+            bad = int(np.flatnonzero(steps <= 0)[0])
+            raise Sd2Error(
+                f"Frame {bad + 1} is at {times[bad + 1]:.6f} s, frame {bad} at {times[bad]:.6f} s",
+                "times that increase from frame to frame",
+            )
+        times.flags.writeable = False
+        object.__setattr__(self, "times_s", times)
+
+    @classmethod
+    def regular(cls, frames: int, frames_per_s: float, start_s: float = 0.0) -> Timebase:
+        """Evenly spaced frames."""
+        if not (frames_per_s > 0 and np.isfinite(frames_per_s)):
+            raise Sd2Error(f"The frame rate is {frames_per_s}", "a positive number of frames per s")
+        return cls(start_s + np.arange(frames) / frames_per_s)
+
+    def __len__(self) -> int:
+        return len(self.times_s)
+
+    @property
+    def frame_duration_s(self) -> float:
+        """Typical (median) time from one frame to the next; 1/30 s for a single frame."""
+        return float(np.median(np.diff(self.times_s))) if len(self) > 1 else 1.0 / 30.0
+
+    @property
+    def frames_per_s(self) -> float:
+        """Typical frame rate."""
+        return 1.0 / self.frame_duration_s
+
+    @property
+    def start_s(self) -> float:
+        """Time of the first frame."""
+        return float(self.times_s[0])
+
+    @property
+    def end_s(self) -> float:
+        """End of the last frame (exclusive)."""
+        return float(self.times_s[-1]) + self.frame_duration_s
+
+    @property
+    def duration_s(self) -> float:
+        """From the start of the first frame to the end of the last."""
+        return self.end_s - self.start_s
+
+    def frame_at(self, time_s: float) -> int:
+        """Frame on screen at ``time_s``, held at both ends."""
+        index = int(np.searchsorted(self.times_s, time_s + _TOLERANCE_S, side="right")) - 1
+        return min(max(index, 0), len(self) - 1)
+
+    def nearest_frame(self, time_s: float) -> int:
+        """Frame whose time is closest to ``time_s`` (the earlier one on a tie)."""
+        return int(np.argmin(np.abs(self.times_s - time_s)))
+
+    def covers(self, time_s: float) -> bool:
+        """Whether some frame is on screen at ``time_s``."""
+        return self.start_s - _TOLERANCE_S <= time_s < self.end_s - _TOLERANCE_S
+
+    def time_of(self, frame: int) -> float:
+        """Time of ``frame``; it must exist."""
+        if not 0 <= frame < len(self):
+            raise IndexError(f"frame {frame} of {len(self)}")
+        return float(self.times_s[frame])
+
+    def frames_between(self, start_s: float, end_s: float) -> tuple[int, int]:
+        """Half-open range of frames on screen during ``[start_s, end_s)``."""
+        if end_s <= start_s or end_s <= self.start_s or start_s >= self.end_s:
+            return (0, 0)
+        first = self.frame_at(start_s)
+        last = int(np.searchsorted(self.times_s, end_s - _TOLERANCE_S, side="left"))
+        return (first, max(last, first + 1))
+
+    def shifted(self, offset_s: float) -> Timebase:
+        """The same frames ``offset_s`` later."""
+        return Timebase(self.times_s + offset_s)

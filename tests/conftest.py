@@ -1,0 +1,22 @@
+"""Fixtures for every layer."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """Folder of real recordings; it is not part of the repository."""
+    folder = Path(os.environ.get("SD2_SHARED_DATA", REPOSITORY.parent / "shared" / "data"))
+    if folder.is_dir():
+        return folder
+    reason = f"the real recordings are not at {folder} (set SD2_SHARED_DATA)"
+    if os.environ.get("SD2_REQUIRE_SHARED") == "1":
+        pytest.fail(reason)
+    pytest.skip(reason)
