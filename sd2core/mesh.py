@@ -16,10 +16,12 @@ class VertexArray(Protocol):
     """What vertices need: a NumPy array, or a chunked array that stays on disk."""
 
     @property
-    def shape(self) -> tuple[int, ...]: ...
+    def shape(self) -> tuple[int, ...]:
+        """(T, V, 3)."""
 
     @property
-    def dtype(self) -> Any: ...
+    def dtype(self) -> Any:
+        """A floating point type."""
 
     def __getitem__(self, key: Any) -> Any: ...
 
@@ -70,7 +72,7 @@ class MeshSequence:
                 f"{self.source or 'The mesh'}: faces have shape {faces.shape}",
                 "(faces, 3): three vertex numbers per triangle",
             )
-        if faces.size and not (0 <= faces.min() and faces.max() < shape[1]):
+        if faces.size and not (faces.min() >= 0 and faces.max() < shape[1]):
             bad = faces.max() if faces.max() >= shape[1] else faces.min()
             raise Sd2Error(
                 f"{self.source or 'The mesh'}: a face names vertex {bad}",

@@ -51,7 +51,7 @@ class VelocityAxis:
     @property
     def edges_mps(self) -> NDArray[np.float64]:
         """Bin edges, shape (bins + 1,)."""
-        return np.linspace(-self.v_max_mps, self.v_max_mps, self.bins + 1)
+        return np.arange(self.bins + 1) * self.bin_width_mps - self.v_max_mps
 
     @property
     def centres_mps(self) -> NDArray[np.float64]:

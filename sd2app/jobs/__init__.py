@@ -1,0 +1,1 @@
+"""Work beside the window: threads that report back to the Qt event loop."""

@@ -1,0 +1,127 @@
+"""A background thread on which the newest request wins."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from PySide6.QtCore import QObject, Signal
+
+from sd2core.progress import Cancelled
+
+Emit = Callable[[Any], None]
+"""Hands an intermediate result to the window; raises Cancelled when it is stale."""
+
+Task = Callable[[Emit], Any]
+
+
+class LatestRunner(QObject):
+    """Runs one task at a time; a newer request cancels the running one.
+
+    Results of a cancelled task are dropped by their revision number, so a
+    listener sees only what belongs to the newest request. Signals arrive in
+    the thread that owns the runner.
+    """
+
+    partial = Signal(object)
+    finished = Signal(object)
+    failed = Signal(object)
+    idle_changed = Signal(bool)
+
+    _posted = Signal(int, str, object)
+
+    def __init__(self, name: str, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._name = name
+        self._wakeup = threading.Condition()
+        self._revision = 0
+        self._pending: tuple[int, Task] | None = None
+        self._closed = False
+        self._busy = False
+        self._thread: threading.Thread | None = None
+        self._posted.connect(self._deliver)
+
+    @property
+    def busy(self) -> bool:
+        """Whether the newest request is still waiting for its result."""
+        return self._busy
+
+    def submit(self, task: Task) -> int:
+        """Ask for ``task(emit)`` in the background; returns its revision number."""
+        with self._wakeup:
+            if self._closed:
+                return self._revision
+            self._revision += 1
+            revision = self._revision
+            self._pending = (revision, task)
+            self._wakeup.notify()
+        if self._thread is None:
+            self._thread = threading.Thread(target=self._run, name=self._name, daemon=True)
+            self._thread.start()
+        self._set_busy(True)
+        return revision
+
+    def cancel(self) -> None:
+        """Drop the running and the waiting task; nothing of them is delivered."""
+        with self._wakeup:
+            self._revision += 1
+            self._pending = None
+        self._set_busy(False)
+
+    def close(self, timeout_s: float = 5.0) -> None:
+        """Cancel, and wait until the thread has left its task."""
+        with self._wakeup:
+            self._closed = True
+            self._revision += 1
+            self._pending = None
+            self._wakeup.notify()
+        if self._thread is not None:
+            self._thread.join(timeout_s)
+        self._set_busy(False)
+
+    def _run(self) -> None:
+        while True:
+            with self._wakeup:
+                while self._pending is None and not self._closed:
+                    self._wakeup.wait()
+                if self._pending is None:
+                    return
+                revision, task = self._pending
+                self._pending = None
+            try:
+                self._post(revision, "finished", task(lambda value: self._emit(revision, value)))
+            except Cancelled:
+                continue
+            except Exception as error:
+                self._post(revision, "failed", error)
+
+    def _emit(self, revision: int, value: Any) -> None:
+        if revision != self._revision:
+            raise Cancelled
+        if value is not None:
+            self._post(revision, "partial", value)
+
+    def _post(self, revision: int, what: str, value: object) -> None:
+        try:
+            self._posted.emit(revision, what, value)
+        except RuntimeError:
+            # The window is gone; there is nobody left to tell.
+            self._closed = True
+
+    def _deliver(self, revision: int, what: str, value: object) -> None:
+        if revision != self._revision:
+            return
+        if what == "partial":
+            self.partial.emit(value)
+            return
+        self._set_busy(False)
+        if what == "finished":
+            self.finished.emit(value)
+        else:
+            self.failed.emit(value)
+
+    def _set_busy(self, busy: bool) -> None:
+        if busy != self._busy:
+            self._busy = busy
+            self.idle_changed.emit(not busy)

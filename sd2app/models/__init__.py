@@ -1,0 +1,1 @@
+"""State of the window: what is open, where the clock stands, what is shown."""

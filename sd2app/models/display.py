@@ -1,0 +1,102 @@
+"""How things are shown: levels, colours, theme."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from PySide6.QtCore import QObject, Signal
+
+MeshColour = Literal["velocity", "range", "visibility", "plain"]
+Scale = Literal["dB", "linear"]
+COLOUR_MAPS = ("viridis", "cividis", "magma", "inferno", "gray")
+
+
+@dataclass(frozen=True)
+class HeatmapLevels:
+    """One level control for all heatmaps.
+
+    A map is shown relative to its own reference (the 99.9th percentile of its
+    non-zero values over the whole clip), because counted shares and received
+    power have no common unit; the levels below that reference are absolute and
+    shared.
+    """
+
+    scale: Scale = "dB"
+    low_db: float = -30.0
+    high_db: float = 0.0
+    colour_map: str = "viridis"
+
+
+class DisplayModel(QObject):
+    """Choices that change no data."""
+
+    levels_changed = Signal()
+    mesh_changed = Signal()
+    theme_changed = Signal()
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._levels = HeatmapLevels()
+        self._mesh_colour: MeshColour = "velocity"
+        self._as_dots = False
+        self._overlay = True
+        self._dark = False
+
+    @property
+    def levels(self) -> HeatmapLevels:
+        """Level control of the heatmaps."""
+        return self._levels
+
+    @property
+    def mesh_colour(self) -> MeshColour:
+        """What the colour of the mesh means."""
+        return self._mesh_colour
+
+    @property
+    def as_dots(self) -> bool:
+        """Whether vertices are drawn as dots instead of a surface."""
+        return self._as_dots
+
+    @property
+    def overlay(self) -> bool:
+        """Whether the mesh is drawn over the video."""
+        return self._overlay
+
+    @property
+    def dark(self) -> bool:
+        """Whether the dark theme is on."""
+        return self._dark
+
+    def set_levels(self, **changes: object) -> None:
+        """Change some of the levels."""
+        levels = replace(self._levels, **changes)  # type: ignore[arg-type]
+        if levels.high_db - levels.low_db < 1.0:
+            return
+        if levels != self._levels:
+            self._levels = levels
+            self.levels_changed.emit()
+
+    def set_mesh_colour(self, colour: MeshColour) -> None:
+        """Choose what the colour of the mesh means."""
+        if colour != self._mesh_colour:
+            self._mesh_colour = colour
+            self.mesh_changed.emit()
+
+    def set_as_dots(self, as_dots: bool) -> None:
+        """Draw vertices as dots, or the surface."""
+        if as_dots != self._as_dots:
+            self._as_dots = as_dots
+            self.mesh_changed.emit()
+
+    def set_overlay(self, overlay: bool) -> None:
+        """Draw the mesh over the video, or not."""
+        if overlay != self._overlay:
+            self._overlay = overlay
+            self.mesh_changed.emit()
+
+    def set_dark(self, dark: bool) -> None:
+        """Choose the theme."""
+        if dark != self._dark:
+            self._dark = dark
+            self.theme_changed.emit()

@@ -1,0 +1,162 @@
+"""The one clock of the window."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QElapsedTimer, QObject, Qt, QTimer, Signal
+
+from sd2core.timebase import Timebase
+
+SPEEDS = (0.1, 0.25, 0.5, 1.0, 1.5, 2.0, 4.0)
+_TICK_MS = 5
+
+
+class PlaybackModel(QObject):
+    """Time, play state, speed and loop.
+
+    The frame on screen follows from elapsed time, so a late frame is dropped
+    rather than slowing the clock.
+    """
+
+    time_changed = Signal(float)
+    frame_changed = Signal(int)
+    playing_changed = Signal(bool)
+    speed_changed = Signal(float)
+    loop_changed = Signal(bool)
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._timebase = Timebase([0.0])
+        self._time_s = 0.0
+        self._frame = 0
+        self._speed = 1.0
+        self._loop = False
+        self._origin_s = 0.0
+        self._elapsed = QElapsedTimer()
+        self._timer = QTimer(self)
+        self._timer.setTimerType(Qt.TimerType.PreciseTimer)
+        self._timer.setInterval(_TICK_MS)
+        self._timer.timeout.connect(self._tick)
+
+    @property
+    def timebase(self) -> Timebase:
+        """Frames that the clock steps through."""
+        return self._timebase
+
+    @property
+    def time_s(self) -> float:
+        """Time on screen: always the time of a frame while paused."""
+        return self._time_s
+
+    @property
+    def frame(self) -> int:
+        """Frame of :attr:`timebase` on screen."""
+        return self._frame
+
+    @property
+    def playing(self) -> bool:
+        """Whether the clock runs."""
+        return self._timer.isActive()
+
+    @property
+    def speed(self) -> float:
+        """Seconds of recording per second."""
+        return self._speed
+
+    @property
+    def loop(self) -> bool:
+        """Whether playing starts again at the end."""
+        return self._loop
+
+    def set_timebase(self, timebase: Timebase) -> None:
+        """Clock another recording, from its first frame."""
+        self.pause()
+        self._timebase = timebase
+        self._move_to(timebase.start_s, force=True)
+
+    def play(self) -> None:
+        """Run from here, or from the start when at the end."""
+        if self.playing or len(self._timebase) < 2:
+            return
+        if self._frame >= len(self._timebase) - 1:
+            self._move_to(self._timebase.start_s)
+        self._restart_clock()
+        self._timer.start()
+        self.playing_changed.emit(True)
+
+    def pause(self) -> None:
+        """Stop on the frame that is on screen."""
+        if not self.playing:
+            return
+        self._timer.stop()
+        self._move_to(self._timebase.time_of(self._frame))
+        self.playing_changed.emit(False)
+
+    def toggle(self) -> None:
+        """Play or pause."""
+        if self.playing:
+            self.pause()
+        else:
+            self.play()
+
+    def seek(self, time_s: float) -> None:
+        """Show the frame at ``time_s``, held inside the recording."""
+        self.seek_frame(self._timebase.frame_at(time_s))
+
+    def seek_frame(self, frame: int) -> None:
+        """Show ``frame``, held inside the recording."""
+        frame = min(max(frame, 0), len(self._timebase) - 1)
+        self._move_to(self._timebase.time_of(frame))
+        self._restart_clock()
+
+    def step_frames(self, count: int) -> None:
+        """Pause and go ``count`` frames on (or back)."""
+        self.pause()
+        self.seek_frame(self._frame + count)
+
+    def step_seconds(self, seconds: float) -> None:
+        """Go ``seconds`` on (or back)."""
+        self.seek(self._time_s + seconds)
+
+    def set_speed(self, speed: float) -> None:
+        """Set seconds of recording per second (one of :data:`SPEEDS`)."""
+        if speed not in SPEEDS:
+            raise ValueError(f"speed {speed} is not one of {SPEEDS}")
+        if speed != self._speed:
+            self._speed = speed
+            self._restart_clock()
+            self.speed_changed.emit(speed)
+
+    def change_speed(self, steps: int) -> None:
+        """Go ``steps`` along :data:`SPEEDS`."""
+        index = SPEEDS.index(self._speed) + steps
+        self.set_speed(SPEEDS[min(max(index, 0), len(SPEEDS) - 1)])
+
+    def set_loop(self, loop: bool) -> None:
+        """Start again at the end, or stop there."""
+        if loop != self._loop:
+            self._loop = loop
+            self.loop_changed.emit(loop)
+
+    def _restart_clock(self) -> None:
+        self._origin_s = self._time_s
+        self._elapsed.start()
+
+    def _tick(self) -> None:
+        time_s = self._origin_s + self._elapsed.nsecsElapsed() * 1e-9 * self._speed
+        if time_s < self._timebase.end_s:
+            self._move_to(time_s)
+        elif self._loop:
+            overrun = (time_s - self._timebase.start_s) % self._timebase.duration_s
+            self._move_to(self._timebase.start_s + overrun)
+            self._restart_clock()
+        else:
+            self.pause()
+            self.seek_frame(len(self._timebase) - 1)
+
+    def _move_to(self, time_s: float, force: bool = False) -> None:
+        frame = self._timebase.frame_at(time_s)
+        self._time_s = time_s
+        if frame != self._frame or force or not self.playing:
+            self._frame = frame
+            self.frame_changed.emit(frame)
+            self.time_changed.emit(time_s)

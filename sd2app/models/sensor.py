@@ -1,0 +1,41 @@
+"""Where the virtual sensor stands."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QObject, Signal
+
+from sd2core.sensor import VirtualSensor
+
+
+class SensorModel(QObject):
+    """The sensor, and whether a hand is moving it right now."""
+
+    changed = Signal()
+    dragging_changed = Signal(bool)
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._sensor = VirtualSensor()
+        self._dragging = False
+
+    @property
+    def sensor(self) -> VirtualSensor:
+        """Current placement."""
+        return self._sensor
+
+    @property
+    def dragging(self) -> bool:
+        """Whether more moves are about to follow."""
+        return self._dragging
+
+    def set_sensor(self, sensor: VirtualSensor) -> None:
+        """Place the sensor."""
+        if sensor != self._sensor:
+            self._sensor = sensor
+            self.changed.emit()
+
+    def set_dragging(self, dragging: bool) -> None:
+        """Say that a hand took hold of the sensor, or let go of it."""
+        if dragging != self._dragging:
+            self._dragging = dragging
+            self.dragging_changed.emit(dragging)

@@ -1,0 +1,74 @@
+"""Which stretch of time the tracks show."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QObject, Signal
+
+_SHORTEST_S = 0.2
+
+
+class VisibleSpanModel(QObject):
+    """The time axis that all tracks share: its whole extent and the stretch in view."""
+
+    changed = Signal()
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._extent = (0.0, 1.0)
+        self._span = (0.0, 1.0)
+
+    @property
+    def extent_s(self) -> tuple[float, float]:
+        """Start and end of everything there is."""
+        return self._extent
+
+    @property
+    def start_s(self) -> float:
+        """Left edge of the tracks."""
+        return self._span[0]
+
+    @property
+    def end_s(self) -> float:
+        """Right edge of the tracks."""
+        return self._span[1]
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the stretch in view."""
+        return self._span[1] - self._span[0]
+
+    def set_extent(self, start_s: float, end_s: float) -> None:
+        """Take over another recording and show all of it."""
+        self._extent = (start_s, max(end_s, start_s + _SHORTEST_S))
+        self._span = self._extent
+        self.changed.emit()
+
+    def set_span(self, start_s: float, end_s: float) -> None:
+        """Show a stretch, held inside the extent and not shorter than 0.2 s."""
+        first, last = self._extent
+        duration = min(max(end_s - start_s, _SHORTEST_S), last - first)
+        start = min(max(start_s, first), last - duration)
+        span = (start, start + duration)
+        if span != self._span:
+            self._span = span
+            self.changed.emit()
+
+    def zoom(self, factor: float, anchor_s: float) -> None:
+        """Scale the stretch by ``factor`` (< 1 shows less), keeping ``anchor_s`` in place."""
+        duration = min(max(self.duration_s * factor, _SHORTEST_S), self._extent[1] - self._extent[0])
+        share = (anchor_s - self.start_s) / self.duration_s
+        start = anchor_s - share * duration
+        self.set_span(start, start + duration)
+
+    def pan(self, seconds: float) -> None:
+        """Move the stretch without changing its length."""
+        self.set_span(self.start_s + seconds, self.end_s + seconds)
+
+    def fit(self) -> None:
+        """Show everything."""
+        self.set_span(*self._extent)
+
+    def reveal(self, time_s: float) -> None:
+        """Turn the page when ``time_s`` has left the stretch."""
+        if time_s < self.start_s or time_s >= self.end_s:
+            self.set_span(time_s, time_s + self.duration_s)
