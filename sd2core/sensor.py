@@ -51,12 +51,12 @@ class VelocityAxis:
     @property
     def edges_mps(self) -> NDArray[np.float64]:
         """Bin edges, shape (bins + 1,)."""
-        return np.arange(self.bins + 1) * self.bin_width_mps - self.v_max_mps
+        return np.arange(self.bins + 1, dtype=np.float64) * self.bin_width_mps - self.v_max_mps
 
     @property
     def centres_mps(self) -> NDArray[np.float64]:
         """Bin centres, shape (bins,)."""
-        return (np.arange(self.bins) + 0.5) * self.bin_width_mps - self.v_max_mps
+        return (np.arange(self.bins, dtype=np.float64) + 0.5) * self.bin_width_mps - self.v_max_mps
 
     def bin_of(self, velocity_mps: float) -> int | None:
         """Bin that holds a velocity, or None beyond the axis."""

@@ -1,0 +1,72 @@
+"""What kind of thing a path is, by a cheap look at its name and first entries."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+from typing import Literal
+
+from sd2core.errors import Sd2Error
+
+Kind = Literal["recording", "video", "mesh", "radar", "map"]
+
+VIDEO_SUFFIXES = frozenset({".mp4", ".mkv", ".mov", ".avi", ".webm", ".m4v", ".mpg", ".ts", ".wmv"})
+MESH_SUFFIXES = frozenset({".obj", ".ply", ".glb", ".pkl", ".pickle", ".joblib"})
+
+
+def kind_of(path: Path) -> Kind:
+    """Recognise a recording, video, mesh, radar capture or Doppler map.
+
+    Raises
+    ------
+    Sd2Error
+        When the path does not exist or is none of these.
+    """
+    path = Path(path)
+    if any(character in path.name for character in "*?["):
+        return "mesh"
+    if not path.exists():
+        raise Sd2Error(f"{path} does not exist", "a file or folder", "Check the path")
+    if path.is_dir():
+        return _kind_of_folder(path)
+    suffix = path.suffix.lower()
+    if path.name == "recording.json":
+        return "recording"
+    if suffix in VIDEO_SUFFIXES:
+        return "video"
+    if suffix in MESH_SUFFIXES or path.name.endswith(".zarr.zip"):
+        return "mesh"
+    if suffix == ".npy":
+        return "radar"
+    if suffix == ".npz":
+        return "map" if _is_doppler_map(path) else "mesh"
+    raise Sd2Error(
+        f"{path} is of no kind that is known",
+        "a recording (.sd2), a video (.mp4, .mkv …), a mesh (.npz, .zarr, .obj, .ply, .glb, .pkl)"
+        " or a radar capture (a folder with radar.npy)",
+    )
+
+
+def _kind_of_folder(folder: Path) -> Kind:
+    if (folder / "recording.json").exists():
+        return "recording"
+    if (folder / "zarr.json").exists() or folder.suffix == ".zarr":
+        return "mesh"
+    if (folder / "radar.npy").exists() or any(folder.glob("*/radar.npy")):
+        return "radar"
+    if any(entry.suffix.lower() in MESH_SUFFIXES for entry in folder.iterdir()):
+        return "mesh"
+    raise Sd2Error(
+        f"The folder {folder} holds nothing that is known",
+        "recording.json, zarr.json, radar.npy, or .obj/.ply/.glb files",
+    )
+
+
+def _is_doppler_map(path: Path) -> bool:
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return "velocity_mps.npy" in archive.namelist()
+    except (OSError, zipfile.BadZipFile) as error:
+        raise Sd2Error(
+            f"{path} is not a readable .npz ({error})", "an .npz written by NumPy or SD² Studio"
+        ) from error
