@@ -1,0 +1,260 @@
+"""Frame-exact reading of video files, also of variable frame rate and with B-frames."""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+from sd2core.io.video_index import FrameIndex, build_index, decoded_frames, open_stream
+from sd2core.progress import Progress, silent
+from sd2core.timebase import Timebase
+
+_CACHE_BYTES = 96 * 2**20
+_SEEK_COST_FRAMES = 4
+"""A seek costs about as much as decoding this many frames more."""
+
+
+class VideoReader:
+    """Random access to the frames of one video file.
+
+    Made by :func:`open_video`. Safe to use from several threads; a context
+    manager. Frame ``k`` is the k-th frame shown, whatever the container says.
+
+    Attributes
+    ----------
+    path : Path
+    timebase : Timebase
+        When each frame that really decodes is shown; the first at 0 s.
+    width, height : int
+        Of the upright picture.
+    """
+
+    def __init__(self, path: Path, index: FrameIndex) -> None:
+        self.path = path
+        self.timebase = Timebase(index.times_s)
+        self._index = index
+        self._notes = list(index.notes)
+        self._lock = threading.Lock()
+        self._cache: OrderedDict[int, tuple[Any, int]] = OrderedDict()  # frame, its bytes
+        self._cached_bytes = 0
+        self._substitutes: dict[int, int] = {}
+        self._frames: Iterator[tuple[int, Any]] | None = None
+        self._next = 0  # number of the frame that decoding on would give
+        self._entry = 0  # where decoding began
+        self._gave_earlier = False
+        self._container, self._stream = open_stream(path)
+        try:
+            self._begin(0)
+            first = self._find(0)
+        except BaseException:
+            self.close()
+            raise
+        self._turns = round(first.rotation / 90) % 4
+        if first.rotation % 90:
+            self._notes.append(
+                f"The file asks for a rotation by {first.rotation}°; only quarter turns are made."
+            )
+        self._size = (first.width, first.height)
+        self.width, self.height = self._size[:: -1 if self._turns % 2 else 1]
+        aspect = self._stream.sample_aspect_ratio
+        if aspect and aspect != 1:
+            self._notes.append(
+                f"Pixels are not square (ratio {aspect}); the picture is shown as stored."
+            )
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the reader found in the file and the user may want to know."""
+        return tuple(self._notes)
+
+    def __len__(self) -> int:
+        return len(self.timebase)
+
+    def __enter__(self) -> VideoReader:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file; a second time does nothing."""
+        with self._lock:
+            self._frames = None
+            self._cache.clear()
+            self._cached_bytes = 0
+            if self._container is not None:
+                self._container.close()
+                self._container = None
+
+    def read(self, frame: int) -> NDArray[np.uint8]:
+        """Picture of one frame.
+
+        Parameters
+        ----------
+        frame : int
+            From 0 to ``len(reader) - 1``.
+
+        Returns
+        -------
+        uint8 array, shape (height, width, 3)
+            RGB; the caller's own.
+
+        Raises
+        ------
+        IndexError
+            When there is no such frame.
+        Sd2Error
+            When the reader is closed or the file can no longer be read.
+        """
+        if not 0 <= frame < len(self):
+            raise IndexError(f"frame {frame} of {len(self)}")
+        with self._lock:
+            if self._container is None:
+                raise Sd2Error(f"{self.path} is closed", "an open video", "Open it again")
+            picture = self._find(frame)
+        width, height = self._size
+        rgb = picture.to_ndarray(format="rgb24", width=width, height=height)
+        return np.ascontiguousarray(np.rot90(rgb, self._turns))
+
+    def frames(self, start: int = 0, stop: int | None = None) -> Iterator[NDArray[np.uint8]]:
+        """Pictures of frames ``start`` to ``stop`` (exclusive), in order."""
+        for frame in range(start, len(self) if stop is None else stop):
+            yield self.read(frame)
+
+    def _find(self, frame: int) -> Any:
+        frame = self._substitutes.get(frame, frame)
+        if frame in self._cache:
+            self._cache.move_to_end(frame)
+            return self._cache[frame][0]
+        entry = self._entry_before(frame)
+        if not self._is_ahead(frame, entry):
+            self._begin(entry)
+        back = 1
+        while True:
+            found = self._decode_to(frame)
+            if found is not None:
+                return found
+            # The file may lead to a later place than asked, or the decoder need
+            # earlier pictures than the file admits: begin further back. When
+            # that gives the frames around this one again and not this one, it
+            # is damaged.
+            if self._entry == 0 or (back > 2 and self._gave_earlier):
+                return self._hold_before(frame)
+            entry = max(entry - back, 0)
+            back *= 2
+            self._begin(entry)
+
+    def _entry_before(self, frame: int) -> int:
+        key = self._index.keys[frame]
+        return max(int(np.searchsorted(self._index.entry_keys, key, side="right")) - 1, 0)
+
+    def _is_ahead(self, frame: int, entry: int) -> bool:
+        """Whether decoding on reaches ``frame`` sooner than a seek."""
+        if self._frames is None or frame < self._next:
+            return False
+        if self._index.counted or not self._index.entry_keys.size:
+            return True
+        first = int(np.searchsorted(self._index.keys, self._index.entry_keys[entry]))
+        return self._next >= first or frame - self._next <= frame - first + _SEEK_COST_FRAMES
+
+    def _begin(self, entry: int) -> None:
+        """Make decoding continue at ``entry`` (0 is the start of the file)."""
+        self._entry = entry
+        if entry == 0:
+            # Opening anew reaches the start of every file; seeking does not.
+            self._container.close()
+            self._container, self._stream = open_stream(self.path)
+            self._next = 0
+        else:
+            seek = int(self._index.entry_seeks[entry])
+            self._container.seek(seek, stream=self._stream, backward=True)
+            self._next = int(np.searchsorted(self._index.keys, self._index.entry_keys[entry]))
+        self._frames = self._numbered(None if entry == 0 else self._index.entry_keys[entry])
+
+    def _numbered(self, begin: int | None) -> Iterator[tuple[int, Any]]:
+        """Decoded frames with their numbers; what precedes ``begin`` may be incomplete."""
+        keys = self._index.keys
+        frames = decoded_frames(self._container, self._stream)
+        for count, picture in enumerate(frames):
+            key = count if self._index.counted else picture.pts
+            if key is None or (begin is not None and key < begin):
+                continue
+            number = int(np.searchsorted(keys, key))
+            if number < len(keys) and keys[number] == key:
+                yield number, picture
+
+    def _decode_to(self, frame: int) -> Any | None:
+        """Decode up to ``frame``; None when the decoder has passed it."""
+        assert self._frames is not None
+        self._gave_earlier = False
+        for number, picture in self._frames:
+            self._remember(number, picture)
+            self._next = number + 1
+            if number == frame:
+                return picture
+            if number > frame:
+                return None
+            self._gave_earlier = True
+        self._frames = None
+        return None
+
+    def _remember(self, number: int, picture: Any) -> None:
+        if number in self._cache:
+            self._cache.move_to_end(number)
+            return
+        size = sum(plane.buffer_size for plane in picture.planes)
+        self._cache[number] = (picture, size)
+        self._cached_bytes += size
+        while self._cached_bytes > _CACHE_BYTES and len(self._cache) > 1:
+            _, (_, freed) = self._cache.popitem(last=False)
+            self._cached_bytes -= freed
+
+    def _hold_before(self, frame: int) -> Any:
+        """Show the frame before one that is damaged inside the file."""
+        neighbours = [k for k in self._cache if k < frame] or list(self._cache)
+        if not neighbours:
+            raise Sd2Error(
+                f"{self.path}: frame {frame} does not decode any more",
+                "the file as it was when it was opened",
+                "Open it again",
+            )
+        held = min(neighbours, key=lambda k: abs(k - frame))
+        self._substitutes[frame] = held
+        self._notes.append(f"Frame {frame} is damaged; frame {held} is shown in its place.")
+        return self._cache[held][0]
+
+
+def open_video(path: Path | str, progress: Progress = silent) -> VideoReader:
+    """Open a video file for frame-exact reading.
+
+    Parameters
+    ----------
+    path : path
+        Any file that FFmpeg reads.
+    progress : callable
+        Called while the frames are listed; may raise ``Cancelled``.
+
+    Returns
+    -------
+    VideoReader
+
+    Raises
+    ------
+    Sd2Error
+        When the file is missing, is no video, or no frame of it decodes.
+    """
+    path = Path(path)
+    return VideoReader(path, build_index(path, progress))
