@@ -7,6 +7,8 @@ from typing import Literal
 
 from PySide6.QtCore import QObject, Signal
 
+from sd2app.palette import Palette, palette_for
+
 MeshColour = Literal["velocity", "range", "visibility", "plain"]
 Scale = Literal["dB", "linear"]
 COLOUR_MAPS = ("viridis", "cividis", "magma", "inferno", "gray")
@@ -67,6 +69,11 @@ class DisplayModel(QObject):
     def dark(self) -> bool:
         """Whether the dark theme is on."""
         return self._dark
+
+    @property
+    def palette(self) -> Palette:
+        """Colours of the theme that is on."""
+        return palette_for(self._dark)
 
     def set_levels(self, **changes: object) -> None:
         """Change some of the levels."""

@@ -1,0 +1,58 @@
+"""Colours of the two themes. Text on its background has a contrast of at least 4.5:1."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Palette:
+    """Named colours as ``#rrggbb``."""
+
+    window: str
+    panel: str
+    well: str
+    border: str
+    text: str
+    muted: str
+    accent: str
+    accent_text: str
+    synthetic: str
+    real: str
+    hatch: str
+    warning: str
+
+
+LIGHT = Palette(
+    window="#f3f4f6",
+    panel="#ffffff",
+    well="#e9ebee",
+    border="#d3d7dd",
+    text="#1d2127",
+    muted="#5a6370",
+    accent="#1f66d1",
+    accent_text="#ffffff",
+    synthetic="#1f66d1",
+    real="#b4520b",
+    hatch="#9aa1ab",
+    warning="#a33a00",
+)
+DARK = Palette(
+    window="#17191d",
+    panel="#1e2126",
+    well="#121417",
+    border="#343941",
+    text="#e7e9ec",
+    muted="#a0a8b3",
+    accent="#79b0ff",
+    accent_text="#0e1116",
+    synthetic="#79b0ff",
+    real="#f5a45a",
+    hatch="#5a616c",
+    warning="#ffb07a",
+)
+
+
+def palette_for(dark: bool) -> Palette:
+    """The colours of a theme."""
+    return DARK if dark else LIGHT

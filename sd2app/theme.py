@@ -1,0 +1,66 @@
+"""One look for every widget: Fusion, the palette, and an 8-pixel grid."""
+
+from __future__ import annotations
+
+from PySide6.QtGui import QColor, QPalette
+from PySide6.QtWidgets import QApplication
+
+from sd2app.palette import Palette, palette_for
+
+_ROLES = {
+    QPalette.ColorRole.Window: "window",
+    QPalette.ColorRole.Base: "panel",
+    QPalette.ColorRole.AlternateBase: "well",
+    QPalette.ColorRole.Button: "panel",
+    QPalette.ColorRole.ToolTipBase: "panel",
+    QPalette.ColorRole.WindowText: "text",
+    QPalette.ColorRole.Text: "text",
+    QPalette.ColorRole.ButtonText: "text",
+    QPalette.ColorRole.ToolTipText: "text",
+    QPalette.ColorRole.PlaceholderText: "muted",
+    QPalette.ColorRole.Highlight: "accent",
+    QPalette.ColorRole.HighlightedText: "accent_text",
+    QPalette.ColorRole.Link: "accent",
+    QPalette.ColorRole.Accent: "accent",
+}
+
+
+def apply_theme(application: QApplication, dark: bool) -> None:
+    """Dress the whole application."""
+    colours = palette_for(dark)
+    palette = QPalette()
+    for role, name in _ROLES.items():
+        palette.setColor(role, QColor(getattr(colours, name)))
+    for role in (
+        QPalette.ColorRole.WindowText,
+        QPalette.ColorRole.Text,
+        QPalette.ColorRole.ButtonText,
+    ):
+        palette.setColor(QPalette.ColorGroup.Disabled, role, QColor(colours.hatch))
+    if application.style().objectName() != "fusion":
+        application.setStyle("Fusion")
+    application.setPalette(palette)
+    application.setStyleSheet(_style_sheet(colours))
+
+
+def _style_sheet(c: Palette) -> str:
+    return f"""
+    QMainWindow, QMenuBar {{ background: {c.window}; }}
+    QMenuBar {{ padding: 2px 4px; }}
+    QMenuBar::item {{ padding: 4px 8px; border-radius: 4px; background: transparent; }}
+    QMenuBar::item:selected {{ background: {c.well}; }}
+    QSplitter::handle {{ background: {c.window}; }}
+    QToolTip {{ border: 1px solid {c.border}; padding: 4px; }}
+    QFrame#panel {{ background: {c.panel}; border: 1px solid {c.border}; border-radius: 6px; }}
+    QLabel#title {{ font-weight: 600; }}
+    QLabel#muted, QLabel#unit {{ color: {c.muted}; }}
+    QLabel#warning {{ color: {c.warning}; }}
+    QLabel#badge {{
+        color: {c.warning}; border: 1px solid {c.warning}; border-radius: 4px; padding: 1px 6px;
+    }}
+    QToolButton {{ border: 1px solid transparent; border-radius: 4px; padding: 4px; }}
+    QToolButton:hover {{ background: {c.well}; }}
+    QToolButton:checked {{ background: {c.well}; border-color: {c.border}; }}
+    QToolButton:focus {{ border-color: {c.accent}; }}
+    QScrollArea {{ border: none; background: transparent; }}
+    """

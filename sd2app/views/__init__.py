@@ -1,0 +1,1 @@
+"""Widgets. They show models and hold no truth of their own."""

@@ -1,0 +1,280 @@
+"""A Doppler map on the shared time axis: velocity up, time to the right."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import (
+    QBrush,
+    QColor,
+    QImage,
+    QMouseEvent,
+    QPainter,
+    QPaintEvent,
+    QPen,
+    QResizeEvent,
+    QWheelEvent,
+)
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from sd2app.models.display import DisplayModel
+from sd2app.models.playback import PlaybackModel
+from sd2app.models.tracks import PointerModel, TrackModel
+from sd2app.models.visible_span import VisibleSpanModel
+from sd2app.views.heatmap_image import heatmap_image
+from sd2app.views.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, ticks
+
+_HEADER_PX = 24
+_ZOOM_PER_NOTCH = 0.8
+
+
+class HeatmapView(QWidget):
+    """Shows one track; click or drag seeks, wheel zooms, Shift+wheel pans.
+
+    ``offset_dragged`` and ``offset_released`` are emitted while the user drags
+    the header of a track that can be aligned; the view itself moves nothing.
+    """
+
+    offset_grabbed = Signal()
+    offset_dragged = Signal(float)
+    offset_released = Signal()
+
+    def __init__(
+        self,
+        track: TrackModel,
+        span: VisibleSpanModel,
+        playback: PlaybackModel,
+        display: DisplayModel,
+        pointer: PointerModel,
+        *,
+        alignable: bool = False,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._track = track
+        self._span = span
+        self._playback = playback
+        self._display = display
+        self._pointer = pointer
+        self._alignable = alignable
+        self._image: QImage | None = None
+        self._grab: tuple[str, float] | None = None
+        self.setMouseTracking(True)
+        self.setMinimumHeight(96)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        for signal in (track.changed, span.changed, display.levels_changed, display.theme_changed):
+            signal.connect(self._invalidate)
+        for signal in (track.status_changed, playback.frame_changed, pointer.changed):
+            signal.connect(self.update)
+
+    def sizeHint(self) -> QSize:
+        """Room for 32 bins of 5 pixels."""
+        return QSize(640, _HEADER_PX + 160)
+
+    def plot_rect(self) -> QRectF:
+        """Where the map is drawn."""
+        return QRectF(
+            GUTTER_PX,
+            _HEADER_PX,
+            max(self.width() - GUTTER_PX - MARGIN_PX, 1),
+            max(self.height() - _HEADER_PX - 4, 1),
+        )
+
+    @property
+    def scale(self) -> TimeScale:
+        """Time axis of this widget."""
+        return TimeScale(self._span.start_s, self._span.end_s, self.width())
+
+    def y_of(self, velocity_mps: float) -> float:
+        """Pixel of a velocity."""
+        assert self._track.map is not None
+        plot, v_max = self.plot_rect(), self._track.map.axis.v_max_mps
+        return plot.top() + plot.height() * (v_max - velocity_mps) / (2.0 * v_max)
+
+    def velocity_of(self, y_px: float) -> float:
+        """Velocity of a pixel."""
+        assert self._track.map is not None
+        plot, v_max = self.plot_rect(), self._track.map.axis.v_max_mps
+        return v_max - 2.0 * v_max * (y_px - plot.top()) / plot.height()
+
+    def _invalidate(self) -> None:
+        self._image = None
+        self.update()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Draw the map anew for the new number of columns."""
+        self._invalidate()
+
+    # --- painting -------------------------------------------------------------------------
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Header, map, marked bins, axis, cursor."""
+        painter = QPainter(self)
+        colours = self._display.palette
+        painter.fillRect(self.rect(), QColor(colours.panel))
+        self._paint_header(painter)
+        if self._track.map is None:
+            return
+        plot = self.plot_rect()
+        if self._image is None:
+            self._image = heatmap_image(
+                self._track,
+                self._display.levels,
+                self._span.start_s,
+                self._span.end_s,
+                max(round(plot.width() * self.devicePixelRatioF()), 1),
+                QColor(colours.well).rgb(),
+            )
+        painter.drawImage(plot, self._image)
+        self._paint_marked_bins(painter, plot)
+        self._paint_axis(painter, plot)
+        self._paint_cursors(painter, plot)
+
+    def _paint_header(self, painter: QPainter) -> None:
+        colours = self._display.palette
+        font = painter.font()
+        font.setBold(True)
+        painter.setFont(font)
+        painter.setPen(QColor(colours.text))
+        box = QRectF(8, 0, self.width() - 16, _HEADER_PX)
+        centred = Qt.AlignmentFlag.AlignVCenter
+        painter.drawText(box, centred | Qt.AlignmentFlag.AlignLeft, self._track.title)
+        left = 8 + painter.fontMetrics().horizontalAdvance(self._track.title) + 12
+        font.setBold(False)
+        painter.setFont(font)
+        painter.setPen(QColor(colours.muted))
+        right = "approaching +  /  receding −   m/s"
+        room = self.width() - 16 - left - painter.fontMetrics().horizontalAdvance(right)
+        status = painter.fontMetrics().elidedText(
+            self._track.status, Qt.TextElideMode.ElideRight, int(max(room - 16, 40))
+        )
+        painter.drawText(
+            QRectF(left, 0, self.width(), _HEADER_PX), centred | Qt.AlignmentFlag.AlignLeft, status
+        )
+        if room > 60:
+            painter.drawText(box, centred | Qt.AlignmentFlag.AlignRight, right)
+
+    def _paint_marked_bins(self, painter: QPainter, plot: QRectF) -> None:
+        doppler_map = self._track.map
+        assert doppler_map is not None
+        edges = doppler_map.axis.edges_mps
+        colours = self._display.palette
+        painter.save()
+        painter.setClipRect(plot)
+        painter.setPen(Qt.PenStyle.NoPen)
+        for bins, pattern in (
+            (doppler_map.null_bins, Qt.BrushStyle.BDiagPattern),
+            (doppler_map.unseen_bins, Qt.BrushStyle.DiagCrossPattern),
+        ):
+            for index in bins:
+                top, bottom = self.y_of(edges[index + 1]), self.y_of(edges[index])
+                band = QRectF(plot.left(), top, plot.width(), bottom - top)
+                painter.fillRect(band, QColor(colours.well))
+                painter.fillRect(band, QBrush(QColor(colours.hatch), pattern))
+        painter.restore()
+
+    def _paint_axis(self, painter: QPainter, plot: QRectF) -> None:
+        doppler_map = self._track.map
+        assert doppler_map is not None
+        colours = self._display.palette
+        v_max = doppler_map.axis.v_max_mps
+        painter.setPen(QPen(QColor(colours.border), 1))
+        painter.drawRect(plot.adjusted(-0.5, -0.5, 0.5, 0.5))
+        line_px = painter.fontMetrics().height()
+        for velocity in ticks(-v_max, v_max, max(int(plot.height() / (line_px * 1.8)), 2)):
+            y = self.y_of(velocity)
+            painter.setPen(QPen(QColor(colours.muted), 1))
+            painter.drawLine(QPointF(plot.left() - 4, y), QPointF(plot.left(), y))
+            text = f"{velocity:+g}".replace("-", "−") if abs(velocity) > 1e-9 else "0"
+            y_text = min(max(y, plot.top() + line_px / 2 - 2), plot.bottom() - line_px / 2 + 2)
+            painter.drawText(
+                QRectF(0, y_text - line_px / 2, GUTTER_PX - 8, line_px),
+                Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter,
+                text,
+            )
+
+    def _paint_cursors(self, painter: QPainter, plot: QRectF) -> None:
+        painter.save()
+        painter.setClipRect(plot)
+        scale = self.scale
+        if self._pointer.time_s is not None:
+            painter.setPen(QPen(QColor(255, 255, 255, 120), 1, Qt.PenStyle.DotLine))
+            x = scale.x_of(self._pointer.time_s)
+            painter.drawLine(QPointF(x, plot.top()), QPointF(x, plot.bottom()))
+            if self._pointer.velocity_mps is not None:
+                y = self.y_of(self._pointer.velocity_mps)
+                painter.drawLine(QPointF(plot.left(), y), QPointF(plot.right(), y))
+        x = scale.x_of(self._playback.time_s)
+        painter.setPen(QPen(QColor(0, 0, 0, 140), 3))
+        painter.drawLine(QPointF(x, plot.top()), QPointF(x, plot.bottom()))
+        painter.setPen(QPen(QColor(255, 255, 255), 1))
+        painter.drawLine(QPointF(x, plot.top()), QPointF(x, plot.bottom()))
+        painter.restore()
+
+    # --- mouse ----------------------------------------------------------------------------
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Take hold of the cursor, the time axis or the alignment."""
+        position = event.position()
+        if event.button() == Qt.MouseButton.MiddleButton:
+            self._grab = ("pan", position.x())
+        elif event.button() == Qt.MouseButton.LeftButton:
+            if self._alignable and position.y() < _HEADER_PX:
+                self._grab = ("offset", position.x())
+                self.offset_grabbed.emit()
+            else:
+                self._grab = ("seek", position.x())
+                self._playback.seek(self.scale.time_of(position.x()))
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """Drag what is held, and read what is under the pointer."""
+        position = event.position()
+        self._read(position)
+        if self._grab is None:
+            over_header = self._alignable and position.y() < _HEADER_PX
+            self.setCursor(
+                Qt.CursorShape.SizeHorCursor if over_header else Qt.CursorShape.CrossCursor
+            )
+            return
+        what, start_x = self._grab
+        if what == "seek":
+            self._playback.seek(self.scale.time_of(position.x()))
+        elif what == "pan":
+            self._span.pan((start_x - position.x()) * self.scale.seconds_per_px)
+            self._grab = ("pan", position.x())
+        else:
+            self.offset_dragged.emit((position.x() - start_x) * self.scale.seconds_per_px)
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        """Let go."""
+        if self._grab is not None and self._grab[0] == "offset":
+            self.offset_released.emit()
+        self._grab = None
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        """Show the whole recording."""
+        if event.position().y() >= _HEADER_PX:
+            self._span.fit()
+
+    def leaveEvent(self, event: object) -> None:
+        """Nothing is under the pointer any more."""
+        self._pointer.leave()
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Zoom about the pointer, or pan with Shift or a sideways wheel."""
+        delta = event.angleDelta()
+        sideways = delta.x() or (
+            delta.y() if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 0
+        )
+        if sideways:
+            self._span.pan(-sideways / 120.0 * self._span.duration_s * 0.1)
+        elif delta.y():
+            anchor_s = self.scale.time_of(event.position().x())
+            self._span.zoom(_ZOOM_PER_NOTCH ** (delta.y() / 120.0), anchor_s)
+        event.accept()
+
+    def _read(self, position: QPointF) -> None:
+        if self._track.map is None or not self.plot_rect().contains(position):
+            self._pointer.leave()
+            return
+        time_s, velocity_mps = self.scale.time_of(position.x()), self.velocity_of(position.y())
+        self._pointer.point_at(time_s, velocity_mps, self._track.read(time_s, velocity_mps))

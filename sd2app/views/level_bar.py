@@ -1,0 +1,111 @@
+"""One control of level and colour map for all heatmaps."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QRectF, QSignalBlocker, QSize
+from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
+from PySide6.QtWidgets import (
+    QComboBox,
+    QDoubleSpinBox,
+    QGridLayout,
+    QHBoxLayout,
+    QLabel,
+    QVBoxLayout,
+    QWidget,
+)
+
+from sd2app.colour_maps import lookup_table
+from sd2app.models.display import COLOUR_MAPS, DisplayModel
+from sd2app.models.tracks import TrackModel
+
+
+class _ColourStrip(QWidget):
+    def __init__(self, display: DisplayModel, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._display = display
+        self.setFixedHeight(12)
+        display.levels_changed.connect(self.update)
+
+    def sizeHint(self) -> QSize:
+        return QSize(200, 12)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        table = lookup_table(self._display.levels.colour_map)
+        image = QImage(table.tobytes(), 256, 1, 1024, QImage.Format.Format_RGB32)
+        painter = QPainter(self)
+        painter.drawImage(QRectF(self.rect()), image)
+        painter.setPen(QColor(self._display.palette.border))
+        painter.drawRect(self.rect().adjusted(0, 0, -1, -1))
+
+
+class LevelBar(QWidget):
+    """Colour strip with its two ends, scale, colour map, and what 0 dB means."""
+
+    def __init__(
+        self,
+        display: DisplayModel,
+        tracks: tuple[TrackModel, ...],
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._display = display
+        self._tracks = tracks
+        self._low = self._level_box("Level shown as the first colour")
+        self._high = self._level_box("Level shown as the last colour")
+        self._low.valueChanged.connect(lambda value: display.set_levels(low_db=value))
+        self._high.valueChanged.connect(lambda value: display.set_levels(high_db=value))
+        self._scale = QComboBox(self)
+        self._scale.addItems(["dB", "linear"])
+        self._scale.setToolTip("Logarithmic or linear levels, for all heatmaps")
+        self._scale.currentTextChanged.connect(lambda text: display.set_levels(scale=text))
+        self._colours = QComboBox(self)
+        self._colours.addItems(list(COLOUR_MAPS))
+        self._colours.setToolTip("Colour map of all heatmaps")
+        self._colours.currentTextChanged.connect(lambda text: display.set_levels(colour_map=text))
+        self._reference = QLabel(self)
+        self._reference.setObjectName("muted")
+        self._reference.setWordWrap(True)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(8, 4, 8, 8)
+        layout.setSpacing(4)
+        layout.addWidget(_ColourStrip(display, self))
+        ends = QHBoxLayout()
+        ends.addWidget(self._low)
+        ends.addStretch(1)
+        ends.addWidget(self._high)
+        layout.addLayout(ends)
+        choices = QGridLayout()
+        choices.addWidget(self._scale, 0, 0)
+        choices.addWidget(self._colours, 0, 1)
+        layout.addLayout(choices)
+        layout.addWidget(self._reference)
+        display.levels_changed.connect(self._refresh)
+        for track in tracks:
+            track.changed.connect(self._refresh)
+        self._refresh()
+
+    def _level_box(self, tip: str) -> QDoubleSpinBox:
+        box = QDoubleSpinBox(self)
+        box.setRange(-90.0, 20.0)
+        box.setSingleStep(3.0)
+        box.setDecimals(0)
+        box.setSuffix(" dB")
+        box.setToolTip(tip)
+        return box
+
+    def _refresh(self) -> None:
+        levels = self._display.levels
+        for widget, value in ((self._low, levels.low_db), (self._high, levels.high_db)):
+            with QSignalBlocker(widget):
+                widget.setValue(value)
+        self._low.setEnabled(levels.scale == "dB")
+        for combo, text in ((self._scale, levels.scale), (self._colours, levels.colour_map)):
+            with QSignalBlocker(combo):
+                combo.setCurrentText(text)
+        self._reference.setText(
+            "\n".join(
+                f"0 dB {track.title.lower()}: {track.reference:.3g} {track.map.unit}"
+                for track in self._tracks
+                if track.map is not None
+            )
+        )

@@ -1,0 +1,175 @@
+"""The spectrum of the current frame: every track as a curve over velocity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QBrush, QColor, QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtWidgets import QWidget
+
+from sd2app.models.display import DisplayModel
+from sd2app.models.playback import PlaybackModel
+from sd2app.models.tracks import PointerModel, TrackModel
+from sd2app.views.time_axis import ticks
+
+_LEFT_PX, _TOP_PX, _RIGHT_PX, _BOTTOM_PX = 48, 28, 12, 40
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A track and the name of its colour in the palette."""
+
+    track: TrackModel
+    colour: str
+
+
+class SpectrumView(QWidget):
+    """Level to the right, velocity upwards like in the heatmaps beside it."""
+
+    def __init__(
+        self,
+        curves: tuple[Curve, ...],
+        playback: PlaybackModel,
+        display: DisplayModel,
+        pointer: PointerModel,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._curves = curves
+        self._playback = playback
+        self._display = display
+        self._pointer = pointer
+        self.setMinimumSize(180, 160)
+        for curve in curves:
+            curve.track.changed.connect(self.update)
+        for signal in (
+            playback.frame_changed,
+            display.levels_changed,
+            display.theme_changed,
+            pointer.changed,
+        ):
+            signal.connect(self.update)
+
+    def sizeHint(self) -> QSize:
+        """As wide as the level bar under it."""
+        return QSize(240, 280)
+
+    def _shown(self) -> list[Curve]:
+        return [curve for curve in self._curves if curve.track.map is not None]
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Axes, marked bins and curves."""
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        colours = self._display.palette
+        painter.fillRect(self.rect(), QColor(colours.panel))
+        plot = QRectF(self.rect()).adjusted(_LEFT_PX, _TOP_PX, -_RIGHT_PX, -_BOTTOM_PX)
+        font = painter.font()
+        font.setBold(True)
+        painter.setFont(font)
+        painter.setPen(QColor(colours.text))
+        painter.drawText(QRectF(8, 0, self.width(), 24), Qt.AlignmentFlag.AlignVCenter, "This frame")
+        font.setBold(False)
+        painter.setFont(font)
+        shown = self._shown()
+        if not shown:
+            return
+        v_max = shown[0].track.map.axis.v_max_mps  # type: ignore[union-attr]
+        self._paint_axes(painter, plot, v_max)
+        painter.save()
+        painter.setClipRect(plot)
+        for curve in shown:
+            self._paint_curve(painter, plot, curve, v_max)
+        if self._pointer.velocity_mps is not None:
+            y = _y_of(plot, self._pointer.velocity_mps, v_max)
+            painter.setPen(QPen(QColor(colours.muted), 1, Qt.PenStyle.DotLine))
+            painter.drawLine(QPointF(plot.left(), y), QPointF(plot.right(), y))
+        painter.restore()
+        self._paint_legend(painter, plot, shown)
+
+    def _paint_axes(self, painter: QPainter, plot: QRectF, v_max: float) -> None:
+        colours, levels = self._display.palette, self._display.levels
+        doppler_map = self._shown()[0].track.map
+        assert doppler_map is not None
+        edges = doppler_map.axis.edges_mps
+        for index in doppler_map.null_bins:
+            top, bottom = _y_of(plot, edges[index + 1], v_max), _y_of(plot, edges[index], v_max)
+            painter.fillRect(
+                QRectF(plot.left(), top, plot.width(), bottom - top),
+                QBrush(QColor(colours.border), Qt.BrushStyle.BDiagPattern),
+            )
+        line_px = painter.fontMetrics().height()
+        for velocity in ticks(-v_max, v_max, max(int(plot.height() / (2 * line_px)), 2)):
+            y = _y_of(plot, velocity, v_max)
+            painter.setPen(QPen(QColor(colours.border), 1))
+            painter.drawLine(QPointF(plot.left(), y), QPointF(plot.right(), y))
+            painter.setPen(QColor(colours.muted))
+            text = f"{velocity:+g}".replace("-", "−") if abs(velocity) > 1e-9 else "0"
+            painter.drawText(
+                QRectF(0, y - line_px / 2, _LEFT_PX - 6, line_px),
+                Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter,
+                text,
+            )
+        if levels.scale == "dB":
+            low, high, unit = levels.low_db, levels.high_db, "dB"
+        else:
+            low, high, unit = 0.0, 100.0 * 10.0 ** (levels.high_db / 10.0), "%"
+        for level in ticks(low, high, 4):
+            x = plot.left() + plot.width() * (level - low) / (high - low)
+            painter.setPen(QPen(QColor(colours.border), 1))
+            painter.drawLine(QPointF(x, plot.top()), QPointF(x, plot.bottom()))
+            painter.setPen(QColor(colours.muted))
+            painter.drawText(
+                QRectF(x - 30, plot.bottom() + 2, 60, line_px),
+                Qt.AlignmentFlag.AlignCenter,
+                f"{level:g}".replace("-", "−"),
+            )
+        painter.drawText(
+            QRectF(plot.left(), plot.bottom() + line_px + 2, plot.width(), line_px),
+            Qt.AlignmentFlag.AlignCenter,
+            f"level ({unit} of the reference)",
+        )
+
+    def _paint_curve(self, painter: QPainter, plot: QRectF, curve: Curve, v_max: float) -> None:
+        doppler_map = curve.track.map
+        assert doppler_map is not None
+        frame = curve.track.frame_at(self._playback.time_s)
+        if frame is None:
+            return
+        shades = curve.track.shade(doppler_map.values[:, frame], self._display.levels)
+        points = QPolygonF()
+        for velocity, shade in zip(doppler_map.axis.centres_mps, np.asarray(shades), strict=True):
+            points.append(
+                QPointF(plot.left() + plot.width() * float(shade), _y_of(plot, velocity, v_max))
+            )
+        colour = QColor(getattr(self._display.palette, curve.colour))
+        area = QPolygonF(points)
+        area.append(QPointF(plot.left(), points[-1].y()))
+        area.append(QPointF(plot.left(), points[0].y()))
+        fill = QColor(colour)
+        fill.setAlpha(40)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(fill)
+        painter.drawPolygon(area)
+        painter.setPen(QPen(colour, 2))
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        painter.drawPolyline(points)
+
+    def _paint_legend(self, painter: QPainter, plot: QRectF, shown: list[Curve]) -> None:
+        x = self.width() - _RIGHT_PX
+        for curve in reversed(shown):
+            text = curve.track.title.lower()
+            width = painter.fontMetrics().horizontalAdvance(text)
+            x -= width
+            painter.setPen(QColor(self._display.palette.muted))
+            painter.drawText(QRectF(x, 0, width + 2, 24), Qt.AlignmentFlag.AlignVCenter, text)
+            x -= 18
+            painter.setPen(QPen(QColor(getattr(self._display.palette, curve.colour)), 2))
+            painter.drawLine(QPointF(x, 12), QPointF(x + 13, 12))
+            x -= 10
+
+
+def _y_of(plot: QRectF, velocity_mps: float, v_max_mps: float) -> float:
+    return plot.top() + plot.height() * (v_max_mps - velocity_mps) / (2.0 * v_max_mps)

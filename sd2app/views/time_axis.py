@@ -1,0 +1,65 @@
+"""Pixels to seconds, and round numbers to write on an axis."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+GUTTER_PX = 56
+"""Left of every track: room for the velocity axis, so that all tracks line up."""
+MARGIN_PX = 8
+
+
+@dataclass(frozen=True)
+class TimeScale:
+    """Linear map between the x of a widget and time."""
+
+    start_s: float
+    end_s: float
+    width_px: float
+
+    @property
+    def plot_width_px(self) -> float:
+        """Width of what is drawn to scale."""
+        return max(self.width_px - GUTTER_PX - MARGIN_PX, 1.0)
+
+    def x_of(self, time_s: float) -> float:
+        """Pixel of a time."""
+        share = (time_s - self.start_s) / (self.end_s - self.start_s)
+        return GUTTER_PX + share * self.plot_width_px
+
+    def time_of(self, x_px: float) -> float:
+        """Time of a pixel, extrapolated outside."""
+        share = (x_px - GUTTER_PX) / self.plot_width_px
+        return self.start_s + share * (self.end_s - self.start_s)
+
+    @property
+    def seconds_per_px(self) -> float:
+        """Time that one pixel covers."""
+        return (self.end_s - self.start_s) / self.plot_width_px
+
+
+def tick_step(span: float, most: int) -> float:
+    """Smallest step of 1, 2 or 5 times a power of ten with at most ``most`` ticks."""
+    raw = span / max(most, 1)
+    power = 10.0 ** math.floor(math.log10(raw))
+    return next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= raw)
+
+
+def ticks(low: float, high: float, most: int) -> list[float]:
+    """Round numbers between ``low`` and ``high``."""
+    step = tick_step(high - low, most)
+    first = math.ceil(low / step - 1e-9)
+    last = math.floor(high / step + 1e-9)
+    return [index * step for index in range(first, last + 1)]
+
+
+def clock_text(time_s: float, decimals: int = 3) -> str:
+    """``mm:ss.mmm``, with hours when there are any."""
+    sign = "-" if time_s < 0 else ""
+    scale = 10**decimals
+    whole, rest = divmod(round(abs(time_s) * scale), scale)
+    minutes, seconds = divmod(whole, 60)
+    hours, minutes = divmod(minutes, 60)
+    text = f"{hours}:{minutes:02d}:{seconds:02d}" if hours else f"{minutes:02d}:{seconds:02d}"
+    return f"{sign}{text}.{rest:0{decimals}d}" if decimals else f"{sign}{text}"
