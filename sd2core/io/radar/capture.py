@@ -1,0 +1,92 @@
+"""A radar recording as it came out of the converter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+from sd2core.sensor import RadarConfig
+from sd2core.timebase import Timebase
+
+
+@dataclass(frozen=True, eq=False)
+class RadarCapture:
+    """Raw samples of an FMCW radar with what is needed to read them.
+
+    Parameters
+    ----------
+    samples : uint16 array, shape (frames, receivers, chirps, samples)
+        Converter counts around mid-scale; may be a memory map.
+    config : RadarConfig
+    timebase : Timebase
+        One time per frame, the first at 0 s. A frame is the burst of
+        ``chirps_per_frame`` chirps.
+    start_unix_s : float or None
+        Wall-clock time of the first frame where the recording knows it.
+    simulated : bool
+        True when the samples were computed, not measured.
+    source : str
+        Where it came from, for provenance.
+    notes : tuple of str
+        What the reader found odd and wants the user to know.
+    meta : dict
+        The recording's own description; holds the truth of a simulated one.
+    """
+
+    samples: NDArray[np.uint16]
+    config: RadarConfig
+    timebase: Timebase
+    start_unix_s: float | None = None
+    simulated: bool = False
+    source: str = ""
+    notes: tuple[str, ...] = ()
+    meta: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        config = self.config
+        shape = tuple(self.samples.shape)
+        cube = (config.receivers, config.chirps_per_frame, config.samples_per_chirp)
+        if len(shape) != 4 or shape[0] == 0 or shape[1:] != cube:
+            raise Sd2Error(
+                f"{self.source or 'The radar cube'} has shape {shape}",
+                f"(frames, {cube[0]} receivers, {cube[1]} chirps, {cube[2]} samples), at least one"
+                " frame, as the configuration says",
+                "Use the config.json that was recorded with this radar.npy",
+            )
+        if self.samples.dtype.kind != "u" or self.samples.dtype.itemsize != 2:
+            raise Sd2Error(
+                f"{self.source or 'The radar cube'} holds {self.samples.dtype}",
+                "uint16 converter counts",
+                "Use the raw radar.npy of the recording, not a processed copy",
+            )
+        if len(self.timebase) != shape[0]:
+            raise Sd2Error(
+                f"{self.source or 'The radar cube'}: {shape[0]} frames but"
+                f" {len(self.timebase)} times",
+                "one time per frame",
+            )
+
+    @property
+    def frame_count(self) -> int:
+        """Number of frames."""
+        return int(self.samples.shape[0])
+
+    def read(self, start: int, stop: int) -> NDArray[np.float32]:
+        """Frames ``start`` to ``stop`` (exclusive) relative to full scale.
+
+        Returns
+        -------
+        float32 array, shape (n, receivers, chirps, samples)
+            Mid-scale is 0, the ends of the converter's range are -1 and (nearly) 1.
+        """
+        if not 0 <= start < stop <= self.frame_count:
+            raise IndexError(f"frames {start} to {stop} of {self.frame_count}")
+        half = np.float32(2.0 ** (self.config.adc_bits - 1))
+        counts = np.asarray(self.samples[start:stop]).astype(np.float32)
+        counts -= half
+        counts /= half
+        return counts

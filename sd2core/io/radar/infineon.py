@@ -1,0 +1,363 @@
+"""Recording folders of Infineon's 60 GHz radars (BGT60 family), read and written.
+
+A recording is a folder, usually called ``RadarIfxAvian_00``::
+
+    radar.npy            uint16 (frames, receivers, chirps, samples)
+    config.json          device_config.fmcw_single_shape
+    radar_timestamp.csv  one unix time per frame, as the host received it
+    meta.json            optional: adc_resolution, description; "simulated": true
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import shutil
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from sd2core.errors import Sd2Error
+from sd2core.io.radar.capture import RadarCapture
+from sd2core.sensor import RadarConfig
+from sd2core.timebase import Timebase
+
+ADC_BITS = 12
+"""Resolution of every converter of this family, used when meta.json is silent."""
+
+_DATA, _CONFIG, _TIMES, _META = "radar.npy", "config.json", "radar_timestamp.csv", "meta.json"
+_FIRST_PLAUSIBLE_UNIX_S = 1e8
+"""Smaller start times are seconds since the start, not a date."""
+
+
+class _Shape(BaseModel):
+    """``device_config.fmcw_single_shape`` of config.json; other keys are left alone."""
+
+    model_config = ConfigDict(extra="ignore")
+
+    rx_antennas: list[int] = Field(min_length=1)
+    start_frequency_Hz: float = Field(gt=0)
+    end_frequency_Hz: float = Field(gt=0)
+    num_chirps_per_frame: int = Field(ge=2)
+    num_samples_per_chirp: int = Field(ge=2)
+    chirp_repetition_time_s: float = Field(gt=0)
+    frame_repetition_time_s: float = Field(gt=0)
+    sample_rate_Hz: float = Field(gt=0)
+
+
+class _Device(BaseModel):
+    fmcw_single_shape: _Shape
+
+
+class _Config(BaseModel):
+    device_config: _Device
+
+
+class _Meta(BaseModel):
+    model_config = ConfigDict(extra="allow")
+
+    adc_resolution: int = Field(default=ADC_BITS, ge=1, le=16)
+    description: str = "Infineon radar"
+    simulated: bool = False
+
+
+def find_recording(path: Path) -> Path | None:
+    """Folder with ``radar.npy`` that the user meant, or None when there is none.
+
+    Raises
+    ------
+    Sd2Error
+        When a folder holds several recordings.
+    """
+    if path.is_file():
+        return path.parent if path.name == _DATA else None
+    if (path / _DATA).is_file():
+        return path
+    inside = sorted(entry.parent for entry in path.glob(f"*/{_DATA}"))
+    if len(inside) > 1:
+        names = ", ".join(folder.name for folder in inside)
+        raise Sd2Error(
+            f"{path} holds {len(inside)} radar recordings ({names})",
+            "one recording",
+            "Name the one to open",
+        )
+    if inside:
+        return inside[0]
+    return path if (path / _CONFIG).is_file() and (path / _TIMES).is_file() else None
+
+
+def load_infineon(folder: Path) -> RadarCapture:
+    """Read one recording folder; the samples are mapped, not loaded.
+
+    Raises
+    ------
+    Sd2Error
+        When a file is missing or damaged, or when the files contradict each other.
+    """
+    meta = _read_meta(folder / _META)
+    config = _read_config(folder / _CONFIG, meta)
+    samples = _open_samples(folder / _DATA)
+    timebase, start_unix_s, notes = _read_times(folder / _TIMES, len(samples), config)
+    return RadarCapture(
+        samples=samples,
+        config=config,
+        timebase=timebase,
+        start_unix_s=start_unix_s,
+        simulated=meta.simulated,
+        source=str(folder / _DATA),
+        notes=notes,
+        meta=meta.model_dump(),
+    )
+
+
+def write_capture(
+    folder: Path | str,
+    samples: ArrayLike,
+    config: RadarConfig,
+    times_s: ArrayLike,
+    *,
+    simulated: bool,
+    start_unix_s: float = 0.0,
+    meta: dict[str, Any] | None = None,
+) -> Path:
+    """Write a recording folder in one step; an older recording there is replaced.
+
+    Parameters
+    ----------
+    folder : path
+        Becomes the folder with ``radar.npy``. A folder that is something else
+        than a radar recording is never replaced.
+    samples : uint16 array, shape (frames, receivers, chirps, samples)
+    config : RadarConfig
+    times_s : array_like, shape (frames,)
+        Time of every frame relative to ``start_unix_s``.
+    simulated : bool
+        Written into ``meta.json``; never call computed samples measured.
+    start_unix_s : float
+        Wall-clock time of time 0; 0 when there is none.
+    meta : dict
+        Further entries of ``meta.json``, e.g. how it was simulated and the truth.
+    """
+    folder = Path(folder)
+    timebase = Timebase(times_s)
+    cube = np.asarray(samples)
+    RadarCapture(cube, config, timebase, simulated=simulated, source=str(folder))
+    if folder.exists() and not (folder.is_dir() and _replaceable(folder)):
+        raise Sd2Error(
+            f"{folder} exists and is not a radar recording",
+            "a new folder, or a radar recording to replace",
+            "Choose another name",
+        )
+    shape = {
+        "rx_antennas": list(range(1, config.receivers + 1)),
+        "tx_antennas": [1],
+        "start_frequency_Hz": config.start_frequency_hz,
+        "end_frequency_Hz": config.end_frequency_hz,
+        "num_chirps_per_frame": config.chirps_per_frame,
+        "num_samples_per_chirp": config.samples_per_chirp,
+        "chirp_repetition_time_s": config.chirp_repetition_s,
+        "frame_repetition_time_s": config.frame_repetition_s,
+        "sample_rate_Hz": config.sample_rate_hz,
+        "mimo_mode": "off",
+    }
+    described = {
+        "description": config.name,
+        "adc_resolution": config.adc_bits,
+        "simulated": simulated,
+        **(meta or {}),
+    }
+    times = timebase.times_s + start_unix_s
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    new = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", suffix=".tmp", dir=folder.parent))
+    try:
+        (new / _CONFIG).write_text(_json({"device_config": {"fmcw_single_shape": shape}}), "utf-8")
+        (new / _META).write_text(_json(described), "utf-8")
+        (new / _TIMES).write_text("".join(f"{time!r}\n" for time in times.tolist()), "utf-8")
+        with (new / _DATA).open("wb") as stream:
+            np.save(stream, cube, allow_pickle=False)
+            stream.flush()
+            os.fsync(stream.fileno())
+        new.chmod(0o755)
+        _swap(new, folder)
+    finally:
+        shutil.rmtree(new, ignore_errors=True)
+    return folder
+
+
+def _swap(new: Path, folder: Path) -> None:
+    if not folder.exists():
+        new.rename(folder)
+        return
+    old = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", suffix=".old", dir=folder.parent))
+    folder.rename(old / folder.name)
+    try:
+        new.rename(folder)
+    except OSError:
+        (old / folder.name).rename(folder)
+        raise
+    finally:
+        shutil.rmtree(old, ignore_errors=True)
+
+
+def _replaceable(folder: Path) -> bool:
+    return (folder / _DATA).is_file() or not any(folder.iterdir())
+
+
+def _json(content: dict[str, Any]) -> str:
+    return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
+
+
+def _read_json(path: Path) -> Any:
+    try:
+        return json.loads(path.read_text("utf-8"))
+    except FileNotFoundError as error:
+        raise Sd2Error(
+            f"{path} is missing",
+            f"{_DATA}, {_CONFIG} and {_TIMES} in one folder",
+            "Copy the whole recording folder",
+        ) from error
+    except (OSError, ValueError) as error:
+        raise Sd2Error(f"{path} cannot be read as JSON ({error})", "a JSON text") from error
+
+
+def _explain(path: Path, error: ValidationError) -> Sd2Error:
+    first = error.errors()[0]
+    key = ".".join(str(part) for part in first["loc"]) or "the top level"
+    if first["type"] == "missing":
+        found = f"{path} has no {key}"
+    else:
+        found = f"{path}: {key} is {first['input']!r:.80} ({first['msg']})"
+    return Sd2Error(
+        found,
+        "the configuration that Infineon's recorder writes (device_config.fmcw_single_shape)",
+        "Use the file that was recorded with this radar.npy",
+    )
+
+
+def _read_meta(path: Path) -> _Meta:
+    if not path.exists():
+        return _Meta()
+    try:
+        return _Meta.model_validate(_read_json(path))
+    except ValidationError as error:
+        raise _explain(path, error) from error
+
+
+def _read_config(path: Path, meta: _Meta) -> RadarConfig:
+    try:
+        shape = _Config.model_validate(_read_json(path)).device_config.fmcw_single_shape
+    except ValidationError as error:
+        raise _explain(path, error) from error
+    try:
+        return RadarConfig(
+            start_frequency_hz=shape.start_frequency_Hz,
+            end_frequency_hz=shape.end_frequency_Hz,
+            samples_per_chirp=shape.num_samples_per_chirp,
+            chirps_per_frame=shape.num_chirps_per_frame,
+            chirp_repetition_s=shape.chirp_repetition_time_s,
+            frame_repetition_s=shape.frame_repetition_time_s,
+            sample_rate_hz=shape.sample_rate_Hz,
+            receivers=len(shape.rx_antennas),
+            adc_bits=meta.adc_resolution,
+            name=meta.description,
+        )
+    except Sd2Error as error:
+        raise Sd2Error(f"{path}: {error.found}", error.expected, error.remedy) from error
+
+
+def _open_samples(path: Path) -> NDArray[np.uint16]:
+    try:
+        return np.load(path, mmap_mode="r", allow_pickle=False)
+    except FileNotFoundError as error:
+        raise Sd2Error(
+            f"{path} is missing",
+            f"{_DATA}, {_CONFIG} and {_TIMES} in one folder",
+            "Copy the whole recording folder",
+        ) from error
+    except (OSError, ValueError, EOFError) as error:
+        size = path.stat().st_size
+        raise Sd2Error(
+            f"{path} ({size} bytes) cannot be read as an array ({error})",
+            "the whole radar.npy as recorded, uint16 (frames, receivers, chirps, samples)",
+            "It may be cut off: copy it again",
+        ) from error
+
+
+def _read_times(
+    path: Path, frames: int, config: RadarConfig
+) -> tuple[Timebase, float | None, tuple[str, ...]]:
+    """Times of the frames from the host's clock, or from the configuration with a note."""
+    nominal_s = config.frame_repetition_s
+    regular = Timebase(np.arange(frames) * nominal_s)
+    fallback = f"frames are placed every {1e3 * nominal_s:g} ms, as {_CONFIG} says"
+    if not path.exists():
+        return regular, None, (f"{path.name} is missing: {fallback}.",)
+    times = _parse_times(path)
+    plausible = times.size > 0 and math.isfinite(times[0]) and times[0] > _FIRST_PLAUSIBLE_UNIX_S
+    start_unix_s = float(times[0]) if plausible else None
+    if len(times) != frames:
+        which = "fewer" if len(times) < frames else "more"
+        note = f"{path.name} has {len(times)} times for {frames} frames, {which} than it should"
+        return regular, start_unix_s, (f"{note}: {fallback}.",)
+    steps = np.diff(times)
+    if not np.isfinite(times).all() or (steps <= 0).any():
+        bad = int(np.flatnonzero(~(steps > 0))[0])
+        note = f"{path.name} does not increase from frame {bad} to {bad + 1}"
+        return regular, start_unix_s, (f"{note}: {fallback}.",)
+    # No frame can follow sooner than the radar sends one; the host read several at once.
+    if steps.size and steps.min() < 0.5 * nominal_s:
+        note = (
+            f"{path.name} has steps down to {1e3 * steps.min():.1f} ms, so frames were buffered"
+            " before they got their time"
+        )
+        return regular, start_unix_s, (f"{note}: {fallback}.",)
+    return Timebase(times - times[0]), start_unix_s, _notes_on_steps(path.name, steps, nominal_s)
+
+
+def _notes_on_steps(name: str, steps_s: NDArray[np.float64], nominal_s: float) -> tuple[str, ...]:
+    if not steps_s.size:
+        return ()
+    notes = []
+    late = steps_s > 1.5 * nominal_s
+    if late.any():
+        notes.append(
+            f"{name} has {int(late.sum())} gap{'s' if late.sum() > 1 else ''} of up to"
+            f" {steps_s.max():.3f} s: frames are missing there."
+        )
+    # The host's clock wanders from frame to frame; only the mean tells the rate.
+    mean_s = float(steps_s[~late].mean()) if not late.all() else nominal_s
+    spread_s = float(np.abs(steps_s[~late] - mean_s).max()) if not late.all() else 0.0
+    if spread_s > 0.1 * nominal_s:
+        notes.append(
+            f"The times in {name} jitter by up to {1e3 * spread_s:.0f} ms around"
+            f" {1e3 * mean_s:.0f} ms; they are used as they are."
+        )
+    if abs(mean_s - nominal_s) > 0.02 * nominal_s:
+        notes.append(
+            f"Frames came every {1e3 * mean_s:.1f} ms; {_CONFIG} says {1e3 * nominal_s:.1f} ms."
+        )
+    return tuple(notes)
+
+
+def _parse_times(path: Path) -> NDArray[np.float64]:
+    """One number per line; a heading in the first line is allowed."""
+    lines = [line.strip() for line in path.read_text("utf-8", "replace").splitlines()]
+    lines = [line for line in lines if line]
+    times = []
+    for number, line in enumerate(lines, start=1):
+        try:
+            times.append(float(line.split(",")[0]))
+        except ValueError as error:
+            if number == 1:
+                continue
+            raise Sd2Error(
+                f"{path}, line {number}: {line[:40]!r} is not a time",
+                "one unix time in seconds per line",
+                "Remove the file to place frames by the frame repetition time",
+            ) from error
+    return np.array(times, dtype=np.float64)
