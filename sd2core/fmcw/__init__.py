@@ -9,5 +9,16 @@ from sd2core.fmcw.processing import (
     limits,
     range_doppler,
 )
+from sd2core.fmcw.signal import Reflector, SignalOptions, capture_scene, simulate_capture
 
-__all__ = ["ProcessingOptions", "RangeDoppler", "doppler_map", "limits", "range_doppler"]
+__all__ = [
+    "ProcessingOptions",
+    "RangeDoppler",
+    "Reflector",
+    "SignalOptions",
+    "capture_scene",
+    "doppler_map",
+    "limits",
+    "range_doppler",
+    "simulate_capture",
+]

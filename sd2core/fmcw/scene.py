@@ -1,0 +1,187 @@
+"""What an FMCW radar's wave meets: facets of a moving mesh, or points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sd2core.errors import Sd2Error
+from sd2core.fmcw.triangle import mean_phasor
+from sd2core.mesh import MeshSequence
+from sd2core.sensor import RadarConfig, VirtualSensor
+
+NEAREST_M = 0.05
+"""The 1/R^2 of the far field is not continued to nearer than this."""
+
+_BLOCK_FRAMES = 64
+
+
+@dataclass(frozen=True, eq=False)
+class Scatterers:
+    """Reflecting centres at one instant.
+
+    Parameters
+    ----------
+    position_m : float64 array, shape (n, 3)
+        Camera frame.
+    velocity_mps : float64 array, shape (n, 3)
+    amplitude : complex128 array, shape (n,)
+        Echo at the sensor: projected area in m^2 over R^2, times the mean
+        phasor of the facet about its centre.
+    """
+
+    position_m: NDArray[np.float64]
+    velocity_mps: NDArray[np.float64]
+    amplitude: NDArray[np.complex128]
+
+
+def point_scatterers(
+    position_m: ArrayLike,
+    velocity_mps: ArrayLike,
+    area_m2: ArrayLike,
+    sensor: VirtualSensor,
+) -> Scatterers:
+    """Small reflectors of a given effective area that look the same from everywhere.
+
+    Parameters
+    ----------
+    position_m, velocity_mps : array_like, shape (n, 3)
+    area_m2 : array_like, shape (n,) or a number
+    sensor : VirtualSensor
+    """
+    position = np.atleast_2d(np.asarray(position_m, dtype=np.float64))
+    velocity = np.broadcast_to(np.asarray(velocity_mps, dtype=np.float64), position.shape)
+    range_m = np.linalg.norm(position - np.asarray(sensor.position_m), axis=1)
+    amplitude = np.asarray(area_m2, dtype=np.float64) / np.maximum(range_m, NEAREST_M) ** 2
+    return Scatterers(position, velocity, amplitude.astype(np.complex128))
+
+
+def facet_scatterers(
+    vertices_m: NDArray[np.float64],
+    velocity_mps: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    sensor: VirtualSensor,
+    config: RadarConfig,
+    visible: NDArray[np.bool_] | None = None,
+) -> Scatterers:
+    """Facets that face the sensor, each reflecting area * cos(theta) / R^2.
+
+    The phase is linear over a facet, so its sum over the facet is closed form
+    (:func:`~sd2core.fmcw.triangle.mean_phasor`). Points one per facet would have
+    to lie well under a wavelength apart to add up to the same.
+
+    Parameters
+    ----------
+    vertices_m, velocity_mps : float64 array, shape (V, 3)
+    faces : int32 array, shape (F, 3)
+        Counter-clockwise seen from outside.
+    visible : bool array, shape (F,), or None
+        Facets that nothing hides; those that face away never count.
+    """
+    corners = vertices_m[faces] - np.asarray(sensor.position_m)  # (F, 3 corners, 3)
+    normal = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    centre = corners.mean(axis=1)
+    range_m = np.linalg.norm(centre, axis=1)
+    # The normal's length is the area, so this is area * cos(theta).
+    towards = -np.einsum("fi,fi->f", normal, centre)
+    projected_m2 = towards / np.maximum(range_m, NEAREST_M)
+    seen = projected_m2 > 0
+    if visible is not None:
+        seen &= visible
+    corners, range_m = corners[seen], range_m[seen]
+    wave_number = 4.0 * np.pi / config.wavelength_m
+    phase = wave_number * (np.linalg.norm(corners, axis=2) - range_m[:, None])
+    strength = projected_m2[seen] / np.maximum(range_m, NEAREST_M) ** 2
+    return Scatterers(
+        centre[seen] + np.asarray(sensor.position_m),
+        velocity_mps[faces[seen]].mean(axis=1),
+        strength * mean_phasor(phase),
+    )
+
+
+class MeshScene:
+    """A moving mesh as seen by one radar.
+
+    Parameters
+    ----------
+    mesh : MeshSequence
+        Must have faces.
+    visibility : bool array, shape (T, F), or "facing"
+        Per mesh frame, the facets that nothing hides from the sensor.
+    """
+
+    def __init__(
+        self,
+        mesh: MeshSequence,
+        config: RadarConfig,
+        sensor: VirtualSensor,
+        visibility: NDArray[np.bool_] | Literal["facing"] = "facing",
+    ) -> None:
+        if mesh.faces is None:
+            raise Sd2Error(
+                f"{mesh.source or 'The mesh'} has no faces",
+                "a surface: a radar signal is computed from facets",
+                "Give the faces (--faces)",
+            )
+        expected = (mesh.frame_count, len(mesh.faces))
+        if not isinstance(visibility, str) and visibility.shape != expected:
+            raise Sd2Error(
+                f"The visibility has shape {visibility.shape}",
+                f"{expected}: one truth value per mesh frame and face",
+            )
+        self.mesh = mesh
+        self.config = config
+        self.sensor = sensor
+        self.visibility = None if isinstance(visibility, str) else visibility
+        self._faces = mesh.faces
+        self._first = 0
+        self._block = np.empty((0, mesh.vertex_count, 3))
+
+    def frame_times_s(self) -> NDArray[np.float64]:
+        """Times of the radar frames that fit into the mesh, from its first frame on."""
+        timebase = self.mesh.timebase
+        step_s = self.config.frame_repetition_s
+        span_s = float(timebase.times_s[-1]) - timebase.start_s
+        times: NDArray[np.float64] = (
+            timebase.start_s + np.arange(int(span_s / step_s + 1e-6) + 1) * step_s
+        )
+        return times
+
+    def at(self, time_s: float) -> Scatterers:
+        """Facets at an instant, moving with the central difference over two mesh frames."""
+        half_s = self.mesh.timebase.frame_duration_s
+        first, last = float(self.mesh.times_s[0]), float(self.mesh.times_s[-1])
+        before, after = max(time_s - half_s, first), min(time_s + half_s, last)
+        position = self._vertices(time_s)
+        velocity = np.zeros_like(position)
+        if after > before:
+            velocity = (self._vertices(after) - self._vertices(before)) / (after - before)
+        visible = None
+        if self.visibility is not None:
+            visible = np.asarray(self.visibility[self.mesh.timebase.nearest_frame(time_s)])
+        return facet_scatterers(position, velocity, self._faces, self.sensor, self.config, visible)
+
+    def _vertices(self, time_s: float) -> NDArray[np.float64]:
+        times = self.mesh.times_s
+        right = int(np.clip(np.searchsorted(times, time_s), 1, max(len(times) - 1, 1)))
+        if len(times) == 1:
+            return self._frame(0)
+        share = float(
+            np.clip((time_s - times[right - 1]) / (times[right] - times[right - 1]), 0, 1)
+        )
+        # Within rounding of a frame's time that frame is meant.
+        if share < 1e-6 or share > 1 - 1e-6:
+            return self._frame(right - 1 if share < 0.5 else right)
+        return (1.0 - share) * self._frame(right - 1) + share * self._frame(right)
+
+    def _frame(self, index: int) -> NDArray[np.float64]:
+        if not self._first <= index < self._first + len(self._block):
+            # A few frames back, because a velocity reaches back.
+            self._first = max(index - 4, 0)
+            stop = min(self._first + _BLOCK_FRAMES, self.mesh.frame_count)
+            self._block = self.mesh.read(self._first, stop).astype(np.float64)
+        frame: NDArray[np.float64] = self._block[index - self._first]
+        return frame

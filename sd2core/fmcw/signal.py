@@ -1,0 +1,293 @@
+"""The raw samples an FMCW radar would record of a moving scene.
+
+Beat signal of one scatterer after M. A. Richards, *Fundamentals of Radar Signal
+Processing*: cos(2 pi (f_c tau + S tau t)) with the round-trip delay tau, the
+chirp's slope S and the time t from the middle of the chirp. Within a frame every
+scatterer moves at constant velocity. Its range advances the phase from chirp to
+chirp and within a chirp; the beat frequency is that of the frame's middle. The
+residual video phase S tau^2 / 2 (0.002 turns at 2 m for the paper's radar) is
+left out, as is multipath.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+import sd2core
+from sd2core.errors import Sd2Error
+from sd2core.fmcw.scene import MeshScene, Scatterers, point_scatterers
+from sd2core.io.radar.capture import RadarCapture
+from sd2core.mesh import MeshSequence
+from sd2core.progress import Progress, silent
+from sd2core.sensor import (
+    SPEED_OF_LIGHT_MPS,
+    RadarConfig,
+    Vector,
+    VirtualSensor,
+)
+from sd2core.timebase import Timebase
+
+_CHUNK = 4096
+"""Scatterers per matrix product: their phasors stay in the cache."""
+
+_NOISE_WITHOUT_ECHO_COUNTS = 4.0
+
+
+@dataclass(frozen=True)
+class Reflector:
+    """A static point of the room.
+
+    Parameters
+    ----------
+    position_m : tuple of 3 floats
+        Camera frame.
+    area_m2 : float
+        Effective area: it echoes like a facet of this area seen square on.
+    """
+
+    position_m: Vector
+    area_m2: float
+
+
+@dataclass(frozen=True)
+class SignalOptions:
+    """What surrounds the moving scene, and the receiver.
+
+    Parameters
+    ----------
+    snr_db : float
+        Mean power of the moving scene's samples over the whole recording
+        against that of the thermal noise; ``inf`` for no noise.
+    reflectors : tuple of Reflector
+        Static clutter.
+    peak_share : float
+        Share of the converter's half range that the strongest sample without
+        noise reaches: this sets the gain.
+    seed : int
+        Same seed, same bits.
+    """
+
+    snr_db: float = 10.0
+    reflectors: tuple[Reflector, ...] = ()
+    peak_share: float = 0.5
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if math.isnan(self.snr_db):
+            raise Sd2Error("snr_db is not a number", "decibels, or inf for no noise")
+        if not 0 < self.peak_share <= 1:
+            raise Sd2Error(f"peak_share is {self.peak_share}", "a share above 0, up to 1")
+
+
+def simulate_capture(
+    mesh: MeshSequence,
+    config: RadarConfig,
+    *,
+    sensor: VirtualSensor | None = None,
+    visibility: NDArray[np.bool_] | Literal["facing"] = "facing",
+    options: SignalOptions | None = None,
+    progress: Progress = silent,
+) -> RadarCapture:
+    """Raw samples of a moving mesh.
+
+    Parameters
+    ----------
+    mesh : MeshSequence
+        With faces.
+    config : RadarConfig
+    sensor : VirtualSensor
+        At the camera by default.
+    visibility : bool array, shape (T, F), or "facing"
+        Per mesh frame, the facets that nothing hides from the sensor;
+        ``facing`` takes all whose normal points towards it.
+    options : SignalOptions
+    progress : Progress
+        Counts radar frames.
+
+    Returns
+    -------
+    RadarCapture
+        ``simulated``; frame k is at k times the frame repetition time after the
+        mesh's first frame, the middle of its burst of chirps.
+    """
+    sensor = sensor or VirtualSensor()
+    scene = MeshScene(mesh, config, sensor, visibility)
+    return capture_scene(
+        scene.at,
+        scene.frame_times_s(),
+        config,
+        sensor=sensor,
+        options=options,
+        source=mesh.source,
+        progress=progress,
+    )
+
+
+def capture_scene(
+    scatterers_at: Callable[[float], Scatterers],
+    times_s: NDArray[np.float64],
+    config: RadarConfig,
+    *,
+    sensor: VirtualSensor | None = None,
+    options: SignalOptions | None = None,
+    source: str = "",
+    progress: Progress = silent,
+) -> RadarCapture:
+    """Raw samples of any scene that is known at every radar frame.
+
+    Parameters
+    ----------
+    scatterers_at : callable
+        Time in seconds → :class:`~sd2core.fmcw.scene.Scatterers`.
+    times_s : float64 array, shape (frames,)
+        Middle of every frame's burst of chirps.
+    """
+    sensor, options = sensor or VirtualSensor(), options or SignalOptions()
+    if config.adc_bits > 16:
+        raise Sd2Error(f"The converter has {config.adc_bits} bits", "16 or fewer")
+    frames = len(times_s)
+    shape = (config.receivers, config.chirps_per_frame, config.samples_per_chirp)
+    signal = np.empty((frames, *shape))
+    for frame, time_s in enumerate(times_s):
+        progress(frame, frames)
+        signal[frame] = echo(scatterers_at(float(time_s)), config, sensor)
+    power = float(np.mean(signal**2))
+    signal += _static(options, config, sensor)
+    samples, levels = _digitise(signal, power, config, options)
+    progress(frames, frames)
+    return RadarCapture(
+        samples=samples,
+        config=config,
+        timebase=Timebase(np.asarray(times_s) - times_s[0]),
+        simulated=True,
+        source=f"simulated from {source or 'a scene'}",
+        meta={
+            "simulation": {
+                "model": "FMCW beat signal of facets",
+                "source": source,
+                "sensor": asdict(sensor),
+                "options": asdict(options) | {"snr_db": _finite(options.snr_db)},
+                "first_frame_s": float(times_s[0]),
+                "frame_time": "middle of the burst of chirps",
+                **levels,
+                "version": sd2core.__version__,
+            }
+        },
+    )
+
+
+def echo(scatterers: Scatterers, config: RadarConfig, sensor: VirtualSensor) -> NDArray[np.float64]:
+    """Beat signal of one frame without noise.
+
+    The transmitter is at the sensor; receivers stand half a wavelength apart to
+    its left and right.
+
+    Returns
+    -------
+    float64 array, shape (receivers, chirps, samples)
+    """
+    signal = np.zeros((config.receivers, config.chirps_per_frame, config.samples_per_chirp))
+    # float64 throughout: rounding then stays far below one converter count, and
+    # the quantised result does not depend on the machine's matrix product.
+    carrier = 4.0 * np.pi / config.wavelength_m  # phase per metre of range
+    slope = 4.0 * np.pi * config.slope_hz_per_s / SPEED_OF_LIGHT_MPS
+    for start in range(0, len(scatterers.amplitude), _CHUNK):
+        part = slice(start, start + _CHUNK)
+        to_transmitter = _range_and_rate(scatterers, part, np.asarray(sensor.position_m))
+        for receiver, position in enumerate(_receivers(config, sensor)):
+            to_receiver = _range_and_rate(scatterers, part, position)
+            range_m, rate_mps = (
+                0.5 * (a + b) for a, b in zip(to_transmitter, to_receiver, strict=True)
+            )
+            per_chirp = carrier * config.chirp_repetition_s * rate_mps
+            per_sample = (slope * range_m + carrier * rate_mps) / config.sample_rate_hz
+            # Chirps are centred on the frame; samples start where the sweep does.
+            first = carrier * range_m - 0.5 * (config.chirps_per_frame - 1) * per_chirp
+            slow = _phasors(first, per_chirp, config.chirps_per_frame)
+            first = -0.5 * config.samples_per_chirp * per_sample
+            fast = _phasors(first, per_sample, config.samples_per_chirp)
+            signal[receiver] += ((scatterers.amplitude[part] * slow) @ fast.T).real
+    return signal
+
+
+def _phasors(
+    first_rad: NDArray[np.float64], step_rad: NDArray[np.float64], count: int
+) -> NDArray[np.complex128]:
+    """exp(j (first + k step)) for k < count, shape (count, n), by doubling."""
+    phasors = np.empty((count, len(first_rad)), dtype=np.complex128)
+    phasors[0] = np.exp(1j * first_rad)
+    step = np.exp(1j * step_rad)
+    done = 1
+    while done < count:
+        more = min(done, count - done)
+        np.multiply(phasors[:more], step, out=phasors[done : done + more])
+        step = step * step
+        done += more
+    return phasors
+
+
+def _receivers(config: RadarConfig, sensor: VirtualSensor) -> NDArray[np.float64]:
+    azimuth = math.radians(sensor.azimuth_deg)
+    right = np.array([math.cos(azimuth), 0.0, -math.sin(azimuth)])
+    steps = np.arange(config.receivers) - 0.5 * (config.receivers - 1)
+    offset_m = steps[:, None] * (0.5 * config.wavelength_m * right)
+    positions: NDArray[np.float64] = np.asarray(sensor.position_m) + offset_m
+    return positions
+
+
+def _range_and_rate(
+    scatterers: Scatterers, part: slice, position_m: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Distance from a place and how fast it grows."""
+    away = scatterers.position_m[part] - position_m
+    range_m = np.linalg.norm(away, axis=1)
+    growth = np.einsum("ni,ni->n", away, scatterers.velocity_mps[part])
+    return range_m, growth / np.maximum(range_m, 1e-9)
+
+
+def _static(
+    options: SignalOptions, config: RadarConfig, sensor: VirtualSensor
+) -> NDArray[np.float64]:
+    if not options.reflectors:
+        return np.zeros((config.receivers, 1, 1))
+    positions = [reflector.position_m for reflector in options.reflectors]
+    areas = [reflector.area_m2 for reflector in options.reflectors]
+    return echo(point_scatterers(positions, (0.0, 0.0, 0.0), areas, sensor), config, sensor)
+
+
+def _digitise(
+    signal: NDArray[np.float64], power: float, config: RadarConfig, options: SignalOptions
+) -> tuple[NDArray[np.uint16], dict[str, float]]:
+    """Gain, thermal noise and rounding to converter counts around mid-scale."""
+    middle = 2 ** (config.adc_bits - 1)
+    peak = float(np.abs(signal).max())
+    gain = options.peak_share * middle / peak if peak > 0 else 1.0
+    if math.isinf(options.snr_db) and options.snr_db > 0:
+        noise = 0.0
+    elif power > 0:
+        noise = gain * math.sqrt(power) * 10.0 ** (-options.snr_db / 20.0)
+    else:
+        noise = _NOISE_WITHOUT_ECHO_COUNTS
+    samples = np.empty(signal.shape, dtype=np.uint16)
+    clipped = 0
+    for frame, values in enumerate(signal):
+        random = np.random.default_rng([options.seed, frame])
+        counts = np.rint(middle + gain * values + noise * random.standard_normal(values.shape))
+        clipped += int(np.count_nonzero((counts < 0) | (counts > 2 * middle - 1)))
+        samples[frame] = np.clip(counts, 0, 2 * middle - 1)
+    return samples, {
+        "counts_per_unit": gain,
+        "noise_rms_counts": noise,
+        "clipped_share": clipped / samples.size,
+    }
+
+
+def _finite(value: float) -> float | None:
+    """JSON has no infinity."""
+    return value if math.isfinite(value) else None
