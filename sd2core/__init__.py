@@ -1,3 +1,92 @@
-"""SD² Studio's library: from a moving mesh to radar Doppler, without any window."""
+"""SD² Studio's library: from a moving mesh to radar Doppler, without any window.
+
+The names below are loaded when they are first used, so that importing the
+library costs nothing::
+
+    import sd2core as sd2
+
+    mesh = sd2.load_mesh("walk.npz")
+    maps = sd2.Synthesizer(mesh, "paper")
+    synthetic = maps.map(sd2.VirtualSensor(position_m=(0, 0, 0)), visibility="exact")
+    real = sd2.doppler_map(sd2.load_capture("recording/"), v_max_mps=2.0, bins=32)
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
+    from sd2core.errors import Sd2Error
+    from sd2core.fmcw import doppler_map
+    from sd2core.io.mesh import load_mesh, save_mesh
+    from sd2core.io.radar import RadarCapture, load_capture
+    from sd2core.io.video import VideoReader, open_video
+    from sd2core.mesh import MeshSequence
+    from sd2core.recording import Recording, Span, open_recording
+    from sd2core.sensor import PAPER_RADAR, RadarConfig, VelocityAxis, VirtualSensor
+    from sd2core.spectrum import DopplerMap
+    from sd2core.timebase import Timebase
+
+__all__ = [
+    "PAPER_RADAR",
+    "PRESETS",
+    "DopplerMap",
+    "MeshSequence",
+    "RadarCapture",
+    "RadarConfig",
+    "Recording",
+    "Sd2Error",
+    "Span",
+    "SynthesisOptions",
+    "Synthesizer",
+    "Timebase",
+    "VelocityAxis",
+    "VideoReader",
+    "VirtualSensor",
+    "doppler_map",
+    "load_capture",
+    "load_mesh",
+    "open_recording",
+    "open_video",
+    "save_mesh",
+]
+
+_HOME = {
+    "PAPER_RADAR": "sensor",
+    "PRESETS": "doppler",
+    "DopplerMap": "spectrum",
+    "MeshSequence": "mesh",
+    "RadarCapture": "io.radar",
+    "RadarConfig": "sensor",
+    "Recording": "recording",
+    "Sd2Error": "errors",
+    "Span": "recording",
+    "SynthesisOptions": "doppler",
+    "Synthesizer": "doppler",
+    "Timebase": "timebase",
+    "VelocityAxis": "sensor",
+    "VideoReader": "io.video",
+    "VirtualSensor": "sensor",
+    "doppler_map": "fmcw",
+    "load_capture": "io.radar",
+    "load_mesh": "io.mesh",
+    "open_recording": "recording",
+    "open_video": "io.video",
+    "save_mesh": "io.mesh",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *__all__])

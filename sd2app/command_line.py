@@ -1,0 +1,95 @@
+"""The ``sd2`` script: the library's commands, and those that open the window."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from sd2core.cli import build_parser, run
+from sd2core.cli.options import add_command
+from sd2core.errors import Sd2Error
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one ``sd2`` command and return its exit code."""
+    parser, commands = build_parser()
+    _add_window_commands(commands)
+    return run(parser, sys.argv[1:] if arguments is None else arguments)
+
+
+def _add_window_commands(commands: argparse._SubParsersAction) -> None:
+    opening = add_command(
+        commands,
+        "open",
+        "open a recording, a video or a mesh in the window",
+        handler=_open,
+        examples=(
+            "  sd2 open walk.sd2\n"
+            "  sd2 open walk.npz\n"
+            "  sd2 open walk.sd2 --screenshot window.png    (needs no display)"
+        ),
+    )
+    opening.add_argument("path", type=Path, metavar="PATH")
+    demo = add_command(
+        commands,
+        "demo",
+        "open the bundled sample recording in the window",
+        handler=_demo,
+        description="A simulated body makes eight swipes in front of a simulated radar.",
+        examples="  sd2 demo\n  sd2 demo --screenshot window.png    (needs no display)",
+    )
+    for parser in (opening, demo):
+        parser.add_argument(
+            "--screenshot",
+            type=Path,
+            metavar="FILE.png",
+            help="draw the window into a picture instead of on the screen",
+        )
+
+
+def _open(options: argparse.Namespace) -> int:
+    if not options.path.exists():
+        raise Sd2Error(f"{options.path} does not exist", "a recording, a video or a mesh")
+    return _show(options.path, options.screenshot)
+
+
+def _demo(options: argparse.Namespace) -> int:
+    from sd2core.resources import resource_path
+
+    return _show(resource_path("swipes.sd2"), options.screenshot)
+
+
+def _show(path: Path, screenshot: Path | None) -> int:
+    if screenshot is not None:
+        _check_screenshot(screenshot)
+        os.environ["QT_QPA_PLATFORM"] = "offscreen"
+    elif not has_display(sys.platform, os.environ):
+        raise Sd2Error(
+            "There is no display to open a window on",
+            remedy="Draw the same window into a picture with --screenshot FILE.png",
+        )
+    from sd2app.main import run as run_window
+
+    return run_window(path, screenshot=screenshot)
+
+
+def has_display(platform: str, environment: Mapping[str, str]) -> bool:
+    """Whether Qt will find a screen, or was told to do without one."""
+    if not platform.startswith("linux"):
+        return True
+    names = ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM")
+    return any(environment.get(name) for name in names)
+
+
+def _check_screenshot(path: Path) -> None:
+    if path.suffix.lower() != ".png":
+        raise Sd2Error(f"The screenshot is to be {path}", "a name that ends in .png")
+    if not path.absolute().parent.is_dir():
+        raise Sd2Error(f"The folder {path.absolute().parent} does not exist", "an existing folder")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

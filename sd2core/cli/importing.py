@@ -1,0 +1,138 @@
+"""``sd2 import`` and ``sd2 relink``: recordings from files."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from sd2core.cli.options import add_command, add_json, add_mesh_reading, finite_float
+from sd2core.cli.output import print_json, progress_bar
+
+
+def add_commands(commands: argparse._SubParsersAction) -> None:
+    """Add ``import`` and ``relink``."""
+    parser = add_command(
+        commands,
+        "import",
+        "make a recording from a video, a mesh and a radar capture",
+        handler=_import,
+        description=(
+            "A recording is a folder NAME.sd2 that says what belongs together. The files stay\n"
+            "where they are and are referred to by relative paths; --copy copies them into\n"
+            "the folder, which can then be handed on as it is. Every file is opened once, so\n"
+            "that what cannot be read is said here and not later."
+        ),
+        examples=(
+            "  sd2 import walk.sd2 --video walk.mkv --mesh walk.npz\n"
+            "  sd2 import lab.sd2 --radar capture/ --title 'Empty lab'\n"
+            "  sd2 import walk.sd2 --video walk.mkv --radar capture/ --radar-offset-s -0.35 --copy"
+        ),
+    )
+    parser.add_argument("out", type=Path, metavar="OUT", help="the recording to make (NAME.sd2)")
+    parser.add_argument("--video", type=Path, metavar="FILE", help="video of the person")
+    parser.add_argument(
+        "--mesh",
+        type=Path,
+        metavar="FILE",
+        help="body mesh fitted to the video (.npz, .zarr, a folder of .obj/.ply/.glb, or the"
+        " output of VIBE, WHAM or 4D-Humans)",
+    )
+    add_mesh_reading(parser)
+    parser.add_argument(
+        "--radar", type=Path, metavar="FOLDER", help="radar capture of the same scene"
+    )
+    parser.add_argument(
+        "--radar-offset-s",
+        type=finite_float,
+        default=0.0,
+        metavar="S",
+        help="time in the video, in seconds, of the first radar frame (default: 0)",
+    )
+    parser.add_argument("--title", default="", help="what to call it (default: its name)")
+    parser.add_argument("--copy", action="store_true", help="copy the files into the recording")
+    add_json(parser)
+
+    parser = add_command(
+        commands,
+        "relink",
+        "find the missing files of a recording in another folder",
+        handler=_relink,
+        description=(
+            "Files that are not where the recording says are looked for by name in FOLDER and\n"
+            "everything below it. Of several files with the same name, the one whose folders\n"
+            "agree best with the old path is taken; when two agree equally well, neither is."
+        ),
+        examples="  sd2 relink walk.sd2 /media/disk/experiments",
+    )
+    parser.add_argument("recording", type=Path, metavar="RECORDING")
+    parser.add_argument("folder", type=Path, metavar="FOLDER")
+    add_json(parser)
+
+
+def _import(options: argparse.Namespace) -> None:
+    from sd2core.cli.info import describe_recording, show
+    from sd2core.recording import Recording
+
+    sources = {
+        "video": options.video,
+        "mesh": options.mesh,
+        "faces": options.faces,
+        "radar": options.radar,
+    }
+    _check_readable(options)
+    with progress_bar("Copying", unit="file") as progress:
+        recording = Recording.create(
+            options.out,
+            **sources,
+            mesh_frames_per_s=options.fps,
+            mesh_scale=options.scale,
+            radar_offset_s=options.radar_offset_s,
+            title=options.title,
+            copy=options.copy,
+            progress=progress,
+        )
+    show(describe_recording(recording), as_json=options.json)
+
+
+def _check_readable(options: argparse.Namespace) -> None:
+    from sd2core.cli.reading import load_mesh_as_told
+
+    if options.video is not None:
+        from sd2core.io.video import open_video
+
+        open_video(options.video).close()
+    if options.mesh is not None:
+        load_mesh_as_told(options.mesh, options)
+    if options.radar is not None:
+        from sd2core.io.radar import load_capture
+
+        load_capture(options.radar)
+
+
+def _relink(options: argparse.Namespace) -> int:
+    from sd2core.recording import open_recording
+
+    recording = open_recording(options.recording)
+    with progress_bar("Searching", unit="folder") as progress:
+        result = recording.relink(options.folder, progress)
+    if options.json:
+        print_json(
+            {
+                "found": {role: str(path) for role, path in result.found.items()},
+                "ambiguous": {
+                    role: [str(path) for path in paths] for role, paths in result.ambiguous.items()
+                },
+                "missing": list(result.missing),
+            }
+        )
+    else:
+        for role, path in result.found.items():
+            print(f"{role}: found at {path}")
+        for role, paths in result.ambiguous.items():
+            print(f"{role}: several files fit equally well, so none was taken:")
+            print(*(f"  {path}" for path in paths), sep="\n")
+        for role in result.missing:
+            print(f"{role}: {getattr(recording, role).name} is not under {options.folder}")
+        if not (result.found or result.ambiguous or result.missing):
+            print("No file of this recording is missing.")
+    return 1 if result.ambiguous or result.missing else 0

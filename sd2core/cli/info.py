@@ -1,0 +1,265 @@
+"""``sd2 info``: what is in a recording, video, mesh, capture or map."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sd2core.cli.options import add_command, add_json, add_mesh_reading
+from sd2core.cli.output import print_facts, print_json
+
+if TYPE_CHECKING:
+    from sd2core.io.radar import RadarCapture
+    from sd2core.io.video import VideoReader
+    from sd2core.mesh import MeshSequence
+    from sd2core.recording import Recording
+    from sd2core.sensor import RadarConfig
+    from sd2core.spectrum import DopplerMap
+    from sd2core.timebase import Timebase
+
+
+@dataclass
+class Description:
+    """The same content for programs (``data``) and for people (``facts``)."""
+
+    title: str
+    data: dict[str, Any]
+    facts: dict[str, str]
+    notes: tuple[str, ...] = ()
+    parts: list[Description] = field(default_factory=list)
+
+
+def add_commands(commands: argparse._SubParsersAction) -> None:
+    """Add ``info``."""
+    parser = add_command(
+        commands,
+        "info",
+        "what is in a recording, video, mesh, radar capture or Doppler map",
+        handler=_info,
+        examples="  sd2 info walk.sd2\n  sd2 info walk.npz --json",
+    )
+    parser.add_argument("path", type=Path, metavar="PATH")
+    add_mesh_reading(parser)
+    add_json(parser)
+
+
+def _info(options: argparse.Namespace) -> None:
+    show(describe(options.path, options), as_json=options.json)
+
+
+def show(description: Description, *, as_json: bool) -> None:
+    """Print a description and its parts."""
+    if as_json:
+        print_json(description.data)
+        return
+    print_facts(description.title, description.facts)
+    for note in description.notes:
+        print(f"  note: {note}")
+    for part in description.parts:
+        print()
+        show(part, as_json=False)
+
+
+def describe(path: Path, options: argparse.Namespace) -> Description:
+    """Open whatever ``path`` is and describe it."""
+    from sd2core.io.kinds import kind_of
+
+    kind = kind_of(path)
+    if kind == "recording":
+        from sd2core.recording import open_recording
+
+        return describe_recording(open_recording(path))
+    if kind == "video":
+        from sd2core.io.video import open_video
+
+        with open_video(path) as video:
+            return describe_video(path, video)
+    if kind == "mesh":
+        from sd2core.cli.reading import load_mesh_as_told
+
+        return describe_mesh(path, load_mesh_as_told(path, options))
+    if kind == "radar":
+        from sd2core.io.radar import load_capture
+
+        return describe_capture(path, load_capture(path))
+    from sd2core.spectrum import DopplerMap
+
+    return describe_map(path, DopplerMap.load(path))
+
+
+def describe_recording(recording: Recording) -> Description:
+    """Describe a recording and each file it holds; missing files are named, not opened."""
+    missing = recording.missing()
+    parts: list[Description] = []
+    if recording.video is not None and "video" not in missing:
+        with recording.open_video() as video:
+            parts.append(describe_video(recording.video, video))
+    if recording.mesh is not None and not missing.keys() & {"mesh", "faces"}:
+        parts.append(describe_mesh(recording.mesh, recording.load_mesh()))
+    if recording.radar is not None and "radar" not in missing:
+        parts.append(describe_capture(recording.radar, recording.load_capture()))
+    x, y, z = recording.sensor.position_m
+    data = {
+        "kind": "recording",
+        "path": str(recording.folder),
+        "title": recording.title,
+        "simulated": recording.simulated,
+        "radar_offset_s": recording.radar_offset_s,
+        "sensor_position_m": [x, y, z],
+        "spans": [span.model_dump(mode="json") for span in recording.spans],
+        "missing": {role: str(path) for role, path in missing.items()},
+        "notes": list(recording.notes),
+    }
+    data |= {part.data["kind"]: part.data for part in parts}
+    facts = {
+        "title": recording.title + (" (simulated)" if recording.simulated else ""),
+        "sensor": f"at x {x:g}, y {y:g}, z {z:g} m",
+        "radar offset": f"{recording.radar_offset_s:+g} s" if recording.radar else "",
+        "spans": _labels(recording),
+    }
+    notes = tuple(f"the {role} is not at {path}" for role, path in missing.items())
+    if missing:
+        notes += (f"find it with: sd2 relink {recording.folder} FOLDER",)
+    return Description(f"Recording {recording.folder}", data, facts, notes + recording.notes, parts)
+
+
+def describe_video(path: Path, video: VideoReader) -> Description:
+    """Describe a video."""
+    data = {
+        "kind": "video",
+        "path": str(path),
+        "width": video.width,
+        "height": video.height,
+        **_clock_data(video.timebase),
+        "notes": list(video.notes),
+    }
+    facts = {
+        "picture": f"{video.width} x {video.height} pixels",
+        "time": _clock(video.timebase),
+    }
+    return Description(f"Video {path}", data, facts, video.notes)
+
+
+def describe_mesh(path: Path, mesh: MeshSequence) -> Description:
+    """Describe a mesh by its first frame; a long one is not read whole."""
+    first = mesh.frame(0)
+    low, high = first.min(axis=0).tolist(), first.max(axis=0).tolist()
+    face_count = 0 if mesh.faces is None else len(mesh.faces)
+    data = {
+        "kind": "mesh",
+        "path": str(path),
+        "vertices": mesh.vertex_count,
+        "faces": face_count,
+        **_clock_data(mesh.timebase),
+        "first_frame_min_m": low,
+        "first_frame_max_m": high,
+        "notes": list(mesh.notes),
+    }
+    facts = {
+        "surface": f"{mesh.vertex_count:,} vertices, "
+        + (f"{face_count:,} triangles" if face_count else "no triangles: a point cloud"),
+        "time": _clock(mesh.timebase),
+        "first frame": ", ".join(
+            f"{axis} {a:.2f} to {b:.2f}" for axis, a, b in zip("xyz", low, high, strict=True)
+        )
+        + " m",
+    }
+    return Description(f"Mesh {path}", data, facts, mesh.notes)
+
+
+def describe_capture(path: Path, capture: RadarCapture) -> Description:
+    """Describe a radar capture and what its radar can tell apart."""
+    config = capture.config
+    data = {
+        "kind": "radar",
+        "path": str(path),
+        "simulated": capture.simulated,
+        "radar": config.name,
+        "receivers": config.receivers,
+        "chirps_per_frame": config.chirps_per_frame,
+        "samples_per_chirp": config.samples_per_chirp,
+        **radar_limits(config),
+        **_clock_data(capture.timebase),
+        "start_unix_s": capture.start_unix_s,
+        "notes": list(capture.notes),
+    }
+    facts = {
+        "radar": config.name + (" (simulated)" if capture.simulated else ""),
+        "samples": f"{config.receivers} receivers, {config.chirps_per_frame} chirps per frame,"
+        f" {config.samples_per_chirp} samples per chirp",
+        "time": _clock(capture.timebase),
+        **limit_facts(config),
+    }
+    return Description(f"Radar capture {path}", data, facts, tuple(capture.notes))
+
+
+def describe_map(path: Path, doppler: DopplerMap) -> Description:
+    """Describe a Doppler map."""
+    data = {
+        "kind": "map",
+        "path": str(path),
+        "map_kind": doppler.kind,
+        "unit": doppler.unit,
+        "bins": doppler.axis.bins,
+        "v_max_mps": doppler.axis.v_max_mps,
+        "null_bins": list(doppler.null_bins),
+        "unseen_bins": list(doppler.unseen_bins),
+        **_clock_data(doppler.timebase),
+        "provenance": doppler.meta,
+    }
+    facts = {
+        "kind": doppler.kind,
+        "velocity": f"{doppler.axis.bins} bins of {doppler.axis.bin_width_mps:g} m/s over"
+        f" ±{doppler.axis.v_max_mps:g} m/s, approaching is positive",
+        "time": _clock(doppler.timebase),
+        "unit": doppler.unit,
+        "nulled bins": ", ".join(map(str, doppler.null_bins)),
+        "unseen bins": ", ".join(map(str, doppler.unseen_bins)),
+    }
+    return Description(f"Doppler map {path}", data, facts)
+
+
+def radar_limits(config: RadarConfig) -> dict[str, float]:
+    """What follows from a radar's configuration, by name."""
+    return {
+        "wavelength_m": config.wavelength_m,
+        "v_max_mps": config.v_max_mps,
+        "velocity_resolution_mps": config.velocity_resolution_mps,
+        "range_resolution_m": config.range_resolution_m,
+        "range_max_m": config.range_max_m,
+    }
+
+
+def limit_facts(config: RadarConfig) -> dict[str, str]:
+    """What follows from a radar's configuration, for people."""
+    return {
+        "wavelength λ": f"{config.wavelength_m * 1e3:.3f} mm",
+        "velocity": f"up to v_max ±{config.v_max_mps:.3f} m/s,"
+        f" in steps Δv of {config.velocity_resolution_mps:.3f} m/s",
+        "range": f"up to R_max {config.range_max_m:.2f} m,"
+        f" in steps ΔR of {config.range_resolution_m:.3f} m",
+    }
+
+
+def _labels(recording: Recording) -> str:
+    counts: dict[str, int] = {}
+    for span in recording.spans:
+        counts[span.label] = counts.get(span.label, 0) + 1
+    return ", ".join(f"{count} x {label}" for label, count in counts.items())
+
+
+def _clock(timebase: Timebase) -> str:
+    return (
+        f"{len(timebase)} frames, {timebase.duration_s:.3f} s, {timebase.frames_per_s:.2f} frames/s"
+    )
+
+
+def _clock_data(timebase: Timebase) -> dict[str, float]:
+    return {
+        "frames": len(timebase),
+        "start_s": timebase.start_s,
+        "duration_s": timebase.duration_s,
+        "frames_per_s": timebase.frames_per_s,
+    }

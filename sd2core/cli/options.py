@@ -1,0 +1,145 @@
+"""Options and argument types that several subcommands share."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+
+def add_command(
+    commands: argparse._SubParsersAction,
+    name: str,
+    summary: str,
+    *,
+    handler: Callable[[argparse.Namespace], int | None] | None = None,
+    description: str = "",
+    examples: str = "",
+) -> argparse.ArgumentParser:
+    """Add a subcommand with its help."""
+    text = f"{summary[0].upper()}{summary[1:]}."
+    parser: argparse.ArgumentParser = commands.add_parser(
+        name,
+        help=summary,
+        description=f"{text}\n\n{description}".strip(),
+        epilog=f"examples:\n{examples}" if examples else None,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    if handler is not None:
+        parser.set_defaults(handler=handler)
+    return parser
+
+
+def add_json(parser: argparse.ArgumentParser) -> None:
+    """Add ``--json``."""
+    parser.add_argument("--json", action="store_true", help="print JSON, for other programs")
+
+
+def add_axis(parser: argparse.ArgumentParser) -> None:
+    """Add the velocity axis."""
+    parser.add_argument(
+        "--bins",
+        type=positive_int,
+        metavar="N",
+        help="velocity bins (default: 32)",
+    )
+    parser.add_argument(
+        "--v-max",
+        type=positive_float,
+        metavar="V",
+        help="end of the velocity axis in m/s (default: 2)",
+    )
+
+
+def add_mesh_reading(parser: argparse.ArgumentParser) -> None:
+    """Add what a mesh file may not say about itself."""
+    parser.add_argument(
+        "--faces",
+        type=Path,
+        metavar="FILE",
+        help="triangles (.npy or .obj) for a mesh that has none of its own",
+    )
+    parser.add_argument(
+        "--fps",
+        type=positive_float,
+        metavar="F",
+        help="frames per second of a mesh that does not say",
+    )
+    parser.add_argument(
+        "--scale",
+        type=positive_float,
+        metavar="S",
+        help="metres per unit of the mesh, e.g. 0.001 for millimetres (default: 1)",
+    )
+
+
+def position(text: str) -> tuple[float, float, float]:
+    """Parse ``X,Y,Z`` in metres."""
+    values = _numbers(text)
+    if len(values) != 3:
+        raise argparse.ArgumentTypeError(f"{text!r} is not X,Y,Z in metres, e.g. -1,0,2.5")
+    return values[0], values[1], values[2]
+
+
+def span_m(text: str) -> tuple[float, float]:
+    """Parse ``LO,HI`` in metres."""
+    values = _numbers(text)
+    if len(values) != 2 or not 0 <= values[0] < values[1]:
+        raise argparse.ArgumentTypeError(f"{text!r} is not LO,HI in metres, e.g. 0.5,4")
+    return values[0], values[1]
+
+
+def bin_list(text: str) -> tuple[int, ...]:
+    """Parse ``14,15,16`` or ``none``."""
+    if text == "none":
+        return ()
+    try:
+        return tuple(int(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is neither bin numbers such as 14,15,16 nor none"
+        ) from None
+
+
+def positive_int(text: str) -> int:
+    """Parse a whole number above 0."""
+    try:
+        value = int(text)
+    except ValueError:
+        value = 0
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number above 0")
+    return value
+
+
+def finite_float(text: str) -> float:
+    """Parse a number."""
+    return _numbers(text, single=True)[0]
+
+
+def positive_float(text: str) -> float:
+    """Parse a number above 0."""
+    value = finite_float(text)
+    if value <= 0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number above 0")
+    return value
+
+
+def not_negative_float(text: str) -> float:
+    """Parse a number from 0 on."""
+    value = finite_float(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"{text!r} is below 0")
+    return value
+
+
+def _numbers(text: str, *, single: bool = False) -> list[float]:
+    parts = [text] if single else text.split(",")
+    try:
+        values = [float(part) for part in parts]
+    except ValueError:
+        values = [math.nan]
+    if not all(math.isfinite(value) for value in values):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number" + ("" if single else " list"))
+    return values

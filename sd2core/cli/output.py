@@ -1,0 +1,49 @@
+"""What commands print: facts for people, JSON for programs, bars for long work."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+from sd2core.progress import Progress
+
+
+@contextmanager
+def progress_bar(what: str, unit: str = "frame") -> Iterator[Progress]:
+    """Show a bar on standard error when that is a terminal."""
+    from tqdm import tqdm
+
+    with tqdm(desc=what, unit=unit, file=sys.stderr, disable=None, leave=False) as bar:
+
+        def report(done: int, total: int) -> None:
+            bar.total = total or None
+            bar.update(done - bar.n)
+
+        yield report
+
+
+def print_json(content: Mapping[str, Any]) -> None:
+    """Print one JSON object; NaN and infinities become null."""
+    print(json.dumps(_finite(content), indent=2, ensure_ascii=False))
+
+
+def print_facts(title: str, facts: Mapping[str, str]) -> None:
+    """Print a title and aligned ``name  value`` lines; empty values are left out."""
+    print(title)
+    shown = {name: value for name, value in facts.items() if value}
+    width = max(map(len, shown), default=0)
+    for name, value in shown.items():
+        print(f"  {name:<{width}}  {value}")
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _finite(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(inner) for inner in value]
+    if isinstance(value, float) and (value != value or abs(value) == float("inf")):
+        return None
+    return value

@@ -1,0 +1,40 @@
+"""The parser of ``sd2`` and the pieces that its subcommands share."""
+
+from __future__ import annotations
+
+import argparse
+
+from sd2core import __version__
+from sd2core.cli import importing, info
+
+_DESCRIPTION = """\
+SD² Studio turns a video of a person into mmWave-radar Doppler: what a radar
+would have measured, at any place one puts it.
+"""
+
+_EPILOG = """\
+examples:
+  sd2 demo                                    look at the bundled sample recording
+  sd2 open walk.sd2                           look at a recording, a video or a mesh
+  sd2 info walk.npz                           what is in a file
+  sd2 import walk.sd2 --video walk.mkv --mesh walk.npz
+  sd2 synth walk.npz --out map.npz --sensor 0,0,1
+  sd2 radar capture/ --out real.npz
+
+`sd2 COMMAND --help` explains one command.
+"""
+
+
+def build_parser() -> tuple[argparse.ArgumentParser, argparse._SubParsersAction]:
+    """Parser of the library's commands, and where the window adds its own."""
+    parser = argparse.ArgumentParser(
+        prog="sd2",
+        description=_DESCRIPTION,
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"SD² Studio {__version__}")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    for group in (info, importing):
+        group.add_commands(commands)
+    return parser, commands

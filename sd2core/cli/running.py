@@ -1,0 +1,81 @@
+"""Run one command: exit code 0, 1 (explained in a paragraph) or 2 (usage)."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import sys
+import textwrap
+from collections.abc import Sequence
+
+from sd2core.errors import Sd2Error
+
+_INTERRUPTED = 130
+_STARTS_WITH_NEGATIVE_NUMBER = re.compile(r"-\.?\d")
+
+
+def run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
+    """Parse, call the handler and turn what goes wrong into a sentence.
+
+    Returns
+    -------
+    int
+        0, or what the handler returned; 1 for an error, which is explained on
+        standard error; 130 when interrupted. argparse itself exits with 2.
+    """
+    options = parser.parse_args(attach_negative_values(arguments))
+    try:
+        code = options.handler(options)
+        sys.stdout.flush()
+        return code or 0
+    except Sd2Error as error:
+        return _explain(str(error))
+    except KeyboardInterrupt:
+        print("sd2: interrupted", file=sys.stderr)
+        return _INTERRUPTED
+    except BrokenPipeError:
+        # Whoever read the output (`| head`) has seen enough; stop Python from
+        # complaining when it flushes at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except Exception as error:
+        if os.environ.get("SD2_TRACEBACK") == "1":
+            raise
+        if isinstance(error, OSError) and error.filename:
+            return _explain(f"{error.filename}: {error.strerror}.")
+        if isinstance(error, MemoryError):
+            return _explain(f"There is not enough memory for this ({error}).")
+        return _explain(
+            f"This should not happen ({type(error).__name__}: {error}). Please report it, with"
+            " what is printed when the same command runs with SD2_TRACEBACK=1 set."
+        )
+
+
+def attach_negative_values(arguments: Sequence[str]) -> list[str]:
+    """Turn ``--sensor -1,0,2`` into ``--sensor=-1,0,2``, which argparse does not mistake.
+
+    No option of ``sd2`` begins with a digit, so what begins with a negative
+    number is always the value of the option before it.
+    """
+    attached: list[str] = []
+    for argument in arguments:
+        before = attached[-1] if attached else ""
+        if (
+            _STARTS_WITH_NEGATIVE_NUMBER.match(argument)
+            and before.startswith("--")
+            and before != "--"
+            and "=" not in before
+        ):
+            attached[-1] = f"{before}={argument}"
+        else:
+            attached.append(argument)
+    return attached
+
+
+def _explain(sentence: str) -> int:
+    print(
+        textwrap.fill(f"sd2: {sentence}", 88, break_long_words=False, break_on_hyphens=False),
+        file=sys.stderr,
+    )
+    return 1

@@ -1,0 +1,452 @@
+"""A recording on disk: video, mesh, radar capture and labels on one clock.
+
+A recording is a folder ``NAME.sd2/`` that holds ``recording.json``. The files it
+speaks of lie inside the folder or anywhere else; their paths are stored relative
+to the folder, so that a whole data set can move. See ``docs/formats.md``.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+import tempfile
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+from pydantic import BaseModel, ConfigDict, FiniteFloat, ValidationError, model_validator
+
+from sd2core.atomic import atomic_write_text
+from sd2core.errors import Sd2Error
+from sd2core.progress import Progress, silent
+from sd2core.relative_paths import (
+    common_suffix_length,
+    is_absolute,
+    located_path,
+    paths_named,
+    plain_path,
+    remove,
+    stored_path,
+)
+from sd2core.sensor import VirtualSensor
+
+if TYPE_CHECKING:
+    from sd2core.io.radar import RadarCapture
+    from sd2core.io.video import VideoReader
+    from sd2core.mesh import MeshSequence
+
+FILE_NAME = "recording.json"
+SUFFIX = ".sd2"
+FORMAT: Literal["sd2-recording"] = "sd2-recording"
+VERSION = 1
+
+Role = Literal["video", "mesh", "faces", "radar"]
+"""What a file is to the recording."""
+
+ROLES: tuple[Role, ...] = get_args(Role)
+
+
+class Span(BaseModel):
+    """A labelled stretch of time, half-open ``[start_s, end_s)``."""
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+
+    start_s: FiniteFloat
+    end_s: FiniteFloat
+    label: str
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Span:
+        if not self.start_s < self.end_s:
+            raise ValueError(f"the span ends at {self.end_s} s and starts at {self.start_s} s")
+        return self
+
+
+class _SensorEntry(BaseModel):
+    model_config = ConfigDict(extra="allow")
+
+    position_m: tuple[FiniteFloat, FiniteFloat, FiniteFloat] = (0.0, 0.0, 0.0)
+    azimuth_deg: FiniteFloat = 0.0
+    elevation_deg: FiniteFloat = 0.0
+    field_of_view_deg: FiniteFloat = 90.0
+
+
+class _Document(BaseModel):
+    """``recording.json`` as it is written; what this version does not know is kept."""
+
+    model_config = ConfigDict(extra="allow")
+
+    format: Literal["sd2-recording"] = FORMAT
+    version: int = VERSION
+    title: str = ""
+    simulated: bool = False
+    video: str | None = None
+    mesh: str | None = None
+    mesh_frames_per_s: FiniteFloat | None = None
+    mesh_scale: FiniteFloat | None = None
+    faces: str | None = None
+    radar: str | None = None
+    radar_offset_s: FiniteFloat = 0.0
+    sensor: _SensorEntry = _SensorEntry()
+    spans: tuple[Span, ...] = ()
+
+
+@dataclass(frozen=True)
+class Relinked:
+    """What :meth:`Recording.relink` did, by role.
+
+    Parameters
+    ----------
+    found : dict
+        New path of every file that was found.
+    ambiguous : dict
+        Candidates that fit equally well; nothing was changed for these.
+    missing : tuple of Role
+        Files that no name under the folder fits.
+    """
+
+    found: dict[Role, Path]
+    ambiguous: dict[Role, tuple[Path, ...]]
+    missing: tuple[Role, ...]
+
+
+@dataclass(eq=False)
+class Recording:
+    """What belongs together; change the fields, then :meth:`save`.
+
+    Parameters
+    ----------
+    folder : Path
+        The ``NAME.sd2`` folder.
+    video, mesh, faces, radar : Path or None
+        Absolute paths, which need not exist (see :meth:`missing`).
+    mesh_frames_per_s, mesh_scale : float or None
+        How to read a mesh that says neither its frame rate nor its unit.
+    radar_offset_s : float
+        Time on the recording's clock at which the first radar frame was taken.
+        The clock is the video's, or the mesh's where there is no video.
+    sensor : VirtualSensor
+    spans : tuple of Span
+    title : str
+    simulated : bool
+        True when no camera and no radar was there.
+    """
+
+    folder: Path
+    video: Path | None = None
+    mesh: Path | None = None
+    faces: Path | None = None
+    radar: Path | None = None
+    mesh_frames_per_s: float | None = None
+    mesh_scale: float | None = None
+    radar_offset_s: float = 0.0
+    sensor: VirtualSensor = field(default_factory=VirtualSensor)
+    spans: tuple[Span, ...] = ()
+    title: str = ""
+    simulated: bool = False
+    _read: _Document = field(default_factory=_Document, repr=False)
+
+    @classmethod
+    def create(
+        cls,
+        folder: Path,
+        *,
+        video: Path | None = None,
+        mesh: Path | None = None,
+        faces: Path | None = None,
+        radar: Path | None = None,
+        mesh_frames_per_s: float | None = None,
+        mesh_scale: float | None = None,
+        radar_offset_s: float = 0.0,
+        sensor: VirtualSensor | None = None,
+        spans: tuple[Span, ...] = (),
+        title: str = "",
+        simulated: bool = False,
+        copy: bool = False,
+        progress: Progress = silent,
+    ) -> Recording:
+        """Make ``folder`` a recording of files that exist, and save it.
+
+        ``.sd2`` is appended to a name without it. Files are referred to where
+        they are; ``copy=True`` copies those outside the folder into it. A
+        folder that exists is taken when it is no recording yet, so that files
+        may be put into it first.
+
+        Raises
+        ------
+        Sd2Error
+            When the folder is a recording already, a file does not exist, or
+            nothing is given to record.
+        """
+        folder = plain_path(Path(folder))
+        if folder.suffix != SUFFIX:
+            folder = folder.with_name(folder.name + SUFFIX)
+        if (folder / FILE_NAME).exists():
+            raise Sd2Error(
+                f"{folder} is a recording already",
+                "a new folder",
+                "Choose another name, or delete that folder first",
+            )
+        given: dict[Role, Path | None] = {
+            "video": video,
+            "mesh": mesh,
+            "faces": faces,
+            "radar": radar,
+        }
+        files: dict[Role, Path] = {}
+        for role, path in given.items():
+            if path is None:
+                continue
+            if not Path(path).exists():
+                remedy = "Give the folder that holds the files" if "*" in str(path) else ""
+                raise Sd2Error(f"The {role} {path} does not exist", "a file or folder", remedy)
+            files[role] = plain_path(Path(path))
+        if not files.keys() - {"faces"}:
+            raise Sd2Error(
+                f"{folder} would hold nothing", "a video, a mesh or a radar capture, or several"
+            )
+        if not folder.parent.is_dir():
+            raise Sd2Error(f"The folder {folder.parent} does not exist", "an existing folder")
+        created = not folder.exists()
+        folder.mkdir(exist_ok=True)
+        copied: list[Path] = []
+        try:
+            if copy:
+                files = _copied(files, folder, copied, progress)
+            recording = cls(
+                folder,
+                video=files.get("video"),
+                mesh=files.get("mesh"),
+                faces=files.get("faces"),
+                radar=files.get("radar"),
+                mesh_frames_per_s=mesh_frames_per_s,
+                mesh_scale=mesh_scale,
+                radar_offset_s=radar_offset_s,
+                sensor=sensor or VirtualSensor(),
+                spans=tuple(spans),
+                title=title or folder.stem,
+                simulated=simulated,
+            )
+            recording.save()
+        except BaseException:
+            for path in [*copied, *([folder] if created else [])]:
+                remove(path)
+            raise
+        return recording
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a user should know about where the files are."""
+        return tuple(
+            f"The {role} {path} is on another drive than the recording: its path is stored in"
+            " full and does not move with the recording."
+            for role, path in self._files().items()
+            if is_absolute(stored_path(path, self.folder))
+        )
+
+    def missing(self) -> dict[Role, Path]:
+        """Files that are not where the recording says."""
+        return {role: path for role, path in self._files().items() if not path.exists()}
+
+    def relink(self, folder: Path, progress: Progress = silent) -> Relinked:
+        """Find all missing files by name under one folder, and save.
+
+        Of several files with the right name, the one whose path agrees with the
+        stored one over the most trailing parts is taken, when it is the only one.
+
+        Parameters
+        ----------
+        folder : Path
+            Searched with everything below it.
+        progress : Progress
+            Called with (folders searched, 0), as the total is not known.
+        """
+        folder = Path(folder)
+        if not folder.is_dir():
+            raise Sd2Error(f"{folder} is not a folder", "the folder to search for missing files")
+        missing = self.missing()
+        candidates = paths_named({path.name for path in missing.values()}, folder, progress)
+        found: dict[Role, Path] = {}
+        ambiguous: dict[Role, tuple[Path, ...]] = {}
+        for role, old in missing.items():
+            same_name = candidates.get(old.name, [])
+            agreement = [common_suffix_length(path, old) for path in same_name]
+            best = [
+                path
+                for path, parts in zip(same_name, agreement, strict=True)
+                if parts == max(agreement)
+            ]
+            if len(best) == 1:
+                found[role] = best[0]
+            elif best:
+                ambiguous[role] = tuple(sorted(best))
+        for role, path in found.items():
+            setattr(self, role, path)
+        if found:
+            self.save()
+        left = tuple(role for role in missing if role not in found and role not in ambiguous)
+        return Relinked(found, ambiguous, left)
+
+    def save(self) -> None:
+        """Write ``recording.json`` in one step, keeping fields this version does not know."""
+        document = self._read
+        document.version = VERSION
+        document.title = self.title
+        document.simulated = self.simulated
+        document.mesh_frames_per_s = self.mesh_frames_per_s
+        document.mesh_scale = self.mesh_scale
+        document.radar_offset_s = _finite(self.radar_offset_s, "radar offset in seconds")
+        document.spans = tuple(self.spans)
+        for name in ("position_m", "azimuth_deg", "elevation_deg", "field_of_view_deg"):
+            setattr(document.sensor, name, getattr(self.sensor, name))
+        for role in ROLES:
+            path = getattr(self, role)
+            setattr(document, role, None if path is None else stored_path(path, self.folder))
+        text = json.dumps(document.model_dump(mode="json"), indent=2, ensure_ascii=False)
+        atomic_write_text(self.folder / FILE_NAME, text + "\n")
+
+    def open_video(self) -> VideoReader:
+        """Open the video."""
+        from sd2core.io.video import open_video
+
+        return open_video(self._present("video"))
+
+    def load_mesh(self) -> MeshSequence:
+        """Load the mesh with its faces, frame rate and scale."""
+        from sd2core.io.mesh import load_mesh
+
+        options: dict[str, Any] = {}
+        if self.faces is not None:
+            options["faces"] = self._present("faces")
+        if self.mesh_frames_per_s is not None:
+            options["frames_per_s"] = self.mesh_frames_per_s
+        if self.mesh_scale is not None:
+            options["scale"] = self.mesh_scale
+        return load_mesh(self._present("mesh"), **options)
+
+    def load_capture(self) -> RadarCapture:
+        """Load the radar capture on its own clock; the recording's is ``radar_offset_s`` later."""
+        from sd2core.io.radar import load_capture
+
+        return load_capture(self._present("radar"))
+
+    def _files(self) -> dict[Role, Path]:
+        paths = {role: getattr(self, role) for role in ROLES}
+        return {role: path for role, path in paths.items() if path is not None}
+
+    def _present(self, role: Role) -> Path:
+        path: Path | None = getattr(self, role)
+        if path is None:
+            has = ", ".join(self._files()) or "nothing"
+            raise Sd2Error(f"{self.folder} holds no {role}", f"a {role}; it has {has}")
+        if not path.exists():
+            raise Sd2Error(
+                f"The {role} of {self.folder} is not at {path}",
+                "the file where the recording says",
+                "Move it back, or find it again with `sd2 relink RECORDING FOLDER`",
+            )
+        return path
+
+
+def is_recording(path: Path) -> bool:
+    """Whether ``path`` is a recording's folder or its ``recording.json``."""
+    path = Path(path)
+    return path.name == FILE_NAME or path.suffix == SUFFIX or (path / FILE_NAME).is_file()
+
+
+def open_recording(path: Path) -> Recording:
+    """Open a recording by its folder or its ``recording.json``.
+
+    Files that it names may be missing: see :meth:`Recording.missing`.
+
+    Raises
+    ------
+    Sd2Error
+        When it is not a recording, is damaged, or was written by a newer version.
+    """
+    path = Path(path)
+    folder = plain_path(path.parent if path.name == FILE_NAME else path)
+    file = folder / FILE_NAME
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise Sd2Error(
+            f"{folder} has no {FILE_NAME}", "a recording made by `sd2 import`"
+        ) from error
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise Sd2Error(f"{file} cannot be read ({error})", "JSON written by SD² Studio") from error
+    found_format = content.get("format") if isinstance(content, dict) else None
+    if found_format != FORMAT:
+        raise Sd2Error(f"{file} has the format {found_format!r}", f"the format {FORMAT!r}")
+    version = content.get("version")
+    if not isinstance(version, int) or not 1 <= version <= VERSION:
+        raise Sd2Error(
+            f"{file} is of version {version!r}",
+            f"a version from 1 to {VERSION}",
+            "Open it with the version of SD² Studio that wrote it, or a later one",
+        )
+    try:
+        document = _Document.model_validate(content)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise Sd2Error(
+            f"{file}: {where} is {first['input']!r} ({first['msg']})",
+            "what docs/formats.md says of a recording",
+            "Correct that entry with a text editor",
+        ) from error
+    sensor = document.sensor
+    return Recording(
+        folder,
+        video=located_path(document.video, folder),
+        mesh=located_path(document.mesh, folder),
+        faces=located_path(document.faces, folder),
+        radar=located_path(document.radar, folder),
+        mesh_frames_per_s=document.mesh_frames_per_s,
+        mesh_scale=document.mesh_scale,
+        radar_offset_s=document.radar_offset_s,
+        sensor=VirtualSensor(
+            position_m=sensor.position_m,
+            azimuth_deg=sensor.azimuth_deg,
+            elevation_deg=sensor.elevation_deg,
+            field_of_view_deg=sensor.field_of_view_deg,
+        ),
+        spans=document.spans,
+        title=document.title or folder.stem,
+        simulated=document.simulated,
+        _read=document,
+    )
+
+
+def _finite(value: float, name: str) -> float:
+    if not math.isfinite(value):
+        raise Sd2Error(f"The {name} is {value}", "a finite number")
+    return float(value)
+
+
+def _copied(
+    files: dict[Role, Path], folder: Path, made: list[Path], progress: Progress
+) -> dict[Role, Path]:
+    """Copy what lies outside ``folder`` into it; ``made`` lists the copies, for undoing."""
+    inside: dict[Role, Path] = {}
+    for done, (role, source) in enumerate(files.items()):
+        progress(done, len(files))
+        if source.is_relative_to(folder):
+            inside[role] = source
+            continue
+        target = folder / source.name
+        if target.exists() or target.name == FILE_NAME:
+            target = folder / f"{role}-{source.name}"
+        temporary = Path(tempfile.mkdtemp(prefix=".copy-", dir=folder))
+        made.append(temporary)
+        if source.is_dir():
+            shutil.copytree(source, temporary / target.name)
+        else:
+            shutil.copy2(source, temporary / target.name)
+        (temporary / target.name).rename(target)
+        made.append(target)
+        temporary.rmdir()
+        inside[role] = target
+    progress(len(files), len(files))
+    return inside

@@ -1,0 +1,68 @@
+"""Paths stored relative to a folder, and files found again after they moved."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path, PurePath, PurePosixPath, PureWindowsPath
+
+from sd2core.progress import Progress
+
+
+def plain_path(path: Path) -> Path:
+    """Absolute, with links in the folders (not the name itself) resolved, so that .. is true."""
+    path = Path(os.path.abspath(path))
+    return path.parent.resolve() / path.name
+
+
+def stored_path(path: Path, folder: Path) -> str:
+    """Write a path relative to ``folder``, with ``/``; in full where it is on another drive."""
+    try:
+        return PurePath(os.path.relpath(path, folder)).as_posix()
+    except ValueError:  # Windows: on another drive
+        return path.as_posix()
+
+
+def located_path(stored: str | None, folder: Path) -> Path | None:
+    """Undo :func:`stored_path`."""
+    if stored is None:
+        return None
+    return Path(stored) if is_absolute(stored) else Path(os.path.normpath(folder / stored))
+
+
+def is_absolute(stored: str) -> bool:
+    """Whether a stored path is written in full, on whatever system it was written."""
+    return PurePosixPath(stored).is_absolute() or PureWindowsPath(stored).is_absolute()
+
+
+def paths_named(names: set[str], folder: Path, progress: Progress) -> dict[str, list[Path]]:
+    """Files and folders of these names below ``folder``."""
+    found: dict[str, list[Path]] = {}
+    root = plain_path(folder)
+    if root.name in names:
+        found.setdefault(root.name, []).append(root)
+    for searched, (where, folders, files) in enumerate(os.walk(root)):
+        progress(searched, 0)
+        for name in names.intersection(folders) | names.intersection(files):
+            found.setdefault(name, []).append(Path(where, name))
+        # A Zarr array is one thing made of countless files.
+        folders[:] = [name for name in folders if not name.endswith(".zarr")]
+    return found
+
+
+def common_suffix_length(a: Path, b: Path) -> int:
+    """How many trailing parts two paths share."""
+    count = 0
+    for part_a, part_b in zip(reversed(a.parts), reversed(b.parts), strict=False):
+        if part_a != part_b:
+            break
+        count += 1
+    return count
+
+
+def remove(path: Path) -> None:
+    """Delete a file or folder, or nothing where there is none."""
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)

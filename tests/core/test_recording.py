@@ -1,0 +1,328 @@
+"""Recordings: what is written is read back, moved, found again and never lost."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sd2core.errors import Sd2Error
+from sd2core.recording import FILE_NAME, VERSION, Recording, Span, is_recording, open_recording
+from sd2core.relative_paths import is_absolute, located_path, stored_path
+from sd2core.sensor import VirtualSensor
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> Path:
+    """A data set: data/one/walk.mkv, data/one/walk.npz, data/one/capture/radar.npy."""
+    folder = tmp_path / "data" / "one"
+    (folder / "capture").mkdir(parents=True)
+    for name in ("walk.mkv", "walk.npz", "faces.npy", "capture/radar.npy"):
+        (folder / name).write_text(name)
+    return folder
+
+
+def make(files: Path, **options: object) -> Recording:
+    return Recording.create(
+        files.parent / "walk.sd2",
+        video=files / "walk.mkv",
+        mesh=files / "walk.npz",
+        faces=files / "faces.npy",
+        radar=files / "capture",
+        **options,  # type: ignore[arg-type]
+    )
+
+
+def content(recording: Recording) -> dict:
+    return json.loads((recording.folder / FILE_NAME).read_text(encoding="utf-8"))
+
+
+def test_everything_is_read_back(files: Path) -> None:
+    made = make(
+        files,
+        mesh_frames_per_s=25.0,
+        mesh_scale=0.001,
+        radar_offset_s=-0.35,
+        sensor=VirtualSensor((-1.0, 0.5, 2.0), 10.0, -5.0, 60.0),
+        spans=(Span(start_s=0.5, end_s=1.25, label="left → right"),),
+        title="Wälk",
+        simulated=True,
+    )
+    read = open_recording(made.folder)
+    for name in Recording.__dataclass_fields__.keys() - {"_read"}:
+        assert getattr(read, name) == getattr(made, name), name
+    assert not read.missing()
+    assert not read.notes
+
+
+def test_opens_by_folder_or_by_file(files: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = make(files)
+    monkeypatch.chdir(made.folder)
+    for path in (Path(), Path(FILE_NAME), made.folder, made.folder / FILE_NAME):
+        assert open_recording(path).video == files / "walk.mkv"
+        assert is_recording(path)
+    assert not is_recording(files / "walk.npz")
+
+
+def test_paths_are_relative_with_forward_slashes(files: Path) -> None:
+    assert content(make(files))["radar"] == "../one/capture"
+
+
+def test_a_data_set_moves_as_a_whole(files: Path, tmp_path: Path) -> None:
+    make(files)
+    (tmp_path / "data").rename(tmp_path / "moved")
+    moved = open_recording(tmp_path / "moved" / "walk.sd2")
+    assert moved.video == tmp_path / "moved" / "one" / "walk.mkv"
+    assert not moved.missing()
+
+
+def test_a_recording_reached_through_a_link_finds_its_files(files: Path, tmp_path: Path) -> None:
+    (tmp_path / "elsewhere" / "deep").mkdir(parents=True)
+    link = tmp_path / "elsewhere" / "deep" / "link"
+    link.symlink_to(files.parent, target_is_directory=True)
+    outside = tmp_path / "outside.mkv"
+    outside.write_text("video")
+    Recording.create(link / "linked.sd2", video=outside)
+    read = open_recording(link / "linked.sd2")
+    assert not read.missing()
+    assert open_recording(files.parent / "linked.sd2").video == outside
+
+
+@given(
+    st.lists(st.sampled_from(["a", "b c", "ä.sd2"]), min_size=1, max_size=4),
+    st.lists(st.sampled_from(["a", "b c", "ä.sd2"]), min_size=1, max_size=4),
+)
+def test_stored_paths_lead_back(path: list[str], folder: list[str]) -> None:
+    root = Path("/root")
+    target, home = root.joinpath(*path), root.joinpath(*folder)
+    stored = stored_path(target, home)
+    assert not is_absolute(stored)
+    assert "\\" not in stored
+    assert located_path(stored, home) == target
+
+
+@pytest.mark.parametrize(
+    "stored", ["D:/data/walk.mkv", "//server/share/walk.mkv", "/data/walk.mkv"]
+)
+def test_a_path_on_another_drive_is_kept_in_full(files: Path, stored: str) -> None:
+    made = make(files)
+    file = made.folder / FILE_NAME
+    file.write_text(json.dumps(content(made) | {"video": stored}))
+    read = open_recording(made.folder)
+    assert read.video == Path(stored)
+    assert read.missing() == {"video": Path(stored)}
+
+
+def test_a_file_on_another_drive_is_noted(files: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def other_drive(path: Path, folder: Path) -> str:
+        raise ValueError("path is on mount 'D:', start on mount 'C:'")
+
+    made = make(files)
+    monkeypatch.setattr("sd2core.relative_paths.os.path.relpath", other_drive)
+    made.save()
+    assert content(made)["video"] == (files / "walk.mkv").as_posix()
+    assert "another drive" in made.notes[0]
+
+
+def test_unknown_fields_survive_a_save(files: Path) -> None:
+    made = make(files, spans=(Span(start_s=0, end_s=1, label="up"),))
+    written = content(made)
+    written["camera"] = {"focal_px": 600}
+    written["sensor"]["name"] = "left"
+    written["spans"][0]["annotator"] = "A"
+    (made.folder / FILE_NAME).write_text(json.dumps(written))
+    read = open_recording(made.folder)
+    read.radar_offset_s = 0.5
+    read.sensor = replace(read.sensor, position_m=(1.0, 0.0, 0.0))
+    read.save()
+    again = content(read)
+    assert again["camera"] == {"focal_px": 600}
+    assert again["sensor"]["name"] == "left"
+    assert again["sensor"]["position_m"] == [1.0, 0.0, 0.0]
+    assert again["spans"][0]["annotator"] == "A"
+    assert again["radar_offset_s"] == 0.5
+
+
+def test_a_failed_save_leaves_the_old_recording(
+    files: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = make(files, title="before")
+
+    def full(descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("sd2core.atomic.os.fsync", full)
+    made.title = "after"
+    with pytest.raises(OSError, match="No space"):
+        made.save()
+    assert open_recording(made.folder).title == "before"
+    assert [path.name for path in made.folder.iterdir()] == [FILE_NAME]
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"version": VERSION + 1}, r"of version 2.*the version of SD² Studio that wrote it"),
+        ({"version": "new"}, "of version 'new'"),
+        ({"format": "other"}, "format 'other'"),
+        ({"radar_offset_s": "soon"}, "radar_offset_s is 'soon'"),
+        ({"sensor": {"position_m": [0, 0]}}, "sensor.position_m"),
+        ({"spans": [{"start_s": 2, "end_s": 1, "label": "x"}]}, "ends at 1.0 s"),
+        ({"video": 3}, "video is 3"),
+    ],
+)
+def test_what_is_wrong_is_said(files: Path, change: dict, says: str) -> None:
+    made = make(files)
+    (made.folder / FILE_NAME).write_text(json.dumps(content(made) | change))
+    with pytest.raises(Sd2Error, match=says):
+        open_recording(made.folder)
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "3", "\udcff"])
+def test_damaged_files_are_explained(files: Path, text: str) -> None:
+    made = make(files)
+    (made.folder / FILE_NAME).write_bytes(text.encode("utf-8", "surrogateescape"))
+    with pytest.raises(Sd2Error, match=FILE_NAME):
+        open_recording(made.folder)
+
+
+def test_a_folder_that_is_no_recording(tmp_path: Path) -> None:
+    with pytest.raises(Sd2Error, match=r"has no recording.json.*sd2 import"):
+        open_recording(tmp_path)
+
+
+class TestCreate:
+    def test_appends_the_suffix(self, files: Path) -> None:
+        assert Recording.create(files / "walk.v2", video=files / "walk.mkv").folder.name == (
+            "walk.v2.sd2"
+        )
+
+    def test_refuses_to_replace_a_recording(self, files: Path) -> None:
+        make(files, title="first")
+        with pytest.raises(Sd2Error, match="is a recording already"):
+            make(files)
+        assert open_recording(files.parent / "walk.sd2").title == "first"
+
+    def test_refuses_a_file_that_is_not_there(self, files: Path) -> None:
+        with pytest.raises(Sd2Error, match=r"The mesh .*no\.npz does not exist"):
+            Recording.create(files / "x.sd2", mesh=files / "no.npz")
+        assert not (files / "x.sd2").exists()
+
+    @pytest.mark.parametrize("given_faces", [False, True])
+    def test_refuses_nothing(self, files: Path, given_faces: bool) -> None:
+        faces = files / "faces.npy" if given_faces else None
+        with pytest.raises(Sd2Error, match="would hold nothing"):
+            Recording.create(files / "x.sd2", faces=faces)
+
+    def test_refuses_an_offset_that_is_no_number(self, files: Path) -> None:
+        with pytest.raises(Sd2Error, match="radar offset"):
+            make(files, radar_offset_s=float("nan"))
+        assert not (files.parent / "walk.sd2").exists()
+
+    def test_takes_a_folder_into_which_files_were_put(self, files: Path) -> None:
+        folder = files / "ready.sd2"
+        folder.mkdir()
+        (folder / "body.npz").write_text("mesh")
+        made = Recording.create(folder, mesh=folder / "body.npz", copy=True)
+        assert content(made)["mesh"] == "body.npz"
+        assert sorted(path.name for path in folder.iterdir()) == ["body.npz", FILE_NAME]
+
+    def test_copies_files_and_folders(self, files: Path, tmp_path: Path) -> None:
+        other = tmp_path / "other" / "walk.mkv"
+        other.parent.mkdir()
+        other.write_text("a mesh with the video's name")
+        made = Recording.create(
+            tmp_path / "all.sd2",
+            video=files / "walk.mkv",
+            mesh=other,
+            radar=files / "capture",
+            copy=True,
+        )
+        assert {role: content(made)[role] for role in ("video", "mesh", "radar")} == {
+            "video": "walk.mkv",
+            "mesh": "mesh-walk.mkv",
+            "radar": "capture",
+        }
+        assert (made.folder / "mesh-walk.mkv").read_text() == other.read_text()
+        assert (made.folder / "capture" / "radar.npy").read_text() == "capture/radar.npy"
+        assert not list(made.folder.glob(".*"))
+
+    def test_a_cancelled_copy_leaves_nothing(self, files: Path, tmp_path: Path) -> None:
+        from sd2core.progress import Cancelled
+
+        def stop(done: int, total: int) -> None:
+            if done == 1:
+                raise Cancelled
+
+        with pytest.raises(Cancelled):
+            Recording.create(
+                tmp_path / "all.sd2",
+                video=files / "walk.mkv",
+                mesh=files / "walk.npz",
+                copy=True,
+                progress=stop,
+            )
+        assert not (tmp_path / "all.sd2").exists()
+        assert (files / "walk.mkv").exists()
+
+
+class TestRelink:
+    def test_all_missing_files_by_one_folder(self, files: Path, tmp_path: Path) -> None:
+        made = make(files)
+        files.rename(tmp_path / "disk")
+        read = open_recording(made.folder)
+        assert set(read.missing()) == {"video", "mesh", "faces", "radar"}
+        result = read.relink(tmp_path)
+        assert set(result.found) == {"video", "mesh", "faces", "radar"}
+        assert not result.missing
+        again = open_recording(made.folder)
+        assert not again.missing()
+        assert content(again)["video"] == "../../disk/walk.mkv"
+
+    def test_the_longest_common_path_wins(self, files: Path, tmp_path: Path) -> None:
+        made = make(files)
+        for name in ("one", "two"):
+            (tmp_path / "disk" / name).mkdir(parents=True)
+            (tmp_path / "disk" / name / "walk.mkv").write_text(name)
+        (files / "walk.mkv").unlink()
+        result = made.relink(tmp_path / "disk")
+        assert result.found == {"video": tmp_path / "disk" / "one" / "walk.mkv"}
+        assert made.mesh == files / "walk.npz"
+
+    def test_equally_good_files_are_named_and_left_alone(self, files: Path, tmp_path: Path) -> None:
+        made = make(files)
+        before = content(made)
+        candidates = tuple(tmp_path / "disk" / name / "walk.mkv" for name in ("a", "b"))
+        for path in candidates:
+            path.parent.mkdir(parents=True)
+            path.write_text("video")
+        (files / "walk.mkv").unlink()
+        (files / "walk.npz").unlink()
+        result = made.relink(tmp_path / "disk")
+        assert not result.found
+        assert result.ambiguous == {"video": candidates}
+        assert result.missing == ("mesh",)
+        assert content(made) == before
+
+    def test_the_folder_itself_may_be_what_is_missing(self, files: Path, tmp_path: Path) -> None:
+        made = make(files)
+        (files / "capture").rename(tmp_path / "capture")
+        assert made.relink(tmp_path / "capture").found == {"radar": tmp_path / "capture"}
+
+    def test_a_file_is_no_folder(self, files: Path) -> None:
+        with pytest.raises(Sd2Error, match="is not a folder"):
+            make(files).relink(files / "walk.mkv")
+
+
+def test_a_missing_file_is_explained_when_it_is_opened(files: Path) -> None:
+    made = make(files)
+    (files / "walk.npz").unlink()
+    with pytest.raises(Sd2Error, match=r"mesh of .*walk\.npz.*sd2 relink"):
+        made.load_mesh()
+    made.mesh = None
+    with pytest.raises(Sd2Error, match="holds no mesh"):
+        made.load_mesh()
