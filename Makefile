@@ -1,0 +1,76 @@
+# Everything one does with a checkout. `make demo` and `make test` set up what they need.
+
+# The Python to make .venv from, e.g. `make setup PYTHON=python3.12`; found by itself otherwise.
+PYTHON ?=
+BIN := .venv/bin
+PYTEST := $(BIN)/python -m pytest
+export PYTHON
+
+INSTALLED := .venv/.installed
+COMPILED := .venv/.compiled
+KERNELS := $(wildcard sd2core/compiled.py sd2core/scattering/*.py sd2core/doppler/*.py)
+
+.PHONY: help setup demo test test-slow lint format bench wheel screenshots clean
+
+help:
+	@echo "make demo         set up, and open the sample recording in the window"
+	@echo "make test         set up, and run the test suite (no display needed)"
+	@echo "make setup        virtual environment in .venv, with pinned dependencies"
+	@echo "make lint         ruff, mypy and the rules between modules"
+	@echo "make format       let ruff format the code"
+	@echo "make test-slow    the tests that take minutes"
+	@echo "make bench        the benchmarks"
+	@echo "make wheel        dist/*.whl"
+	@echo "make screenshots  the pictures in docs/"
+	@echo "make clean        remove what the above made, .venv included"
+
+setup: system-libraries $(COMPILED)
+
+.PHONY: system-libraries system-libraries-for-tests
+system-libraries:
+	@scripts/system_libraries.sh window
+
+system-libraries-for-tests:
+	@scripts/system_libraries.sh window tests
+
+$(INSTALLED): pyproject.toml constraints.txt scripts/virtual_environment.sh
+	@scripts/virtual_environment.sh
+	@touch $@
+
+$(COMPILED): $(INSTALLED) $(KERNELS)
+	@echo "Compiling the kernels …"
+	@$(BIN)/sd2 warm-up
+	@touch $@
+
+demo: setup
+	@scripts/demo.sh
+
+test: system-libraries-for-tests setup
+	@scripts/test.sh "not slow"
+
+test-slow: system-libraries-for-tests setup
+	@scripts/test.sh "slow"
+
+lint: $(INSTALLED)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+format: $(INSTALLED)
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+bench: setup
+	QT_QPA_PLATFORM=offscreen $(PYTEST) tests/benchmarks --benchmark-only --timeout=0
+
+wheel: $(INSTALLED)
+	$(BIN)/python -m build --wheel --no-isolation
+
+screenshots: system-libraries-for-tests setup
+	$(BIN)/python docs/screenshots.py
+
+clean:
+	rm -rf .venv build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks \
+		.import_linter_cache
+	find sd2core sd2app tests docs -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,27 @@
+#!/usr/bin/env bash
+# Run the tests of a marker expression, e.g. "not slow": first those that need no
+# display, then those that need one, on a virtual one. Fails when either part does.
+set -uo pipefail
+cd "$(dirname "$0")/.."
+
+NO_TESTS_COLLECTED=5
+pytest=".venv/bin/python -m pytest"
+expression=$1
+
+echo "== Tests without a display"
+QT_QPA_PLATFORM=offscreen $pytest -m "($expression) and not gl" < /dev/null
+offscreen=$?
+if [ $offscreen -eq $NO_TESTS_COLLECTED ]; then offscreen=0; fi
+
+echo "== Tests on a display"
+if [ "$(uname -s)" = Linux ]; then
+    QT_QPA_PLATFORM=xcb xvfb-run -a -s "-screen 0 1600x1000x24 -noreset" \
+        $pytest -m "($expression) and gl" < /dev/null
+else
+    $pytest -m "($expression) and gl" < /dev/null
+fi
+display=$?
+if [ $display -eq $NO_TESTS_COLLECTED ]; then display=0; fi
+
+if [ $offscreen -ne 0 ]; then exit $offscreen; fi
+exit $display
