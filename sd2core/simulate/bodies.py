@@ -1,0 +1,235 @@
+"""The bundled body: a closed surface on a skeleton, posed by linear blend skinning."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+from sd2core.resources import resource_path
+
+FORMAT = "sd2-body"
+VERSION = 1
+INFLUENCES = 8
+"""Bones per vertex, at most."""
+
+Resolution = Literal["low", "high"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Skeleton:
+    """Bones at rest, every parent before its children, bone 0 the root.
+
+    Parameters
+    ----------
+    names : tuple of str
+    parents : tuple of int
+        -1 for the root.
+    heads_m, tails_m : float64 array, shape (B, 3)
+        The head is where the bone turns.
+    rotations : float64 array, shape (B, 3, 3)
+        Axes of every bone as Anny defines them, in columns. Posing does not
+        need them; whoever exchanges poses with Anny does.
+    """
+
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    heads_m: Floats
+    tails_m: Floats
+    rotations: Floats
+
+    @cached_property
+    def index(self) -> Mapping[str, int]:
+        """Number of a bone by its name."""
+        return {name: number for number, name in enumerate(self.names)}
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def transforms(self, rotations: Floats, translation_m: Floats | None = None) -> Floats:
+        """Where every bone takes what is fixed to it.
+
+        Parameters
+        ----------
+        rotations : array, shape (T, B, 3, 3)
+            Rotation of every bone about its head relative to its parent, in the
+            axes of the rest pose; the identity is the rest pose.
+        translation_m : array, shape (T, 3), optional
+            Added to everything.
+
+        Returns
+        -------
+        float64 array, shape (T, B, 3, 4)
+            ``[R | t]``: a point x at rest goes to R x + t.
+        """
+        frames = len(rotations)
+        transforms = np.empty((frames, len(self), 3, 4))
+        for bone, parent in enumerate(self.parents):
+            head = self.heads_m[bone]
+            turn = rotations[:, bone]
+            if parent < 0:
+                moved = np.broadcast_to(head, (frames, 3))
+                if translation_m is not None:
+                    moved = moved + translation_m
+            else:
+                above = transforms[:, parent]
+                turn = _product(above[..., :3], turn)
+                moved = _apply(above, head)
+            transforms[:, bone, :, :3] = turn
+            transforms[:, bone, :, 3] = moved - _turned(turn, head)
+        return transforms
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A surface fixed to a skeleton.
+
+    Axes are those of the camera frame for a body that faces the camera: x to its
+    left (right in the image), y down, z backwards; the origin is on the floor.
+
+    Parameters
+    ----------
+    vertices_m : float64 array, shape (V, 3)
+        At rest.
+    faces : int32 array, shape (F, 3)
+        Counter-clockwise seen from outside.
+    bones : intp array, shape (V, 8)
+        Bones that move a vertex, strongest first.
+    weights : float64 array, shape (V, 8)
+        How much; each row adds up to 1.
+    skeleton : Skeleton
+    """
+
+    vertices_m: Floats
+    faces: NDArray[np.int32]
+    bones: NDArray[np.intp]
+    weights: Floats
+    skeleton: Skeleton
+
+    @classmethod
+    def load(cls, resolution: Resolution = "high", path: Path | None = None) -> Body:
+        """Read one surface of the bundled body (or of another export).
+
+        Parameters
+        ----------
+        resolution : {"high", "low"}
+            13,348 or 1,229 vertices; both are one closed component.
+        path : Path, optional
+
+        Raises
+        ------
+        Sd2Error
+            When the file is missing, damaged or of a later version.
+        """
+        path = resource_path("body.npz") if path is None else Path(path)
+        try:
+            with np.load(path, allow_pickle=False) as data:
+                meta = json.loads(str(data["meta"]))
+                if meta.get("format") != FORMAT or meta.get("version", 0) > VERSION:
+                    raise Sd2Error(
+                        f"{path} is of format {meta.get('format')!r} version {meta.get('version')}",
+                        f"{FORMAT!r} up to version {VERSION}",
+                        "Open it with the version of SD² Studio that wrote it",
+                    )
+                return cls._from_arrays(resolution, data)
+        except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
+            raise Sd2Error(
+                f"{path} cannot be read as a body ({error})",
+                "a file written by `sd2 simulate export-body`",
+            ) from error
+
+    @classmethod
+    def _from_arrays(cls, resolution: Resolution, data: Any) -> Body:
+        skeleton = Skeleton(
+            names=tuple(str(name) for name in data["bone_names"]),
+            parents=tuple(int(parent) for parent in data["bone_parents"]),
+            heads_m=data["bone_heads"].astype(np.float64),
+            tails_m=data["bone_tails"].astype(np.float64),
+            rotations=data["bone_rotations"].astype(np.float64),
+        )
+        weights = data[f"{resolution}_weights"].astype(np.float64)
+        return cls(
+            vertices_m=data[f"{resolution}_vertices"].astype(np.float64),
+            faces=data[f"{resolution}_faces"].astype(np.int32),
+            bones=data[f"{resolution}_bones"].astype(np.intp),
+            weights=weights / weights.sum(axis=1, keepdims=True),
+            skeleton=skeleton,
+        )
+
+    def pose(self, rotations: Floats, translation_m: Floats | None = None) -> Floats:
+        """Vertices of every frame by linear blend skinning.
+
+        Parameters
+        ----------
+        rotations : array, shape (T, B, 3, 3)
+        translation_m : array, shape (T, 3), optional
+            See :meth:`Skeleton.transforms`.
+
+        Returns
+        -------
+        float64 array, shape (T, V, 3)
+        """
+        transforms = self.skeleton.transforms(rotations, translation_m)  # (T, B, 3, 4)
+        vertices = np.empty((len(transforms), len(self.vertices_m), 3))
+        for frame, bones in enumerate(transforms):
+            blend = np.zeros((len(self.vertices_m), 3, 4))
+            # Slot after slot instead of a matrix product: the same sum in the same
+            # order everywhere, which the sample's reproducibility rests on.
+            for rows, numbers, weights in self._slots:
+                blend[rows] += weights[:, None, None] * bones[numbers]
+            vertices[frame] = _apply(blend, self.vertices_m)
+        return vertices
+
+    @cached_property
+    def _slots(self) -> list[tuple[NDArray[np.intp], NDArray[np.intp], Floats]]:
+        slots = []
+        for slot in range(self.weights.shape[1]):
+            rows = np.flatnonzero(self.weights[:, slot])
+            slots.append((rows, self.bones[rows, slot], self.weights[rows, slot]))
+        return slots
+
+
+def vertex_normals(vertices_m: Floats, faces: NDArray[np.int32]) -> Floats:
+    """Outward unit normals of one frame, area-weighted over the faces, (V, 3)."""
+    corners = vertices_m[faces]  # (F, 3, 3)
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = np.stack(
+        [
+            np.bincount(faces.ravel(), np.repeat(across[:, axis], 3), minlength=len(vertices_m))
+            for axis in range(3)
+        ],
+        axis=1,
+    )
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
+
+
+def _turned(turn: Floats, point: Floats) -> Floats:
+    """(..., 3, 3) applied to (..., 3), summed in a fixed order."""
+    return (
+        turn[..., 0] * point[..., 0, None]
+        + turn[..., 1] * point[..., 1, None]
+        + turn[..., 2] * point[..., 2, None]
+    )
+
+
+def _apply(transform: Floats, point: Floats) -> Floats:
+    return _turned(transform[..., :3], point) + transform[..., 3]
+
+
+def _product(left: Floats, right: Floats) -> Floats:
+    return (
+        left[..., :, 0, None] * right[..., None, 0, :]
+        + left[..., :, 1, None] * right[..., None, 1, :]
+        + left[..., :, 2, None] * right[..., None, 2, :]
+    )
