@@ -171,6 +171,8 @@ def describe_mesh(path: Path, mesh: MeshSequence) -> Description:
 
 def describe_capture(path: Path, capture: RadarCapture) -> Description:
     """Describe a radar capture and what its radar can tell apart."""
+    from sd2core.fmcw import limits
+
     config = capture.config
     data = {
         "kind": "radar",
@@ -180,15 +182,15 @@ def describe_capture(path: Path, capture: RadarCapture) -> Description:
         "receivers": config.receivers,
         "chirps_per_frame": config.chirps_per_frame,
         "samples_per_chirp": config.samples_per_chirp,
-        **radar_limits(config),
+        **limits(config),
         **_clock_data(capture.timebase),
         "start_unix_s": capture.start_unix_s,
         "notes": list(capture.notes),
     }
     facts = {
         "radar": config.name + (" (simulated)" if capture.simulated else ""),
-        "samples": f"{config.receivers} receivers, {config.chirps_per_frame} chirps per frame,"
-        f" {config.samples_per_chirp} samples per chirp",
+        "samples": f"{config.samples_per_chirp} per chirp, {config.chirps_per_frame} chirps per frame,"
+        f" {config.receivers} receiver{'s' if config.receivers > 1 else ''}",
         "time": _clock(capture.timebase),
         **limit_facts(config),
     }
@@ -218,27 +220,17 @@ def describe_map(path: Path, doppler: DopplerMap) -> Description:
         "nulled bins": ", ".join(map(str, doppler.null_bins)),
         "unseen bins": ", ".join(map(str, doppler.unseen_bins)),
     }
-    return Description(f"Doppler map {path}", data, facts)
-
-
-def radar_limits(config: RadarConfig) -> dict[str, float]:
-    """What follows from a radar's configuration, by name."""
-    return {
-        "wavelength_m": config.wavelength_m,
-        "v_max_mps": config.v_max_mps,
-        "velocity_resolution_mps": config.velocity_resolution_mps,
-        "range_resolution_m": config.range_resolution_m,
-        "range_max_m": config.range_max_m,
-    }
+    notes = tuple(doppler.meta.get("notes", ()))
+    return Description(f"Doppler map {path}", data, facts, notes)
 
 
 def limit_facts(config: RadarConfig) -> dict[str, str]:
     """What follows from a radar's configuration, for people."""
     return {
         "wavelength λ": f"{config.wavelength_m * 1e3:.3f} mm",
-        "velocity": f"up to v_max ±{config.v_max_mps:.3f} m/s,"
+        "radar velocity": f"up to v_max ±{config.v_max_mps:.3f} m/s,"
         f" in steps Δv of {config.velocity_resolution_mps:.3f} m/s",
-        "range": f"up to R_max {config.range_max_m:.2f} m,"
+        "radar range": f"up to R_max {config.range_max_m:.2f} m,"
         f" in steps ΔR of {config.range_resolution_m:.3f} m",
     }
 

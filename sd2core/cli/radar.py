@@ -1,0 +1,81 @@
+"""``sd2 radar``: raw capture to Doppler map."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from sd2core.cli.options import add_axis, add_command, add_json, span_m
+from sd2core.cli.output import progress_bar
+
+
+def add_commands(commands: argparse._SubParsersAction) -> None:
+    """Add ``radar``."""
+    parser = add_command(
+        commands,
+        "radar",
+        "turn a raw radar capture into a Doppler map",
+        handler=_radar,
+        description=(
+            "Prints what the radar can tell apart by its configuration, and says when the\n"
+            "velocity axis reaches further than the radar sees."
+        ),
+        examples=(
+            "  sd2 radar capture/ --out real.npz\n"
+            "  sd2 radar capture/ --out real.npz --clutter mean --range 0.5,4\n"
+            "  sd2 radar walk.sd2 --out real.npz    (the capture of a recording)"
+        ),
+    )
+    parser.add_argument(
+        "capture", type=Path, metavar="CAPTURE", help="the capture's folder, or a recording"
+    )
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="FILE.npz", help="the map to write"
+    )
+    add_axis(parser)
+    parser.add_argument(
+        "--clutter",
+        choices=("none", "mean", "moving"),
+        default="none",
+        help="what to subtract as static: nothing; each frame's mean over its chirps; or that"
+        " mean averaged over frames, which keeps slow movers (default: none)",
+    )
+    parser.add_argument(
+        "--range",
+        type=span_m,
+        metavar="LO,HI",
+        help="count only echoes from this range in metres (default: all)",
+    )
+    add_json(parser)
+
+
+def _radar(options: argparse.Namespace) -> None:
+    from sd2core.cli.info import describe_map, limit_facts, show
+    from sd2core.cli.reading import check_output
+    from sd2core.fmcw import doppler_map, limits
+    from sd2core.io.radar import load_capture
+    from sd2core.recording import is_recording, open_recording
+    from sd2core.sensor import VelocityAxis
+
+    check_output(options.out, ".npz")
+    offset_s = 0.0
+    if is_recording(options.capture):
+        recording = open_recording(options.capture)
+        capture, offset_s = recording.load_capture(), recording.radar_offset_s
+    else:
+        capture = load_capture(options.capture)
+    default = VelocityAxis()
+    with progress_bar("Processing") as progress:
+        doppler = doppler_map(
+            capture,
+            axis=VelocityAxis(options.bins or default.bins, options.v_max or default.v_max_mps),
+            clutter=options.clutter,
+            range_m=options.range,
+            progress=progress,
+        ).shifted(offset_s)
+    doppler.save(options.out)
+    description = describe_map(options.out, doppler)
+    description.data["limits"] = limits(capture.config)
+    radar = {"radar": capture.config.name, **limit_facts(capture.config)}
+    description.facts = radar | description.facts
+    show(description, as_json=options.json)
