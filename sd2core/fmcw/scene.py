@@ -145,10 +145,8 @@ class MeshScene:
         timebase = self.mesh.timebase
         step_s = self.config.frame_repetition_s
         span_s = float(timebase.times_s[-1]) - timebase.start_s
-        times: NDArray[np.float64] = (
-            timebase.start_s + np.arange(int(span_s / step_s + 1e-6) + 1) * step_s
-        )
-        return times
+        steps = np.arange(int(span_s / step_s + 1e-6) + 1, dtype=np.float64)
+        return timebase.start_s + steps * step_s
 
     def at(self, time_s: float) -> Scatterers:
         """Facets at an instant, moving with the central difference over two mesh frames."""

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -170,7 +171,8 @@ def capture_scene(
         meta={
             "simulation": {
                 "model": "FMCW beat signal of facets",
-                "source": source,
+                # The name only: the folder says nothing on another machine.
+                "source": Path(source).name,
                 "sensor": asdict(sensor),
                 "options": asdict(options) | {"snr_db": _finite(options.snr_db)},
                 "first_frame_s": float(times_s[0]),
@@ -282,8 +284,9 @@ def _digitise(
         clipped += int(np.count_nonzero((counts < 0) | (counts > 2 * middle - 1)))
         samples[frame] = np.clip(counts, 0, 2 * middle - 1)
     return samples, {
-        "counts_per_unit": gain,
-        "noise_rms_counts": noise,
+        # Rounded, so that the last bits of a machine's arithmetic are not in the file.
+        "counts_per_unit": float(f"{gain:.9g}"),
+        "noise_rms_counts": float(f"{noise:.9g}"),
         "clipped_share": clipped / samples.size,
     }
 

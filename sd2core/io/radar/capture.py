@@ -47,25 +47,11 @@ class RadarCapture:
     meta: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        config = self.config
-        shape = tuple(self.samples.shape)
-        cube = (config.receivers, config.chirps_per_frame, config.samples_per_chirp)
-        if len(shape) != 4 or shape[0] == 0 or shape[1:] != cube:
+        check_cube(self.samples, self.config, self.source)
+        frames = self.samples.shape[0]
+        if len(self.timebase) != frames:
             raise Sd2Error(
-                f"{self.source or 'The radar cube'} has shape {shape}",
-                f"(frames, {cube[0]} receivers, {cube[1]} chirps, {cube[2]} samples), at least one"
-                " frame, as the configuration says",
-                "Use the config.json that was recorded with this radar.npy",
-            )
-        if self.samples.dtype.kind != "u" or self.samples.dtype.itemsize != 2:
-            raise Sd2Error(
-                f"{self.source or 'The radar cube'} holds {self.samples.dtype}",
-                "uint16 converter counts",
-                "Use the raw radar.npy of the recording, not a processed copy",
-            )
-        if len(self.timebase) != shape[0]:
-            raise Sd2Error(
-                f"{self.source or 'The radar cube'}: {shape[0]} frames but"
+                f"{self.source or 'The radar cube'}: {frames} frames but"
                 f" {len(self.timebase)} times",
                 "one time per frame",
             )
@@ -90,3 +76,28 @@ class RadarCapture:
         counts -= half
         counts /= half
         return counts
+
+
+def check_cube(samples: NDArray[np.uint16], config: RadarConfig, source: str) -> None:
+    """Refuse samples that cannot be what this radar recorded.
+
+    Raises
+    ------
+    Sd2Error
+        When the shape contradicts the configuration or the type is another one.
+    """
+    shape = tuple(samples.shape)
+    cube = (config.receivers, config.chirps_per_frame, config.samples_per_chirp)
+    if len(shape) != 4 or shape[0] == 0 or shape[1:] != cube:
+        raise Sd2Error(
+            f"{source or 'The radar cube'} has shape {shape}",
+            f"(frames, {cube[0]} receivers, {cube[1]} chirps, {cube[2]} samples) as the"
+            " configuration says, at least one frame",
+            "Use the config.json that was recorded with this radar.npy",
+        )
+    if samples.dtype.kind != "u" or samples.dtype.itemsize != 2:
+        raise Sd2Error(
+            f"{source or 'The radar cube'} holds {samples.dtype}",
+            "uint16 converter counts",
+            "Use the raw radar.npy of the recording, not a processed copy",
+        )

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from sd2core.errors import Sd2Error
-from sd2core.io.radar.capture import RadarCapture
+from sd2core.io.radar.capture import RadarCapture, check_cube
 from sd2core.sensor import RadarConfig
 from sd2core.timebase import Timebase
 
@@ -102,6 +102,7 @@ def load_infineon(folder: Path) -> RadarCapture:
     meta = _read_meta(folder / _META)
     config = _read_config(folder / _CONFIG, meta)
     samples = _open_samples(folder / _DATA)
+    check_cube(samples, config, str(folder / _DATA))
     timebase, start_unix_s, notes = _read_times(folder / _TIMES, len(samples), config)
     return RadarCapture(
         samples=samples,
@@ -146,7 +147,9 @@ def write_capture(
     folder = Path(folder)
     timebase = Timebase(times_s)
     cube = np.asarray(samples)
-    RadarCapture(cube, config, timebase, simulated=simulated, source=str(folder))
+    check_cube(cube, config, f"The recording for {folder}")
+    if len(timebase) != len(cube):
+        raise Sd2Error(f"{len(cube)} radar frames but {len(timebase)} times", "one time per frame")
     if folder.exists() and not (folder.is_dir() and _replaceable(folder)):
         raise Sd2Error(
             f"{folder} exists and is not a radar recording",
