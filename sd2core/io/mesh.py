@@ -1,0 +1,220 @@
+"""Reading and writing meshes of every kind that is known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+from sd2core.io.mesh_arrays import (
+    RawMesh,
+    StoredVertices,
+    read_npz,
+    read_zarr,
+    write_npz,
+    write_zarr,
+)
+from sd2core.io.mesh_checks import check_mesh, drop_empty_frames
+from sd2core.io.mesh_files import is_pattern, read_faces, read_mesh_files
+from sd2core.mesh import MeshSequence
+from sd2core.progress import Progress, silent
+from sd2core.timebase import Timebase
+
+_SURFACES = {".obj", ".ply", ".glb", ".gltf", ".off", ".stl"}
+_KNOWN = (
+    ".npz, .zarr, .zarr.zip, .obj/.ply/.glb (one, a folder or a pattern such as 'frames/*.obj'), "
+    "or the .pkl of VIBE, WHAM or another tool that holds 'verts'"
+)
+
+
+def load_mesh(
+    path: Path | str,
+    *,
+    faces: Path | str | None = None,
+    frames_per_s: float | None = None,
+    scale: float | None = None,
+    person: int | str | None = None,
+    image_size: tuple[int, int] | None = None,
+    focal_px: float | None = None,
+    distance_m: float | None = None,
+    progress: Progress = silent,
+) -> MeshSequence:
+    """Read a mesh sequence or point cloud.
+
+    Parameters
+    ----------
+    path : path
+        ``.npz`` or Zarr (``vertices`` (T, V, 3), ``faces`` (F, 3), ``times_s``
+        (T,)); a file, folder or pattern of OBJ, PLY or GLB, one file per frame
+        in natural order of their names; the pickle of VIBE, WHAM or any tool
+        that stores ``verts``, of which nothing is executed.
+    faces : path, optional
+        ``.npy``, ``.npz`` or a mesh file with the triangles, instead of those
+        in the file.
+    frames_per_s : float, optional
+        Replaces the file's times. Without it a file that has none is taken to
+        be at 30 frames/s, with a note.
+    scale : float, optional
+        Factor to metres. Giving it, 1.0 included, also says that the size is
+        right and needs no check.
+    person : optional
+        Which person of a file of several; by default the one seen longest.
+    image_size : (width, height), optional
+        Of the video that VIBE saw: places its root-centred mesh in front of
+        the camera.
+    focal_px : float, optional
+        Focal length for ``image_size``; by default the image's diagonal.
+    distance_m : float, optional
+        Moves the mesh forward, for one that is centred on the body's root.
+    progress : callable
+        Called while files are read; may raise ``Cancelled``.
+
+    Returns
+    -------
+    MeshSequence
+        With notes about everything that was assumed or repaired. Vertices in
+        memory are all checked; those on disk in a sample of frames here, and
+        for finite values whenever they are read.
+
+    Raises
+    ------
+    Sd2Error
+        When the file cannot be understood; it says what to do.
+    """
+    path = Path(path)
+    if scale is not None and not (np.isfinite(scale) and scale > 0):
+        raise Sd2Error(f"The scale is {scale}", "a positive factor to metres, such as 0.001")
+    raw = _read(path, person, image_size, focal_px, progress)
+    source = str(path)
+    if faces is not None:
+        raw.faces = read_faces(Path(faces))
+    _as_vertices(raw, source)
+    times_s = drop_empty_frames(raw, _times(raw, frames_per_s, source), source)
+    _place(raw, 1.0 if scale is None else scale, distance_m or 0.0)
+    check_mesh(raw, source, check_size=scale is None)
+    try:
+        timebase = Timebase(times_s)
+    except Sd2Error as error:
+        raise Sd2Error(f"{source}: {error.found}", error.expected, error.remedy) from error
+    return MeshSequence(raw.vertices, raw.faces, timebase, source, tuple(raw.notes))
+
+
+def save_mesh(mesh: MeshSequence, path: Path | str, progress: Progress = silent) -> None:
+    """Write a mesh as ``.npz``, ``.zarr`` or ``.zarr.zip``, block by block and in one step.
+
+    Raises
+    ------
+    Sd2Error
+        When the name ends in none of these, or a vertex is not finite.
+    """
+    path = Path(path)
+    if not path.absolute().parent.is_dir():
+        raise Sd2Error(
+            f"The folder {path.absolute().parent} does not exist", "an existing folder for the mesh"
+        )
+    if path.suffix.lower() == ".npz":
+        write_npz(mesh, path, progress)
+    elif path.suffix.lower() == ".zarr" or path.name.lower().endswith(".zarr.zip"):
+        write_zarr(mesh, path, progress)
+    else:
+        raise Sd2Error(
+            f"The mesh is to be saved as {path.name}",
+            "a name that ends in .npz, .zarr or .zarr.zip",
+            "Use .zarr for long recordings and .npz for exchange",
+        )
+
+
+def _read(
+    path: Path,
+    person: int | str | None,
+    image_size: tuple[int, int] | None,
+    focal_px: float | None,
+    progress: Progress,
+) -> RawMesh:
+    if is_pattern(path):
+        return read_mesh_files(path, progress)
+    if not path.exists():
+        raise Sd2Error(f"{path} does not exist", f"a mesh: {_KNOWN}", "Check the path")
+    suffix = path.suffix.lower()
+    if path.is_dir():
+        markers = ("zarr.json", ".zgroup", ".zarray")
+        if suffix == ".zarr" or any((path / name).exists() for name in markers):
+            return read_zarr(path)
+        return read_mesh_files(path, progress)
+    if path.name.lower().endswith(".zarr.zip"):
+        return read_zarr(path)
+    if suffix == ".npz":
+        return read_npz(path)
+    if suffix in _SURFACES:
+        return read_mesh_files(path, progress)
+    if suffix in {".pt", ".pth", ".ckpt"}:
+        raise Sd2Error(
+            f"{path} is a torch file",
+            f"a mesh: {_KNOWN}",
+            "Save the vertices as numpy.savez('mesh.npz', vertices=verts.cpu().numpy())",
+        )
+    raise Sd2Error(f"{path} is not a mesh of a kind that is known", f"a mesh: {_KNOWN}")
+
+
+def _as_vertices(raw: RawMesh, source: str) -> None:
+    """Turn what was read into real numbers of shape (T, V, 3)."""
+    if not isinstance(raw.vertices, StoredVertices):
+        vertices = np.asarray(raw.vertices)
+        if vertices.dtype.kind not in "fiu":
+            raise Sd2Error(
+                f"{source}: the vertices are of type {vertices.dtype}", "numbers in metres"
+            )
+        if vertices.dtype != np.float64:
+            vertices = vertices.astype(np.float32, copy=False)
+        raw.vertices = vertices[None] if vertices.ndim == 2 else vertices
+    shape = tuple(raw.vertices.shape)
+    if len(shape) != 3 or shape[2] != 3 or 0 in shape:
+        raise Sd2Error(
+            f"{source}: the vertices have shape {shape}",
+            "(frames, vertices, 3), none of them zero",
+            "Transpose or cut the array where the file is written",
+        )
+
+
+def _place(raw: RawMesh, scale: float, distance_m: float) -> None:
+    shift_m = np.array([0, 0, distance_m], np.float32)
+    if isinstance(raw.vertices, StoredVertices):
+        raw.vertices.scale, raw.vertices.shift_m = scale, shift_m
+        return
+    vertices: NDArray[Any] = np.asarray(raw.vertices)
+    if scale != 1.0:
+        vertices = vertices * vertices.dtype.type(scale)
+    if distance_m:
+        vertices = vertices + shift_m.astype(vertices.dtype)
+    raw.vertices = vertices
+
+
+def _times(raw: RawMesh, frames_per_s: float | None, source: str) -> NDArray[np.float64]:
+    """Times of all frames: as told, as in the file, or assumed."""
+    count = int(raw.vertices.shape[0])
+    if frames_per_s is not None and not (np.isfinite(frames_per_s) and frames_per_s > 0):
+        raise Sd2Error(f"The frame rate is {frames_per_s}", "a positive number of frames per s")
+    if raw.times_s is not None and frames_per_s is None:
+        if raw.times_s.shape != (count,):
+            raise Sd2Error(
+                f"{source}: {count} frames but times of shape {raw.times_s.shape}",
+                "one time per frame",
+                "Pass --fps to place the frames evenly instead",
+            )
+        return raw.times_s
+    if raw.times_s is not None:
+        raw.notes.append(f"The times in the file are replaced by {frames_per_s:g} frames/s.")
+    rate = frames_per_s or raw.frames_per_s
+    if rate is None:
+        rate = 30.0
+        raw.notes.append(
+            "The file holds no times: 30 frames/s are assumed. Pass --fps with the video's rate, "
+            "every velocity is proportional to it."
+        )
+    elif not (np.isfinite(rate) and rate > 0):
+        raise Sd2Error(f"{source}: the frame rate is {rate}", "a positive number of frames per s")
+    numbers = np.arange(count) if raw.frame_numbers is None else raw.frame_numbers
+    return numbers / rate

@@ -1,0 +1,261 @@
+"""Meshes kept as named arrays: ``.npz`` files and chunked Zarr stores."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+import zipfile
+import zlib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.atomic import atomic_write
+from sd2core.errors import Sd2Error
+from sd2core.mesh import MeshSequence, VertexArray
+from sd2core.progress import Progress, silent
+
+VERTEX_NAMES = ("vertices", "verts")
+FACE_NAMES = ("faces", "triangles")
+TIME_NAMES = ("times_s", "times")
+RATE_NAMES = ("frames_per_s", "fps")
+
+_CHUNK_BYTES = 2 * 2**20
+_FORMAT = "sd2-mesh"
+
+
+@dataclass
+class RawMesh:
+    """What a file holds, before times are completed and anything is checked."""
+
+    vertices: VertexArray  # (T, V, 3)
+    faces: NDArray[Any] | None = None
+    times_s: NDArray[np.float64] | None = None
+    frames_per_s: float | None = None
+    notes: list[str] = field(default_factory=list)
+    frame_numbers: NDArray[np.int64] | None = None  # (T,), of the video, when some are missing
+
+
+class StoredVertices:
+    """Vertices that stay on disk; scaled, moved and checked when they are read.
+
+    Parameters
+    ----------
+    array : chunked array, shape (T, V, 3)
+    source : str
+        For messages.
+    """
+
+    def __init__(self, array: Any, source: str) -> None:
+        self._array = array
+        self._source = source
+        self.scale = 1.0
+        self.shift_m = np.zeros(3, np.float32)
+        self.shape: tuple[int, ...] = tuple(array.shape)
+        self.dtype = _real_type(array.dtype)
+
+    @property
+    def frames_per_chunk(self) -> int:
+        """Frames that come from the disk together."""
+        return int(self._array.chunks[0])
+
+    def __getitem__(self, key: Any) -> NDArray[Any]:
+        part: NDArray[Any] = np.asarray(self._array[key], dtype=self.dtype)
+        # A sum is finite only when its terms are, and costs next to nothing
+        # beside the reading; a sum that overflowed is looked at again.
+        with np.errstate(all="ignore"):
+            suspect = not np.isfinite(part.sum())
+        if suspect and not np.isfinite(part).all():
+            raise Sd2Error(
+                f"{self._source}: vertices that are NaN or infinite in {_where(key)}",
+                "finite coordinates in metres in every frame",
+                "Fill or leave out those frames where the file is written",
+            )
+        if self.scale != 1.0:
+            part = part * part.dtype.type(self.scale)
+        if self.shift_m.any():
+            part = part + self.shift_m.astype(part.dtype)
+        return part
+
+
+def read_npz(path: Path) -> RawMesh:
+    """Read ``vertices`` and, where present, ``faces``, ``times_s`` and ``fps``."""
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            if not hasattr(archive, "files"):
+                raise ValueError("a single array")
+            wanted = VERTEX_NAMES + FACE_NAMES + TIME_NAMES + RATE_NAMES
+            arrays = {name: archive[name] for name in archive.files if name in wanted}
+            names = list(archive.files)
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error, KeyError) as error:
+        raise Sd2Error(
+            f"{path} cannot be read as .npz ({error})",
+            "a complete .npz file that holds plain numbers",
+            "Write it again with numpy.savez(path, vertices=..., faces=..., times_s=...)",
+        ) from error
+    return named_arrays(arrays, names, str(path))
+
+
+def named_arrays(arrays: dict[str, Any], names: list[str], source: str) -> RawMesh:
+    """Pick vertices, faces, times and rate out of arrays by their names."""
+    vertices = _first(arrays, VERTEX_NAMES)
+    if vertices is None:
+        raise Sd2Error(
+            f"{source} holds {', '.join(sorted(names)) or 'nothing'}",
+            "an array 'vertices' (or 'verts') of shape (frames, vertices, 3)",
+            "Rename the array where the file is written",
+        )
+    times = _first(arrays, TIME_NAMES)
+    rate = _first(arrays, RATE_NAMES)
+    return RawMesh(
+        vertices=vertices,
+        faces=_first(arrays, FACE_NAMES),
+        times_s=None if times is None else np.asarray(times, dtype=np.float64),
+        frames_per_s=None if rate is None else float(np.asarray(rate).reshape(-1)[0]),
+    )
+
+
+def read_zarr(path: Path) -> RawMesh:
+    """Open a Zarr folder or ``.zarr.zip``; the vertices stay on disk."""
+    import zarr
+    from zarr.storage import ZipStore
+
+    try:
+        store = ZipStore(path, mode="r") if path.is_file() else str(path)
+        group = zarr.open_group(store, mode="r")
+        names = sorted(group.array_keys())
+        wanted = FACE_NAMES + TIME_NAMES + RATE_NAMES
+        arrays: dict[str, Any] = {name: group[name][...] for name in names if name in wanted}
+        arrays.update({name: group[name] for name in names if name in VERTEX_NAMES})
+    except (OSError, ValueError, KeyError, zipfile.BadZipFile, RuntimeError) as error:
+        raise Sd2Error(
+            f"{path} cannot be read as a Zarr group ({error})",
+            "a .zarr folder or .zarr.zip with the arrays vertices, faces and times_s",
+            "Copy it again with all its files, or write it again",
+        ) from error
+    raw = named_arrays(arrays, names, str(path))
+    if raw.faces is not None and not len(raw.faces):
+        raw.faces = None
+    raw.vertices = StoredVertices(raw.vertices, str(path))
+    return raw
+
+
+def write_npz(mesh: MeshSequence, path: Path, progress: Progress = silent) -> None:
+    """Write a mesh block by block into one compressed ``.npz``, in one step."""
+    step = _frames_per_chunk(mesh)
+    dtype = np.dtype(mesh.vertices.dtype).newbyteorder("<")
+    with atomic_write(path) as stream, zipfile.ZipFile(stream, "w") as archive:
+        with archive.open(_member("vertices"), "w", force_zip64=True) as member:
+            header = {"descr": dtype.str, "fortran_order": False, "shape": mesh.vertices.shape}
+            np.lib.format.write_array_header_1_0(member, header)  # type: ignore[arg-type]
+            for start in range(0, mesh.frame_count, step):
+                progress(start, mesh.frame_count)
+                member.write(_block(mesh, start, step).astype(dtype, copy=False).tobytes())
+        if mesh.faces is not None:
+            with archive.open(_member("faces"), "w") as member:
+                np.lib.format.write_array(member, mesh.faces, allow_pickle=False)
+        with archive.open(_member("times_s"), "w") as member:
+            np.lib.format.write_array(member, mesh.times_s, allow_pickle=False)
+    progress(mesh.frame_count, mesh.frame_count)
+
+
+def write_zarr(mesh: MeshSequence, path: Path, progress: Progress = silent) -> None:
+    """Write a mesh chunk by chunk into a folder that takes its name when complete.
+
+    A chunk holds about 2 MB: all vertices of a stretch of frames.
+    """
+    import zarr
+    from zarr.codecs import BloscCodec
+
+    zipped = path.suffix.lower() == ".zip"
+    step = _frames_per_chunk(mesh)
+    workspace = Path(tempfile.mkdtemp(prefix=f".{path.name}.", suffix=".tmp", dir=path.parent))
+    try:
+        folder = workspace / "new"
+        group = zarr.open_group(str(folder), mode="w")
+        group.attrs.update({"format": _FORMAT, "version": 1, "unit": "m"})
+        vertices = group.create_array(
+            "vertices",
+            shape=mesh.vertices.shape,
+            chunks=(step, mesh.vertex_count, 3),
+            dtype=np.dtype(mesh.vertices.dtype).newbyteorder("<"),
+            compressors=BloscCodec(cname="lz4", clevel=5, shuffle="shuffle"),
+        )
+        for start in range(0, mesh.frame_count, step):
+            progress(start, mesh.frame_count)
+            block = _block(mesh, start, step)
+            vertices[start : start + len(block)] = block
+        if mesh.faces is not None and len(mesh.faces):
+            group.create_array("faces", data=np.ascontiguousarray(mesh.faces))
+        group.create_array("times_s", data=np.array(mesh.times_s))
+        if zipped:
+            with atomic_write(path) as stream:
+                _zip_folder(folder, stream)
+        else:
+            _take_place(folder, path, workspace / "old")
+    finally:
+        shutil.rmtree(workspace, ignore_errors=True)
+    progress(mesh.frame_count, mesh.frame_count)
+
+
+def _block(mesh: MeshSequence, start: int, step: int) -> NDArray[Any]:
+    block = mesh.read(start, min(start + step, mesh.frame_count))
+    if not np.isfinite(block).all():
+        frame = start + int(np.flatnonzero(~np.isfinite(block).all(axis=(1, 2)))[0])
+        raise Sd2Error(
+            f"{mesh.source or 'The mesh'}: frame {frame} has vertices that are NaN or infinite",
+            "finite coordinates in metres",
+            "Fill or leave out that frame before saving",
+        )
+    return block
+
+
+def _frames_per_chunk(mesh: MeshSequence) -> int:
+    frame_bytes = mesh.vertex_count * 3 * np.dtype(mesh.vertices.dtype).itemsize
+    return int(min(max(_CHUNK_BYTES // frame_bytes, 1), mesh.frame_count))
+
+
+def _member(name: str) -> zipfile.ZipInfo:
+    """An entry with a fixed date, so that the same mesh gives the same bytes."""
+    entry = zipfile.ZipInfo(f"{name}.npy")
+    entry.compress_type = zipfile.ZIP_DEFLATED
+    return entry
+
+
+def _zip_folder(folder: Path, stream: Any) -> None:
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive:
+        for file in sorted(folder.rglob("*")):
+            if file.is_file():
+                archive.write(file, file.relative_to(folder).as_posix())
+
+
+def _take_place(new: Path, path: Path, aside: Path) -> None:
+    """Rename a complete folder to ``path``; a folder of that name goes first."""
+    if path.is_file():
+        raise Sd2Error(f"{path} is a file", "a folder name for a .zarr mesh", "Remove or rename it")
+    if path.is_dir():
+        path.rename(aside)
+        try:
+            new.rename(path)
+        except OSError:
+            aside.rename(path)
+            raise
+    else:
+        new.rename(path)
+
+
+def _first(arrays: dict[str, Any], names: tuple[str, ...]) -> Any | None:
+    return next((arrays[name] for name in names if name in arrays), None)
+
+
+def _real_type(dtype: Any) -> np.dtype[Any]:
+    return np.dtype(np.float64 if np.dtype(dtype) == np.float64 else np.float32)
+
+
+def _where(key: Any) -> str:
+    if isinstance(key, slice):
+        return f"frames {key.start or 0} to {(key.stop or 0) - 1}"
+    return f"frame {key}"

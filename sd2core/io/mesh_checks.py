@@ -1,0 +1,189 @@
+"""What is wrong with a mesh, said in a sentence, and repaired where that is safe."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+from sd2core.io.mesh_arrays import RawMesh, StoredVertices
+
+_SAMPLE_FRAMES = 5
+_LARGEST_BODY_M = 10.0
+_SMALLEST_BODY_M = 0.02
+_LIKELY_BODY_M = (0.3, 3.0)
+_CLOSED_SHARE = 0.95
+_MIXED_SHARE = 0.01
+_SMPL_VERTICES = 6890
+
+
+def drop_empty_frames(
+    raw: RawMesh, times_s: NDArray[np.float64], source: str
+) -> NDArray[np.float64]:
+    """Leave out frames without a single finite vertex; refuse other gaps.
+
+    Trackers write such frames where they lost the person. Vertices that stay
+    on disk are not touched here: they are checked as they are read.
+
+    Returns
+    -------
+    float64 array
+        The times of the frames that are left.
+    """
+    if isinstance(raw.vertices, StoredVertices):
+        return times_s
+    vertices: NDArray[Any] = np.asarray(raw.vertices)
+    finite = np.isfinite(vertices).all(axis=2)  # (T, V)
+    whole = finite.all(axis=1)
+    if whole.all():
+        return times_s
+    empty = ~finite.any(axis=1)
+    if empty.all():
+        raise Sd2Error(
+            f"{source}: no frame holds a finite vertex (all NaN or infinite)",
+            "coordinates in metres",
+            "Look at how the file was written",
+        )
+    partial = np.flatnonzero(~whole & ~empty)
+    if partial.size:
+        frame = int(partial[0])
+        bad = np.flatnonzero(~finite[frame])
+        raise Sd2Error(
+            f"{source}: vertex {bad[0]} of frame {frame} is NaN or infinite ({bad.size:,} vertices "
+            f"of that frame, {partial.size:,} frames in all)",
+            "finite coordinates in metres; only frames that are wholly NaN can be left out",
+            "Fill those vertices where the file is written",
+        )
+    gone = np.flatnonzero(empty)
+    raw.vertices = vertices[~empty]
+    raw.notes.append(
+        f"{gone.size:,} frames hold no body (all NaN), the first is frame {gone[0]}; they are left "
+        "out, and motion runs evenly across the gap."
+    )
+    return times_s[~empty]
+
+
+def check_mesh(raw: RawMesh, source: str, check_size: bool) -> None:
+    """Check size, place and faces on a few frames; flip faces that look inwards.
+
+    Raises
+    ------
+    Sd2Error
+        For a size that no body has, or faces that cannot belong to the mesh.
+    """
+    count = int(raw.vertices.shape[0])
+    chosen = np.unique(np.linspace(0, count - 1, _SAMPLE_FRAMES).astype(int))
+    sample = [np.asarray(raw.vertices[int(k)], dtype=np.float64) for k in chosen]  # (V, 3) each
+    if check_size and sample[0].shape[0] > 3:
+        _check_size(raw, sample, source)
+    depth_m = float(np.mean([frame[:, 2].mean() for frame in sample]))
+    if depth_m <= 0:
+        raw.notes.append(
+            f"The mesh is at a mean depth of {depth_m:.2f} m, at or behind the camera. Expected is "
+            "the camera's frame: x right, y down, z forward. A mesh with y up and z backward needs "
+            "a half turn about x; one centred on its root needs its distance from the camera."
+        )
+    if raw.faces is None:
+        _note_missing_faces(raw)
+    else:
+        _check_faces(raw, sample[0], source)
+
+
+def _check_size(raw: RawMesh, sample: list[NDArray[np.float64]], source: str) -> None:
+    extent_m = float(np.median([np.ptp(frame, axis=0).max() for frame in sample]))
+    if extent_m > _LARGEST_BODY_M:
+        for factor, unit in ((0.01, "centimetres"), (0.001, "millimetres")):
+            if _LIKELY_BODY_M[0] <= extent_m * factor <= _LIKELY_BODY_M[1]:
+                guess = f"These are probably {unit}: pass --scale {factor:g}"
+                break
+        else:
+            guess = "Pass --scale with the factor to metres"
+        raise Sd2Error(
+            f"{source}: the body measures {extent_m:,.0f} m",
+            f"metres, a body below {_LARGEST_BODY_M:g} m",
+            f"{guess} (or --scale 1 when the size is right)",
+        )
+    if extent_m < _SMALLEST_BODY_M:
+        raw.notes.append(
+            f"The mesh measures {extent_m * 1000:.3g} mm. When that is not its size in metres, "
+            "pass --scale with the factor."
+        )
+
+
+def _note_missing_faces(raw: RawMesh) -> None:
+    note = (
+        "The file holds no faces: it is a point cloud without a surface, of which every point "
+        "is seen (visibility 'none' only). Pass --faces with a .npy, .npz or .obj to make it a "
+        "mesh."
+    )
+    if raw.vertices.shape[1] == _SMPL_VERTICES:
+        note += (
+            f" Its {_SMPL_VERTICES:,} vertices are SMPL's; that model's faces are licensed with "
+            "it and cannot be included here, so give those of your copy."
+        )
+    raw.notes.append(note)
+
+
+def _check_faces(raw: RawMesh, vertices: NDArray[np.float64], source: str) -> None:
+    faces = np.asarray(raw.faces)
+    if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iuf":
+        raise Sd2Error(
+            f"{source}: the faces have shape {faces.shape} and type {faces.dtype}",
+            "(faces, 3): three vertex numbers per triangle",
+            "Triangulate the surface where the file is written",
+        )
+    if faces.dtype.kind == "f" and not (faces == np.floor(faces)).all():
+        raise Sd2Error(f"{source}: face numbers are not whole", "vertex numbers such as 0, 1, 2")
+    faces = faces.astype(np.int64)
+    last = len(vertices) - 1
+    if faces.size and faces.min() == 1 and faces.max() == last + 1:
+        faces = faces - 1
+        raw.notes.append("The faces number the vertices from 1; they are read as such.")
+    if faces.size and not (0 <= faces.min() and faces.max() <= last):
+        bad = int(faces.max()) if faces.max() > last else int(faces.min())
+        raise Sd2Error(
+            f"{source}: a face names vertex {bad}, the mesh has {last + 1:,} vertices",
+            f"vertex numbers from 0 to {last}",
+            "Give the faces that belong to this mesh (--faces)",
+        )
+    corners = vertices[faces]  # (F, 3, 3)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    empty = int((np.linalg.norm(normals, axis=1) < 1e-12).sum())
+    if empty:
+        raw.notes.append(
+            f"{empty:,} of {len(faces):,} faces have no area; they are kept and hide nothing."
+        )
+    closed, mixed = _edge_shares(faces)
+    if mixed > _MIXED_SHARE:
+        raw.notes.append(
+            f"The faces are not wound alike ({mixed:.0%} of the edges join faces that look "
+            "opposite ways), so what looks away from the sensor may be taken for its front."
+        )
+    elif closed >= _CLOSED_SHARE and _signed_volume(vertices, faces) < 0:
+        faces = faces[:, ::-1]
+        raw.notes.append("The faces looked inwards (clockwise from outside); they are turned over.")
+    raw.faces = np.ascontiguousarray(faces, dtype=np.int32)
+
+
+def _edge_shares(faces: NDArray[np.int64]) -> tuple[float, float]:
+    """Shares of edges that two faces use in opposite directions, and in the same."""
+    if not faces.size:
+        return 0.0, 0.0
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    forward = edges[:, 0] < edges[:, 1]
+    span = int(edges.max()) + 1
+    key = edges.min(axis=1) * span + edges.max(axis=1)
+    _, inverse = np.unique(key, return_inverse=True)
+    along = np.bincount(inverse, weights=forward)
+    against = np.bincount(inverse, weights=~forward)
+    closed = (along == 1) & (against == 1)
+    mixed = ((along == 2) & (against == 0)) | ((along == 0) & (against == 2))
+    return float(closed.mean()), float(mixed.mean())
+
+
+def _signed_volume(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> float:
+    corners = vertices[faces] - vertices.mean(axis=0)
+    turned = np.cross(corners[:, 1], corners[:, 2])
+    return float(np.einsum("ij,ij->", corners[:, 0], turned)) / 6.0

@@ -1,0 +1,151 @@
+"""One mesh file per frame: OBJ, PLY, GLB, through trimesh."""
+
+from __future__ import annotations
+
+import glob
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+from sd2core.io.mesh_arrays import FACE_NAMES, RawMesh
+from sd2core.progress import Progress, silent
+
+_SUFFIXES = (".obj", ".ply", ".glb", ".gltf", ".off", ".stl")
+
+
+def is_pattern(path: Path) -> bool:
+    """Whether a path is a pattern such as ``frames/*.obj`` and names no file itself."""
+    return glob.has_magic(str(path)) and not path.exists()
+
+
+def natural_key(name: str) -> tuple[tuple[int, int | str], ...]:
+    """Sort key by which ``frame9`` comes before ``frame10``."""
+    parts = re.findall(r"[0-9]+|[^0-9]+", name)
+    return tuple((0, int(part)) if part[0] in "0123456789" else (1, part) for part in parts)
+
+
+def read_mesh_files(path: Path, progress: Progress = silent) -> RawMesh:
+    """Read one file, all files of a folder, or those that match a pattern, as frames."""
+    files = _files(path)
+    frames: list[NDArray[np.float32]] = []
+    faces: NDArray[Any] | None = None
+    for number, file in enumerate(files):
+        progress(number, len(files))
+        vertices, own_faces = read_surface(file)
+        if not frames:
+            faces = own_faces
+        elif len(vertices) != len(frames[0]):
+            raise Sd2Error(
+                f"{file} has {len(vertices):,} vertices, {files[0].name} has {len(frames[0]):,}",
+                "the same vertices in every frame",
+                "Export the frames from one fitted mesh; files that do not belong can be left "
+                "out with a pattern such as 'body_*.obj'",
+            )
+        elif not _same_faces(faces, own_faces):
+            raise Sd2Error(
+                f"{file} has other faces ({_count(own_faces)}) than {files[0].name} "
+                f"({_count(faces)})",
+                "one topology through all frames",
+                "Export the frames from one fitted mesh, with the vertices' order kept",
+            )
+        frames.append(vertices.astype(np.float32))
+    progress(len(files), len(files))
+    return RawMesh(vertices=np.stack(frames), faces=faces)
+
+
+def read_surface(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64] | None]:
+    """Vertices (V, 3) and faces (F, 3) of one file, in the order of the file."""
+    import trimesh
+
+    try:
+        loaded = trimesh.load(str(path), process=False, maintain_order=True)
+        if isinstance(loaded, trimesh.Scene):
+            loaded = loaded.to_geometry() if len(loaded.geometry) else trimesh.Trimesh()
+        vertices = np.asarray(loaded.vertices, dtype=np.float64)
+    except Exception as error:  # trimesh's readers raise whatever their parsing meets
+        raise Sd2Error(
+            f"{path} cannot be read as a mesh ({type(error).__name__}: {error})",
+            "a complete OBJ, PLY or GLB file",
+            "Export it again",
+        ) from error
+    if vertices.ndim != 2 or not len(vertices):
+        raise Sd2Error(f"{path} holds no vertices", "a mesh or a point cloud", "Export it again")
+    faces = np.asarray(getattr(loaded, "faces", np.zeros((0, 3))), dtype=np.int64)
+    return vertices, faces if len(faces) else None
+
+
+def read_faces(path: Path) -> NDArray[Any]:
+    """Triangles from a ``.npy``, a ``.npz`` or a mesh file.
+
+    Raises
+    ------
+    Sd2Error
+        When the file is missing or holds none.
+    """
+    if not path.is_file():
+        raise Sd2Error(
+            f"The faces file {path} does not exist", "a .npy, .npz or .obj file", "Check the path"
+        )
+    suffix = path.suffix.lower()
+    if suffix in _SUFFIXES:
+        faces = read_surface(path)[1]
+        if faces is None:
+            raise Sd2Error(f"{path} holds no faces", "a mesh with triangles")
+        return faces
+    if suffix not in {".npy", ".npz"}:
+        raise Sd2Error(f"{path} is no file of faces", "a .npy, .npz or .obj file")
+    try:
+        loaded = np.load(path, allow_pickle=False)
+        if isinstance(loaded, np.ndarray):
+            return loaded
+        with loaded:
+            names = [name for name in (*FACE_NAMES, "f") if name in loaded.files]
+            if not names and len(loaded.files) == 1:
+                names = list(loaded.files)
+            if names:
+                array: NDArray[Any] = loaded[names[0]]
+                return array
+            held = ", ".join(loaded.files)
+    except Exception as error:  # a damaged archive fails in many ways
+        raise Sd2Error(
+            f"{path} cannot be read ({error})", "a complete .npy or .npz file of plain numbers"
+        ) from error
+    raise Sd2Error(f"{path} holds {held}", "an array 'faces' of shape (faces, 3)")
+
+
+def _files(path: Path) -> list[Path]:
+    if path.is_file():
+        return [path]
+    if path.is_dir():
+        found = [file for file in path.iterdir() if file.suffix.lower() in _SUFFIXES]
+        kinds = sorted({file.suffix.lower() for file in found})
+        if len(kinds) > 1:
+            raise Sd2Error(
+                f"{path} holds meshes of several kinds ({', '.join(kinds)})",
+                "one kind of file, one file per frame",
+                f"Name those that are meant, for example '{path.name}/*{kinds[0]}'",
+            )
+    else:
+        found = [Path(name) for name in glob.glob(str(path))]
+        found = [file for file in found if file.suffix.lower() in _SUFFIXES]
+    if not found:
+        raise Sd2Error(
+            f"{path} matches no mesh file",
+            "one .obj, .ply or .glb file per frame",
+            "Check the folder or the pattern",
+        )
+    return sorted(found, key=lambda file: natural_key(file.name))
+
+
+def _same_faces(first: NDArray[Any] | None, second: NDArray[Any] | None) -> bool:
+    if first is None or second is None:
+        return first is second
+    return np.array_equal(first, second)
+
+
+def _count(faces: NDArray[Any] | None) -> str:
+    return f"{0 if faces is None else len(faces):,}"
