@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from PySide6.QtCore import QObject, Signal
@@ -90,7 +91,7 @@ class LatestRunner(QObject):
                 revision, task = self._pending
                 self._pending = None
             try:
-                self._post(revision, "finished", task(lambda value: self._emit(revision, value)))
+                self._post(revision, "finished", task(partial(self._emit, revision)))
             except Cancelled:
                 continue
             except Exception as error:

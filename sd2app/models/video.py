@@ -42,6 +42,11 @@ class VideoModel(QObject):
         return self._picture
 
     @property
+    def busy(self) -> bool:
+        """Whether a picture is being decoded."""
+        return self._runner.busy
+
+    @property
     def shown_frame(self) -> int:
         """Frame of the video that :attr:`picture` is, minus one for none."""
         return self._shown

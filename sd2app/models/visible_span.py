@@ -55,7 +55,9 @@ class VisibleSpanModel(QObject):
 
     def zoom(self, factor: float, anchor_s: float) -> None:
         """Scale the stretch by ``factor`` (< 1 shows less), keeping ``anchor_s`` in place."""
-        duration = min(max(self.duration_s * factor, _SHORTEST_S), self._extent[1] - self._extent[0])
+        duration = min(
+            max(self.duration_s * factor, _SHORTEST_S), self._extent[1] - self._extent[0]
+        )
         share = (anchor_s - self.start_s) / self.duration_s
         start = anchor_s - share * duration
         self.set_span(start, start + duration)

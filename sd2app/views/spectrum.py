@@ -70,7 +70,9 @@ class SpectrumView(QWidget):
         font.setBold(True)
         painter.setFont(font)
         painter.setPen(QColor(colours.text))
-        painter.drawText(QRectF(8, 0, self.width(), 24), Qt.AlignmentFlag.AlignVCenter, "This frame")
+        painter.drawText(
+            QRectF(8, 0, self.width(), 24), Qt.AlignmentFlag.AlignVCenter, "This frame"
+        )
         font.setBold(False)
         painter.setFont(font)
         shown = self._shown()

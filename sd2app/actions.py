@@ -1,0 +1,226 @@
+"""The one table of actions: menus, keys, tips and the list of keys all come from it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from sd2app.context import Context
+    from sd2app.views.window import MainWindow
+
+Handler = Callable[["MainWindow"], None]
+Test = Callable[["Context"], bool]
+
+
+def _always(context: Context) -> bool:
+    return True
+
+
+def _has_content(context: Context) -> bool:
+    return context.document.content is not None
+
+
+def _has_mesh(context: Context) -> bool:
+    return context.document.mesh is not None
+
+
+@dataclass(frozen=True)
+class Action:
+    """One row.
+
+    ``checked`` makes it checkable and says whether it is on.
+    """
+
+    id: str
+    menu: str
+    text: str
+    keys: tuple[str, ...]
+    tip: str
+    run: Handler
+    enabled: Test = _always
+    checked: Test | None = None
+    separator_before: bool = False
+    icon: str = ""
+
+
+ACTIONS: tuple[Action, ...] = (
+    Action(
+        "open", "File", "Open…", ("Ctrl+O",),
+        "Open a video, mesh or radar capture, or several that belong together",
+        lambda w: w.dialogs.open_files(),
+    ),
+    Action(
+        "open_folder", "File", "Open folder…", ("Ctrl+Shift+O",),
+        "Open a recording (.sd2), a radar capture or a folder of meshes",
+        lambda w: w.dialogs.open_folder(),
+    ),
+    Action(
+        "add", "File", "Add to this recording…", (),
+        "Add a video, mesh or radar capture to what is open",
+        lambda w: w.dialogs.add_files(), _has_content,
+    ),
+    Action(
+        "add_folder", "File", "Add folder to this recording…", (),
+        "Add a radar capture or a folder of meshes to what is open",
+        lambda w: w.dialogs.add_folder(), _has_content,
+    ),
+    Action(
+        "relink", "File", "Find missing files…", (),
+        "Choose one folder; all missing files are looked for below it",
+        lambda w: w.dialogs.relink(),
+        lambda c: c.document.recording is not None and bool(c.document.recording.missing()),
+    ),
+    Action(
+        "save", "File", "Save", ("Ctrl+S",), "Save sensor and alignment in the recording",
+        lambda w: w.dialogs.save(), _has_content, separator_before=True,
+    ),
+    Action(
+        "save_as", "File", "Save as…", ("Ctrl+Shift+S",),
+        "Make a recording folder that refers to these files",
+        lambda w: w.dialogs.save_as(), _has_content,
+    ),
+    Action(
+        "export_map", "File", "Export synthetic map…", ("Ctrl+E",),
+        "Write the synthetic Doppler map with its provenance (.npz)",
+        lambda w: w.dialogs.export_map(),
+        lambda c: c.synthesis.complete,
+    ),
+    Action(
+        "quit", "File", "Quit", ("Ctrl+Q",), "Close the window", lambda w: w.close_window(),
+        separator_before=True,
+    ),
+    Action(
+        "sensor_to_camera", "Edit", "Sensor at the camera", ("Home",),
+        "Put the sensor at the camera, looking along its axis",
+        lambda w: w.context.edits.sensor_to_camera(), separator_before=True,
+    ),
+    Action(
+        "colour_velocity", "View", "Colour by radial velocity", ("1",),
+        "Blue recedes, red approaches, grey is hidden or still",
+        lambda w: w.context.display.set_mesh_colour("velocity"), _has_mesh,
+        lambda c: c.display.mesh_colour == "velocity",
+    ),
+    Action(
+        "colour_range", "View", "Colour by range", ("2",), "Distance from the sensor in metres",
+        lambda w: w.context.display.set_mesh_colour("range"), _has_mesh,
+        lambda c: c.display.mesh_colour == "range",
+    ),
+    Action(
+        "colour_visibility", "View", "Colour by visibility", ("3",),
+        "What the sensor sees, and what is hidden from it",
+        lambda w: w.context.display.set_mesh_colour("visibility"), _has_mesh,
+        lambda c: c.display.mesh_colour == "visibility",
+    ),
+    Action(
+        "colour_plain", "View", "Plain mesh", ("4",), "One colour",
+        lambda w: w.context.display.set_mesh_colour("plain"), _has_mesh,
+        lambda c: c.display.mesh_colour == "plain",
+    ),
+    Action(
+        "dots", "View", "Vertices as dots", ("D",), "Draw vertices instead of the surface",
+        lambda w: w.context.display.set_as_dots(not w.context.display.as_dots), _has_mesh,
+        lambda c: c.display.as_dots,
+    ),
+    Action(
+        "overlay", "View", "Mesh over the video", ("M",), "Draw the mesh over the video",
+        lambda w: w.context.display.set_overlay(not w.context.display.overlay), _has_mesh,
+        lambda c: c.display.overlay,
+    ),
+    Action(
+        "view_three_quarter", "View", "Scene: overview", ("Ctrl+1",),
+        "See sensor, camera and body",
+        lambda w: w.set_scene_view("overview"), _has_mesh, separator_before=True,
+    ),
+    Action(
+        "view_camera", "View", "Scene: from the camera", ("Ctrl+2",), "See what the camera sees",
+        lambda w: w.set_scene_view("camera"), _has_mesh,
+    ),
+    Action(
+        "view_sensor", "View", "Scene: from the sensor", ("Ctrl+3",), "See what the sensor sees",
+        lambda w: w.set_scene_view("sensor"), _has_mesh,
+    ),
+    Action(
+        "view_side", "View", "Scene: from the side", ("Ctrl+4",), "See sensor and body sideways",
+        lambda w: w.set_scene_view("side"), _has_mesh,
+    ),
+    Action(
+        "view_top", "View", "Scene: from above", ("Ctrl+5",), "See sensor and body from above",
+        lambda w: w.set_scene_view("top"), _has_mesh,
+    ),
+    Action(
+        "zoom_in", "View", "Zoom in on time", ("+", "="), "Show less time, around the cursor",
+        lambda w: w.context.span.zoom(0.7, w.context.playback.time_s), _has_content,
+        separator_before=True,
+    ),
+    Action(
+        "zoom_out", "View", "Zoom out", ("-",), "Show more time",
+        lambda w: w.context.span.zoom(1.0 / 0.7, w.context.playback.time_s), _has_content,
+    ),
+    Action(
+        "zoom_fit", "View", "Whole recording", ("0",), "Show all of it",
+        lambda w: w.context.span.fit(), _has_content,
+    ),
+    Action(
+        "reset_reference", "View", "Set 0 dB to this placement", ("R",),
+        "Make the strongest bin of the synthetic map 0 dB",
+        lambda w: w.context.synthesis.reset_reference(),
+        lambda c: c.synthesis.complete,
+    ),
+    Action(
+        "dark", "View", "Dark theme", ("Ctrl+D",), "Dark or light",
+        lambda w: w.set_dark(not w.context.display.dark), checked=lambda c: c.display.dark,
+        separator_before=True,
+    ),
+    Action(
+        "play", "Play", "Play", ("Space",), "Play or pause",
+        lambda w: w.context.playback.toggle(), _has_content,
+        lambda c: c.playback.playing, icon="play",
+    ),
+    Action(
+        "previous_frame", "Play", "Previous frame", ("Left",), "One frame back",
+        lambda w: w.context.playback.step_frames(-1), _has_content, icon="previous",
+    ),
+    Action(
+        "next_frame", "Play", "Next frame", ("Right",), "One frame on",
+        lambda w: w.context.playback.step_frames(1), _has_content, icon="next",
+    ),
+    Action(
+        "back_second", "Play", "Back one second", ("Shift+Left",), "One second back",
+        lambda w: w.context.playback.step_seconds(-1.0), _has_content,
+    ),
+    Action(
+        "on_second", "Play", "On one second", ("Shift+Right",), "One second on",
+        lambda w: w.context.playback.step_seconds(1.0), _has_content,
+    ),
+    Action(
+        "first_frame", "Play", "First frame", ("Ctrl+Left",), "Go to the start",
+        lambda w: w.context.playback.seek_frame(0), _has_content, icon="first",
+    ),
+    Action(
+        "last_frame", "Play", "Last frame", ("Ctrl+Right",), "Go to the end",
+        lambda w: w.context.playback.seek_frame(len(w.context.playback.timebase) - 1),
+        _has_content, icon="last",
+    ),
+    Action(
+        "slower", "Play", "Slower", (",",), "Play slower",
+        lambda w: w.context.playback.change_speed(-1), separator_before=True, icon="slower",
+    ),
+    Action(
+        "faster", "Play", "Faster", (".",), "Play faster",
+        lambda w: w.context.playback.change_speed(1), icon="faster",
+    ),
+    Action(
+        "loop", "Play", "Loop", ("L",), "Start again at the end",
+        lambda w: w.context.playback.set_loop(not w.context.playback.loop),
+        checked=lambda c: c.playback.loop, icon="loop",
+    ),
+    Action(
+        "sample", "Help", "Open the sample recording", (), "A simulated person, four gestures",
+        lambda w: w.open_sample(),
+    ),
+    Action("keys", "Help", "Keys", ("?", "F1"), "All keys", lambda w: w.dialogs.show_keys()),
+    Action("about", "Help", "About SD² Studio", (), "Version and licence",
+           lambda w: w.dialogs.show_about()),
+)  # fmt: skip

@@ -1,0 +1,106 @@
+"""Every edit of a recording: done first, then pushed to the history as one step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from PySide6.QtGui import QUndoCommand
+
+from sd2app.models.document import DocumentModel
+from sd2app.models.sensor import SensorModel
+from sd2core.sensor import Vector, VirtualSensor
+
+
+class _Assign(QUndoCommand):
+    """Sets one value of a model; models ignore a value that they have already."""
+
+    def __init__(
+        self, text: str, assign: Callable[[Any], None], before: object, after: object
+    ) -> None:
+        super().__init__(text)
+        self._assign, self._before, self._after = assign, before, after
+
+    def undo(self) -> None:
+        self._assign(self._before)
+
+    def redo(self) -> None:
+        self._assign(self._after)
+
+
+class Edits:
+    """What the user can change. A drag is one step in the history."""
+
+    def __init__(self, document: DocumentModel, sensor: SensorModel) -> None:
+        self._document = document
+        self._sensor = sensor
+        self._before: Any = None
+
+    # --- sensor ---------------------------------------------------------------------------
+
+    def place_sensor(self, sensor: VirtualSensor, text: str = "Move sensor") -> None:
+        """Put the sensor somewhere."""
+        before = self._sensor.sensor
+        self._assign_sensor(sensor)
+        self._push(text, self._assign_sensor, before, sensor)
+
+    def sensor_to_camera(self) -> None:
+        """Put the sensor at the camera, looking along the optical axis."""
+        view = self._sensor.sensor.field_of_view_deg
+        self.place_sensor(VirtualSensor(field_of_view_deg=view), "Sensor to camera")
+
+    def begin_sensor_drag(self) -> None:
+        """A hand takes hold of the sensor."""
+        self._before = self._sensor.sensor
+        self._sensor.set_dragging(True)
+
+    def drag_sensor(self, position_m: Vector) -> None:
+        """The hand moves it."""
+        self._assign_sensor(replace(self._sensor.sensor, position_m=position_m))
+
+    def end_sensor_drag(self) -> None:
+        """The hand lets go."""
+        self._sensor.set_dragging(False)
+        self._push("Move sensor", self._assign_sensor, self._before, self._sensor.sensor)
+
+    def _assign_sensor(self, sensor: VirtualSensor) -> None:
+        self._sensor.set_sensor(sensor)
+        if self._document.recording is not None:
+            self._document.recording.sensor = sensor
+
+    # --- alignment of the real capture ----------------------------------------------------
+
+    def set_radar_offset(self, offset_s: float) -> None:
+        """Align the capture."""
+        if self._document.recording is None:
+            return
+        before = self._document.recording.radar_offset_s
+        self._document.set_radar_offset(offset_s)
+        self._push("Align radar", self._document.set_radar_offset, before, offset_s)
+
+    def begin_offset_drag(self) -> None:
+        """A hand takes hold of the real track."""
+        if self._document.recording is not None:
+            self._before = self._document.recording.radar_offset_s
+
+    def drag_offset(self, seconds: float) -> None:
+        """The hand has moved it by ``seconds`` since it took hold."""
+        self._document.set_radar_offset(round(self._before + seconds, 3))
+
+    def end_offset_drag(self) -> None:
+        """The hand lets go."""
+        recording = self._document.recording
+        if recording is not None:
+            self._push(
+                "Align radar",
+                self._document.set_radar_offset,
+                self._before,
+                recording.radar_offset_s,
+            )
+
+    def _push(
+        self, text: str, assign: Callable[[Any], None], before: object, after: object
+    ) -> None:
+        if before != after and self._document.content is not None:
+            self._document.undo_stack.push(_Assign(text, assign, before, after))

@@ -1,0 +1,105 @@
+"""Builds the models once and passes them on; there is no other shared state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from PySide6.QtCore import QObject
+
+from sd2app.commands import Edits
+from sd2app.models.display import DisplayModel
+from sd2app.models.document import DocumentModel
+from sd2app.models.jobs import JobsModel
+from sd2app.models.playback import PlaybackModel
+from sd2app.models.sensor import SensorModel
+from sd2app.models.synthesis import SynthesisModel
+from sd2app.models.tracks import PointerModel, TrackModel
+from sd2app.models.video import VideoModel
+from sd2app.models.visible_span import VisibleSpanModel
+from sd2app.settings import Settings
+
+
+@dataclass(frozen=True)
+class Context:
+    """Everything a window is about."""
+
+    settings: Settings
+    jobs: JobsModel
+    document: DocumentModel
+    playback: PlaybackModel
+    video: VideoModel
+    sensor: SensorModel
+    display: DisplayModel
+    span: VisibleSpanModel
+    pointer: PointerModel
+    synthetic: TrackModel
+    real: TrackModel
+    synthesis: SynthesisModel
+    edits: Edits
+
+    def close(self) -> None:
+        """Stop every thread and let go of the files."""
+        self.playback.pause()
+        self.synthesis.close()
+        self.video.close()
+        self.document.close()
+
+
+def build_context(parent: QObject, settings: Settings) -> Context:
+    """Make the models and let them follow the document."""
+    jobs = JobsModel(parent)
+    document = DocumentModel(jobs, parent)
+    playback = PlaybackModel(parent)
+    sensor = SensorModel(parent)
+    span = VisibleSpanModel(parent)
+    synthetic = TrackModel("Synthetic", parent)
+    real = TrackModel("Real", parent)
+    context = Context(
+        settings=settings,
+        jobs=jobs,
+        document=document,
+        playback=playback,
+        video=VideoModel(playback, parent),
+        sensor=sensor,
+        display=DisplayModel(parent),
+        span=span,
+        pointer=PointerModel(parent),
+        synthetic=synthetic,
+        real=real,
+        synthesis=SynthesisModel(document, sensor, playback, span, synthetic, jobs, parent),
+        edits=Edits(document, sensor),
+    )
+    document.opened.connect(lambda: _take_over(context))
+    document.changed.connect(lambda: _follow_capture(context))
+    playback.frame_changed.connect(
+        lambda _: playback.playing and span.reveal(playback.time_s)  # turn the page
+    )
+    return context
+
+
+def _take_over(context: Context) -> None:
+    document = context.document
+    content = document.content
+    if content is None:
+        return
+    context.playback.set_timebase(content.timebase)
+    context.span.set_extent(content.timebase.start_s, content.timebase.end_s)
+    context.video.set_reader(content.video)
+    context.sensor.set_sensor(content.recording.sensor)
+    _follow_capture(context, new=True)
+    context.synthesis.take_over()
+
+
+def _follow_capture(context: Context, new: bool = False) -> None:
+    from sd2app.models.content import reference_of
+
+    document, real = context.document, context.real
+    radar_map, recording = document.radar_map, document.recording
+    if recording is not None:
+        real.set_offset(recording.radar_offset_s)
+    if radar_map is real.map and not new:
+        return
+    real.title = "Radar (simulated)" if radar_map and radar_map.kind == "simulated" else "Real"
+    if radar_map is not None:
+        real.set_reference(reference_of(radar_map.values, radar_map.null_bins))
+    real.set_map(radar_map)

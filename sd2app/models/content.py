@@ -1,0 +1,154 @@
+"""What a window shows of one recording, read from disk in the background."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sd2core.errors import Sd2Error
+from sd2core.io.kinds import kind_of
+from sd2core.mesh import MeshSequence
+from sd2core.progress import Progress
+from sd2core.recording import Recording, open_recording
+from sd2core.spectrum import DopplerMap
+from sd2core.timebase import Timebase
+
+if TYPE_CHECKING:
+    from sd2core.io.radar import RadarCapture
+    from sd2core.io.video import VideoReader
+
+UNTITLED = Path()
+"""Folder of a recording that was not saved yet."""
+
+CLUTTER_CHOICES = ("mean", "moving", "none")
+
+
+@dataclass(frozen=True, eq=False)
+class Content:
+    """A recording with its parts opened; what could not be opened is in ``problems``."""
+
+    recording: Recording
+    timebase: Timebase
+    video: VideoReader | None = None
+    mesh: MeshSequence | None = None
+    capture: RadarCapture | None = None
+    radar_map: DopplerMap | None = None
+    notes: tuple[str, ...] = ()
+    problems: tuple[str, ...] = ()
+
+    @property
+    def saved(self) -> bool:
+        """Whether the recording has a folder on disk."""
+        return self.recording.folder != UNTITLED
+
+    def close(self) -> None:
+        """Release the video file."""
+        if self.video is not None:
+            self.video.close()
+
+
+def recording_of(paths: Sequence[Path], base: Recording | None = None) -> Recording:
+    """A recording made of the paths, added to those of ``base``.
+
+    Raises
+    ------
+    Sd2Error
+        When a path is of no known kind, or two are of the same.
+    """
+    kinds: dict[str, Path] = {}
+    for path in paths:
+        kind = kind_of(path)
+        if kind == "map":
+            raise Sd2Error(
+                f"{path} is a Doppler map",
+                "a recording, video, mesh or radar capture",
+                "Look at it with `sd2 info`",
+            )
+        if kind in kinds:
+            raise Sd2Error(
+                f"{kinds[kind]} and {path} are both a {kind}", "at most one file of each kind"
+            )
+        kinds[kind] = Path(path)
+    if "recording" in kinds:
+        if len(kinds) > 1:
+            raise Sd2Error(
+                f"{kinds['recording']} was given together with other files",
+                "a recording alone",
+                "Open it first, then add the others",
+            )
+        return open_recording(kinds["recording"])
+    recording = base or Recording(UNTITLED, title=Path(paths[0]).stem)
+    for kind, path in kinds.items():
+        setattr(recording, kind, path)
+    return recording
+
+
+def load_content(recording: Recording, clutter: str, progress: Progress) -> Content:
+    """Open every part of a recording.
+
+    A part that is missing or damaged does not keep the others from being
+    shown; it is named in ``problems``. Only when nothing can be opened the
+    first problem is raised.
+    """
+    from sd2core.fmcw.processing import doppler_map
+
+    problems: list[Sd2Error] = []
+
+    def attempt(present: object, read: Callable[[], Any]) -> Any:
+        if present is None:
+            return None
+        try:
+            return read()
+        except Sd2Error as error:
+            problems.append(error)
+            return None
+
+    progress(0, 4)
+    video = attempt(recording.video, recording.open_video)
+    progress(1, 4)
+    mesh = attempt(recording.mesh, recording.load_mesh)
+    progress(2, 4)
+    capture = attempt(recording.radar, recording.load_capture)
+    progress(3, 4)
+    radar_map = attempt(
+        capture,
+        lambda: doppler_map(capture, clutter=clutter, progress=lambda *_: progress(3, 4)),
+    )
+    progress(4, 4)
+    parts = [part for part in (video, mesh, capture) if part is not None]
+    if not parts:
+        raise (
+            problems[0]
+            if problems
+            else Sd2Error(
+                f"{recording.folder} holds nothing to show", "a video, a mesh or a radar capture"
+            )
+        )
+    notes = [*recording.notes] if recording.folder != UNTITLED else []
+    for part in parts:
+        notes.extend(part.notes)
+    timebase = parts[0].timebase
+    if parts[0] is capture:
+        timebase = timebase.shifted(recording.radar_offset_s)
+    return Content(
+        recording=recording,
+        timebase=timebase,
+        video=video,
+        mesh=mesh,
+        capture=capture,
+        radar_map=radar_map,
+        notes=tuple(notes),
+        problems=tuple(str(problem) for problem in problems),
+    )
+
+
+def reference_of(values: np.ndarray, bins: Iterable[int] = ()) -> float:
+    """Largest value of a map outside ``bins``: what is shown as 0 dB."""
+    keep = np.ones(values.shape[0], bool)
+    keep[list(bins)] = False
+    top = float(values[keep].max(initial=0.0))
+    return top if top > 0 else 1.0

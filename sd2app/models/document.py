@@ -1,0 +1,273 @@
+"""The recording that is open."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtGui import QUndoStack
+
+from sd2app.jobs.latest import Emit, LatestRunner
+from sd2app.models.content import UNTITLED, Content, load_content, recording_of
+from sd2app.models.jobs import Job, JobsModel
+from sd2core.mesh import MeshSequence
+from sd2core.recording import Recording, Relinked, Span
+from sd2core.spectrum import DopplerMap
+from sd2core.timebase import Timebase
+
+if TYPE_CHECKING:
+    from sd2core.io.radar import RadarCapture
+    from sd2core.io.video import VideoReader
+
+FOCAL_PER_WIDTH = 600.0 / 640.0
+"""Assumed focal length when a recording states none: 56° across the picture."""
+
+
+class DocumentModel(QObject):
+    """One recording, its parts, and the history of its edits.
+
+    Signals
+    -------
+    opened
+        Another recording (or none) is there now.
+    changed
+        Something in it or its place on disk changed.
+    noted, failed : str
+        Sentences for the user.
+    """
+
+    opened = Signal()
+    changed = Signal()
+    noted = Signal(str)
+    failed = Signal(str)
+
+    def __init__(self, jobs: JobsModel, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self.undo_stack = QUndoStack(self)
+        self._jobs = jobs
+        self._job: Job | None = None
+        self._content: Content | None = None
+        self._clutter = "mean"
+        self._runner = LatestRunner("open", self)
+        self._runner.partial.connect(self._report)
+        self._runner.finished.connect(self._receive)
+        self._runner.failed.connect(self._fail)
+        self._maps = LatestRunner("radar", self)
+        self._maps.finished.connect(self._receive_map)
+        self._maps.failed.connect(lambda error: self.failed.emit(str(error)))
+
+    # --- what is there --------------------------------------------------------------------
+
+    @property
+    def content(self) -> Content | None:
+        """All parts, None when nothing is open."""
+        return self._content
+
+    @property
+    def recording(self) -> Recording | None:
+        """Description of what belongs together."""
+        return self._content.recording if self._content else None
+
+    @property
+    def video(self) -> VideoReader | None:
+        """Open video file."""
+        return self._content.video if self._content else None
+
+    @property
+    def mesh(self) -> MeshSequence | None:
+        """Moving mesh or point cloud."""
+        return self._content.mesh if self._content else None
+
+    @property
+    def capture(self) -> RadarCapture | None:
+        """Raw radar capture, on its own clock."""
+        return self._content.capture if self._content else None
+
+    @property
+    def radar_map(self) -> DopplerMap | None:
+        """Doppler map of the capture, on its own clock."""
+        return self._content.radar_map if self._content else None
+
+    @property
+    def timebase(self) -> Timebase | None:
+        """Frames of the recording's clock: the video's, else the mesh's, else the radar's."""
+        return self._content.timebase if self._content else None
+
+    @property
+    def title(self) -> str:
+        """Name on the window."""
+        return self._content.recording.title if self._content else ""
+
+    @property
+    def simulated(self) -> bool:
+        """Whether no camera and no radar was there."""
+        return self._content is not None and self._content.recording.simulated
+
+    @property
+    def spans(self) -> tuple[Span, ...]:
+        """Gesture spans that came with the recording."""
+        return self._content.recording.spans if self._content else ()
+
+    @property
+    def focal_px(self) -> float:
+        """Focal length of the camera in pixels of the video."""
+        if self._content is None or self._content.video is None:
+            return 600.0
+        return FOCAL_PER_WIDTH * self._content.video.width
+
+    @property
+    def clutter(self) -> str:
+        """How static echoes are removed from the capture."""
+        return self._clutter
+
+    @property
+    def modified(self) -> bool:
+        """Whether there are edits that were not saved."""
+        return self._content is not None and not self.undo_stack.isClean()
+
+    # --- opening --------------------------------------------------------------------------
+
+    def open(self, paths: Sequence[Path]) -> None:
+        """Open a recording, or files that make up one, in the background."""
+        self._start(None, list(paths))
+
+    def add(self, paths: Sequence[Path]) -> None:
+        """Add files to the recording that is open, or open them."""
+        recording = self.recording
+        self._start(replace(recording) if recording is not None else None, list(paths))
+
+    def reload(self) -> None:
+        """Read all parts again, e.g. after files were found."""
+        if self.recording is not None:
+            self._start(self.recording, [])
+
+    def cancel_opening(self) -> None:
+        """Stop reading; what is open stays open."""
+        self._runner.cancel()
+        self._end_job()
+
+    def close(self) -> None:
+        """Stop all work and let go of the files."""
+        self._runner.close()
+        self._maps.close()
+        if self._content is not None:
+            self._content.close()
+            self._content = None
+
+    def _start(self, base: Recording | None, paths: list[Path]) -> None:
+        name = paths[0].name if paths else (base.title if base else "")
+        clutter = self._clutter
+
+        def read(emit: Emit) -> Content:
+            recording = recording_of(paths, base) if paths or base is None else base
+            return load_content(recording, clutter, lambda done, total: emit((done, total)))
+
+        self._end_job()
+        self._job = self._jobs.start(f"Opening {name}", self.cancel_opening)
+        self._runner.submit(read)
+
+    def _report(self, progress: Any) -> None:
+        if self._job is not None:
+            self._jobs.report(self._job, *progress)
+
+    def _receive(self, content: Content) -> None:
+        self._end_job()
+        before, self._content = self._content, content
+        if before is not None and before.video is not content.video:
+            before.close()
+        self.undo_stack.clear()
+        self.opened.emit()
+        self.changed.emit()
+        for problem in content.problems:
+            self.failed.emit(problem)
+        if content.notes:
+            self.noted.emit(" ".join(content.notes))
+
+    def _fail(self, error: Exception) -> None:
+        self._end_job()
+        self.failed.emit(str(error))
+
+    def _end_job(self) -> None:
+        if self._job is not None:
+            self._jobs.finish(self._job)
+            self._job = None
+
+    # --- changing -------------------------------------------------------------------------
+
+    def set_radar_offset(self, offset_s: float) -> None:
+        """Align the capture: time of its first frame on the recording's clock."""
+        recording = self.recording
+        if recording is not None and offset_s != recording.radar_offset_s:
+            recording.radar_offset_s = offset_s
+            self.changed.emit()
+
+    def set_clutter(self, clutter: str) -> None:
+        """Remove static echoes another way."""
+        if clutter == self._clutter:
+            return
+        self._clutter = clutter
+        capture = self.capture
+        self.changed.emit()
+        if capture is None:
+            return
+
+        def process(emit: Emit) -> DopplerMap:
+            from sd2core.fmcw.processing import doppler_map
+
+            return doppler_map(capture, clutter=clutter, progress=lambda *_: emit(None))
+
+        self._maps.submit(process)
+
+    def _receive_map(self, radar_map: DopplerMap) -> None:
+        if self._content is not None:
+            self._content = replace(self._content, radar_map=radar_map)
+            self.changed.emit()
+
+    # --- saving ---------------------------------------------------------------------------
+
+    def save(self) -> None:
+        """Write the recording where it came from.
+
+        Raises
+        ------
+        Sd2Error, OSError
+            When the folder cannot be written.
+        """
+        if self._content is not None and self._content.saved:
+            self._content.recording.save()
+            self.undo_stack.setClean()
+            self.changed.emit()
+
+    def save_as(self, folder: Path) -> None:
+        """Make a recording folder that refers to the files where they are."""
+        if self._content is None:
+            return
+        now = self._content.recording
+        made = Recording.create(
+            folder,
+            video=now.video,
+            mesh=now.mesh,
+            faces=now.faces,
+            radar=now.radar,
+            mesh_reading=now.mesh_reading,
+            radar_offset_s=now.radar_offset_s,
+            sensor=now.sensor,
+            spans=now.spans,
+            title="" if now.folder == UNTITLED else now.title,
+            simulated=now.simulated,
+        )
+        self._content = replace(self._content, recording=made)
+        self.undo_stack.setClean()
+        self.changed.emit()
+
+    def relink(self, folder: Path) -> Relinked | None:
+        """Look for missing files under one folder, and read again what was found."""
+        if self.recording is None:
+            return None
+        relinked = self.recording.relink(folder)
+        if relinked.found:
+            self.reload()
+        return relinked

@@ -1,0 +1,60 @@
+"""Long work that is under way: what it is, how far it got, how to stop it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from PySide6.QtCore import QObject, Signal
+
+
+@dataclass(eq=False)
+class Job:
+    """One piece of work; ``total`` is zero while its length is unknown."""
+
+    title: str
+    cancel: Callable[[], None]
+    done: int = 0
+    total: int = 0
+    cancelling: bool = False
+
+
+class JobsModel(QObject):
+    """All jobs, the oldest first."""
+
+    changed = Signal()
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._jobs: list[Job] = []
+
+    @property
+    def jobs(self) -> tuple[Job, ...]:
+        """What is under way."""
+        return tuple(self._jobs)
+
+    def start(self, title: str, cancel: Callable[[], None]) -> Job:
+        """Announce a job."""
+        job = Job(title, cancel)
+        self._jobs.append(job)
+        self.changed.emit()
+        return job
+
+    def report(self, job: Job, done: int, total: int) -> None:
+        """Say how far a job got."""
+        if (done, total) != (job.done, job.total):
+            job.done, job.total = done, total
+            self.changed.emit()
+
+    def finish(self, job: Job) -> None:
+        """A job is over, one way or the other."""
+        if job in self._jobs:
+            self._jobs.remove(job)
+            self.changed.emit()
+
+    def cancel(self, job: Job) -> None:
+        """Stop a job; it says so at once."""
+        if job in self._jobs and not job.cancelling:
+            job.cancelling = True
+            self.changed.emit()
+            job.cancel()

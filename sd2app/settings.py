@@ -1,0 +1,47 @@
+"""What the window remembers from one start to the next."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import QByteArray, QSettings
+
+_RECENT = 10
+
+
+class Settings:
+    """Typed access to the user's settings."""
+
+    def __init__(self, store: QSettings | None = None) -> None:
+        self._store = store if store is not None else QSettings("SD2 Studio", "SD2 Studio")
+
+    @property
+    def recent(self) -> list[Path]:
+        """Recently opened paths, the newest first."""
+        value = self._store.value("recent", [])
+        paths = [value] if isinstance(value, str) else list(value or [])
+        return [Path(path) for path in paths]
+
+    def add_recent(self, path: Path) -> None:
+        """Remember a path as the newest."""
+        paths = [path, *(known for known in self.recent if known != path)]
+        self._store.setValue("recent", [str(known) for known in paths[:_RECENT]])
+
+    @property
+    def dark(self) -> bool | None:
+        """Theme the user chose, or None to follow the system."""
+        value = self._store.value("dark")
+        return None if value is None else str(value).lower() == "true"
+
+    @dark.setter
+    def dark(self, dark: bool) -> None:
+        self._store.setValue("dark", dark)
+
+    def layout(self, name: str) -> QByteArray | None:
+        """Saved geometry of a part of the window."""
+        value = self._store.value(f"layout/{name}")
+        return value if isinstance(value, QByteArray) else None
+
+    def set_layout(self, name: str, state: QByteArray) -> None:
+        """Remember the geometry of a part of the window."""
+        self._store.setValue(f"layout/{name}", state)

@@ -1,0 +1,49 @@
+"""One sentence over the window: what went wrong and what to do, or what to know."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QToolButton, QWidget
+
+
+class MessageBar(QFrame):
+    """Hidden until there is something to say."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("panel")
+        self._text = QLabel(self)
+        self._text.setWordWrap(True)
+        self._text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        close = QToolButton(self)
+        close.setText("✕")
+        close.setToolTip("Close this message")
+        close.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        close.clicked.connect(self.hide)
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(12, 4, 4, 4)
+        layout.addWidget(self._text, 1)
+        layout.addWidget(close, 0, Qt.AlignmentFlag.AlignTop)
+        self.hide()
+
+    @property
+    def text(self) -> str:
+        """What is said, empty while hidden."""
+        return "" if self.isHidden() else self._text.text()
+
+    def warn(self, text: str) -> None:
+        """Say what failed; several failures stand below each other."""
+        warning = self._text.objectName() == "warning" and bool(self.text)
+        self._say(f"{self.text}\n{text}" if warning else text, "warning")
+
+    def note(self, text: str) -> None:
+        """Say what is good to know; a failure on show stays."""
+        if not (self.text and self._text.objectName() == "warning"):
+            self._say(text, "muted")
+
+    def _say(self, text: str, role: str) -> None:
+        self._text.setObjectName(role)
+        self._text.style().unpolish(self._text)
+        self._text.style().polish(self._text)
+        self._text.setText(text)
+        self.show()

@@ -1,0 +1,83 @@
+"""What the colour of the mesh means, over the 3D view."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from PySide6.QtCore import QSignalBlocker, Qt
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QToolButton, QWidget
+
+from sd2app.models.display import DisplayModel
+
+_COLOURS = (
+    ("velocity", "radial velocity"),
+    ("range", "range"),
+    ("visibility", "visibility"),
+    ("plain", "plain"),
+)
+_VIEWS = (
+    ("view_three_quarter", "Overview"),
+    ("view_camera", "Camera"),
+    ("view_sensor", "Sensor"),
+    ("view_side", "Side"),
+    ("view_top", "Top"),
+)
+
+
+class SceneBar(QWidget):
+    """Colour, dots, and where one looks from."""
+
+    def __init__(
+        self,
+        display: DisplayModel,
+        actions: Mapping[str, QAction],
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._display = display
+        self._colour = QComboBox(self)
+        self._colour.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._colour.setToolTip("What the colour of the mesh means (1 to 4)")
+        for value, text in _COLOURS:
+            self._colour.addItem(text, value)
+        self._colour.currentIndexChanged.connect(
+            lambda _: display.set_mesh_colour(self._colour.currentData())
+        )
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(8, 2, 4, 2)
+        layout.setSpacing(4)
+        title = QLabel("Scene", self)
+        title.setObjectName("title")
+        layout.addWidget(title)
+        layout.addSpacing(8)
+        layout.addWidget(QLabel("colour", self))
+        layout.addWidget(self._colour)
+        layout.addWidget(_button(actions["dots"], "Dots"))
+        layout.addStretch(1)
+        for name, text in _VIEWS:
+            layout.addWidget(_button(actions[name], text))
+        display.mesh_changed.connect(self._refresh)
+        self._refresh()
+
+    def _refresh(self) -> None:
+        with QSignalBlocker(self._colour):
+            self._colour.setCurrentIndex(self._colour.findData(self._display.mesh_colour))
+
+
+def _button(action: QAction, text: str) -> QToolButton:
+    # The button keeps its short text; the action has the full one for the menu.
+    button = QToolButton()
+    button.setText(text)
+    button.setToolTip(action.toolTip())
+    button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+    button.setCheckable(action.isCheckable())
+    button.setEnabled(action.isEnabled())
+    button.clicked.connect(action.trigger)
+
+    def follow() -> None:
+        button.setEnabled(action.isEnabled())
+        button.setChecked(action.isChecked())
+
+    action.changed.connect(follow)
+    return button

@@ -1,0 +1,276 @@
+"""The sensor in numbers: where it is, what it sees, what it cannot see."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from PySide6.QtCore import QSignalBlocker, Qt
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import (
+    QComboBox,
+    QDoubleSpinBox,
+    QFormLayout,
+    QFrame,
+    QLabel,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from sd2app.commands import Edits
+from sd2app.models.content import CLUTTER_CHOICES
+from sd2app.models.document import DocumentModel
+from sd2app.models.sensor import SensorModel
+from sd2app.models.synthesis import SynthesisModel
+from sd2core.sensor import position_from_spherical, spherical_from_position
+
+_CLUTTER_TEXT = {
+    "mean": "mean over chirps",
+    "moving": "moving average over frames",
+    "none": "keep",
+}
+
+
+class SensorPanel(QWidget):
+    """Type a placement; read range, visible share and limits."""
+
+    def __init__(
+        self,
+        sensor: SensorModel,
+        document: DocumentModel,
+        synthesis: SynthesisModel,
+        edits: Edits,
+        to_camera: QAction,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._sensor = sensor
+        self._document = document
+        self._synthesis = synthesis
+        self._edits = edits
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(8, 8, 8, 8)
+        layout.setSpacing(8)
+        layout.addWidget(_title("Sensor"))
+        layout.addLayout(self._placement_form())
+        button = QPushButton("At the camera", self)
+        button.setToolTip(to_camera.toolTip())
+        button.clicked.connect(to_camera.trigger)
+        layout.addWidget(button)
+        layout.addWidget(_rule())
+        layout.addWidget(_title("What it sees"))
+        layout.addLayout(self._readout_form())
+        self._capture = self._capture_part()
+        layout.addWidget(self._capture)
+        layout.addStretch(1)
+        sensor.changed.connect(self._refresh_placement)
+        synthesis.target_changed.connect(self._refresh_placement)
+        synthesis.readout_changed.connect(self._refresh_readout)
+        document.changed.connect(self._refresh_capture)
+        self._refresh_placement()
+        self._refresh_readout()
+        self._refresh_capture()
+
+    # --- building -------------------------------------------------------------------------
+
+    def _placement_form(self) -> QFormLayout:
+        form = _form()
+        self._xyz = [
+            _number(self, -100.0, 100.0, " m", f"Sensor position, {axis}: {meaning}")
+            for axis, meaning in (("x", "to the right"), ("y", "down"), ("z", "forward"))
+        ]
+        for box, name in zip(self._xyz, ("x right", "y down", "z forward"), strict=True):
+            box.valueChanged.connect(self._place_by_xyz)
+            form.addRow(name, box)
+        self._range = _number(self, 0.05, 100.0, " m", "Distance from the body's centre")
+        self._azimuth = _number(
+            self, -180.0, 180.0, "°", "0° is between body and camera, positive to the right", 1
+        )
+        self._elevation = _number(self, -90.0, 90.0, "°", "Positive is above the body's centre", 1)
+        for box, name in (
+            (self._range, "Range"),
+            (self._azimuth, "Azimuth"),
+            (self._elevation, "Elevation"),
+        ):
+            box.valueChanged.connect(self._place_by_angles)
+            form.addRow(name, box)
+        return form
+
+    def _readout_form(self) -> QFormLayout:
+        form = _form()
+        self._torso = _value(self, "Distance from the sensor to the body's median vertex")
+        self._visible = _value(self, "Share of the vertices that the sensor sees in this frame")
+        self._beyond = _value(
+            self, "Share of what the sensor sees in this frame that is faster than the axis"
+        )
+        self._v_max = _value(self, "Edge of the velocity axis")
+        form.addRow("Range to torso", self._torso)
+        form.addRow("Visible", self._visible)
+        form.addRow("Axis ends at", self._v_max)
+        form.addRow("Beyond it", self._beyond)
+        return form
+
+    def _capture_part(self) -> QWidget:
+        part = QWidget(self)
+        layout = QVBoxLayout(part)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(8)
+        layout.addWidget(_rule())
+        self._capture_title = _title("Radar capture")
+        layout.addWidget(self._capture_title)
+        form = _form()
+        self._offset = _number(self, -1e5, 1e5, " s", "Time of the first radar frame here", 3)
+        self._offset.setSingleStep(0.01)
+        self._offset.valueChanged.connect(self._edits.set_radar_offset)
+        form.addRow("Offset", self._offset)
+        self._clutter = QComboBox(self)
+        self._clutter.setToolTip("How echoes that do not move are removed")
+        for choice in CLUTTER_CHOICES:
+            self._clutter.addItem(_CLUTTER_TEXT[choice], choice)
+        self._clutter.setMinimumContentsLength(8)
+        self._clutter.setSizeAdjustPolicy(
+            QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
+        )
+        self._clutter.currentIndexChanged.connect(
+            lambda _: self._document.set_clutter(self._clutter.currentData())
+        )
+        form.addRow("Clutter", self._clutter)
+        self._limits = {
+            name: _value(self, tip)
+            for name, tip in (
+                ("λ", "Wavelength at the centre frequency"),
+                ("v max", "Largest unambiguous velocity, λ / 4 T_c"),
+                ("Δv", "Velocity resolution"),
+                ("ΔR", "Range resolution, c / 2 B"),
+                ("R max", "Largest unambiguous range"),
+            )
+        }
+        for name, label in self._limits.items():
+            form.addRow(name, label)
+        layout.addLayout(form)
+        self._warning = QLabel(part)
+        self._warning.setObjectName("warning")
+        self._warning.setWordWrap(True)
+        layout.addWidget(self._warning)
+        return part
+
+    # --- typing ---------------------------------------------------------------------------
+
+    def _place_by_xyz(self) -> None:
+        x, y, z = (box.value() for box in self._xyz)
+        now = self._sensor.sensor
+        if any(abs(a - b) > 5e-4 for a, b in zip((x, y, z), now.position_m, strict=True)):
+            self._edits.place_sensor(replace(now, position_m=(x, y, z)))
+
+    def _place_by_angles(self) -> None:
+        target = self._synthesis.torso_m
+        if target is None:
+            return
+        wanted = (self._range.value(), self._azimuth.value(), self._elevation.value())
+        now = spherical_from_position(target, self._sensor.sensor.position_m)
+        if any(
+            abs(a - b) > tolerance
+            for a, b, tolerance in zip(wanted, now, (5e-4, 0.05, 0.05), strict=True)
+        ):
+            position = position_from_spherical(target, *wanted)
+            self._edits.place_sensor(replace(self._sensor.sensor, position_m=position))
+
+    # --- showing --------------------------------------------------------------------------
+
+    def _refresh_placement(self) -> None:
+        position = self._sensor.sensor.position_m
+        target = self._synthesis.torso_m
+        for box in (self._range, self._azimuth, self._elevation):
+            box.setEnabled(target is not None)
+        shown = [*zip(self._xyz, position, strict=True)]
+        if target is not None:
+            spherical = spherical_from_position(target, position)
+            boxes = (self._range, self._azimuth, self._elevation)
+            shown += [*zip(boxes, spherical, strict=True)]
+        for box, value in shown:
+            with QSignalBlocker(box):
+                box.setValue(value)
+        self._refresh_readout()
+
+    def _refresh_readout(self) -> None:
+        readout = self._synthesis.readout()
+        for label, text in (
+            (self._torso, f"{readout.torso_range_m:.2f} m" if readout else "–"),
+            (self._visible, _percent(readout.visible_share) if readout else "–"),
+            (self._beyond, _percent(readout.beyond_share) if readout else "–"),
+            (self._v_max, f"±{self._synthesis.v_max_mps:g} m/s"),
+        ):
+            label.setText(text)
+
+    def _refresh_capture(self) -> None:
+        capture, recording = self._document.capture, self._document.recording
+        self._capture.setVisible(capture is not None)
+        if capture is None or recording is None:
+            return
+        kind = "Simulated radar" if capture.simulated else "Real radar"
+        self._capture_title.setText(kind)
+        self._capture_title.setToolTip(capture.config.name)
+        with QSignalBlocker(self._offset):
+            self._offset.setValue(recording.radar_offset_s)
+        with QSignalBlocker(self._clutter):
+            self._clutter.setCurrentIndex(CLUTTER_CHOICES.index(self._document.clutter))
+        config = capture.config
+        for name, text in (
+            ("λ", f"{1e3 * config.wavelength_m:.2f} mm"),
+            ("v max", f"±{config.v_max_mps:.2f} m/s"),
+            ("Δv", f"{config.velocity_resolution_mps:.3f} m/s"),
+            ("ΔR", f"{config.range_resolution_m:.2f} m"),
+            ("R max", f"{config.range_max_m:.1f} m"),
+        ):
+            self._limits[name].setText(text)
+        radar_map = self._document.radar_map
+        blind = len(radar_map.unseen_bins) if radar_map is not None else 0
+        self._warning.setVisible(blind > 0)
+        self._warning.setText(
+            f"The axis goes beyond this radar's v max: it cannot see {blind} of the bins."
+        )
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.1f} %"
+
+
+def _form() -> QFormLayout:
+    form = QFormLayout()
+    form.setHorizontalSpacing(12)
+    form.setVerticalSpacing(4)
+    form.setLabelAlignment(Qt.AlignmentFlag.AlignLeft)
+    return form
+
+
+def _title(text: str) -> QLabel:
+    label = QLabel(text)
+    label.setObjectName("title")
+    return label
+
+
+def _rule() -> QFrame:
+    rule = QFrame()
+    rule.setFrameShape(QFrame.Shape.HLine)
+    rule.setObjectName("rule")
+    return rule
+
+
+def _value(parent: QWidget, tip: str) -> QLabel:
+    label = QLabel("–", parent)
+    label.setToolTip(tip)
+    label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+    return label
+
+
+def _number(
+    parent: QWidget, low: float, high: float, suffix: str, tip: str, decimals: int = 3
+) -> QDoubleSpinBox:
+    box = QDoubleSpinBox(parent)
+    box.setRange(low, high)
+    box.setDecimals(decimals)
+    box.setSingleStep(0.1 if decimals > 1 else 1.0)
+    box.setSuffix(suffix)
+    box.setToolTip(tip)
+    box.setKeyboardTracking(False)
+    return box

@@ -1,0 +1,404 @@
+"""The window: a skeleton that stands at once, filled when the rest is loaded."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtGui import QAction, QCloseEvent, QDragEnterEvent, QDropEvent, QKeySequence
+from PySide6.QtWidgets import (
+    QApplication,
+    QFrame,
+    QMainWindow,
+    QMenu,
+    QScrollArea,
+    QSplitter,
+    QVBoxLayout,
+    QWidget,
+)
+
+from sd2app.settings import Settings
+from sd2app.theme import apply_theme
+
+if TYPE_CHECKING:
+    from sd2app.context import Context
+    from sd2app.dialogs.dialogs import Dialogs
+    from sd2app.views.scene3d import SceneView
+
+_PANELS = ("video", "scene", "sensor", "tracks", "spectrum")
+
+
+class MainWindow(QMainWindow):
+    """One recording: frame-wise views on top, time-wise tracks below."""
+
+    context: Context
+    dialogs: Dialogs
+
+    def __init__(self, settings: Settings) -> None:
+        super().__init__()
+        self._settings = settings
+        self._scene: SceneView | None = None
+        self._ready = False
+        self.setWindowTitle("SD² Studio")
+        self.setAcceptDrops(True)
+        self.resize(1280, 800)
+        self._panels = {name: _panel(name) for name in _PANELS}
+        self._build_skeleton()
+        if (geometry := settings.layout("window")) is not None:
+            self.restoreGeometry(geometry)
+
+    @property
+    def ready(self) -> bool:
+        """Whether the views stand and a recording can be shown."""
+        return self._ready
+
+    @property
+    def settled(self) -> bool:
+        """Whether nothing is being read, computed or decoded."""
+        return (
+            self._scene is not None
+            and not self.context.jobs.jobs
+            and not self.context.synthesis.busy
+            and not self.context.video.busy
+        )
+
+    # --- building -------------------------------------------------------------------------
+
+    def _build_skeleton(self) -> None:
+        self._top = _splitter(
+            Qt.Orientation.Horizontal,
+            [self._panels[name] for name in ("video", "scene", "sensor")],
+            (370, 640, 254),
+        )
+        self._bottom = _splitter(
+            Qt.Orientation.Horizontal,
+            [self._panels["tracks"], self._panels["spectrum"]],
+            (1016, 248),
+        )
+        self._rows = _splitter(Qt.Orientation.Vertical, [self._top, self._bottom], (360, 380))
+        self._column = QVBoxLayout()
+        self._column.setContentsMargins(8, 0, 8, 0)
+        self._column.setSpacing(4)
+        self._column.addWidget(self._rows, 1)
+        centre = QWidget(self)
+        centre.setLayout(self._column)
+        self.setCentralWidget(centre)
+
+    def populate(self) -> None:
+        """Load what takes time to import, and fill the skeleton."""
+        # Imported here so that the skeleton is on screen before NumPy, PyAV,
+        # numba and VTK are loaded.
+        from sd2app.context import build_context
+        from sd2app.dialogs.dialogs import Dialogs
+        from sd2app.views.message_bar import MessageBar
+        from sd2app.views.status import StatusLine
+        from sd2app.views.transport import TransportBar
+
+        self.context = build_context(self, self._settings)
+        context = self.context
+        context.display.set_dark(is_dark(self._settings))
+        self.messages = MessageBar(self)
+        self.dialogs = Dialogs(self, context, self.messages.warn)
+        self._actions = self._build_actions()
+        self._build_menus()
+        self._fill_panels()
+        self._column.insertWidget(0, self.messages)
+        self._column.addWidget(TransportBar(context.playback, self._actions, self))
+        self._column.addWidget(StatusLine(context.pointer, context.jobs, self))
+        self._connect()
+        self._restyle()
+        for name in ("top", "bottom", "rows"):
+            if (state := self._settings.layout(name)) is not None:
+                getattr(self, f"_{name}").restoreState(state)
+        self._ready = True
+        # VTK last: everything else is usable while it loads.
+        QTimer.singleShot(0, self._add_scene)
+
+    def _fill_panels(self) -> None:
+        from sd2app.views.heatmap import HeatmapView
+        from sd2app.views.level_bar import LevelBar
+        from sd2app.views.sensor_panel import SensorPanel
+        from sd2app.views.spectrum import Curve, SpectrumView
+        from sd2app.views.timeline import Overview, TimeRuler
+        from sd2app.views.video import VideoView
+
+        c = self.context
+        _fill(self._panels["video"], VideoView(c.video, c.document, c.playback, c.display))
+        to_camera = self._actions["sensor_to_camera"]
+        panel = SensorPanel(c.sensor, c.document, c.synthesis, c.edits, to_camera)
+        _fill(self._panels["sensor"], _scrolled(panel))
+        self._synthetic_view = HeatmapView(c.synthetic, c.span, c.playback, c.display, c.pointer)
+        self._real_view = HeatmapView(
+            c.real, c.span, c.playback, c.display, c.pointer, alignable=True
+        )
+        self._real_view.setToolTip("Drag the title to align the capture in time")
+        self._real_view.offset_grabbed.connect(c.edits.begin_offset_drag)
+        self._real_view.offset_dragged.connect(c.edits.drag_offset)
+        self._real_view.offset_released.connect(c.edits.end_offset_drag)
+        self._overview = Overview(c.synthetic, c.span, c.playback, c.display)
+        tracks = QVBoxLayout()
+        for view, stretch in (
+            (self._synthetic_view, 1),
+            (self._real_view, 1),
+            (TimeRuler(c.span, c.playback, c.display), 0),
+            (self._overview, 0),
+        ):
+            tracks.addWidget(view, stretch)
+        _fill_layout(self._panels["tracks"], tracks)
+        side = QVBoxLayout()
+        curves = (Curve(c.synthetic, "synthetic"), Curve(c.real, "real"))
+        side.addWidget(SpectrumView(curves, c.playback, c.display, c.pointer), 1)
+        side.addWidget(LevelBar(c.display, (c.synthetic, c.real)))
+        _fill_layout(self._panels["spectrum"], side)
+
+    def _add_scene(self) -> None:
+        from sd2app.views.scene3d import SceneView
+        from sd2app.views.scene_bar import SceneBar
+
+        c = self.context
+        self._scene = SceneView(
+            c.document,
+            c.playback,
+            c.sensor,
+            c.display,
+            c.synthesis,
+            begin_drag=c.edits.begin_sensor_drag,
+            drag=c.edits.drag_sensor,
+            end_drag=c.edits.end_sensor_drag,
+        )
+        layout = QVBoxLayout()
+        layout.addWidget(SceneBar(c.display, self._actions))
+        layout.addWidget(self._scene, 1)
+        _fill_layout(self._panels["scene"], layout)
+
+    def _build_actions(self) -> dict[str, QAction]:
+        from sd2app.actions import ACTIONS
+
+        actions = {}
+        for row in ACTIONS:
+            action = QAction(row.text, self)
+            action.setShortcuts([QKeySequence(key) for key in row.keys])
+            keys = ", ".join(row.keys)
+            action.setToolTip(f"{row.tip} ({keys})" if keys else row.tip)
+            action.setCheckable(row.checked is not None)
+            action.triggered.connect(lambda _=False, run=row.run: run(self))
+            actions[row.id] = action
+        return actions
+
+    def _build_menus(self) -> None:
+        from sd2app.actions import ACTIONS
+
+        menus: dict[str, QMenu] = {}
+        for name in ("File", "Edit", "View", "Play", "Help"):
+            menus[name] = self.menuBar().addMenu(name)
+        stack = self.context.document.undo_stack
+        undo, redo = stack.createUndoAction(self, "Undo"), stack.createRedoAction(self, "Redo")
+        undo.setShortcut(QKeySequence("Ctrl+Z"))
+        redo.setShortcut(QKeySequence("Ctrl+Shift+Z"))
+        menus["Edit"].addActions([undo, redo])
+        for row in ACTIONS:
+            if row.separator_before:
+                menus[row.menu].addSeparator()
+            menus[row.menu].addAction(self._actions[row.id])
+            if row.id == "open_folder":
+                self._recent_menu = menus["File"].addMenu("Open recent")
+                self._recent_menu.aboutToShow.connect(self._list_recent)
+
+    def _connect(self) -> None:
+        c = self.context
+        c.document.opened.connect(self._show_document)
+        c.document.changed.connect(self._refresh)
+        c.document.failed.connect(self.messages.warn)
+        c.document.noted.connect(self.messages.note)
+        c.synthesis.failed.connect(self.messages.warn)
+        c.video.failed.connect(self.messages.warn)
+        c.document.undo_stack.cleanChanged.connect(self._refresh)
+        for signal in (
+            c.playback.playing_changed,
+            c.playback.loop_changed,
+            c.display.mesh_changed,
+            c.synthesis.completed,
+        ):
+            signal.connect(self._refresh)
+        c.display.theme_changed.connect(self._restyle)
+        for track in (c.synthetic, c.real):
+            track.changed.connect(self._show_tracks)
+        self._show_tracks()
+
+    # --- following the models -------------------------------------------------------------
+
+    def _show_document(self) -> None:
+        self.messages.hide()
+        self._overview.set_labels(self.context.document.spans)
+        self._show_tracks()
+        self._refresh()
+
+    def _show_tracks(self) -> None:
+        c = self.context
+        has_any = c.synthetic.map is not None or c.real.map is not None
+        self._synthetic_view.setVisible(c.synthetic.map is not None or not has_any)
+        self._real_view.setVisible(c.real.map is not None)
+        self._overview.set_track(c.synthetic if c.synthetic.map is not None else c.real)
+        self._panels["spectrum"].setVisible(True)
+
+    def _refresh(self) -> None:
+        from sd2app.actions import ACTIONS
+
+        document = self.context.document
+        for row in ACTIONS:
+            action = self._actions[row.id]
+            action.setEnabled(row.enabled(self.context))
+            if row.checked is not None:
+                action.setChecked(row.checked(self.context))
+        playing = self.context.playback.playing
+        if playing != (self._actions["play"].text() == "Pause"):
+            self._actions["play"].setText("Pause" if playing else "Play")
+            self._set_icon("play", "pause" if playing else "play")
+        mark = " *" if document.modified else ""
+        kind = " (simulated)" if document.simulated else ""
+        name = f"{document.title}{mark}{kind} – " if document.title else ""
+        self.setWindowTitle(f"{name}SD² Studio")
+
+    def _restyle(self) -> None:
+        from sd2app.actions import ACTIONS
+
+        application = QApplication.instance()
+        assert isinstance(application, QApplication)
+        apply_theme(application, self.context.display.dark)
+        for row in ACTIONS:
+            if row.icon:
+                self._set_icon(row.id, row.icon)
+        self._refresh()
+
+    def _set_icon(self, action: str, icon: str) -> None:
+        from sd2app.icons import transport_icon
+
+        self._actions[action].setIcon(transport_icon(icon, self.context.display.palette.text))
+
+    # --- what actions call ----------------------------------------------------------------
+
+    def open_paths(self, paths: list[Path]) -> None:
+        """Open what was named on the command line, dropped, or chosen from the list."""
+        self.context.document.open(paths)
+        if len(paths) == 1:
+            self._settings.add_recent(paths[0].resolve())
+
+    def open_sample(self) -> None:
+        """Open the recording that comes with the program."""
+        from sd2core.resources import resource_path
+
+        if self.dialogs.may_discard():
+            self.open_paths([resource_path("swipes.sd2")])
+
+    def set_dark(self, dark: bool) -> None:
+        """Choose the theme and remember it."""
+        self._settings.dark = dark
+        self.context.display.set_dark(dark)
+
+    def set_scene_view(self, name: str) -> None:
+        """Look at the scene from somewhere else."""
+        if self._scene is not None:
+            self._scene.set_view(name)
+
+    def close_window(self) -> None:
+        """Close, after asking when edits would be lost."""
+        self.close()
+
+    def _list_recent(self) -> None:
+        self._recent_menu.clear()
+        for path in self._settings.recent:
+            action = self._recent_menu.addAction(str(path))
+            action.triggered.connect(lambda _=False, path=path: self._open_recent(path))
+        self._recent_menu.setEnabled(True)
+        if self._recent_menu.isEmpty():
+            self._recent_menu.addAction("Nothing yet").setEnabled(False)
+
+    def _open_recent(self, path: Path) -> None:
+        if self.dialogs.may_discard():
+            self.open_paths([path])
+
+    # --- Qt events ------------------------------------------------------------------------
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
+        """Take files."""
+        if self._ready and event.mimeData().hasUrls():
+            event.acceptProposedAction()
+
+    def dropEvent(self, event: QDropEvent) -> None:
+        """Open what was dropped; with Shift, add it to what is open."""
+        paths = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
+        if not paths:
+            return
+        event.acceptProposedAction()
+        if event.modifiers() & Qt.KeyboardModifier.ShiftModifier:
+            self.context.document.add(paths)
+        elif self.dialogs.may_discard():
+            self.open_paths(paths)
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        """Ask, remember the layout, stop every thread, release VTK."""
+        if not self._ready:
+            event.accept()
+            return
+        if not self.dialogs.may_discard():
+            event.ignore()
+            return
+        self._settings.set_layout("window", self.saveGeometry())
+        for name in ("top", "bottom", "rows"):
+            self._settings.set_layout(name, getattr(self, f"_{name}").saveState())
+        self._ready = False
+        self.context.close()
+        if self._scene is not None:
+            self._scene.close()
+        event.accept()
+
+
+def is_dark(settings: Settings) -> bool:
+    """The user's choice of theme, or the system's."""
+    if settings.dark is not None:
+        return settings.dark
+    hints = QApplication.styleHints()
+    return hints.colorScheme() == Qt.ColorScheme.Dark
+
+
+def _panel(name: str) -> QFrame:
+    panel = QFrame()
+    panel.setObjectName("panel")
+    panel.setAccessibleName(name.capitalize())
+    return panel
+
+
+def _splitter(
+    orientation: Qt.Orientation, widgets: list[QWidget], sizes: tuple[int, ...]
+) -> QSplitter:
+    splitter = QSplitter(orientation)
+    splitter.setChildrenCollapsible(False)
+    splitter.setHandleWidth(8)
+    for widget in widgets:
+        splitter.addWidget(widget)
+    splitter.setSizes(list(sizes))
+    # Extra room goes to the middle of the top row and to the left of the bottom row.
+    for index, size in enumerate(sizes):
+        splitter.setStretchFactor(index, 1 if size == max(sizes) else 0)
+    return splitter
+
+
+def _fill(panel: QFrame, widget: QWidget) -> None:
+    layout = QVBoxLayout()
+    layout.addWidget(widget)
+    _fill_layout(panel, layout)
+
+
+def _fill_layout(panel: QFrame, layout: QVBoxLayout) -> None:
+    layout.setContentsMargins(1, 1, 1, 1)
+    layout.setSpacing(0)
+    panel.setLayout(layout)
+
+
+def _scrolled(widget: QWidget) -> QScrollArea:
+    scroll = QScrollArea()
+    scroll.setWidget(widget)
+    scroll.setWidgetResizable(True)
+    scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    return scroll
