@@ -150,7 +150,7 @@ def write_npz(mesh: MeshSequence, path: Path, progress: Progress = silent) -> No
     with atomic_write(path) as stream, zipfile.ZipFile(stream, "w") as archive:
         with archive.open(_member("vertices"), "w", force_zip64=True) as member:
             header = {"descr": dtype.str, "fortran_order": False, "shape": mesh.vertices.shape}
-            np.lib.format.write_array_header_1_0(member, header)  # type: ignore[arg-type]
+            np.lib.format.write_array_header_1_0(member, header)
             for start in range(0, mesh.frame_count, step):
                 progress(start, mesh.frame_count)
                 member.write(_block(mesh, start, step).astype(dtype, copy=False).tobytes())

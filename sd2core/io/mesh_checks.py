@@ -141,7 +141,7 @@ def _check_faces(raw: RawMesh, vertices: NDArray[np.float64], source: str) -> No
     if faces.size and faces.min() == 1 and faces.max() == last + 1:
         faces = faces - 1
         raw.notes.append("The faces number the vertices from 1; they are read as such.")
-    if faces.size and not (0 <= faces.min() and faces.max() <= last):
+    if faces.size and not (faces.min() >= 0 and faces.max() <= last):
         bad = int(faces.max()) if faces.max() > last else int(faces.min())
         raise Sd2Error(
             f"{source}: a face names vertex {bad}, the mesh has {last + 1:,} vertices",

@@ -1,0 +1,264 @@
+"""What body-estimation tools write: VIBE, WHAM, 4D-Humans, and pickles with ``verts``.
+
+The first two store, per person, SMPL vertices and the numbers of the video
+frames they belong to. WHAM's stand in the camera's frame. VIBE's are centred
+on the body's root, beside a weak-perspective camera per frame.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+from sd2core.io.mesh_arrays import (
+    FACE_NAMES,
+    RATE_NAMES,
+    TIME_NAMES,
+    VERTEX_NAMES,
+    RawMesh,
+)
+from sd2core.io.pickles import read_pickle
+
+_AT_ROOT_M = 0.6
+_PARAMETERS = ("smpl", "body_pose", "pose", "betas", "global_orient")
+
+
+def read_model_output(
+    path: Path,
+    person: int | str | None = None,
+    image_size: tuple[int, int] | None = None,
+    focal_px: float | None = None,
+) -> RawMesh:
+    """Read vertices from a pickle or joblib file without executing anything in it.
+
+    Parameters
+    ----------
+    path : Path
+    person : optional
+        Key of the person; by default the one with the most frames.
+    image_size : (width, height), optional
+        Of the video; with VIBE's camera it places the body.
+    focal_px : float, optional
+        Focal length for that; by default the image's diagonal.
+
+    Raises
+    ------
+    Sd2Error
+        When the file holds no vertices, or something that is not plain data.
+    """
+    content = read_pickle(path)
+    if not isinstance(content, dict):
+        content = {"verts": content}
+    notes: list[str] = []
+    entry = content
+    if _vertices_of(content) is None:
+        people = {
+            key: value
+            for key, value in content.items()
+            if isinstance(key, str | int)
+            and isinstance(value, dict)
+            and _vertices_of(value) is not None
+        }
+        if not people:
+            raise _no_vertices(path, content)
+        entry = _choose(path, people, person, notes)
+    raw = RawMesh(vertices=_stacked(_vertices_of(entry), path), notes=notes)
+    raw.faces = _array(entry, content, FACE_NAMES)
+    times = _array(entry, content, TIME_NAMES)
+    raw.times_s = None if times is None else times.astype(np.float64)
+    rate = _array(entry, content, RATE_NAMES)
+    raw.frames_per_s = None if rate is None or not rate.size else float(rate.reshape(-1)[0])
+    _number_frames(raw, entry, path)
+    _place_in_front(raw, entry, path, image_size, focal_px)
+    return raw
+
+
+def weak_perspective_shift(
+    camera: NDArray[np.float64],
+    boxes: NDArray[np.float64],
+    image_size: tuple[int, int],
+    focal_px: float,
+) -> NDArray[np.float64]:
+    """Where a root-centred body stands so that a real camera sees it in its box.
+
+    VIBE's camera (s, t_x, t_y) maps a point X of the body to s·(X + t_x) in its
+    box, which spans -1 to 1; the box is h pixels wide and centred on c_x. In
+    pixels: u = c_x + (s·h/2)·(X + t_x). A pinhole camera with focal length f,
+    centred on the image of width W, sees a body at depth Z and offset T_x at
+    u = W/2 + f·(X + T_x)/Z. Equal scale gives Z = 2·f/(s·h); equal position gives
+    T_x = t_x + (c_x - W/2)·2/(s·h). The same holds for y with the image's height.
+
+    Parameters
+    ----------
+    camera : array, shape (T, 3)
+        s, t_x, t_y.
+    boxes : array, shape (T, 4)
+        c_x, c_y, width, height in pixels; VIBE's are square.
+    image_size : (width, height)
+        Pixels.
+    focal_px : float
+
+    Returns
+    -------
+    array, shape (T, 3)
+        Metres, to be added to every vertex.
+    """
+    metres_per_pixel = 2.0 / (camera[:, 0] * boxes[:, 2])
+    width, height = image_size
+    return np.stack(
+        [
+            camera[:, 1] + (boxes[:, 0] - width / 2) * metres_per_pixel,
+            camera[:, 2] + (boxes[:, 1] - height / 2) * metres_per_pixel,
+            focal_px * metres_per_pixel,
+        ],
+        axis=1,
+    )
+
+
+def _vertices_of(entry: dict[Any, Any]) -> Any:
+    return next((entry[name] for name in VERTEX_NAMES if entry.get(name) is not None), None)
+
+
+def _choose(
+    path: Path, people: dict[Any, Any], person: int | str | None, notes: list[str]
+) -> dict[Any, Any]:
+    lengths = {key: len(_vertices_of(value)) for key, value in people.items()}
+    listed = ", ".join(f"{key} ({count:,} frames)" for key, count in lengths.items())
+    if person is None:
+        key = max(lengths, key=lambda k: lengths[k])
+        if len(people) > 1:
+            notes.append(f"Person {key} is read, seen longest of: {listed}.")
+    else:
+        matching = [k for k in people if str(k) == str(person)]
+        if not matching:
+            raise Sd2Error(f"{path} holds no person {person}", f"one of: {listed}")
+        key = matching[0]
+    chosen: dict[Any, Any] = people[key]
+    return chosen
+
+
+def _stacked(vertices: Any, path: Path) -> NDArray[Any]:
+    """One array (T, V, 3) out of an array or a list with one array per frame."""
+    if isinstance(vertices, np.ndarray):
+        return vertices
+    if isinstance(vertices, list | tuple) and all(isinstance(v, np.ndarray) for v in vertices):
+        shapes = [v.shape[1:] if v.ndim == 3 and len(v) == 1 else v.shape for v in vertices]
+        for frame, shape in enumerate(shapes):
+            if shape != shapes[0]:
+                raise Sd2Error(
+                    f"{path}: frame {frame} has vertices of shape {shape}, frame 0 {shapes[0]}",
+                    "the same vertices in every frame",
+                    "Save one person's fitted mesh per file",
+                )
+        if shapes:
+            return np.stack([v.reshape(shapes[0]) for v in vertices])
+    raise Sd2Error(
+        f"{path}: the vertices are a {type(vertices).__name__}",
+        "a NumPy array (frames, vertices, 3), or a list with one array per frame",
+        "Convert them with numpy.asarray(...) where the file is written",
+    )
+
+
+def _array(entry: dict[Any, Any], content: dict[Any, Any], names: tuple[str, ...]) -> Any:
+    for place in (entry, content):
+        for name in names:
+            if isinstance(place.get(name), np.ndarray | int | float):
+                return np.asarray(place[name])
+    return None
+
+
+def _number_frames(raw: RawMesh, entry: dict[Any, Any], path: Path) -> None:
+    ids = entry.get("frame_ids")
+    if ids is None or raw.times_s is not None:
+        return
+    numbers = np.asarray(ids if isinstance(ids, np.ndarray) else list(ids), dtype=np.int64)
+    count = len(raw.vertices)  # type: ignore[arg-type]
+    if numbers.shape != (count,):
+        raise Sd2Error(
+            f"{path}: {count} frames of vertices but frame_ids of shape {numbers.shape}",
+            "one video frame number per frame",
+        )
+    raw.frame_numbers = numbers
+    missing = int(numbers[-1] - numbers[0] + 1 - count)
+    if missing > 0:
+        gap = int(np.flatnonzero(np.diff(numbers) > 1)[0])
+        raw.notes.append(
+            f"{missing:,} video frames hold no mesh, the first after frame {numbers[gap]}; motion "
+            "runs evenly across the gap."
+        )
+
+
+def _place_in_front(
+    raw: RawMesh,
+    entry: dict[Any, Any],
+    path: Path,
+    image_size: tuple[int, int] | None,
+    focal_px: float | None,
+) -> None:
+    vertices = np.asarray(raw.vertices)
+    if vertices.ndim != 3 or not np.isfinite(vertices).any():
+        return
+    centres = np.nanmean(vertices[:: max(len(vertices) // 16, 1)], axis=1)  # (n, 3)
+    if np.nanmax(np.linalg.norm(centres, axis=1)) > _AT_ROOT_M:
+        return
+    camera, boxes = entry.get("pred_cam"), entry.get("bboxes")
+    have_camera = isinstance(camera, np.ndarray) and isinstance(boxes, np.ndarray)
+    if not have_camera or image_size is None:
+        how = (
+            "Give the video's size (image_size) to place it by the camera that is in the file, or"
+            if have_camera
+            else "Give"
+        )
+        raw.notes.append(
+            "The mesh is centred on the body's root, so it stands around the camera and walking "
+            f"gives no Doppler. {how} its distance (distance_m)."
+        )
+        return
+    camera, boxes = np.asarray(camera, np.float64), np.asarray(boxes, np.float64)
+    if camera.shape != (len(vertices), 3) or boxes.shape != (len(vertices), 4):
+        raise Sd2Error(
+            f"{path}: pred_cam has shape {camera.shape} and bboxes {boxes.shape}",
+            f"({len(vertices)}, 3) and ({len(vertices)}, 4)",
+        )
+    if not (np.minimum(camera[:, 0], boxes[:, 2]) > 0).all():
+        bad = int(np.argmin(np.minimum(camera[:, 0], boxes[:, 2])))
+        raise Sd2Error(
+            f"{path}: frame {bad} has camera scale {camera[bad, 0]:g} and box width "
+            f"{boxes[bad, 2]:g}",
+            "positive ones",
+            "Read it without image_size and give distance_m",
+        )
+    focal = float(np.hypot(*image_size)) if focal_px is None else focal_px
+    shift_m = weak_perspective_shift(camera, boxes, image_size, focal)
+    raw.vertices = (vertices + shift_m[:, None, :]).astype(np.float32)
+    assumed = " (assumed: the image's diagonal)" if focal_px is None else ""
+    raw.notes.append(
+        f"The body is placed by the file's weak-perspective camera, focal length {focal:.0f} "
+        f"px{assumed}, at {np.median(shift_m[:, 2]):.2f} m. Its depth follows the size of the box "
+        "and jitters: smooth the trajectory before reading velocities along the line of sight."
+    )
+
+
+def _no_vertices(path: Path, content: dict[Any, Any]) -> Sd2Error:
+    first = next((v for v in content.values() if isinstance(v, dict)), content)
+    keys = (
+        ", ".join(str(key) for key in list(first)[:12] if isinstance(key, str | int)) or "nothing"
+    )
+    if any(name in first for name in _PARAMETERS):
+        return Sd2Error(
+            f"{path} holds body parameters and no vertices ({keys}), as 4D-Humans (PHALP) and "
+            "SMPL tools write them",
+            "vertices: making them needs the licensed SMPL model",
+            "Let that tool export one OBJ per frame and open the folder, or save its vertices as "
+            "numpy.savez('mesh.npz', vertices=verts, faces=faces, times_s=times)",
+        )
+    return Sd2Error(
+        f"{path} holds {keys}",
+        "'verts' or 'vertices' of shape (frames, vertices, 3), for one person or one entry per "
+        "person",
+        "Save them as numpy.savez('mesh.npz', vertices=verts, faces=faces, times_s=times)",
+    )
