@@ -11,15 +11,21 @@ import json
 import math
 import shutil
 import tempfile
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
-
-from pydantic import BaseModel, ConfigDict, FiniteFloat, ValidationError, model_validator
+from typing import TYPE_CHECKING, Literal, get_args
 
 from sd2core.atomic import atomic_write_text
 from sd2core.errors import Sd2Error
 from sd2core.progress import Progress, silent
+from sd2core.recording_document import (
+    FILE_NAME,
+    VERSION,
+    Document,
+    MeshReading,
+    Span,
+    read_document,
+)
 from sd2core.relative_paths import (
     common_suffix_length,
     is_absolute,
@@ -36,60 +42,15 @@ if TYPE_CHECKING:
     from sd2core.io.video import VideoReader
     from sd2core.mesh import MeshSequence
 
-FILE_NAME = "recording.json"
 SUFFIX = ".sd2"
-FORMAT: Literal["sd2-recording"] = "sd2-recording"
-VERSION = 1
 
 Role = Literal["video", "mesh", "faces", "radar"]
 """What a file is to the recording."""
 
+_PLACED_BY_VIDEO = {".pkl", ".pickle", ".joblib"}
+"""Outputs of body models, which know their place only in the picture's pixels."""
+
 ROLES: tuple[Role, ...] = get_args(Role)
-
-
-class Span(BaseModel):
-    """A labelled stretch of time, half-open ``[start_s, end_s)``."""
-
-    model_config = ConfigDict(extra="allow", frozen=True)
-
-    start_s: FiniteFloat
-    end_s: FiniteFloat
-    label: str
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Span:
-        if not self.start_s < self.end_s:
-            raise ValueError(f"the span ends at {self.end_s} s and starts at {self.start_s} s")
-        return self
-
-
-class _SensorEntry(BaseModel):
-    model_config = ConfigDict(extra="allow")
-
-    position_m: tuple[FiniteFloat, FiniteFloat, FiniteFloat] = (0.0, 0.0, 0.0)
-    azimuth_deg: FiniteFloat = 0.0
-    elevation_deg: FiniteFloat = 0.0
-    field_of_view_deg: FiniteFloat = 90.0
-
-
-class _Document(BaseModel):
-    """``recording.json`` as it is written; what this version does not know is kept."""
-
-    model_config = ConfigDict(extra="allow")
-
-    format: Literal["sd2-recording"] = FORMAT
-    version: int = VERSION
-    title: str = ""
-    simulated: bool = False
-    video: str | None = None
-    mesh: str | None = None
-    mesh_frames_per_s: FiniteFloat | None = None
-    mesh_scale: FiniteFloat | None = None
-    faces: str | None = None
-    radar: str | None = None
-    radar_offset_s: FiniteFloat = 0.0
-    sensor: _SensorEntry = _SensorEntry()
-    spans: tuple[Span, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -121,8 +82,8 @@ class Recording:
         The ``NAME.sd2`` folder.
     video, mesh, faces, radar : Path or None
         Absolute paths, which need not exist (see :meth:`missing`).
-    mesh_frames_per_s, mesh_scale : float or None
-        How to read a mesh that says neither its frame rate nor its unit.
+    mesh_reading : MeshReading
+        How to read a mesh that does not say its frame rate, unit or place.
     radar_offset_s : float
         Time on the recording's clock at which the first radar frame was taken.
         The clock is the video's, or the mesh's where there is no video.
@@ -138,14 +99,13 @@ class Recording:
     mesh: Path | None = None
     faces: Path | None = None
     radar: Path | None = None
-    mesh_frames_per_s: float | None = None
-    mesh_scale: float | None = None
+    mesh_reading: MeshReading = field(default_factory=MeshReading)
     radar_offset_s: float = 0.0
     sensor: VirtualSensor = field(default_factory=VirtualSensor)
     spans: tuple[Span, ...] = ()
     title: str = ""
     simulated: bool = False
-    _read: _Document = field(default_factory=_Document, repr=False)
+    _read: Document = field(default_factory=Document, repr=False)
 
     @classmethod
     def create(
@@ -156,8 +116,7 @@ class Recording:
         mesh: Path | None = None,
         faces: Path | None = None,
         radar: Path | None = None,
-        mesh_frames_per_s: float | None = None,
-        mesh_scale: float | None = None,
+        mesh_reading: MeshReading | None = None,
         radar_offset_s: float = 0.0,
         sensor: VirtualSensor | None = None,
         spans: tuple[Span, ...] = (),
@@ -166,38 +125,41 @@ class Recording:
         copy: bool = False,
         progress: Progress = silent,
     ) -> Recording:
-        """Make ``folder`` a recording of files that exist, and save it.
+        """Make ``folder`` a recording of files that exist; see :meth:`save_as`."""
+        recording = cls(
+            Path(folder),
+            video=video,
+            mesh=mesh,
+            faces=faces,
+            radar=radar,
+            mesh_reading=mesh_reading or MeshReading(),
+            radar_offset_s=radar_offset_s,
+            sensor=sensor or VirtualSensor(),
+            spans=tuple(spans),
+            title=title,
+            simulated=simulated,
+        )
+        return recording.save_as(Path(folder), copy=copy, progress=progress)
+
+    def save_as(
+        self, folder: Path, *, copy: bool = False, progress: Progress = silent
+    ) -> Recording:
+        """Make ``folder`` a recording with the same content, and return it.
 
         ``.sd2`` is appended to a name without it. Files are referred to where
         they are; ``copy=True`` copies those outside the folder into it. A
         folder that exists is taken when it is no recording yet, so that files
-        may be put into it first.
+        may be put into it first. Without a title it is called as its folder.
 
         Raises
         ------
         Sd2Error
             When the folder is a recording already, a file does not exist, or
-            nothing is given to record.
+            there is nothing to record.
         """
-        folder = plain_path(Path(folder))
-        if folder.suffix != SUFFIX:
-            folder = folder.with_name(folder.name + SUFFIX)
-        if (folder / FILE_NAME).exists():
-            raise Sd2Error(
-                f"{folder} is a recording already",
-                "a new folder",
-                "Choose another name, or delete that folder first",
-            )
-        given: dict[Role, Path | None] = {
-            "video": video,
-            "mesh": mesh,
-            "faces": faces,
-            "radar": radar,
-        }
+        folder = _new_folder(Path(folder))
         files: dict[Role, Path] = {}
-        for role, path in given.items():
-            if path is None:
-                continue
+        for role, path in self._files().items():
             if not Path(path).exists():
                 remedy = "Give the folder that holds the files" if "*" in str(path) else ""
                 raise Sd2Error(f"The {role} {path} does not exist", "a file or folder", remedy)
@@ -206,34 +168,25 @@ class Recording:
             raise Sd2Error(
                 f"{folder} would hold nothing", "a video, a mesh or a radar capture, or several"
             )
-        if not folder.parent.is_dir():
-            raise Sd2Error(f"The folder {folder.parent} does not exist", "an existing folder")
         created = not folder.exists()
         folder.mkdir(exist_ok=True)
         copied: list[Path] = []
         try:
             if copy:
                 files = _copied(files, folder, copied, progress)
-            recording = cls(
-                folder,
-                video=files.get("video"),
-                mesh=files.get("mesh"),
-                faces=files.get("faces"),
-                radar=files.get("radar"),
-                mesh_frames_per_s=mesh_frames_per_s,
-                mesh_scale=mesh_scale,
-                radar_offset_s=radar_offset_s,
-                sensor=sensor or VirtualSensor(),
-                spans=tuple(spans),
-                title=title or folder.stem,
-                simulated=simulated,
+            made = replace(
+                self,
+                folder=folder,
+                **files,  # type: ignore[arg-type]
+                title=self.title or folder.stem,
+                _read=self._read.model_copy(deep=True),
             )
-            recording.save()
+            made.save()
         except BaseException:
             for path in [*copied, *([folder] if created else [])]:
                 remove(path)
             raise
-        return recording
+        return made
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -294,8 +247,7 @@ class Recording:
         document.version = VERSION
         document.title = self.title
         document.simulated = self.simulated
-        document.mesh_frames_per_s = self.mesh_frames_per_s
-        document.mesh_scale = self.mesh_scale
+        document.mesh_reading = self.mesh_reading
         document.radar_offset_s = _finite(self.radar_offset_s, "radar offset in seconds")
         document.spans = tuple(self.spans)
         for name in ("position_m", "azimuth_deg", "elevation_deg", "field_of_view_deg"):
@@ -312,18 +264,18 @@ class Recording:
 
         return open_video(self._present("video"))
 
-    def load_mesh(self) -> MeshSequence:
-        """Load the mesh with its faces, frame rate and scale."""
+    def load_mesh(self, progress: Progress = silent) -> MeshSequence:
+        """Load the mesh as :attr:`mesh_reading` says, placed by the video where that helps."""
         from sd2core.io.mesh import load_mesh
 
-        options: dict[str, Any] = {}
+        path = self._present("mesh")
+        options = self.mesh_reading.options()
         if self.faces is not None:
             options["faces"] = self._present("faces")
-        if self.mesh_frames_per_s is not None:
-            options["frames_per_s"] = self.mesh_frames_per_s
-        if self.mesh_scale is not None:
-            options["scale"] = self.mesh_scale
-        return load_mesh(self._present("mesh"), **options)
+        if path.suffix.lower() in _PLACED_BY_VIDEO and self.video and self.video.exists():
+            with self.open_video() as video:
+                options["image_size"] = (video.width, video.height)
+        return load_mesh(path, **options, progress=progress)
 
     def load_capture(self) -> RadarCapture:
         """Load the radar capture on its own clock; the recording's is ``radar_offset_s`` later."""
@@ -367,35 +319,7 @@ def open_recording(path: Path) -> Recording:
     """
     path = Path(path)
     folder = plain_path(path.parent if path.name == FILE_NAME else path)
-    file = folder / FILE_NAME
-    try:
-        content = json.loads(file.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise Sd2Error(
-            f"{folder} has no {FILE_NAME}", "a recording made by `sd2 import`"
-        ) from error
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise Sd2Error(f"{file} cannot be read ({error})", "JSON written by SD² Studio") from error
-    found_format = content.get("format") if isinstance(content, dict) else None
-    if found_format != FORMAT:
-        raise Sd2Error(f"{file} has the format {found_format!r}", f"the format {FORMAT!r}")
-    version = content.get("version")
-    if not isinstance(version, int) or not 1 <= version <= VERSION:
-        raise Sd2Error(
-            f"{file} is of version {version!r}",
-            f"a version from 1 to {VERSION}",
-            "Open it with the version of SD² Studio that wrote it, or a later one",
-        )
-    try:
-        document = _Document.model_validate(content)
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise Sd2Error(
-            f"{file}: {where} is {first['input']!r} ({first['msg']})",
-            "what docs/formats.md says of a recording",
-            "Correct that entry with a text editor",
-        ) from error
+    document = read_document(folder / FILE_NAME)
     sensor = document.sensor
     return Recording(
         folder,
@@ -403,8 +327,7 @@ def open_recording(path: Path) -> Recording:
         mesh=located_path(document.mesh, folder),
         faces=located_path(document.faces, folder),
         radar=located_path(document.radar, folder),
-        mesh_frames_per_s=document.mesh_frames_per_s,
-        mesh_scale=document.mesh_scale,
+        mesh_reading=document.mesh_reading,
         radar_offset_s=document.radar_offset_s,
         sensor=VirtualSensor(
             position_m=sensor.position_m,
@@ -417,6 +340,21 @@ def open_recording(path: Path) -> Recording:
         simulated=document.simulated,
         _read=document,
     )
+
+
+def _new_folder(folder: Path) -> Path:
+    folder = plain_path(folder)
+    if folder.suffix != SUFFIX:
+        folder = folder.with_name(folder.name + SUFFIX)
+    if (folder / FILE_NAME).exists():
+        raise Sd2Error(
+            f"{folder} is a recording already",
+            "a new folder",
+            "Choose another name, or delete that folder first",
+        )
+    if not folder.parent.is_dir():
+        raise Sd2Error(f"The folder {folder.parent} does not exist", "an existing folder")
+    return folder
 
 
 def _finite(value: float, name: str) -> float:

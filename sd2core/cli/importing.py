@@ -70,43 +70,27 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _import(options: argparse.Namespace) -> None:
-    from sd2core.cli.info import describe_recording, show
+    from sd2core.cli.info import describe_parts, describe_recording, show
+    from sd2core.cli.reading import mesh_reading
     from sd2core.recording import Recording
 
-    sources = {
-        "video": options.video,
-        "mesh": options.mesh,
-        "faces": options.faces,
-        "radar": options.radar,
-    }
-    _check_readable(options)
+    recording = Recording(
+        options.out,
+        video=options.video,
+        mesh=options.mesh,
+        faces=options.faces,
+        radar=options.radar,
+        mesh_reading=mesh_reading(options),
+        radar_offset_s=options.radar_offset_s,
+        title=options.title,
+    )
+    # Opens every file, so that nothing is made of what cannot be read.
+    parts = describe_parts(recording)
     with progress_bar("Copying", unit="file") as progress:
-        recording = Recording.create(
-            options.out,
-            **sources,
-            mesh_frames_per_s=options.fps,
-            mesh_scale=options.scale,
-            radar_offset_s=options.radar_offset_s,
-            title=options.title,
-            copy=options.copy,
-            progress=progress,
-        )
-    show(describe_recording(recording), as_json=options.json)
-
-
-def _check_readable(options: argparse.Namespace) -> None:
-    from sd2core.cli.reading import load_mesh_as_told
-
-    if options.video is not None:
-        from sd2core.io.video import open_video
-
-        open_video(options.video).close()
-    if options.mesh is not None:
-        load_mesh_as_told(options.mesh, options)
-    if options.radar is not None:
-        from sd2core.io.radar import load_capture
-
-        load_capture(options.radar)
+        recording = recording.save_as(options.out, copy=options.copy, progress=progress)
+    if options.copy:
+        parts = describe_parts(recording)
+    show(describe_recording(recording, parts), as_json=options.json)
 
 
 def _relink(options: argparse.Namespace) -> int:

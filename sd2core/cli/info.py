@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.options import add_command, add_json, add_mesh_reading
-from sd2core.cli.output import print_facts, print_json
+from sd2core.cli.output import print_facts, print_json, progress_bar
 
 if TYPE_CHECKING:
     from sd2core.io.radar import RadarCapture
@@ -70,7 +70,8 @@ def describe(path: Path, options: argparse.Namespace) -> Description:
     if kind == "recording":
         from sd2core.recording import open_recording
 
-        return describe_recording(open_recording(path))
+        recording = open_recording(path)
+        return describe_recording(recording, describe_parts(recording))
     if kind == "video":
         from sd2core.io.video import open_video
 
@@ -89,17 +90,25 @@ def describe(path: Path, options: argparse.Namespace) -> Description:
     return describe_map(path, DopplerMap.load(path))
 
 
-def describe_recording(recording: Recording) -> Description:
-    """Describe a recording and each file it holds; missing files are named, not opened."""
+def describe_parts(recording: Recording) -> list[Description]:
+    """Open and describe each file of a recording, as far as it is there."""
     missing = recording.missing()
     parts: list[Description] = []
     if recording.video is not None and "video" not in missing:
         with recording.open_video() as video:
             parts.append(describe_video(recording.video, video))
     if recording.mesh is not None and not missing.keys() & {"mesh", "faces"}:
-        parts.append(describe_mesh(recording.mesh, recording.load_mesh()))
+        with progress_bar("Reading the mesh") as progress:
+            mesh = recording.load_mesh(progress)
+        parts.append(describe_mesh(recording.mesh, mesh))
     if recording.radar is not None and "radar" not in missing:
         parts.append(describe_capture(recording.radar, recording.load_capture()))
+    return parts
+
+
+def describe_recording(recording: Recording, parts: list[Description]) -> Description:
+    """Describe a recording and its parts; missing files are named."""
+    missing = recording.missing()
     x, y, z = recording.sensor.position_m
     data = {
         "kind": "recording",
@@ -189,8 +198,8 @@ def describe_capture(path: Path, capture: RadarCapture) -> Description:
     }
     facts = {
         "radar": config.name + (" (simulated)" if capture.simulated else ""),
-        "samples": f"{config.samples_per_chirp} per chirp, {config.chirps_per_frame} chirps per frame,"
-        f" {config.receivers} receiver{'s' if config.receivers > 1 else ''}",
+        "samples": f"{config.samples_per_chirp} per chirp,"
+        f" {config.chirps_per_frame} chirps per frame, receivers: {config.receivers}",
         "time": _clock(capture.timebase),
         **limit_facts(config),
     }

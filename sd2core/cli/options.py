@@ -72,6 +72,21 @@ def add_mesh_reading(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help="metres per unit of the mesh, e.g. 0.001 for millimetres (default: 1)",
     )
+    parser.add_argument(
+        "--person", metavar="ID", help="which person of a file of several (default: seen longest)"
+    )
+    parser.add_argument(
+        "--distance-m",
+        type=finite_float,
+        metavar="D",
+        help="move a mesh that is centred on the body's root this far forward",
+    )
+    parser.add_argument(
+        "--focal-px",
+        type=positive_float,
+        metavar="F",
+        help="focal length of the video, to place the output of VIBE (default: the diagonal)",
+    )
 
 
 def position(text: str) -> tuple[float, float, float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from sd2core import __version__
-from sd2core.cli import importing, info, radar
+from sd2core.cli import importing, info, radar, simulate, synth, warm_up
 
 _DESCRIPTION = """\
 SD² Studio turns a video of a person into mmWave-radar Doppler: what a radar
@@ -35,6 +35,6 @@ def build_parser() -> tuple[argparse.ArgumentParser, argparse._SubParsersAction]
     )
     parser.add_argument("--version", action="version", version=f"SD² Studio {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for group in (info, importing, radar):
+    for group in (info, importing, synth, radar, simulate, warm_up):
         group.add_commands(commands)
     return parser, commands

@@ -4,24 +4,37 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from sd2core.cli.output import progress_bar
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
     from sd2core.mesh import MeshSequence
+    from sd2core.recording import MeshReading
+
+
+def mesh_reading(options: argparse.Namespace) -> MeshReading:
+    """How to read a mesh, as far as the command line says it."""
+    from sd2core.recording import MeshReading
+
+    return MeshReading(
+        frames_per_s=options.fps,
+        scale=options.scale,
+        person=options.person,
+        distance_m=options.distance_m,
+        focal_px=options.focal_px,
+    )
 
 
 def load_mesh_as_told(path: Path, options: argparse.Namespace) -> MeshSequence:
-    """Load a mesh with ``--faces``, ``--fps`` and ``--scale`` where they are given."""
+    """Load a mesh with ``--faces`` and what else is given on the command line."""
     from sd2core.io.mesh import load_mesh
 
-    told: dict[str, Any] = {
-        "faces": options.faces,
-        "frames_per_s": options.fps,
-        "scale": options.scale,
-    }
-    return load_mesh(path, **{name: value for name, value in told.items() if value is not None})
+    with progress_bar("Reading the mesh") as progress:
+        return load_mesh(
+            path, faces=options.faces, progress=progress, **mesh_reading(options).options()
+        )
 
 
 def check_output(path: Path, suffix: str) -> None:

@@ -11,7 +11,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
-from sd2core.recording import FILE_NAME, VERSION, Recording, Span, is_recording, open_recording
+from sd2core.recording import (
+    FILE_NAME,
+    VERSION,
+    MeshReading,
+    Recording,
+    Span,
+    is_recording,
+    open_recording,
+)
 from sd2core.relative_paths import is_absolute, located_path, stored_path
 from sd2core.sensor import VirtualSensor
 
@@ -44,8 +52,7 @@ def content(recording: Recording) -> dict:
 def test_everything_is_read_back(files: Path) -> None:
     made = make(
         files,
-        mesh_frames_per_s=25.0,
-        mesh_scale=0.001,
+        mesh_reading=MeshReading(frames_per_s=25.0, scale=0.001, person="2"),
         radar_offset_s=-0.35,
         sensor=VirtualSensor((-1.0, 0.5, 2.0), 10.0, -5.0, 60.0),
         spans=(Span(start_s=0.5, end_s=1.25, label="left → right"),),
@@ -145,6 +152,24 @@ def test_unknown_fields_survive_a_save(files: Path) -> None:
     assert again["sensor"]["position_m"] == [1.0, 0.0, 0.0]
     assert again["spans"][0]["annotator"] == "A"
     assert again["radar_offset_s"] == 0.5
+
+
+def test_saved_as_another_recording_nothing_is_lost(files: Path, tmp_path: Path) -> None:
+    made = make(files, title="first", spans=(Span(start_s=0, end_s=1, label="up"),))
+    written = content(made) | {"camera": {"focal_px": 600}}
+    (made.folder / FILE_NAME).write_text(json.dumps(written))
+    read = open_recording(made.folder)
+    other = read.save_as(tmp_path / "other")
+    other.radar_offset_s = 1.0
+    other.save()
+    assert content(other) == written | {
+        "video": "../data/one/walk.mkv",
+        "mesh": "../data/one/walk.npz",
+        "faces": "../data/one/faces.npy",
+        "radar": "../data/one/capture",
+        "radar_offset_s": 1.0,
+    }
+    assert content(read) == written
 
 
 def test_a_failed_save_leaves_the_old_recording(

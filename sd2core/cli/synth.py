@@ -1,0 +1,210 @@
+"""``sd2 synth``: mesh to synthetic Doppler map."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sd2core.cli.options import (
+    add_axis,
+    add_command,
+    add_json,
+    add_mesh_reading,
+    bin_list,
+    not_negative_float,
+    position,
+    positive_float,
+    positive_int,
+)
+from sd2core.cli.output import progress_bar
+
+if TYPE_CHECKING:
+    from sd2core.doppler import SynthesisOptions
+    from sd2core.mesh import MeshSequence
+    from sd2core.sensor import VelocityAxis, VirtualSensor
+
+
+def add_commands(commands: argparse._SubParsersAction) -> None:
+    """Add ``synth``."""
+    parser = add_command(
+        commands,
+        "synth",
+        "compute the Doppler that a radar would have measured of a moving mesh",
+        handler=_synth,
+        description=(
+            "Counts the mesh's vertices by their velocity towards the sensor, frame by frame.\n"
+            "The camera is at 0,0,0 and looks along z; x is to its right and y down, in\n"
+            "metres. Positive velocity is approaching. Options that are not given come from\n"
+            "the preset."
+        ),
+        examples=(
+            "  sd2 synth walk.npz --out map.npz\n"
+            "  sd2 synth walk.npz --out left.npz --sensor -1,0,2\n"
+            "  sd2 synth walk.sd2 --out map.npz    (mesh and sensor of a recording)\n"
+            "  sd2 synth points.npz --out map.npz --visibility none --null-bins none\n"
+            "  sd2 synth walk.npz --out map.npz --preset vid2doppler"
+        ),
+    )
+    parser.add_argument("mesh", type=Path, metavar="MESH", help="a mesh, or a recording")
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="FILE.npz", help="the map to write"
+    )
+    parser.add_argument(
+        "--png", type=Path, metavar="FILE.png", help="also draw the map as a picture"
+    )
+    parser.add_argument(
+        "--sensor",
+        type=position,
+        metavar="X,Y,Z",
+        help="where the radar is, in metres (default: the recording's sensor, or the camera)",
+    )
+    parser.add_argument(
+        "--preset",
+        choices=("paper", "vid2doppler"),
+        default="paper",
+        help="the paper's chain, or Vid2Doppler's arithmetic to the last digit (default: paper)",
+    )
+    parser.add_argument(
+        "--visibility",
+        choices=("none", "facing", "exact"),
+        help="which vertices count: all, those that face the sensor, or those that nothing hides",
+    )
+    parser.add_argument(
+        "--weight",
+        choices=("count", "area"),
+        help="a vertex counts as one, or by its area",
+    )
+    add_axis(parser)
+    parser.add_argument(
+        "--null-bins",
+        type=bin_list,
+        metavar="BINS",
+        help="bins to empty, as 14,15,16, or none (default: those from -0.25 to 0.125 m/s, which"
+        " the paper's radar cannot tell from a static room)",
+    )
+    parser.add_argument(
+        "--beyond",
+        choices=("drop", "wrap", "clip"),
+        help="velocities beyond the axis: left out, folded back as a radar does, or counted in"
+        " the last bin",
+    )
+    parser.add_argument(
+        "--range-exponent",
+        type=not_negative_float,
+        metavar="N",
+        help="echoes weaken with range to the power of N; 4 is the radar equation, 0 is off",
+    )
+    parser.add_argument(
+        "--reference-range-m",
+        type=positive_float,
+        metavar="R",
+        help="range at which a vertex counts as one (paper: 2.2)",
+    )
+    parser.add_argument(
+        "--trajectory-smoothing-s",
+        type=not_negative_float,
+        metavar="S",
+        help="smooth the mesh's motion over this many seconds (sigma), without delay",
+    )
+    parser.add_argument(
+        "--oversampling",
+        type=positive_int,
+        metavar="N",
+        help="average each frame over N moments within it (odd)",
+    )
+    parser.add_argument(
+        "--velocity-sigma-bins",
+        type=not_negative_float,
+        metavar="B",
+        help="smooth the map along velocity (sigma in bins)",
+    )
+    parser.add_argument(
+        "--time-sigma-s",
+        type=not_negative_float,
+        metavar="S",
+        help="smooth the map along time (sigma in seconds)",
+    )
+    add_mesh_reading(parser)
+    add_json(parser)
+
+
+def _synth(options: argparse.Namespace) -> None:
+    from sd2core.cli.info import describe_map, show
+    from sd2core.cli.reading import check_output
+    from sd2core.doppler import Synthesizer
+
+    check_output(options.out, ".npz")
+    if options.png is not None:
+        check_output(options.png, ".png")
+    mesh, sensor = _mesh_and_sensor(options)
+    chosen = synthesis_options(options)
+    synthesizer = Synthesizer(mesh, chosen)
+    with progress_bar("Synthesising") as progress:
+        doppler = synthesizer.map(sensor, progress=progress)
+    doppler.save(options.out)
+    if options.png is not None:
+        from sd2core.cli.picture import draw_map
+
+        draw_map(doppler, options.png)
+    description = describe_map(options.out, doppler)
+    description.notes = mesh.notes + description.notes
+    description.data["notes"] = list(description.notes)
+    show(description, as_json=options.json)
+
+
+def synthesis_options(options: argparse.Namespace) -> SynthesisOptions:
+    """The preset with what is given on the command line in its place."""
+    from sd2core.doppler import PRESETS
+    from sd2core.sensor import VelocityAxis
+
+    preset = PRESETS[options.preset]
+    names = (
+        "visibility",
+        "weight",
+        "null_bins",
+        "beyond",
+        "range_exponent",
+        "reference_range_m",
+        "trajectory_smoothing_s",
+        "oversampling",
+        "velocity_sigma_bins",
+        "time_sigma_s",
+    )
+    given: dict[str, Any] = {
+        name: getattr(options, name) for name in names if getattr(options, name) is not None
+    }
+    axis = VelocityAxis(options.bins or preset.axis.bins, options.v_max or preset.axis.v_max_mps)
+    if axis != preset.axis and "null_bins" not in given:
+        given["null_bins"] = same_velocities(preset.null_bins, preset.axis, axis)
+    return replace(preset, axis=axis, **given)
+
+
+def same_velocities(
+    bins: tuple[int, ...], axis: VelocityAxis, other: VelocityAxis
+) -> tuple[int, ...]:
+    """Bins of ``other`` whose centre lies in one of the ``bins`` of ``axis``."""
+    return tuple(
+        number
+        for number, centre_mps in enumerate(other.centres_mps)
+        if axis.bin_of(float(centre_mps)) in bins
+    )
+
+
+def _mesh_and_sensor(options: argparse.Namespace) -> tuple[MeshSequence, VirtualSensor]:
+    from sd2core.cli.reading import load_mesh_as_told
+    from sd2core.recording import is_recording, open_recording
+    from sd2core.sensor import VirtualSensor
+
+    sensor = VirtualSensor()
+    if is_recording(options.mesh):
+        recording = open_recording(options.mesh)
+        sensor = recording.sensor
+        with progress_bar("Reading the mesh") as progress:
+            mesh = recording.load_mesh(progress)
+    else:
+        mesh = load_mesh_as_told(options.mesh, options)
+    if options.sensor is not None:
+        sensor = replace(sensor, position_m=options.sensor)
+    return mesh, sensor

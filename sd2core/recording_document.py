@@ -1,0 +1,116 @@
+"""``recording.json``: what it holds, checked when it is read. See ``docs/formats.md``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, FiniteFloat, ValidationError, model_validator
+
+from sd2core.errors import Sd2Error
+
+FILE_NAME = "recording.json"
+FORMAT: Literal["sd2-recording"] = "sd2-recording"
+VERSION = 1
+
+
+class Span(BaseModel):
+    """A labelled stretch of time, half-open ``[start_s, end_s)``."""
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+
+    start_s: FiniteFloat
+    end_s: FiniteFloat
+    label: str
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Span:
+        if not self.start_s < self.end_s:
+            raise ValueError(f"the span ends at {self.end_s} s and starts at {self.start_s} s")
+        return self
+
+
+class SensorEntry(BaseModel):
+    """Fields of :class:`sd2core.sensor.VirtualSensor`."""
+
+    model_config = ConfigDict(extra="allow")
+
+    position_m: tuple[FiniteFloat, FiniteFloat, FiniteFloat] = (0.0, 0.0, 0.0)
+    azimuth_deg: FiniteFloat = 0.0
+    elevation_deg: FiniteFloat = 0.0
+    field_of_view_deg: FiniteFloat = 90.0
+
+
+class MeshReading(BaseModel):
+    """What a mesh file does not say about itself; see :func:`sd2core.io.mesh.load_mesh`."""
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+
+    frames_per_s: FiniteFloat | None = None
+    scale: FiniteFloat | None = None
+    person: int | str | None = None
+    focal_px: FiniteFloat | None = None
+    distance_m: FiniteFloat | None = None
+
+    def options(self) -> dict[str, Any]:
+        """Arguments for ``load_mesh``: what is given, and known to this version."""
+        values = {name: getattr(self, name) for name in type(self).model_fields}
+        return {name: value for name, value in values.items() if value is not None}
+
+
+class Document(BaseModel):
+    """``recording.json`` as it is written; what this version does not know is kept."""
+
+    model_config = ConfigDict(extra="allow")
+
+    format: Literal["sd2-recording"] = FORMAT
+    version: int = VERSION
+    title: str = ""
+    simulated: bool = False
+    video: str | None = None
+    mesh: str | None = None
+    mesh_reading: MeshReading = MeshReading()
+    faces: str | None = None
+    radar: str | None = None
+    radar_offset_s: FiniteFloat = 0.0
+    sensor: SensorEntry = SensorEntry()
+    spans: tuple[Span, ...] = ()
+
+
+def read_document(file: Path) -> Document:
+    """Read and check a ``recording.json``.
+
+    Raises
+    ------
+    Sd2Error
+        When it is not there, is damaged, or was written by a newer version.
+    """
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise Sd2Error(
+            f"{file.parent} has no {file.name}", "a recording made by `sd2 import`"
+        ) from error
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise Sd2Error(f"{file} cannot be read ({error})", "JSON written by SD² Studio") from error
+    found_format = content.get("format") if isinstance(content, dict) else None
+    if found_format != FORMAT:
+        raise Sd2Error(f"{file} has the format {found_format!r}", f"the format {FORMAT!r}")
+    version = content.get("version")
+    if not isinstance(version, int) or not 1 <= version <= VERSION:
+        raise Sd2Error(
+            f"{file} is of version {version!r}",
+            f"a version from 1 to {VERSION}",
+            "Open it with the version of SD² Studio that wrote it, or a later one",
+        )
+    try:
+        return Document.model_validate(content)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise Sd2Error(
+            f"{file}: {where} is {first['input']!r} ({first['msg']})",
+            "what docs/formats.md says of a recording",
+            "Correct that entry with a text editor",
+        ) from error
