@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.resources import resource_path
+from sd2core.simulate.rotations import Floats, applied, product
 
 FORMAT = "sd2-body"
 VERSION = 1
@@ -22,8 +23,6 @@ INFLUENCES = 8
 """Bones per vertex, at most."""
 
 Resolution = Literal["low", "high"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,10 +82,10 @@ class Skeleton:
                     moved = moved + translation_m
             else:
                 above = transforms[:, parent]
-                turn = _product(above[..., :3], turn)
+                turn = product(above[..., :3], turn)
                 moved = _apply(above, head)
             transforms[:, bone, :, :3] = turn
-            transforms[:, bone, :, 3] = moved - _turned(turn, head)
+            transforms[:, bone, :, 3] = moved - applied(turn, head)
         return transforms
 
 
@@ -214,22 +213,5 @@ def vertex_normals(vertices_m: Floats, faces: NDArray[np.int32]) -> Floats:
     return np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
 
 
-def _turned(turn: Floats, point: Floats) -> Floats:
-    """(..., 3, 3) applied to (..., 3), summed in a fixed order."""
-    return (
-        turn[..., 0] * point[..., 0, None]
-        + turn[..., 1] * point[..., 1, None]
-        + turn[..., 2] * point[..., 2, None]
-    )
-
-
 def _apply(transform: Floats, point: Floats) -> Floats:
-    return _turned(transform[..., :3], point) + transform[..., 3]
-
-
-def _product(left: Floats, right: Floats) -> Floats:
-    return (
-        left[..., :, 0, None] * right[..., None, 0, :]
-        + left[..., :, 1, None] * right[..., None, 1, :]
-        + left[..., :, 2, None] * right[..., None, 2, :]
-    )
+    return applied(transform[..., :3], point) + transform[..., 3]

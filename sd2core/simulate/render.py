@@ -1,0 +1,306 @@
+"""A shaded picture of the body, without OpenGL: what the sample's camera sees.
+
+Pinhole camera at the origin of the camera frame; a vertex (x, y, z) is drawn at
+pixel coordinates (cx + f x / z, cy + f y / z), so that a mesh laid over the picture
+lies exactly on the person.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.simulate.bodies import Body, vertex_normals
+from sd2core.simulate.caption import stamp
+from sd2core.simulate.clothing import Clothes, srgb
+from sd2core.simulate.raster import interpolate, lit_share, rasterise
+
+Singles = NDArray[np.float32]
+
+_OVERSAMPLING = 2
+_LIGHT_PIXELS = 640
+_LIGHT_WIDTH_M = 3.2
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole camera in the camera frame's origin, looking along +z.
+
+    Parameters
+    ----------
+    width, height : int
+        Pixels.
+    focal_px : float
+    above_floor_m : float
+        Height of the optical axis.
+    """
+
+    width: int = 640
+    height: int = 480
+    focal_px: float = 600.0
+    above_floor_m: float = 1.1
+
+    def project(self, points_m: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Pixel coordinates (..., 2) of points (..., 3) in front of the camera."""
+        return (
+            self.focal_px * points_m[..., :2] / points_m[..., 2:]
+            + np.array([self.width, self.height]) / 2.0
+        )
+
+
+@dataclass(frozen=True)
+class Studio:
+    """The room and its light; colours are sRGB from 0 to 1.
+
+    Parameters
+    ----------
+    wall_m : float
+        Depth of the wall behind the person.
+    wall, floor, skirting : colours
+    key, fill, rim : light directions (towards the light), not normalised
+    """
+
+    wall_m: float = 3.5
+    wall: tuple[float, float, float] = (0.80, 0.815, 0.82)
+    floor: tuple[float, float, float] = (0.60, 0.55, 0.50)
+    skirting: tuple[float, float, float] = (0.90, 0.90, 0.89)
+    key: tuple[float, float, float] = (-0.62, -0.95, -0.95)
+    fill: tuple[float, float, float] = (0.9, -0.2, -0.7)
+    rim: tuple[float, float, float] = (0.75, -0.55, 0.75)
+
+
+class Renderer:
+    """Draws one body in one room; the same picture for the same vertices.
+
+    Parameters
+    ----------
+    body : Body
+        Gives faces and, through its rest shape, the clothes.
+    camera : Camera
+    studio : Studio
+    """
+
+    def __init__(
+        self, body: Body, camera: Camera | None = None, studio: Studio | None = None
+    ) -> None:
+        self.body = body
+        self.camera = camera or Camera()
+        self.studio = studio or Studio()
+        self._clothes = Clothes.of(body)
+        self._offsets = _disc(12, 2.6)
+
+    def frame(self, vertices_m: NDArray[np.float64]) -> NDArray[np.uint8]:
+        """Picture of one frame.
+
+        Parameters
+        ----------
+        vertices_m : float64 array, shape (V, 3)
+            Camera frame, all in front of the camera.
+
+        Returns
+        -------
+        uint8 array, shape (height, width, 3)
+            sRGB.
+        """
+        shadow = self._light_buffer(vertices_m)
+        picture = self._background(shadow)  # (H, W, 3) linear
+        colours, coverage = self._person(vertices_m, shadow)
+        picture = picture * (1.0 - coverage[..., None]) + colours
+        picture = stamp(srgb(_tone(picture)), "Simulated")
+        # Half a step of fixed dither, or the wall's gradient shows bands.
+        return (picture * 255.0 + self._dither[..., None]).astype(np.uint8)
+
+    def _person(
+        self, vertices_m: NDArray[np.float64], shadow: Singles
+    ) -> tuple[Singles, Singles]:
+        """Linear colours times coverage, and coverage, at picture resolution."""
+        n = _OVERSAMPLING
+        height, width = n * self.camera.height, n * self.camera.width
+        points = (n * self.camera.project(vertices_m)).astype(np.float32)
+        nearness = (1.0 / vertices_m[:, 2]).astype(np.float32)
+        buffer = np.zeros((height, width), np.float32)
+        owner = np.full((height, width), -1, np.int32)
+        rasterise(points, nearness, self.body.faces, buffer, owner)
+        rows, columns = np.nonzero(owner >= 0)
+        attributes = np.concatenate(
+            [vertices_m, vertex_normals(vertices_m, self.body.faces), self._clothes.fields], axis=1
+        ).astype(np.float32)
+        values = np.empty((len(rows), attributes.shape[1]), np.float32)
+        interpolate(
+            points, nearness, self.body.faces, rows, columns, owner, attributes, values
+        )
+        colours = np.zeros((height, width, 3), np.float32)
+        colours[rows, columns] = self._shade(
+            values[:, :3], values[:, 3:6], values[:, 6:], shadow
+        )
+        coverage = (owner >= 0).astype(np.float32)
+        return _shrunk(colours, n), _shrunk(coverage, n)
+
+    def _shade(
+        self, positions: Singles, normals: Singles, fields: Singles, shadow: Singles
+    ) -> Singles:
+        albedo, gloss = self._clothes.colours(fields)  # linear (N, 3), (N,)
+        normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        view = -positions / np.linalg.norm(positions, axis=1, keepdims=True)
+        key, fill, rim = (
+            _unit(direction) for direction in (self.studio.key, self.studio.fill, self.studio.rim)
+        )
+        lit = np.empty(len(positions), np.float32)
+        points, nearness = self._seen_by_light(positions)
+        lit_share(points, nearness, shadow, self._offsets, 0.012, lit)
+        # Wrapped diffuse light: softer than Lambert at the terminator, as skin and cloth are.
+        key_light = np.clip((normals @ key + 0.15) / 1.15, 0.0, None) * lit
+        fill_light = np.clip((normals @ fill + 0.3) / 1.3, 0.0, None)
+        sky = 0.5 - 0.5 * normals[:, 1]
+        light = (
+            1.9 * key_light[:, None] * np.float32([1.0, 0.965, 0.91])
+            + 0.30 * fill_light[:, None] * np.float32([0.86, 0.93, 1.0])
+            + (0.20 + 0.28 * sky)[:, None] * np.float32([0.95, 0.98, 1.0])
+        )
+        facing = np.clip((normals * view).sum(axis=1), 0.0, 1.0)
+        edge = (1.0 - facing) ** 3 * np.clip(normals @ rim, 0.0, 1.0)
+        half = key + view
+        half = half / np.linalg.norm(half, axis=1, keepdims=True)
+        highlight = np.clip((normals * half).sum(axis=1), 0.0, 1.0) ** 28 * lit * gloss
+        colours: Singles = (
+            albedo * light + 0.55 * edge[:, None] * (0.25 + albedo) + 0.22 * highlight[:, None]
+        )
+        return colours
+
+    @cached_property
+    def _light_axes(self) -> NDArray[np.float64]:
+        """Right, down and towards the light, in rows."""
+        towards = _unit(self.studio.key)
+        right = _unit(tuple(np.cross(towards, [0.0, 1.0, 0.0])))
+        return np.stack([right, np.cross(right, towards) * -1.0, towards])
+
+    def _seen_by_light(self, positions: NDArray[np.floating]) -> tuple[Singles, Singles]:
+        """Pixels in the light's image, and nearness to it in metres."""
+        centre = np.array([0.0, self.camera.above_floor_m - 0.95, 2.2])
+        seen = (positions - centre) @ self._light_axes.T
+        scale = _LIGHT_PIXELS / _LIGHT_WIDTH_M
+        points = seen[..., :2] * scale + _LIGHT_PIXELS / 2
+        return points.astype(np.float32), seen[..., 2].astype(np.float32)
+
+    def _light_buffer(self, vertices_m: NDArray[np.float64]) -> Singles:
+        points, nearness = self._seen_by_light(vertices_m)
+        buffer = np.full((_LIGHT_PIXELS, _LIGHT_PIXELS), -1e9, np.float32)
+        owner = np.full(buffer.shape, -1, np.int32)
+        rasterise(points, nearness, self.body.faces, buffer, owner)
+        return buffer
+
+    def _background(self, shadow: Singles) -> Singles:
+        """The empty room with the person's soft shadow, linear (H, W, 3)."""
+        silhouette = (shadow > -1e8).astype(np.float32)
+        for _ in range(3):
+            silhouette = _box_blurred(silhouette, 13)
+        r, c, fr, fc = self._room_in_light
+        shade = (
+            silhouette[r, c] * (1 - fr) * (1 - fc)
+            + silhouette[r + 1, c] * fr * (1 - fc)
+            + silhouette[r, c + 1] * (1 - fr) * fc
+            + silhouette[r + 1, c + 1] * fr * fc
+        )
+        picture: Singles = self._room * (1.0 - 0.42 * shade[..., None])
+        return picture
+
+    @cached_property
+    def _rays(self) -> NDArray[np.float64]:
+        """Directions of the picture's pixels with z = 1, (H, W, 3)."""
+        camera = self.camera
+        y, x = np.mgrid[: camera.height, : camera.width] + 0.5
+        return np.stack(
+            [
+                (x - camera.width / 2) / camera.focal_px,
+                (y - camera.height / 2) / camera.focal_px,
+                np.ones_like(x),
+            ],
+            axis=-1,
+        )
+
+    @cached_property
+    def _room_points(self) -> NDArray[np.float64]:
+        """What every pixel of the empty room shows, (H, W, 3) in metres."""
+        down = np.maximum(self._rays[..., 1], 1e-9)
+        depth = np.minimum(self.camera.above_floor_m / down, self.studio.wall_m)
+        return self._rays * depth[..., None]
+
+    @cached_property
+    def _room(self) -> Singles:
+        """The empty room in linear light, (H, W, 3)."""
+        studio, points = self.studio, self._room_points
+        height = self.camera.above_floor_m - points[..., 1]
+        on_floor = points[..., 2] < studio.wall_m - 1e-6
+        pixel_m = studio.wall_m / self.camera.focal_px
+        skirting = np.clip((0.075 - height) / pixel_m + 0.5, 0.0, 1.0) * ~on_floor
+        colours = linear(studio.wall) * np.ones_like(points)
+        colours += skirting[..., None] * (linear(studio.skirting) - colours)
+        colours = np.where(on_floor[..., None], linear(studio.floor), colours)
+        # A pool of light on the wall, upper left, fading towards the corners.
+        away = np.hypot((points[..., 0] + 0.35) / 2.6, (height - 1.5) / 1.9)
+        glow = 0.60 + 0.46 * np.exp(-(away**2))
+        corner = np.exp(-np.abs(height) / 0.10) * ~on_floor
+        near_wall = np.exp(-(studio.wall_m - points[..., 2]) / 0.22) * on_floor
+        colours *= (glow * (1.0 - 0.10 * corner - 0.30 * near_wall))[..., None]
+        return colours.astype(np.float32)
+
+    @cached_property
+    def _room_in_light(self) -> tuple[NDArray[np.intp], NDArray[np.intp], Singles, Singles]:
+        """Where to look each pixel of the room up in the light's image."""
+        points, _ = self._seen_by_light(self._room_points)
+        points = np.clip(points - 0.5, 0, _LIGHT_PIXELS - 1.001)
+        c, r = points[..., 0].astype(np.intp), points[..., 1].astype(np.intp)
+        return r, c, points[..., 1] - r, points[..., 0] - c
+
+    @cached_property
+    def _dither(self) -> Singles:
+        shape = (self.camera.height, self.camera.width)
+        return np.random.default_rng(1).random(shape, dtype=np.float32)
+
+
+def linear(colour: tuple[float, float, float]) -> NDArray[np.float64]:
+    """Linear light of an sRGB colour."""
+    return np.asarray(colour) ** 2.2
+
+
+def _tone(picture: Singles) -> Singles:
+    """Roll off what is brighter than white."""
+    knee = np.float32(0.8)
+    over = np.maximum(picture - knee, 0.0)
+    return np.minimum(picture, knee) + over / (1.0 + over / (1.0 - knee))
+
+
+def _unit(direction: tuple[float, ...]) -> NDArray[np.float64]:
+    vector = np.asarray(direction, dtype=np.float64)
+    return vector / np.linalg.norm(vector)
+
+
+def _shrunk(picture: Singles, factor: int) -> Singles:
+    """Mean over blocks of pixels."""
+    height, width = picture.shape[0] // factor, picture.shape[1] // factor
+    blocks = picture.reshape(height, factor, width, factor, *picture.shape[2:])
+    mean: Singles = blocks.mean(axis=(1, 3))
+    return mean
+
+
+def _box_blurred(picture: Singles, size: int) -> Singles:
+    for axis in (0, 1):
+        padding = [(0, 0), (0, 0)]
+        padding[axis] = (size // 2 + 1, size // 2)
+        total = np.cumsum(np.pad(picture, padding), axis=axis, dtype=np.float64)
+        length = picture.shape[axis]
+        upper = np.take(total, np.arange(size, size + length), axis=axis)
+        lower = np.take(total, np.arange(length), axis=axis)
+        picture = ((upper - lower) / size).astype(np.float32)
+    return picture
+
+
+def _disc(count: int, radius: float) -> Singles:
+    """Evenly spread points in a disc (a sunflower)."""
+    k = np.arange(count) + 0.5
+    r = radius * np.sqrt(k / count)
+    angle = k * np.pi * (3.0 - np.sqrt(5.0))
+    return np.stack([r * np.cos(angle), r * np.sin(angle)], axis=1).astype(np.float32)

@@ -1,0 +1,48 @@
+"""Rotation matrices, many at once."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+def about(axis: Floats, angle_deg: Floats) -> Floats:
+    """Rotations about one unit axis by many angles, (T, 3, 3); right-handed."""
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    square = np.outer(axis, axis) - np.eye(3) * (axis * axis).sum()
+    angle = np.radians(angle_deg)[:, None, None]
+    return np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * square
+
+
+def frame(first: Floats, normal: Floats) -> Floats:
+    """Right-handed axes in columns: along ``first``, along ``normal`` (made orthogonal), their cross."""
+    x = first / np.linalg.norm(first, axis=-1, keepdims=True)
+    y = normal - (normal * x).sum(axis=-1, keepdims=True) * x
+    y = y / np.linalg.norm(y, axis=-1, keepdims=True)
+    return np.stack([x, y, np.cross(x, y)], axis=-1)
+
+
+def product(left: Floats, right: Floats) -> Floats:
+    """Matrix product (..., 3, 3), summed in the same order on every machine."""
+    return (
+        left[..., :, 0, None] * right[..., None, 0, :]
+        + left[..., :, 1, None] * right[..., None, 1, :]
+        + left[..., :, 2, None] * right[..., None, 2, :]
+    )
+
+
+def applied(turn: Floats, point: Floats) -> Floats:
+    """Points (..., 3) turned by (..., 3, 3), summed in the same order on every machine."""
+    return (
+        turn[..., 0] * point[..., 0, None]
+        + turn[..., 1] * point[..., 1, None]
+        + turn[..., 2] * point[..., 2, None]
+    )
+
+
+def transposed(turn: Floats) -> Floats:
+    """The inverse of rotations (..., 3, 3)."""
+    return np.swapaxes(turn, -1, -2)
