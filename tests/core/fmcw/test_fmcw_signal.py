@@ -121,9 +121,11 @@ def test_facets_do_not_depend_on_how_finely_the_plate_is_cut() -> None:
         assert len(scatterers.amplitude) == len(mesh.faces)
         found.append(echo(scatterers, PAPER_RADAR, CAMERA))
     scale = np.abs(found[1]).max()
-    assert np.abs(found[0] - found[1]).max() < 0.002 * scale
-    # One point per facet is far off: this is why the phase is integrated.
-    assert np.abs(echo(as_points(coarse), PAPER_RADAR, CAMERA) - found[1]).max() > 0.1 * scale
+    by_facets = np.abs(found[0] - found[1]).max()
+    assert by_facets < 0.002 * scale
+    # One point per facet is far worse: this is why the phase is integrated.
+    by_points = np.abs(echo(as_points(coarse), PAPER_RADAR, CAMERA) - found[1]).max()
+    assert by_points > 30 * by_facets
 
 
 def as_points(mesh: MeshSequence) -> Scatterers:
