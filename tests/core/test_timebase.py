@@ -1,0 +1,105 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sd2core.errors import Sd2Error
+from sd2core.timebase import Timebase
+
+steps = st.lists(st.floats(1e-3, 10.0), min_size=1, max_size=60)
+starts = st.floats(-1e4, 1e4)
+
+
+def timebase_of(start_s: float, steps_s: list[float]) -> Timebase:
+    return Timebase(start_s + np.concatenate([[0.0], np.cumsum(steps_s)]))
+
+
+@given(starts, steps)
+def test_every_frame_is_on_screen_at_its_own_time(start_s, steps_s):
+    timebase = timebase_of(start_s, steps_s)
+    for frame in range(len(timebase)):
+        time_s = timebase.time_of(frame)
+        assert timebase.frame_at(time_s) == frame
+        assert timebase.nearest_frame(time_s) == frame
+        assert timebase.covers(time_s)
+
+
+@given(starts, steps, st.floats(0.01, 0.99))
+def test_a_frame_stays_until_the_next(start_s, steps_s, share):
+    timebase = timebase_of(start_s, steps_s)
+    for frame, step_s in enumerate(steps_s):
+        between = timebase.time_of(frame) + share * step_s
+        assert timebase.frame_at(between) == frame
+
+
+@given(starts, steps)
+def test_times_outside_hold_the_ends(start_s, steps_s):
+    timebase = timebase_of(start_s, steps_s)
+    assert timebase.frame_at(timebase.start_s - 5) == 0
+    assert timebase.frame_at(timebase.end_s + 5) == len(timebase) - 1
+    assert not timebase.covers(timebase.start_s - 0.5)
+    assert not timebase.covers(timebase.end_s + 0.5)
+
+
+@given(starts, steps, st.data())
+def test_frames_between_are_those_on_screen(start_s, steps_s, data):
+    timebase = timebase_of(start_s, steps_s)
+    low, high = sorted(
+        data.draw(st.floats(timebase.start_s - 1, timebase.end_s + 1)) for _ in range(2)
+    )
+    first, last = timebase.frames_between(low, high)
+    ends = np.append(timebase.times_s[1:], timebase.end_s)
+    clear = 1e-5
+    for frame in range(len(timebase)):
+        overlap = min(ends[frame], high) - max(timebase.times_s[frame], low)
+        if overlap > clear:
+            assert first <= frame < last
+        elif overlap < -clear:
+            assert not first <= frame < last
+
+
+@given(starts, steps, st.floats(-100, 100))
+def test_a_shift_moves_frames_with_time(start_s, steps_s, offset_s):
+    timebase = timebase_of(start_s, steps_s)
+    shifted = timebase.shifted(offset_s)
+    for frame in range(len(timebase)):
+        assert shifted.frame_at(timebase.time_of(frame) + offset_s) == frame
+
+
+def test_a_regular_timebase_has_its_rate():
+    timebase = Timebase.regular(450, 30.0)
+    assert timebase.frames_per_s == pytest.approx(30.0)
+    assert timebase.duration_s == pytest.approx(15.0)
+    assert timebase.frame_at(124 / 30) == 124
+
+
+def test_one_frame_has_a_duration():
+    timebase = Timebase([2.0])
+    assert timebase.duration_s == pytest.approx(1 / 30)
+    assert timebase.frames_between(0, 10) == (0, 1)
+
+
+@pytest.mark.parametrize(
+    ("times", "words"),
+    [
+        ([], "shape (0,)"),
+        ([0.0, np.nan], "frame 1 is nan"),
+        ([0.0, 0.1, 0.1], "Frame 2 is at 0.100000 s, frame 1 at 0.100000 s"),
+        ([[0.0, 1.0]], "shape (1, 2)"),
+    ],
+)
+def test_impossible_times_are_explained(times, words):
+    with pytest.raises(Sd2Error, match="Frame|frame") as caught:
+        Timebase(times)
+    assert words in str(caught.value)
+
+
+def test_times_cannot_be_changed_behind_its_back():
+    times = np.array([0.0, 1.0])
+    timebase = Timebase(times)
+    times[1] = -5
+    assert timebase.times_s[1] == 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        timebase.times_s[0] = 3
