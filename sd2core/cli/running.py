@@ -6,7 +6,6 @@ import argparse
 import os
 import re
 import sys
-import textwrap
 from collections.abc import Sequence
 
 from sd2core.errors import Sd2Error
@@ -74,8 +73,5 @@ def attach_negative_values(arguments: Sequence[str]) -> list[str]:
 
 
 def _explain(sentence: str) -> int:
-    print(
-        textwrap.fill(f"sd2: {sentence}", 88, break_long_words=False, break_on_hyphens=False),
-        file=sys.stderr,
-    )
+    print(f"sd2: {sentence}", file=sys.stderr)
     return 1

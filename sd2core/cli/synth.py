@@ -52,9 +52,6 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         "--out", type=Path, required=True, metavar="FILE.npz", help="the map to write"
     )
     parser.add_argument(
-        "--png", type=Path, metavar="FILE.png", help="also draw the map as a picture"
-    )
-    parser.add_argument(
         "--sensor",
         type=position,
         metavar="X,Y,Z",
@@ -136,18 +133,12 @@ def _synth(options: argparse.Namespace) -> None:
     from sd2core.doppler import Synthesizer
 
     check_output(options.out, ".npz")
-    if options.png is not None:
-        check_output(options.png, ".png")
     mesh, sensor = _mesh_and_sensor(options)
     chosen = synthesis_options(options)
     synthesizer = Synthesizer(mesh, chosen)
     with progress_bar("Synthesising") as progress:
         doppler = synthesizer.map(sensor, progress=progress)
     doppler.save(options.out)
-    if options.png is not None:
-        from sd2core.cli.picture import draw_map
-
-        draw_map(doppler, options.png)
     description = describe_map(options.out, doppler)
     description.notes = mesh.notes + description.notes
     description.data["notes"] = list(description.notes)

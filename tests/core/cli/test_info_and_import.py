@@ -1,0 +1,156 @@
+"""``sd2 info``, ``sd2 import`` and ``sd2 relink``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cli_outcome import Sd2
+
+from sd2core.recording import open_recording
+from sd2core.sensor import VelocityAxis
+from sd2core.spectrum import DopplerMap
+from sd2core.timebase import Timebase
+
+
+def test_a_mesh(sd2: Sd2, plate: Path) -> None:
+    outcome = sd2("info", plate)
+    assert outcome.code == 0
+    assert "81 vertices, 128 triangles" in outcome.out
+    assert "12 frames, 0.400 s, 30.00 frames/s" in outcome.out
+    data = json.loads(sd2("info", plate, "--json").out)
+    assert (data["kind"], data["vertices"], data["faces"]) == ("mesh", 81, 128)
+    assert data["first_frame_max_m"] == pytest.approx([0.1, 0.1, 3.0])
+
+
+def test_a_mesh_is_read_as_told(sd2: Sd2, plate: Path) -> None:
+    data = json.loads(sd2("info", plate, "--scale", "0.5", "--fps", "10", "--json").out)
+    assert data["frames_per_s"] == pytest.approx(10)
+    assert data["first_frame_max_m"] == pytest.approx([0.05, 0.05, 1.5])
+
+
+def test_a_map(sd2: Sd2, tmp_path: Path) -> None:
+    path = tmp_path / "map.npz"
+    DopplerMap(
+        np.zeros((16, 4)),
+        VelocityAxis(16, 4.0),
+        Timebase.regular(4, 10.0),
+        "real",
+        unseen_bins=(0, 15),
+        meta={"notes": ["a note"], "share": float("nan")},
+    ).save(path)
+    outcome = sd2("info", path)
+    assert "16 bins of 0.5 m/s over ±4 m/s" in outcome.out
+    assert "unseen bins  0, 15" in outcome.out
+    assert "note: a note" in outcome.out
+    data = json.loads(sd2("info", path, "--json").out)
+    assert data["provenance"] == {"notes": ["a note"], "share": None}
+
+
+@pytest.mark.parametrize("name", ["no.npz", "text.txt", "broken.npz", "broken.sd2"])
+def test_what_cannot_be_read_is_explained(sd2: Sd2, tmp_path: Path, name: str) -> None:
+    for existing in ("text.txt", "broken.npz"):
+        (tmp_path / existing).write_text("no")
+    (tmp_path / "broken.sd2").mkdir()
+    (tmp_path / "broken.sd2" / "recording.json").write_text("{")
+    outcome = sd2("info", tmp_path / name)
+    assert (outcome.code, outcome.out) == (1, "")
+    assert outcome.err.startswith("sd2: ")
+    assert name in outcome.err
+
+
+def test_import_refers_to_the_files(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
+    outcome = sd2(
+        "import", tmp_path / "a", "--mesh", plate, "--fps", "15", "--radar-offset-s", "-0.25"
+    )
+    assert outcome.code == 0, outcome.err
+    recording = open_recording(tmp_path / "a.sd2")
+    assert recording.mesh == plate
+    assert recording.radar_offset_s == -0.25
+    assert recording.load_mesh().timebase.frames_per_s == pytest.approx(15)
+    assert [path.name for path in recording.folder.iterdir()] == ["recording.json"]
+    data = json.loads(sd2("info", tmp_path / "a.sd2", "--json").out)
+    assert data["mesh"]["frames_per_s"] == pytest.approx(15)
+    assert data["missing"] == {}
+
+
+def test_import_copies_on_request(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
+    data = json.loads(
+        sd2("import", tmp_path / "a.sd2", "--mesh", plate, "--copy", "--title", "T", "--json").out
+    )
+    assert data["title"] == "T"
+    assert data["mesh"]["path"] == str(tmp_path / "a.sd2" / "plate.npz")
+    plate.unlink()
+    assert not open_recording(tmp_path / "a.sd2").missing()
+
+
+@pytest.mark.parametrize(
+    ("option", "says"), [("--mesh", "broken.npz"), ("--video", "broken.npz"), ("--radar", "radar")]
+)
+def test_import_makes_nothing_of_what_cannot_be_read(
+    sd2: Sd2, tmp_path: Path, option: str, says: str
+) -> None:
+    broken = tmp_path / "broken.npz"
+    broken.write_text("no")
+    outcome = sd2("import", tmp_path / "a.sd2", option, broken)
+    assert outcome.code == 1
+    assert says in outcome.err
+    assert not (tmp_path / "a.sd2").exists()
+
+
+@pytest.mark.parametrize("arguments", [[], ["--mesh", "no.npz"]])
+def test_import_of_nothing(sd2: Sd2, tmp_path: Path, arguments: list[str]) -> None:
+    outcome = sd2("import", tmp_path / "a.sd2", *arguments)
+    assert outcome.code == 1
+    assert not (tmp_path / "a.sd2").exists()
+
+
+def test_missing_files_are_named_and_found_again(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
+    recording = tmp_path / "a.sd2"
+    sd2("import", recording, "--mesh", plate)
+    (tmp_path / "disk").mkdir()
+    plate.rename(tmp_path / "disk" / "plate.npz")
+    outcome = sd2("info", recording)
+    assert outcome.code == 0
+    assert f"the mesh is not at {plate}" in outcome.out
+    outcome = sd2("relink", recording, tmp_path / "disk")
+    assert outcome.code == 0
+    assert f"mesh: found at {tmp_path / 'disk' / 'plate.npz'}" in outcome.out
+    assert "No file of this recording is missing" in sd2("relink", recording, tmp_path).out
+
+
+def test_relink_says_what_it_could_not_decide(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
+    recording = tmp_path / "a.sd2"
+    sd2("import", recording, "--mesh", plate)
+    for name in ("one", "two"):
+        (tmp_path / "disk" / name).mkdir(parents=True)
+        (tmp_path / "disk" / name / "plate.npz").write_bytes(plate.read_bytes())
+    plate.unlink()
+    outcome = sd2("relink", recording, tmp_path / "disk")
+    assert outcome.code == 1
+    assert "several files fit equally well" in outcome.out
+    (tmp_path / "empty").mkdir()
+    data = json.loads(sd2("relink", recording, tmp_path / "empty", "--json").out)
+    assert data == {"found": {}, "ambiguous": {}, "missing": ["mesh"]}
+
+
+def test_a_real_recording(sd2: Sd2, shared_data: Path, tmp_path: Path) -> None:
+    outcome = sd2(
+        "import",
+        tmp_path / "walk.sd2",
+        "--video",
+        shared_data / "video" / "walk.mkv",
+        "--mesh",
+        shared_data / "mesh" / "walk.npz",
+        "--radar",
+        shared_data / "radar" / "infineon_people",
+        "--json",
+    )
+    assert outcome.code == 0, outcome.err
+    data = json.loads(outcome.out)
+    assert (data["video"]["frames"], data["video"]["width"]) == (89, 640)
+    assert data["mesh"]["vertices"] == 13718
+    assert data["radar"]["v_max_mps"] == pytest.approx(3.138, abs=1e-3)
+    assert not data["simulated"]

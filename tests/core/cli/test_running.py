@@ -1,0 +1,188 @@
+"""Exit codes, error paragraphs, negative numbers."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from cli_outcome import Sd2
+
+from sd2core.cli import build_parser, run
+from sd2core.cli.running import attach_negative_values
+from sd2core.errors import Sd2Error
+
+
+def failing(error: BaseException) -> argparse.ArgumentParser:
+    def handler(options: argparse.Namespace) -> None:
+        raise error
+
+    parser = argparse.ArgumentParser(prog="sd2")
+    parser.set_defaults(handler=handler)
+    return parser
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "says"),
+    [
+        (Sd2Error("a.npz is empty", "a mesh", "Fit it"), 1, "a.npz is empty. Expected: a mesh."),
+        (KeyboardInterrupt(), 130, "interrupted"),
+        (PermissionError(13, "Permission denied", "/root/a.npz"), 1, "/root/a.npz: Permission"),
+        (MemoryError("Unable to allocate 9 TiB"), 1, "not enough memory"),
+        (ZeroDivisionError("division by zero"), 1, "Please report it"),
+    ],
+)
+def test_errors_are_one_paragraph(
+    error: BaseException, code: int, says: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(failing(error), []) == code
+    captured = capsys.readouterr()
+    assert not captured.out
+    assert says in " ".join(captured.err.split())
+    assert "Traceback" not in captured.err
+    assert "\n\n" not in captured.err.strip()
+
+
+def test_a_traceback_on_request(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SD2_TRACEBACK", "1")
+    with pytest.raises(ZeroDivisionError):
+        run(failing(ZeroDivisionError()), [])
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [[], ["nonsense"], ["info"], ["synth", "a.npz"], ["info", "a", "--nonsense"], ["simulate"]],
+)
+def test_wrong_usage_is_2(sd2: Sd2, arguments: list[str]) -> None:
+    outcome = sd2(*arguments)
+    assert outcome.code == 2
+    assert outcome.err.startswith("usage: sd2")
+
+
+def test_version(sd2: Sd2) -> None:
+    from sd2core import __version__
+
+    outcome = sd2("--version")
+    assert (outcome.code, outcome.out) == (0, f"SD² Studio {__version__}\n")
+
+
+def commands(parser: argparse.ArgumentParser) -> list[argparse.ArgumentParser]:
+    children = [
+        child
+        for action in parser._actions
+        if isinstance(action, argparse._SubParsersAction)
+        for child in action.choices.values()
+    ]
+    return [*children, *(inner for child in children for inner in commands(child))]
+
+
+def test_every_command_explains_itself() -> None:
+    for command in commands(build_parser()[0]):
+        text = command.format_help()
+        assert command.description, command.prog
+        assert max(map(len, text.splitlines())) <= 100, command.prog
+        for action in command._actions:
+            assert action.help or action.metavar in {"PATH", "RECORDING", "FOLDER", "COMMAND"}, (
+                f"{command.prog}: {action.dest} has no help"
+            )
+
+
+@pytest.mark.parametrize(
+    ("given", "attached"),
+    [
+        (["synth", "--sensor", "-1,0,2"], ["synth", "--sensor=-1,0,2"]),
+        (["--radar-offset-s", "-.5", "x"], ["--radar-offset-s=-.5", "x"]),
+        (["--sensor=1,2,3", "-1"], ["--sensor=1,2,3", "-1"]),
+        (["--sensor", "1,0,2"], ["--sensor", "1,0,2"]),
+        (["--json", "--copy"], ["--json", "--copy"]),
+        (["--", "-1"], ["--", "-1"]),
+    ],
+)
+def test_negative_values_are_attached(given: list[str], attached: list[str]) -> None:
+    assert attach_negative_values(given) == attached
+
+
+def test_negative_sensor_position_is_parsed() -> None:
+    arguments = attach_negative_values(["synth", "a.npz", "--out", "b.npz", "--sensor", "-1,-.5,2"])
+    assert build_parser()[0].parse_args(arguments).sensor == (-1.0, -0.5, 2.0)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--sensor", "1,2"],
+        ["--sensor", "1,2,nan"],
+        ["--bins", "0"],
+        ["--bins", "3.5"],
+        ["--v-max", "-1"],
+        ["--null-bins", "14;15"],
+        ["--visibility", "depth"],
+        ["--range-exponent", "-2"],
+    ],
+)
+def test_wrong_values_are_usage_errors(sd2: Sd2, arguments: list[str]) -> None:
+    outcome = sd2("synth", "a.npz", "--out", "b.npz", *arguments)
+    assert outcome.code == 2
+    assert arguments[0] in outcome.err.splitlines()[-1]
+
+
+HEAVY = ("numpy", "scipy", "numba", "zarr", "av", "trimesh", "pydantic", "torch", "anny")
+WINDOW = ("PySide6", "shiboken6", "vtk", "vtkmodules", "pyvista", "pyvistaqt", "pyqtgraph")
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["synth", "--help"], ["open"]])
+def test_help_loads_nothing_heavy(arguments: list[str]) -> None:
+    script = f"""
+import sys
+from sd2app.command_line import main
+try:
+    main({arguments})
+except SystemExit:
+    pass
+loaded = {{name.partition(".")[0] for name in sys.modules}}
+print("loaded:", sorted(loaded & set({HEAVY + WINDOW})))
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True, cwd=repository()
+    )
+    assert done.stdout.splitlines()[-1] == "loaded: []"
+
+
+def test_importing_the_library_is_free() -> None:
+    script = "import sys, sd2core; print('numpy' in sys.modules, sd2core.VirtualSensor.__name__)"
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True, cwd=repository()
+    )
+    assert done.stdout.split() == ["False", "VirtualSensor"]
+
+
+def test_every_public_name_exists() -> None:
+    import sd2core
+
+    for name in sd2core.__all__:
+        assert getattr(sd2core, name) is not None
+    assert set(sd2core.__all__) <= set(dir(sd2core))
+    with pytest.raises(AttributeError, match="nonsense"):
+        _ = sd2core.nonsense
+
+
+def test_a_reader_that_stops_reading_is_no_error(plate: Path) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = subprocess.run(
+        [sys.executable, "-m", "sd2app.command_line", "info", plate],
+        stdout=writer,
+        stderr=subprocess.PIPE,
+        text=True,
+        check=False,
+        cwd=repository(),
+    )
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def repository() -> Path:
+    return Path(__file__).resolve().parents[3]

@@ -1,0 +1,100 @@
+"""``sd2 open`` and ``sd2 demo`` up to the window itself."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+from cli_outcome import Sd2
+
+from sd2app.command_line import has_display
+
+
+@pytest.fixture
+def window(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Path | None, Path | None]]:
+    """Stands in for the window and notes what it was asked to show."""
+    shown: list[tuple[Path | None, Path | None]] = []
+
+    def run(path: Path | None, *, screenshot: Path | None = None) -> int:
+        shown.append((path, screenshot))
+        return 0
+
+    module = ModuleType("sd2app.main")
+    module.run = run  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "sd2app.main", module)
+    return shown
+
+
+@pytest.fixture
+def no_display(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.platform", "linux")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM"):
+        monkeypatch.delenv(name, raising=False)
+
+
+@pytest.mark.parametrize(
+    ("platform", "environment", "expected"),
+    [
+        ("linux", {}, False),
+        ("linux", {"DISPLAY": ""}, False),
+        ("linux", {"DISPLAY": ":0"}, True),
+        ("linux", {"WAYLAND_DISPLAY": "wayland-0"}, True),
+        ("linux", {"QT_QPA_PLATFORM": "offscreen"}, True),
+        ("darwin", {}, True),
+        ("win32", {}, True),
+    ],
+)
+def test_display(platform: str, environment: dict[str, str], expected: bool) -> None:
+    assert has_display(platform, environment) is expected
+
+
+@pytest.mark.usefixtures("no_display")
+@pytest.mark.parametrize("command", ["open", "demo"])
+def test_without_a_display_it_says_what_to_do(
+    sd2: Sd2, window: list, command: str, plate: Path
+) -> None:
+    outcome = sd2(command, *([plate] if command == "open" else []))
+    assert outcome.code == 1
+    assert "no display" in outcome.err
+    assert "--screenshot FILE.png" in outcome.err
+    assert not window
+
+
+@pytest.mark.usefixtures("no_display")
+def test_a_screenshot_needs_no_display(
+    sd2: Sd2, window: list, plate: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import os
+
+    monkeypatch.setenv("QT_QPA_PLATFORM", "xcb")
+    picture = tmp_path / "window.png"
+    assert sd2("open", plate, "--screenshot", picture).code == 0
+    assert window == [(plate, picture)]
+    assert os.environ["QT_QPA_PLATFORM"] == "offscreen"
+
+
+def test_a_display_is_used(
+    sd2: Sd2, window: list, plate: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DISPLAY", ":0")
+    assert sd2("open", plate).code == 0
+    assert window == [(plate, None)]
+
+
+@pytest.mark.parametrize(
+    ("name", "says"), [("window.jpg", "ends in .png"), ("no/window.png", "does not exist")]
+)
+def test_a_screenshot_that_cannot_be_written(
+    sd2: Sd2, window: list, plate: Path, tmp_path: Path, name: str, says: str
+) -> None:
+    outcome = sd2("open", plate, "--screenshot", tmp_path / name)
+    assert (outcome.code, window) == (1, [])
+    assert says in " ".join(outcome.err.split())
+
+
+def test_opening_nothing(sd2: Sd2, window: list, tmp_path: Path) -> None:
+    outcome = sd2("open", tmp_path / "no.sd2")
+    assert (outcome.code, window) == (1, [])
+    assert "does not exist" in outcome.err
