@@ -21,7 +21,8 @@ SHIRT = (0.13, 0.40, 0.56)
 TROUSERS = (0.20, 0.215, 0.25)
 SHOES = (0.86, 0.86, 0.85)
 LIPS = (0.66, 0.42, 0.37)
-EYES = (0.13, 0.11, 0.10)
+EYES = (0.24, 0.17, 0.14)
+WHITES = (0.90, 0.88, 0.86)
 
 _SLEEVE_M = 0.19
 _HEM_M = 0.93
@@ -34,9 +35,9 @@ class Clothes:
 
     Parameters
     ----------
-    fields : float32 array, shape (V, 7)
-        Positive inside: trousers, shirt, shoes, hair, brows, eyes, lips; metres
-        for the first four.
+    fields : float32 array, shape (V, 8)
+        Positive inside: trousers, shirt, shoes, hair, brows, whites of the eyes,
+        irises, lips; metres for the first four.
     """
 
     fields: Singles
@@ -50,8 +51,9 @@ class Clothes:
         arm = _share_of(body, ("upperarm", "lowerarm", "wrist", "finger", "metacarpal"))
         hem = height - _HEM_M
         neck = skeleton.heads_m[skeleton.index["neck01"]]
-        # The neckline is a tilted plane: lower in front (negative z) than behind.
-        neckline = -neck[1] + 0.022 + 0.42 * (p[:, 2] - neck[2]) - height
+        # A crew neck: a ball around the root of the neck is bare, and all above.
+        collar = np.linalg.norm(p - neck - np.array([0.0, 0.004, -0.022]), axis=1) - 0.088
+        neckline = np.minimum(collar, 0.3 * (0.5 - _share_of(body, ("neck02", "neck03", "head"))))
         sleeve = np.maximum(_SLEEVE_M - _along_arm(skeleton, p), 0.25 * (0.5 - arm))
         head = skeleton.heads_m[skeleton.index["head"]]
         z = p[:, 2] - head[2]
@@ -61,7 +63,8 @@ class Clothes:
         eye_height = height + skeleton.heads_m[skeleton.index["eye.L"], 1]
         front = (-z - 0.03) * 40.0
         brows = 1.0 - (eye / 0.021) ** 2 - ((eye_height - 0.021 + 4.0 * eye**2) / 0.0045) ** 2
-        eyes = 1.0 - (eye / 0.013) ** 2 - (eye_height / 0.0052) ** 2
+        whites = 1.0 - (eye / 0.0145) ** 2 - ((eye_height + 0.0004) / 0.0043) ** 2
+        eyes = 1.0 - (eye / 0.0068) ** 2 - (eye_height / 0.0062) ** 2
         lips = 1.0 - (p[:, 0] / 0.024) ** 2 - ((eye_height + 0.071) / 0.0075) ** 2
         fields = [
             np.minimum(-hem, 0.5 - arm),
@@ -69,18 +72,20 @@ class Clothes:
             _SHOE_M - height,
             hair,
             np.minimum(brows, front),
-            np.minimum(eyes, front),
+            np.minimum(whites, front),
+            np.minimum(np.minimum(eyes, whites), front),
             np.minimum(lips, front),
         ]
         return cls(np.stack(fields, axis=1).astype(np.float32))
 
     def colours(self, fields: Singles) -> tuple[Singles, Singles]:
-        """Linear colour (N, 3) and gloss (N,) at interpolated fields (N, 7)."""
+        """Linear colour (N, 3) and gloss (N,) at interpolated fields (N, 8)."""
         colours = np.tile(_linear(SKIN), (len(fields), 1))
         gloss = np.full(len(fields), 0.6, np.float32)
         painted = (
-            (6, LIPS, 0.8),
-            (5, EYES, 1.0),
+            (7, LIPS, 0.8),
+            (5, WHITES, 0.5),
+            (6, EYES, 1.0),
             (4, HAIR, 0.2),
             (3, HAIR, 0.35),
             (0, TROUSERS, 0.05),

@@ -79,29 +79,29 @@ class _Move(NamedTuple):
     label: str | None = None
 
 
-_HANGING = ArmPose(-10.0, -80.0, 0.525, 0.5, 0.0, 1.0, 0.0, 5.0, 0.0)
+_HANGING = ArmPose(-10.0, -80.0, 0.525, 0.5, 0.0, 1.0, -28.0, 5.0, 0.0)
 _LEFT = ArmPose(-64.0, -6.0, 0.46, 0.35, 1.0, 0.25, 20.0, -8.0, -6.0)
 _RIGHT = ArmPose(36.0, -4.0, 0.42, 0.9, 1.0, 0.0, 10.0, 12.0, 9.0)
-_UP = ArmPose(-8.0, 34.0, 0.40, 0.75, 1.0, 0.0, 55.0, -20.0, 0.0)
-_DOWN = ArmPose(-6.0, -56.0, 0.47, 0.8, 0.2, 0.8, 60.0, 18.0, 2.0)
+_UP = ArmPose(-14.0, 22.0, 0.32, 0.75, 1.0, 0.0, 45.0, -10.0, -3.0)
+_DOWN = ArmPose(-4.0, -44.0, 0.50, 0.8, 0.5, 0.6, 60.0, 18.0, 5.0)
 _LEFT_AGAIN = ArmPose(-58.0, -12.0, 0.47, 0.35, 1.0, 0.25, 24.0, -8.0, -5.0)
 _RIGHT_AGAIN = ArmPose(38.0, -9.0, 0.43, 0.9, 1.0, 0.0, 10.0, 12.0, 8.0)
-_UP_AGAIN = ArmPose(-4.0, 30.0, 0.41, 0.75, 1.0, 0.0, 52.0, -16.0, 0.0)
-_DOWN_AGAIN = ArmPose(-10.0, -58.0, 0.48, 0.8, 0.2, 0.8, 62.0, 20.0, 1.0)
+_UP_AGAIN = ArmPose(-10.0, 17.0, 0.33, 0.75, 1.0, 0.0, 42.0, -8.0, -3.0)
+_DOWN_AGAIN = ArmPose(-8.0, -47.0, 0.50, 0.8, 0.5, 0.6, 62.0, 20.0, 4.0)
 
 _MOVES = (
-    _Move(0.5, 1.4, _LEFT),
-    _Move(1.7, 2.8, _RIGHT, "left-to-right"),
-    _Move(3.1, 4.2, _LEFT, "right-to-left"),
-    _Move(4.4, 5.1, _UP),
-    _Move(5.4, 6.4, _DOWN, "up-to-down"),
+    _Move(0.3, 1.35, _LEFT),
+    _Move(1.6, 2.8, _RIGHT, "left-to-right"),
+    _Move(3.05, 4.25, _LEFT, "right-to-left"),
+    _Move(4.45, 5.2, _UP),
+    _Move(5.45, 6.45, _DOWN, "up-to-down"),
     _Move(6.7, 7.7, _UP, "down-to-up"),
-    _Move(8.0, 8.95, _DOWN_AGAIN, "up-to-down"),
-    _Move(9.25, 10.2, _UP_AGAIN, "down-to-up"),
-    _Move(10.4, 11.1, _LEFT_AGAIN),
-    _Move(11.4, 12.4, _RIGHT_AGAIN, "left-to-right"),
-    _Move(12.7, 13.7, _LEFT_AGAIN, "right-to-left"),
-    _Move(13.9, 14.8, _HANGING),
+    _Move(7.95, 8.9, _DOWN_AGAIN, "up-to-down"),
+    _Move(9.15, 10.15, _UP_AGAIN, "down-to-up"),
+    _Move(10.35, 11.1, _LEFT_AGAIN),
+    _Move(11.35, 12.5, _RIGHT_AGAIN, "left-to-right"),
+    _Move(12.75, 13.9, _LEFT_AGAIN, "right-to-left"),
+    _Move(14.0, 14.95, _HANGING),
 )
 
 SPANS = tuple(
@@ -119,7 +119,7 @@ def minimum_jerk(phase: ArrayLike) -> Floats:
 def swipes(skeleton: Skeleton, times_s: ArrayLike) -> Motion:
     """Motion of the whole body at any times, smooth in time.
 
-    Before 0.5 s and after 14.8 s the arm hangs.
+    Before 0.3 s and after 14.95 s the arm hangs.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def _turn_torso(skeleton: Skeleton, rotations: Floats, times: Floats, across_deg
     rotations[:, index["clavicle.R"]] = about(z, 0.8 * breath + 0.8)
     rotations[:, index["clavicle.L"]] = about(z, -0.8 * breath - 0.8)
     rotations[:, index["neck01"]] = about(y, -0.4 * yaw)
-    rotations[:, index["head"]] = product(about(y, -0.45 * yaw), about(x, -pitch))
+    rotations[:, index["head"]] = product(about(y, -0.45 * yaw), about(x, 5.0 - pitch))
 
 
 def _relax_fingers(skeleton: Skeleton, rotations: Floats) -> None:

@@ -64,10 +64,10 @@ class Studio:
     """
 
     wall_m: float = 3.5
-    wall: tuple[float, float, float] = (0.80, 0.815, 0.82)
+    wall: tuple[float, float, float] = (0.84, 0.845, 0.84)
     floor: tuple[float, float, float] = (0.60, 0.55, 0.50)
     skirting: tuple[float, float, float] = (0.90, 0.90, 0.89)
-    key: tuple[float, float, float] = (-0.62, -0.95, -0.95)
+    key: tuple[float, float, float] = (-0.70, -0.72, -0.95)
     fill: tuple[float, float, float] = (0.9, -0.2, -0.7)
     rim: tuple[float, float, float] = (0.75, -0.55, 0.75)
 
@@ -113,9 +113,7 @@ class Renderer:
         # Half a step of fixed dither, or the wall's gradient shows bands.
         return (picture * 255.0 + self._dither[..., None]).astype(np.uint8)
 
-    def _person(
-        self, vertices_m: NDArray[np.float64], shadow: Singles
-    ) -> tuple[Singles, Singles]:
+    def _person(self, vertices_m: NDArray[np.float64], shadow: Singles) -> tuple[Singles, Singles]:
         """Linear colours times coverage, and coverage, at picture resolution."""
         n = _OVERSAMPLING
         height, width = n * self.camera.height, n * self.camera.width
@@ -129,13 +127,9 @@ class Renderer:
             [vertices_m, vertex_normals(vertices_m, self.body.faces), self._clothes.fields], axis=1
         ).astype(np.float32)
         values = np.empty((len(rows), attributes.shape[1]), np.float32)
-        interpolate(
-            points, nearness, self.body.faces, rows, columns, owner, attributes, values
-        )
+        interpolate(points, nearness, self.body.faces, rows, columns, owner, attributes, values)
         colours = np.zeros((height, width, 3), np.float32)
-        colours[rows, columns] = self._shade(
-            values[:, :3], values[:, 3:6], values[:, 6:], shadow
-        )
+        colours[rows, columns] = self._shade(values[:, :3], values[:, 3:6], values[:, 6:], shadow)
         coverage = (owner >= 0).astype(np.float32)
         return _shrunk(colours, n), _shrunk(coverage, n)
 
@@ -156,7 +150,7 @@ class Renderer:
         fill_light = np.clip((normals @ fill + 0.3) / 1.3, 0.0, None)
         sky = 0.5 - 0.5 * normals[:, 1]
         light = (
-            1.9 * key_light[:, None] * np.float32([1.0, 0.965, 0.91])
+            1.7 * key_light[:, None] * np.float32([1.0, 0.965, 0.91])
             + 0.30 * fill_light[:, None] * np.float32([0.86, 0.93, 1.0])
             + (0.20 + 0.28 * sky)[:, None] * np.float32([0.95, 0.98, 1.0])
         )
@@ -196,7 +190,7 @@ class Renderer:
         """The empty room with the person's soft shadow, linear (H, W, 3)."""
         silhouette = (shadow > -1e8).astype(np.float32)
         for _ in range(3):
-            silhouette = _box_blurred(silhouette, 13)
+            silhouette = _box_blurred(silhouette, 19)
         r, c, fr, fc = self._room_in_light
         shade = (
             silhouette[r, c] * (1 - fr) * (1 - fc)
