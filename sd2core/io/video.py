@@ -124,9 +124,9 @@ class VideoReader:
         with self._lock:
             if self._container is None:
                 raise Sd2Error(f"{self.path} is closed", "an open video", "Open it again")
-            picture = self._find(frame)
-        width, height = self._size
-        rgb = picture.to_ndarray(format="rgb24", width=width, height=height)
+            width, height = self._size
+            # Inside the lock: a frame keeps its converter, which two threads must not share.
+            rgb = self._find(frame).to_ndarray(format="rgb24", width=width, height=height)
         return np.ascontiguousarray(np.rot90(rgb, self._turns))
 
     def frames(self, start: int = 0, stop: int | None = None) -> Iterator[NDArray[np.uint8]]:

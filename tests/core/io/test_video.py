@@ -1,0 +1,304 @@
+from __future__ import annotations
+
+import random
+import threading
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+from numbered_videos import number_in, picture, write_video
+
+from sd2core.errors import Sd2Error
+from sd2core.io import video, video_index
+from sd2core.io.video import open_video
+from sd2core.progress import Cancelled
+
+UNEVEN_MS = np.cumsum([0, *random.Random(3).choices([11, 33, 34, 70, 240], k=59)]).tolist()
+
+# name, frames, how it is written
+FILES = {
+    "b_frames.mp4": (60, {"options": {"bf": "3", "g": "12", "b-pyramid": "normal"}}),
+    "one_gop.mkv": (60, {"options": {"bf": "3", "g": "600"}}),
+    "open_gop.mkv": (60, {"options": {"bf": "3", "x264-params": "open-gop=1:keyint=12"}}),
+    "uneven.mp4": (60, {"times_ms": UNEVEN_MS, "options": {"bf": "3", "g": "12"}}),
+    "uneven.mkv": (60, {"times_ms": UNEVEN_MS, "options": {"bf": "2", "g": "10"}}),
+    "transport.ts": (60, {"options": {"bf": "2", "g": "10"}}),
+    "old.avi": (60, {"codec": "mpeg4", "options": {"bf": "2", "g": "12"}}),
+    "intra.avi": (60, {"codec": "mjpeg", "pixels": "yuvj420p"}),
+    "alt_ref.webm": (60, {"codec": "libvpx", "options": {"auto-alt-ref": "1"}}),
+    "hevc.mp4": (30, {"codec": "libx265", "options": {"x265-params": "log-level=0:keyint=8"}}),
+    "odd_size.mkv": (20, {"codec": "ffv1", "size": (131, 67)}),
+    "one_frame.mp4": (1, {}),
+    "no_times.h264": (60, {"options": {"bf": "2", "g": "10"}}),
+    "wrong_times.avi": (60, {"options": {"bf": "2", "g": "10"}}),
+}
+
+
+@pytest.fixture(params=["whole", "ends"])
+def listing(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Both ways of listing frames: all decoded, or packets with decoded ends."""
+    if request.param == "ends":
+        monkeypatch.setattr(video_index, "_WHOLE_MEGAPIXELS", 0.0)
+    return str(request.param)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_random_access_is_frame_exact(tmp_path: Path, name: str, listing: str) -> None:
+    frames, how = FILES[name]
+    path = write_video(tmp_path / name, frames, **how)
+    with open_video(path) as reader:
+        assert len(reader) == frames
+        assert (reader.width, reader.height) == how.get("size", (128, 64))
+        shuffled = list(range(frames)) * 2
+        random.Random(1).shuffle(shuffled)
+        assert [number_in(reader.read(k)) for k in shuffled] == shuffled
+        assert [number_in(image) for image in reader.frames()] == list(range(frames))
+
+
+def test_access_without_a_cache_equals_sequential_decoding(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(video, "_CACHE_BYTES", 0)
+    path = write_video(tmp_path / "v.mp4", 60, options={"bf": "3", "g": "12"})
+    with open_video(path) as reader, av.open(str(path)) as container:
+        decoded = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+        shuffled = random.Random(2).sample(range(60), 60)
+        for k in shuffled:
+            np.testing.assert_array_equal(reader.read(k), decoded[k])
+
+
+@pytest.mark.parametrize("name", ["uneven.mp4", "uneven.mkv"])
+def test_presentation_times_are_those_written(tmp_path: Path, name: str) -> None:
+    frames, how = FILES[name]
+    with open_video(write_video(tmp_path / name, frames, **how)) as reader:
+        np.testing.assert_allclose(reader.timebase.times_s, np.array(UNEVEN_MS) / 1000, atol=1e-9)
+
+
+def test_a_regular_clock_is_freed_of_the_containers_rounding(tmp_path: Path) -> None:
+    """Matroska keeps whole milliseconds."""
+    with open_video(write_video(tmp_path / "v.mkv", 40)) as reader:
+        np.testing.assert_allclose(reader.timebase.times_s, np.arange(40) / 30, atol=1e-12)
+
+
+def test_first_frame_is_at_zero_when_the_file_starts_later(tmp_path: Path) -> None:
+    path = write_video(tmp_path / "v.mkv", 10, times_ms=[500 + 100 * k for k in range(10)])
+    with open_video(path) as reader:
+        np.testing.assert_allclose(reader.timebase.times_s, np.arange(10) / 10, atol=1e-9)
+        assert number_in(reader.read(0)) == 0
+
+
+def test_a_file_without_times_says_so(tmp_path: Path) -> None:
+    path = write_video(tmp_path / "v.h264", 10)
+    with open_video(path) as reader:
+        assert "no usable frame times" in reader.notes[0]
+        assert "25 frames/s" in reader.notes[0]
+        np.testing.assert_allclose(reader.timebase.times_s, np.arange(10) / 25)
+
+
+def test_an_edit_list_hides_the_frames_it_cuts(tmp_path: Path, listing: str) -> None:
+    whole = write_video(tmp_path / "whole.mp4", 60, options={"bf": "3", "g": "20"})
+    cut = tmp_path / "cut.mp4"
+    # Copying packets from before zero makes the muxer write an edit list.
+    with av.open(str(whole)) as source, av.open(str(cut), "w") as target:
+        stream = source.streams.video[0]
+        copy = target.add_stream_from_template(stream)
+        shift = int(7 / 30 / stream.time_base)
+        for packet in source.demux(stream):
+            if packet.dts is None:
+                continue
+            packet.pts -= shift
+            packet.dts -= shift
+            packet.stream = copy
+            target.mux(packet)
+    with av.open(str(cut)) as container:
+        expected = [number_in(f.to_ndarray(format="rgb24")) for f in container.decode(video=0)]
+    with open_video(cut) as reader:
+        order = random.Random(4).sample(range(len(expected)), len(expected))
+        assert len(reader) == len(expected)
+        assert [number_in(reader.read(k)) for k in order] == [expected[k] for k in order]
+
+
+@pytest.mark.parametrize("suffix", ["mkv", "ts"])
+def test_a_truncated_file_is_read_to_its_true_end(
+    tmp_path: Path, suffix: str, listing: str
+) -> None:
+    path = write_video(tmp_path / f"v.{suffix}", 60, options={"bf": "2", "g": "10", "crf": "5"})
+    content = path.read_bytes()
+    path.write_bytes(content[: int(len(content) * 0.6)])
+    with open_video(path) as reader:
+        count = len(reader)
+        assert 20 < count < 50
+        read = [number_in(image) for image in reader.frames()]
+        assert read[: count - 3] == list(range(count - 3))
+        assert number_in(reader.read(3)) == 3
+
+
+def test_frames_before_the_first_key_frame_are_not_listed(tmp_path: Path, listing: str) -> None:
+    options = {"bf": "0", "g": "20", "sc_threshold": "0"}
+    whole = write_video(tmp_path / "whole.mkv", 60, options=options)
+    cut = tmp_path / "cut.mkv"
+    with av.open(str(whole)) as source, av.open(str(cut), "w") as target:
+        stream = source.streams.video[0]
+        copy = target.add_stream_from_template(stream)
+        for number, packet in enumerate(source.demux(stream)):
+            if number >= 13 and packet.size:
+                packet.stream = copy
+                target.mux(packet)
+    with open_video(cut) as reader:
+        assert [number_in(image) for image in reader.frames()] == list(range(20, 60))
+        assert reader.timebase.start_s == 0.0
+
+
+def test_a_damaged_frame_inside_is_replaced_by_the_one_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(video_index, "_WHOLE_MEGAPIXELS", 0.0)
+    monkeypatch.setattr(video_index, "_HEAD_PACKETS", 8)
+    path = write_video(tmp_path / "v.mkv", 60, codec="mjpeg", pixels="yuvj420p")
+    content = bytearray(path.read_bytes())
+    with av.open(str(path)) as container:
+        packet = [p for p in container.demux(video=0) if p.size][30]
+        place = content.find(bytes(packet)[:64])
+        size = packet.size
+    content[place : place + size] = bytes(size)
+    path.write_bytes(content)
+    with open_video(path) as reader:
+        assert len(reader) == 60
+        assert reader.notes == ()
+        assert [number_in(reader.read(k)) for k in (29, 30, 31, 45, 30)] == [29, 29, 31, 45, 29]
+        assert reader.notes == ("Frame 30 is damaged; frame 29 is shown in its place.",)
+
+
+@pytest.mark.parametrize(("degrees", "turns"), [(90, 1), (180, 2), (-90, 3)])
+def test_rotation_is_honoured(tmp_path: Path, degrees: int, turns: int) -> None:
+    path = write_video(tmp_path / "v.mp4", 3, options={"crf": "1"}, rotation=degrees)
+    expected = np.rot90(picture(2, 128, 64), turns)
+    with open_video(path) as reader:
+        image = reader.read(2)
+        assert image.shape == (reader.height, reader.width, 3) == expected.shape
+        assert np.abs(image.astype(int) - expected).mean() < 12
+
+
+def test_colours_are_red_green_blue(tmp_path: Path) -> None:
+    path = tmp_path / "v.mkv"
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("ffv1", rate=30)
+        stream.width, stream.height, stream.pix_fmt = 32, 32, "bgr0"
+        image = np.zeros((32, 32, 3), np.uint8)
+        image[...] = (250, 120, 10)
+        container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))
+        container.mux(stream.encode())
+    with open_video(path) as reader:
+        np.testing.assert_array_equal(reader.read(0), image)
+
+
+def test_what_is_returned_is_the_callers_own(tmp_path: Path) -> None:
+    with open_video(write_video(tmp_path / "v.mp4", 3)) as reader:
+        first = reader.read(1)
+        kept = first.copy()
+        first[...] = 0
+        np.testing.assert_array_equal(reader.read(1), kept)
+
+
+def test_the_cache_keeps_to_its_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    frame_bytes = 128 * 64 * 3 // 2
+    monkeypatch.setattr(video, "_CACHE_BYTES", 6 * frame_bytes)
+    with open_video(write_video(tmp_path / "v.mp4", 60, options={"g": "30"})) as reader:
+        for k in (59, 10, 40):
+            reader.read(k)
+            assert 0 < reader._cached_bytes <= 6 * frame_bytes
+            assert reader._cached_bytes == sum(size for _, size in reader._cache.values())
+
+
+def test_threads_read_their_own_frames(tmp_path: Path) -> None:
+    reader = open_video(write_video(tmp_path / "v.mp4", 60, options={"bf": "2", "g": "10"}))
+    wrong: list[tuple[int, int]] = []
+
+    def read(seed: int) -> None:
+        for k in random.Random(seed).sample(range(60), 30):
+            found = number_in(reader.read(k))
+            if found != k:
+                wrong.append((k, found))
+
+    threads = [threading.Thread(target=read, args=(seed,)) for seed in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    reader.close()
+    assert wrong == []
+
+
+def test_a_closed_reader_says_so(tmp_path: Path) -> None:
+    reader = open_video(write_video(tmp_path / "v.mp4", 3))
+    reader.close()
+    reader.close()
+    with pytest.raises(Sd2Error, match=r"v\.mp4 is closed"):
+        reader.read(0)
+
+
+def test_frames_outside_the_file_are_refused(tmp_path: Path) -> None:
+    with open_video(write_video(tmp_path / "v.mp4", 3)) as reader:
+        for k in (-1, 3):
+            with pytest.raises(IndexError, match=f"frame {k} of 3"):
+                reader.read(k)
+
+
+@pytest.mark.parametrize("content", [b"", b"hello, this is text\n" * 50, bytes(range(256)) * 40])
+def test_what_is_no_video_is_named(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "not_a_video.mp4"
+    path.write_bytes(content)
+    with pytest.raises(Sd2Error, match=r"not_a_video\.mp4.*Expected: a .*video"):
+        open_video(path)
+
+
+def test_a_file_of_sound_only_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "sound.wav"
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("pcm_s16le", rate=8000, layout="mono")
+        frame = av.AudioFrame.from_ndarray(np.zeros((1, 800), np.int16), "s16", "mono")
+        frame.sample_rate = 8000
+        container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+    with pytest.raises(Sd2Error, match=r"sound\.wav holds no video stream"):
+        open_video(path)
+
+
+def test_missing_files_and_folders_are_named(tmp_path: Path) -> None:
+    with pytest.raises(Sd2Error, match=r"gone\.mp4 does not exist"):
+        open_video(tmp_path / "gone.mp4")
+    with pytest.raises(Sd2Error, match="is a folder"):
+        open_video(tmp_path)
+
+
+def test_listing_can_be_cancelled(tmp_path: Path) -> None:
+    path = write_video(tmp_path / "v.mp4", 40)
+
+    def stop(done: int, total: int) -> None:
+        raise Cancelled
+
+    with pytest.raises(Cancelled):
+        open_video(path, progress=stop)
+
+
+@pytest.mark.parametrize(
+    ("name", "frames", "notes"),
+    [
+        ("again.mkv", 77, 1),
+        ("help.mkv", 58, 0),
+        ("walk.mkv", 89, 0),
+    ],
+)
+def test_real_videos(shared_data: Path, listing: str, name: str, frames: int, notes: int) -> None:
+    path = shared_data / "video" / name
+    with open_video(path) as reader, av.open(str(path)) as container:
+        assert len(reader) == frames
+        assert (reader.width, reader.height) == (640, 480)
+        np.testing.assert_allclose(reader.timebase.times_s, np.arange(frames) / 30, atol=1e-9)
+        assert len(reader.notes) == notes
+        if notes:
+            assert "claims 78 frames, 77 decode" in reader.notes[0]
+        decoded = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+        for k in random.Random(5).sample(range(frames), 12):
+            np.testing.assert_array_equal(reader.read(k), decoded[k])
