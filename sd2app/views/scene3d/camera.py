@@ -1,0 +1,222 @@
+"""The eye of the scene: orbit, pan, zoom, framing and exact projection; no VTK.
+
+Pixels are those of the widget (device independent), x right, y down from the
+top left corner. The world is x right, y down, z forward, so the view's up is −y.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Vector = NDArray[np.float64]
+
+_STEEPEST_DEG = 89.5
+_NEAREST_M = 0.05
+_FARTHEST_M = 500.0
+_ORBIT_DEG_PER_PX = 0.35
+_LEAST_PX_PER_M = 4.0
+_FARTHEST_DRAG_M = 60.0
+STANDARD_ANGLE_DEG = 30.0
+
+
+@dataclass(frozen=True)
+class Margins:
+    """Pixels to keep free when framing."""
+
+    left: float = 24.0
+    top: float = 24.0
+    right: float = 24.0
+    bottom: float = 24.0
+
+
+@dataclass(frozen=True)
+class EyePose:
+    """Where the eye is: it looks at ``focus`` from ``distance_m`` behind it.
+
+    Parameters
+    ----------
+    focus : tuple of 3 floats
+        Point that the eye turns around, metres.
+    azimuth_deg, elevation_deg : float
+        Direction of view: azimuth to the right of +z, elevation above the horizon.
+    distance_m : float
+        From the eye to the focus.
+    angle_deg : float
+        Vertical opening angle.
+    """
+
+    focus: tuple[float, float, float] = (0.0, 0.0, 2.0)
+    azimuth_deg: float = 0.0
+    elevation_deg: float = 0.0
+    distance_m: float = 5.0
+    angle_deg: float = STANDARD_ANGLE_DEG
+
+    @property
+    def axes(self) -> tuple[Vector, Vector, Vector]:
+        """Unit vectors right, down and forward of the picture."""
+        azimuth, elevation = math.radians(self.azimuth_deg), math.radians(self.elevation_deg)
+        cosine = math.cos(elevation)
+        forward = np.array(
+            [math.sin(azimuth) * cosine, -math.sin(elevation), math.cos(azimuth) * cosine]
+        )
+        right = np.array([math.cos(azimuth), 0.0, -math.sin(azimuth)])
+        return right, np.cross(forward, right), forward
+
+    @property
+    def position(self) -> Vector:
+        """The eye, metres."""
+        return np.asarray(self.focus) - self.distance_m * self.axes[2]
+
+    def orbited(self, dx_px: float, dy_px: float) -> EyePose:
+        """Turned around the focus by a drag; the vertical stays vertical."""
+        elevation = self.elevation_deg - _ORBIT_DEG_PER_PX * dy_px
+        return replace(
+            self,
+            azimuth_deg=(self.azimuth_deg + _ORBIT_DEG_PER_PX * dx_px + 180.0) % 360.0 - 180.0,
+            elevation_deg=min(max(elevation, -_STEEPEST_DEG), _STEEPEST_DEG),
+        )
+
+    def panned(self, dx_px: float, dy_px: float, height_px: float) -> EyePose:
+        """Shifted so that what lies at the focus follows the drag."""
+        right, down, _ = self.axes
+        scale = self.distance_m / self.pixels_per_tangent(height_px)
+        focus = np.asarray(self.focus) - scale * (dx_px * right + dy_px * down)
+        return replace(self, focus=_triple(focus))
+
+    def zoomed(self, factor: float, x_px: float, y_px: float, size_px: ArrayLike) -> EyePose:
+        """Distance times ``factor``, keeping in place what the pointer is on (at the focus)."""
+        width, height = (float(value) for value in np.asarray(size_px))
+        distance = min(max(self.distance_m * factor, _NEAREST_M), _FARTHEST_M)
+        right, down, _ = self.axes
+        shift = (self.distance_m - distance) / self.pixels_per_tangent(height)
+        focus = np.asarray(self.focus) + shift * (
+            (x_px - width / 2) * right + (y_px - height / 2) * down
+        )
+        return replace(self, focus=_triple(focus), distance_m=distance)
+
+    def pixels_per_tangent(self, height_px: float) -> float:
+        """Pixels per metre of width at one metre of depth."""
+        return 0.5 * height_px / math.tan(math.radians(self.angle_deg) / 2)
+
+    def project(self, points: ArrayLike, size_px: ArrayLike) -> NDArray[np.float64]:
+        """Pixels and depth of points, (n, 3); what lies behind the eye is NaN, NaN, depth."""
+        width, height = (float(value) for value in np.asarray(size_px))
+        right, down, forward = self.axes
+        relative = np.atleast_2d(np.asarray(points, np.float64)) - self.position
+        depth = relative @ forward
+        safe = np.where(depth > 1e-6, depth, np.nan)
+        scale = self.pixels_per_tangent(height) / safe
+        return np.stack(
+            [
+                width / 2 + scale * (relative @ right),
+                height / 2 + scale * (relative @ down),
+                depth,
+            ],
+            axis=1,
+        )
+
+    def ray(self, x_px: float, y_px: float, size_px: ArrayLike) -> Vector:
+        """Direction from the eye through a pixel, with a forward part of one."""
+        width, height = (float(value) for value in np.asarray(size_px))
+        right, down, forward = self.axes
+        scale = self.pixels_per_tangent(height)
+        return forward + (x_px - width / 2) / scale * right + (y_px - height / 2) / scale * down
+
+    def metres_per_pixel(self, point: ArrayLike, height_px: float) -> float:
+        """Size of a pixel at a point's depth; infinite behind the eye."""
+        depth = float((np.asarray(point, np.float64) - self.position) @ self.axes[2])
+        return depth / self.pixels_per_tangent(height_px) if depth > 1e-6 else math.inf
+
+    def framed(self, points: ArrayLike, size_px: ArrayLike, margins: Margins) -> EyePose:
+        """The same direction from as near as all points fit inside the margins."""
+        points = np.atleast_2d(np.asarray(points, np.float64))
+        width, height = (float(value) for value in np.asarray(size_px))
+        scale = self.pixels_per_tangent(height)
+        axes = self.axes
+        centre = points.mean(axis=0)
+        x, y, z = ((points - centre) @ axis for axis in axes)
+        room_x = _tangents(width, margins.left, margins.right, scale)
+        room_y = _tangents(height, margins.top, margins.bottom, scale)
+        distance = max(
+            _least_distance(x, z, *room_x), _least_distance(y, z, *room_y), 2.0 * _NEAREST_M
+        )
+        across = _offset(x, z, *room_x, distance)
+        downward = _offset(y, z, *room_y, distance)
+        eye = centre + across * axes[0] + downward * axes[1] - distance * axes[2]
+        return replace(self, focus=_triple(eye + distance * axes[2]), distance_m=distance)
+
+
+def _tangents(size: float, before: float, after: float, scale: float) -> tuple[float, float]:
+    least = 0.1 * size
+    return (max(size / 2 - before, least) / scale, max(size / 2 - after, least) / scale)
+
+
+def _least_distance(x: Vector, z: Vector, low: float, high: float) -> float:
+    # Inside the picture: -low (z + t) <= x - a <= high (z + t) for every point.
+    # Adding both bounds on the eye's offset a leaves the distance t.
+    return float((np.max(x - high * z) + np.max(-x - low * z)) / (low + high))
+
+
+def _offset(x: Vector, z: Vector, low: float, high: float, distance: float) -> float:
+    least = float(np.max(x - high * z)) - high * distance
+    most = low * distance - float(np.max(-x - low * z))
+    return 0.5 * (least + most)
+
+
+def _triple(values: Vector) -> tuple[float, float, float]:
+    return (float(values[0]), float(values[1]), float(values[2]))
+
+
+def drag_in_view(
+    start: ArrayLike, pose: EyePose, x_px: float, y_px: float, size_px: ArrayLike
+) -> Vector:
+    """Where the pointer's ray meets the plane through ``start`` parallel to the picture."""
+    depth = float((np.asarray(start, np.float64) - pose.position) @ pose.axes[2])
+    return pose.position + depth * pose.ray(x_px, y_px, size_px)
+
+
+def drag_along(
+    start: ArrayLike,
+    direction: ArrayLike,
+    pose: EyePose,
+    x_px: float,
+    y_px: float,
+    size_px: ArrayLike,
+) -> Vector | None:
+    """Point of a line through ``start`` whose picture is nearest to the pointer.
+
+    None where there is no good answer: the line points at the eye, or the
+    pointer is at its vanishing point.
+    """
+    right, down, forward = pose.axes
+    start = np.asarray(start, np.float64)
+    unit = np.asarray(direction, np.float64)
+    length = float(np.linalg.norm(unit))
+    depth = float((start - pose.position) @ forward)
+    if length < 1e-9 or depth < 1e-6:
+        return None
+    unit = unit / length
+    width, height = (float(value) for value in np.asarray(size_px))
+    scale = pose.pixels_per_tangent(height)
+    flat = np.array([(start - pose.position) @ right, (start - pose.position) @ down])
+    slope = np.array([unit @ right, unit @ down])
+    climb = float(unit @ forward)
+    heading = slope / depth - flat * climb / depth**2  # of the line's picture, at its start
+    if np.linalg.norm(heading) * scale < _LEAST_PX_PER_M:
+        return None
+    heading /= np.linalg.norm(heading)
+    pointer = np.array([x_px - width / 2, y_px - height / 2]) / scale
+    wanted = float(pointer @ heading)
+    # heading . (flat + s slope) / (depth + s climb) = wanted, solved for s
+    divisor = float(slope @ heading) - wanted * climb
+    if abs(divisor) < 1e-9:
+        return None
+    amount = (wanted * depth - float(flat @ heading)) / divisor
+    new_depth = depth + amount * climb
+    if new_depth < _NEAREST_M or new_depth > _FARTHEST_DRAG_M:
+        return None
+    return start + amount * unit

@@ -1,0 +1,184 @@
+"""What the colours of the mesh mean, as arrays; no VTK."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sd2app.palette import Palette
+
+MeshColour = Literal["velocity", "range", "visibility", "plain"]
+Rgb = NDArray[np.uint8]
+"""Colours, shape (..., 3)."""
+
+# Both ends differ in hue and lightness for every kind of colour vision; the
+# colour rises quickly from the grey middle because a body mostly moves slowly.
+_DIVERGING = (
+    (0.00, "#123f86"),
+    (0.15, "#2065b8"),
+    (0.32, "#5a9ede"),
+    (0.43, "#aacbea"),
+    (0.50, "#e8e6e3"),
+    (0.57, "#f1bd9e"),
+    (0.68, "#e2794f"),
+    (0.85, "#c0391f"),
+    (1.00, "#84170d"),
+)
+# Near is bright, far is dark, as seen from the sensor; viridis (CC0), its ends cut.
+_SEQUENTIAL = (
+    (0.000, "#f2e51d"),
+    (0.125, "#b5de2b"),
+    (0.250, "#6ece58"),
+    (0.375, "#35b779"),
+    (0.500, "#1f9e89"),
+    (0.625, "#26828e"),
+    (0.750, "#31688e"),
+    (0.875, "#3e4989"),
+    (1.000, "#482878"),
+)
+
+
+def rgb(colour: str) -> NDArray[np.uint8]:
+    """``#rrggbb`` as three bytes."""
+    return np.frombuffer(bytes.fromhex(colour.removeprefix("#")), np.uint8)
+
+
+def fractions(colour: str) -> tuple[float, float, float]:
+    """``#rrggbb`` as three numbers from 0 to 1, as VTK wants them."""
+    red, green, blue = (int(value) / 255.0 for value in rgb(colour))
+    return (red, green, blue)
+
+
+def mixed(colour: str, other: str, share: float) -> str:
+    """``colour`` with ``share`` of ``other`` in it."""
+    blend = (1.0 - share) * rgb(colour) + share * rgb(other)
+    return "#" + np.rint(blend).astype(np.uint8).tobytes().hex()
+
+
+def _table(anchors: tuple[tuple[float, str], ...]) -> Rgb:
+    positions = [position for position, _ in anchors]
+    colours = np.array([rgb(colour) for _, colour in anchors], float)  # (anchors, 3)
+    grid = np.linspace(0.0, 1.0, 256)
+    channels = [np.interp(grid, positions, colours[:, channel]) for channel in range(3)]
+    return np.rint(np.stack(channels, axis=1)).astype(np.uint8)
+
+
+DIVERGING = _table(_DIVERGING)
+"""Receding to approaching, shape (256, 3)."""
+SEQUENTIAL = _table(_SEQUENTIAL)
+"""Near to far, shape (256, 3)."""
+
+
+@dataclass(frozen=True)
+class SceneColours:
+    """Colours of the scene in one theme, as ``#rrggbb``."""
+
+    background: str
+    grid: str
+    shadow: str
+    plain: str
+    hidden: str
+    visible: str
+    sensor: str
+    sensor_hot: str
+    camera: str
+    text: str
+    muted: str
+    chip: str
+
+    @classmethod
+    def of(cls, palette: Palette, dark: bool) -> SceneColours:
+        """The scene in a theme of the window."""
+        background = "#1b1d21" if dark else "#f6f7f9"
+        return cls(
+            background=background,
+            grid=mixed(background, palette.muted, 0.42 if dark else 0.38),
+            shadow=mixed(background, "#000000", 0.42 if dark else 0.13),
+            plain="#aab1bb" if dark else "#c3c9d1",
+            hidden="#5f6670" if dark else "#8b929c",
+            visible=palette.accent,
+            sensor=palette.accent,
+            sensor_hot=mixed(palette.accent, "#ffffff", 0.35),
+            camera=palette.muted,
+            text=palette.text,
+            muted=palette.muted,
+            chip=palette.panel,
+        )
+
+
+def velocity_colours(velocity_mps: NDArray[np.floating], v_max_mps: float) -> Rgb:
+    """Diverging colours of radial velocities, fixed at ±``v_max_mps``; (V, 3)."""
+    return _looked_up(DIVERGING, velocity_mps, -v_max_mps, v_max_mps)
+
+
+def range_colours(range_m: NDArray[np.floating], limits_m: tuple[float, float]) -> Rgb:
+    """Sequential colours of ranges between two limits; (V, 3)."""
+    return _looked_up(SEQUENTIAL, range_m, *limits_m)
+
+
+def _looked_up(table: Rgb, values: NDArray[np.floating], low: float, high: float) -> Rgb:
+    share = (np.asarray(values, np.float32) - low) * (256.0 / (high - low))
+    index = np.nan_to_num(np.clip(share, 0.0, 255.0), nan=0.0).astype(np.uint8)
+    return table[index]
+
+
+def range_limits(nearest_m: float, farthest_m: float) -> tuple[float, float]:
+    """Limits of a colour bar around a span of ranges: round and never empty.
+
+    The step grows with the span, so that moving the sensor a little does not
+    change the limits at every step.
+    """
+    step = nice_step(max(farthest_m - nearest_m, 0.05 * abs(farthest_m), 0.1), 4)
+    low = max(math.floor(nearest_m / step + 1e-9) * step, 0.0)
+    high = math.ceil(farthest_m / step - 1e-9) * step
+    return (low, max(high, low + step))
+
+
+def nice_step(span: float, most: int) -> float:
+    """1, 2 or 5 times a power of ten that divides ``span`` into at most ``most`` steps."""
+    raw = span / most
+    power = 10.0 ** math.floor(math.log10(raw))
+    for factor in (1.0, 2.0, 5.0):
+        if factor * power >= raw * (1.0 - 1e-9):
+            return factor * power
+    return 10.0 * power
+
+
+def mesh_colours(
+    mode: MeshColour,
+    colours: SceneColours,
+    count: int,
+    *,
+    velocity_mps: NDArray[np.floating] | None = None,
+    v_max_mps: float = 2.0,
+    range_m: NDArray[np.floating] | None = None,
+    range_limits_m: tuple[float, float] = (0.0, 1.0),
+    visible: NDArray[np.bool_] | None = None,
+    as_dots: bool = False,
+) -> Rgb:
+    """Colours of ``count`` vertices, shape (count, 3).
+
+    What is not known yet is drawn plain. Hidden vertices are muted in every
+    mode but ``plain``: they do not contribute to the spectrum.
+    """
+    plain: ArrayLike = rgb(colours.plain)
+    if mode == "velocity" and velocity_mps is not None:
+        result = velocity_colours(velocity_mps, v_max_mps)
+    elif mode == "range" and range_m is not None:
+        result = range_colours(range_m, range_limits_m)
+    elif mode == "visibility" and visible is not None:
+        result = np.tile(rgb(colours.visible), (count, 1))
+    else:
+        return np.tile(np.asarray(plain, np.uint8), (count, 1))
+    if visible is None:
+        return result
+    # Dots do not cover one another: what is hidden has to step back further.
+    hidden = mixed(colours.hidden, colours.background, 0.6) if as_dots else colours.hidden
+    if mode == "range" and not as_dots:
+        muted = (0.3 * result + 0.7 * rgb(hidden)).astype(np.uint8)
+        return np.where(visible[:, None], result, muted)
+    return np.where(visible[:, None], result, rgb(hidden))

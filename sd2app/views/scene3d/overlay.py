@@ -1,0 +1,256 @@
+"""Words and scales over the 3D picture: crisp text that costs no rendering."""
+
+from __future__ import annotations
+
+import numpy as np
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QFont, QFontMetricsF, QImage, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QWidget
+
+from sd2app.views.scene3d.colours import DIVERGING, SEQUENTIAL, SceneColours, nice_step
+from sd2app.views.scene3d.navigation import Navigator
+from sd2app.views.scene3d.scene import Scene
+
+HINT = "Drag moves the sensor  ·  Shift: up and down  ·  Ctrl: nearer and farther"
+_BAR_WIDTH = 10.0
+_PAD = 10.0
+_GAP = 6.0
+
+
+class Overlay(QWidget):
+    """Colour bar, metre labels, axes and the sensor's coordinates."""
+
+    def __init__(self, scene: Scene, navigator: Navigator, parent: QWidget) -> None:
+        super().__init__(parent)
+        self._scene = scene
+        self._navigator = navigator
+        self.message = ""
+        self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+
+    @property
+    def _colours(self) -> SceneColours:
+        return self._scene.colours
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Everything, from far to near."""
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setFont(self._font())
+        if self.message:
+            painter.setPen(QColor(self._colours.muted))
+            rows = self.rect().adjusted(16, 8, -16, -12)
+            where = Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignBottom
+            painter.drawText(rows, where | Qt.TextFlag.TextWordWrap, self.message)
+        self._paint_metres(painter)
+        self._paint_axes(painter)
+        self._paint_names(painter)
+        self._paint_legend(painter)
+        if self._navigator.holds_sensor:
+            self._paint_coordinates(painter)
+        elif self._navigator.hovers_sensor:
+            self._paint_hint(painter)
+
+    def _font(self) -> QFont:
+        font = QFont(self.font())
+        font.setPointSizeF(max(font.pointSizeF() - 1.0, 7.5))
+        return font
+
+    def _size(self) -> tuple[float, float]:
+        return (self.width(), self.height())
+
+    def _paint_metres(self, painter: QPainter) -> None:
+        labels = self._scene.labels
+        if not labels:
+            return
+        metrics = QFontMetricsF(painter.font())
+        painter.setPen(QColor(self._colours.muted))
+        taken: list[QRectF] = []
+        places = self._scene.pose.project([place for _, place in labels], self._size())
+        for (text, _), (x, y, depth) in zip(labels, places, strict=True):
+            if not depth > 0.1:
+                continue
+            box = metrics.boundingRect(text)
+            box.moveTo(x + 5.0, y - box.height() / 2)
+            spaced = box.adjusted(-4, -2, 4, 2)
+            if not QRectF(self.rect()).contains(box) or any(map(spaced.intersects, taken)):
+                continue
+            taken.append(box)
+            painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)
+
+    def _paint_axes(self, painter: QPainter) -> None:
+        right, down, forward = self._scene.pose.axes
+        centre = QPointF(34.0, self.height() - 34.0)
+        arms = []
+        for name, axis in zip("xyz", np.eye(3), strict=True):
+            arms.append((float(axis @ forward), name, float(axis @ right), float(axis @ down)))
+        for depth, name, across, downward in sorted(arms, reverse=True):
+            colour = QColor(self._colours.muted)
+            colour.setAlphaF(1.0 if depth < 0.5 else 0.6)
+            painter.setPen(QPen(colour, 1.4))
+            tip = centre + QPointF(20.0 * across, 20.0 * downward)
+            painter.drawLine(centre, tip)
+            box = QRectF(0.0, 0.0, 14.0, 14.0)
+            box.moveCenter(centre + QPointF(27.0 * across, 27.0 * downward))
+            painter.drawText(box, Qt.AlignmentFlag.AlignCenter, name)
+
+    def _paint_names(self, painter: QPainter) -> None:
+        scene = self._scene
+        height = self._size()[1]
+        metrics = QFontMetricsF(painter.font())
+        places = scene.pose.project([scene.sensor.position_m, (0.0, 0.0, 0.0)], self._size())
+        painter.setPen(QColor(self._colours.muted))
+        if scene.sensor_shown and places[0, 2] > 0 and not self._navigator.holds_sensor:
+            radius = scene.sensor_radius_m(self._size()) / scene.pose.metres_per_pixel(
+                scene.sensor.position_m, height
+            )
+            text = "Sensor"
+            at = QPointF(
+                places[0, 0] - metrics.horizontalAdvance(text) / 2,
+                places[0, 1] - radius - 6.0,
+            )
+            painter.drawText(at, text)
+        apart = float(np.hypot(*(places[0, :2] - places[1, :2])))
+        if scene.camera_shown and places[1, 2] > 0 and not apart < 48.0:
+            text = "Camera"
+            at = QPointF(
+                places[1, 0] - metrics.horizontalAdvance(text) / 2,
+                places[1, 1] + metrics.ascent() + 10.0,
+            )
+            painter.drawText(at, text)
+
+    def _paint_legend(self, painter: QPainter) -> None:
+        mode = self._scene.mode
+        if not self._scene.has_mesh or mode == "plain":
+            return
+        if mode == "visibility":
+            self._paint_swatches(painter)
+            return
+        if mode == "velocity":
+            top = self._scene.v_max_mps
+            ticks = [(f"{value:+.3g}" if value else "0") for value in np.linspace(top, -top, 5)]
+            shares = list(np.linspace(0.0, 1.0, 5))
+            title, table, ends = (
+                "Radial velocity, m/s",
+                DIVERGING[::-1],
+                ("approaching", "receding"),
+            )
+        else:
+            low, high = self._scene.range_limits_m
+            step = nice_step(high - low, 6)
+            values = np.arange(np.ceil(high / step - 1e-9) * step, low - 1e-9, -step)
+            values = values[values <= high + 1e-9]
+            ticks = [f"{value:.6g}" for value in np.round(values, 9)]
+            shares = [float((high - value) / (high - low)) for value in values]
+            title, table, ends = "Range, m", SEQUENTIAL[::-1], ("far", "near")
+        self._paint_bar(painter, title, table, ticks, shares, ends)
+
+    def _paint_bar(
+        self,
+        painter: QPainter,
+        title: str,
+        table: np.ndarray,
+        ticks: list[str],
+        shares: list[float],
+        ends: tuple[str, str],
+    ) -> None:
+        colours = self._colours
+        metrics = QFontMetricsF(painter.font())
+        line = metrics.height()
+        length = min(max(0.36 * self.height(), 72.0), 170.0)
+        tick_width = max(metrics.horizontalAdvance(text.replace("-", "−")) for text in ticks)
+        words = max(metrics.horizontalAdvance(word) for word in ends)
+        width = max(metrics.horizontalAdvance(title), words, _BAR_WIDTH + _GAP + tick_width)
+        knows_hidden = self._scene.knows_hidden
+        height = length + 3.0 * line + 2 * _GAP + (line + _GAP if knows_hidden else 0.0)
+        card = self._card(painter, width, height)
+        right = card.right() - _PAD
+        y = card.top() + _PAD
+        text_box = QRectF(card.left() + _PAD, y, width, line)
+        painter.setPen(QColor(colours.text))
+        painter.drawText(text_box, Qt.AlignmentFlag.AlignRight, title)
+        painter.setPen(QColor(colours.muted))
+        text_box.translate(0.0, line + _GAP)
+        painter.drawText(text_box, Qt.AlignmentFlag.AlignRight, ends[0])
+        bar = QRectF(right - _BAR_WIDTH, text_box.bottom() + 2.0, _BAR_WIDTH, length - 4.0)
+        strip = np.ascontiguousarray(table).reshape(-1, 1, 3)
+        image = QImage(strip.data, 1, len(strip), 3, QImage.Format.Format_RGB888)
+        painter.drawImage(bar, image)
+        for text, share in zip(ticks, shares, strict=True):
+            y = bar.top() + share * bar.height()
+            painter.setPen(QPen(QColor(colours.muted), 1.0))
+            painter.drawLine(QPointF(bar.left() - 4.0, y), QPointF(bar.left() - 1.0, y))
+            painter.setPen(QColor(colours.text))
+            tick = QRectF(bar.left() - _GAP - tick_width, y - line / 2, tick_width, line)
+            where = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+            painter.drawText(tick, where, text.replace("-", "−"))
+        painter.setPen(QColor(colours.muted))
+        text_box.moveTop(bar.bottom() + 2.0)
+        painter.drawText(text_box, Qt.AlignmentFlag.AlignRight, ends[1])
+        if knows_hidden:
+            text_box.translate(0.0, line + _GAP)
+            self._paint_swatch(painter, text_box, colours.hidden, "hidden")
+
+    def _paint_swatches(self, painter: QPainter) -> None:
+        if not self._scene.knows_hidden:
+            return
+        metrics = QFontMetricsF(painter.font())
+        line = metrics.height()
+        entries = (
+            (self._colours.visible, "seen by the sensor"),
+            (self._colours.hidden, "hidden"),
+        )
+        width = max(metrics.horizontalAdvance(text) for _, text in entries) + _BAR_WIDTH + _GAP
+        card = self._card(painter, width, 2 * line + _GAP)
+        box = QRectF(card.left() + _PAD, card.top() + _PAD, width, line)
+        for colour, text in entries:
+            self._paint_swatch(painter, box, colour, text)
+            box.translate(0.0, line + _GAP)
+
+    def _paint_swatch(self, painter: QPainter, box: QRectF, colour: str, text: str) -> None:
+        swatch = QRectF(0.0, 0.0, _BAR_WIDTH, _BAR_WIDTH)
+        swatch.moveCenter(QPointF(box.right() - _BAR_WIDTH / 2, box.center().y()))
+        painter.fillRect(swatch, QColor(colour))
+        painter.setPen(QColor(self._colours.muted))
+        words = box.adjusted(0.0, 0.0, -_BAR_WIDTH - _GAP, 0.0)
+        where = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+        painter.drawText(words, where, text)
+
+    def _card(self, painter: QPainter, width: float, height: float) -> QRectF:
+        card = QRectF(
+            self.width() - width - 2 * _PAD - 8.0, 8.0, width + 2 * _PAD, height + 2 * _PAD
+        )
+        self._chip(painter, card)
+        return card
+
+    def _chip(self, painter: QPainter, box: QRectF) -> None:
+        colour = QColor(self._colours.background)
+        colour.setAlphaF(0.82)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(colour)
+        painter.drawRoundedRect(box, 6.0, 6.0)
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+
+    def _paint_coordinates(self, painter: QPainter) -> None:
+        x, y, z = self._scene.sensor.position_m
+        text = f"x {x:+.2f}   y {y:+.2f}   z {z:+.2f} m".replace("-", "−")
+        px, py, _ = self._scene.pose.project(self._scene.sensor.position_m, self._size())[0]
+        metrics = QFontMetricsF(painter.font())
+        box = QRectF(0.0, 0.0, metrics.horizontalAdvance(text) + 16.0, metrics.height() + 8.0)
+        box.moveTo(px + 18.0, py - box.height() - 12.0)
+        box.moveLeft(min(max(box.left(), 8.0), self.width() - box.width() - 8.0))
+        box.moveTop(min(max(box.top(), 8.0), self.height() - box.height() - 8.0))
+        self._chip(painter, box)
+        painter.setPen(QColor(self._colours.text))
+        painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)
+
+    def _paint_hint(self, painter: QPainter) -> None:
+        metrics = QFontMetricsF(painter.font())
+        box = QRectF(0.0, 0.0, metrics.horizontalAdvance(HINT) + 16.0, metrics.height() + 8.0)
+        if box.width() > self.width() - 16.0:
+            return
+        box.moveCenter(QPointF(self.width() / 2, 0.0))
+        box.moveBottom(self.height() - 8.0)
+        self._chip(painter, box)
+        painter.setPen(QColor(self._colours.text))
+        painter.drawText(box, Qt.AlignmentFlag.AlignCenter, HINT)

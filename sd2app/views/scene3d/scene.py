@@ -1,0 +1,374 @@
+"""Everything that is drawn in 3D, over any VTK renderer; no Qt."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from vtkmodules.vtkRenderingCore import vtkLight, vtkRenderer
+
+from sd2app.palette import palette_for
+from sd2app.views.scene3d import shapes
+from sd2app.views.scene3d.camera import EyePose, Margins
+from sd2app.views.scene3d.colours import (
+    MeshColour,
+    SceneColours,
+    fractions,
+    mesh_colours,
+    range_limits,
+)
+from sd2app.views.scene3d.parts import Body, CameraGlyph, GroundGrid, SensorGlyph
+from sd2core.mesh import MeshSequence
+from sd2core.sensor import VirtualSensor
+
+Preset = Literal["overview", "camera", "sensor", "side", "top"]
+SENSOR_RADIUS_M = 0.045
+SENSOR_LEAST_PX = 7.0
+_INSIDE_M = 0.25
+_FAR_OFF_M = 30.0
+_SAMPLED_FRAMES = 9
+_SAMPLED_VERTICES = 1500
+
+
+@dataclass(frozen=True, eq=False)
+class Extent:
+    """Where the body is during the whole clip, from a few frames.
+
+    Parameters
+    ----------
+    points_m : array, shape (n, 3)
+        A sample of vertices of several frames.
+    low_m, high_m : arrays, shape (3,)
+        Box around them.
+    floor_m : float
+        Height of the floor (y): where the feet are.
+    """
+
+    points_m: NDArray[np.float64]
+    low_m: NDArray[np.float64]
+    high_m: NDArray[np.float64]
+    floor_m: float
+
+    @classmethod
+    def of_points(cls, points: NDArray[np.floating], floor_m: float | None = None) -> Extent:
+        """Around points; the floor is at the lowest unless given."""
+        points = np.asarray(points, np.float64).reshape(-1, 3)
+        low, high = points.min(axis=0), points.max(axis=0)
+        return cls(points, low, high, float(high[1]) if floor_m is None else floor_m)
+
+    @classmethod
+    def of_mesh(cls, mesh: MeshSequence) -> Extent:
+        """From a few frames spread over the clip, so that a long one stays on disk."""
+        count = min(mesh.frame_count, _SAMPLED_FRAMES)
+        frames = np.linspace(0, mesh.frame_count - 1, count).astype(int)
+        stride = max(mesh.vertex_count // _SAMPLED_VERTICES, 1)
+        kept, feet = [], []
+        for index in frames:
+            vertices = mesh.frame(int(index))
+            feet.append(float(vertices[:, 1].max()))
+            extremes = np.concatenate([vertices.argmin(axis=0), vertices.argmax(axis=0)])
+            kept.append(np.concatenate([vertices[::stride], vertices[extremes]]))
+        return cls.of_points(np.concatenate(kept), float(np.median(feet)))
+
+    @property
+    def centre_m(self) -> NDArray[np.float64]:
+        """Middle of the box."""
+        return 0.5 * (self.low_m + self.high_m)
+
+
+_NOTHING = Extent.of_points(np.array([[-0.4, -0.6, 1.8], [0.4, 1.1, 2.6]]))
+
+
+class Scene:
+    """Mesh, sensor, camera, ground and light.
+
+    Nothing is rendered here: a backend calls :meth:`prepare` and renders.
+
+    Parameters
+    ----------
+    renderer : vtkRenderer
+        Empty; a plotter's ``renderer`` will do.
+    """
+
+    def __init__(self, renderer: vtkRenderer) -> None:
+        self.renderer = renderer
+        self.colours = SceneColours.of(palette_for(False), False)
+        self.pose = EyePose()
+        self.extent = _NOTHING
+        self.sensor = VirtualSensor()
+        self.labels: tuple[tuple[str, tuple[float, float, float]], ...] = ()
+        self.range_limits_m = (0.0, 1.0)
+        self._mode: MeshColour = "velocity"
+        self._v_max_mps = 2.0
+        self._velocity: NDArray[np.floating] | None = None
+        self._visible: NDArray[np.bool_] | None = None
+        self._has_mesh = False
+        self._hot = False
+        self._stale_colours = False
+        self._light_up()
+        self.ground = GroundGrid(renderer)
+        self.body = Body(renderer)
+        self.camera_glyph = CameraGlyph(renderer)
+        self.sensor_glyph = SensorGlyph(renderer)
+        self._set_floor()
+        self.set_sensor(self.sensor)
+        self.set_colours(self.colours)
+
+    # What is shown
+
+    @property
+    def has_mesh(self) -> bool:
+        """Whether there is a mesh."""
+        return self._has_mesh
+
+    @property
+    def mode(self) -> MeshColour:
+        """What the colour of the mesh means."""
+        return self._mode
+
+    @property
+    def v_max_mps(self) -> float:
+        """End of the velocity colours."""
+        return self._v_max_mps
+
+    @property
+    def vertices_m(self) -> NDArray[np.float32]:
+        """Vertices on screen, (V, 3)."""
+        return self.body.points
+
+    def set_mesh(self, mesh: MeshSequence, frame: int = 0) -> None:
+        """Take over another clip and show one frame of it."""
+        self.extent = Extent.of_mesh(mesh)
+        self._velocity = self._visible = None
+        self.body.set_topology(mesh.frame(frame), mesh.faces)
+        self.body.show(True)
+        self._has_mesh = True
+        self._set_floor()
+        self.set_sensor(self.sensor)
+
+    def clear_mesh(self) -> None:
+        """Show sensor and camera alone."""
+        self._has_mesh = False
+        self._velocity = self._visible = None
+        self.body.show(False)
+        self.extent = _NOTHING
+        self._set_floor()
+        self.set_sensor(self.sensor)
+
+    def set_vertices(self, vertices: NDArray[np.floating]) -> None:
+        """Move the mesh to another frame."""
+        self.body.set_vertices(vertices)
+        self._stale_colours = True
+
+    def set_scattering(
+        self,
+        velocity_mps: NDArray[np.floating] | None,
+        visible: NDArray[np.bool_] | None,
+    ) -> None:
+        """Radial velocity and visibility of the frame's vertices, (V,) each; None if unknown."""
+        self._velocity = self._of_this_mesh(velocity_mps)
+        self._visible = self._of_this_mesh(visible)
+        self._stale_colours = True
+
+    def set_v_max(self, v_max_mps: float) -> None:
+        """End of the velocity colours."""
+        self._v_max_mps = v_max_mps
+        self._stale_colours = True
+
+    def set_mode(self, mode: MeshColour) -> None:
+        """Choose what the colour of the mesh means."""
+        self._mode = mode
+        self._stale_colours = True
+
+    def set_as_dots(self, dots: bool) -> None:
+        """Draw vertices instead of the surface."""
+        self.body.set_as_dots(dots)
+        self._stale_colours = True
+
+    def set_sensor(self, sensor: VirtualSensor) -> None:
+        """Place the sensor."""
+        self.sensor = sensor
+        position = np.asarray(sensor.position_m)
+        away = float(np.linalg.norm(self.extent.centre_m - position))
+        self.sensor_glyph.set_sensor(
+            sensor, self.extent.floor_m, reach_m=min(max(0.38 * away, 0.3), 1.0)
+        )
+        ranges = np.linalg.norm(self.extent.points_m - position, axis=1)
+        self.range_limits_m = range_limits(float(ranges.min()), float(ranges.max()))
+        self._stale_colours = True
+
+    def set_hot(self, hot: bool) -> None:
+        """Show that the sensor is under the pointer or in the hand."""
+        if hot != self._hot:
+            self._hot = hot
+            self.sensor_glyph.set_colours(self.colours, hot)
+
+    def set_colours(self, colours: SceneColours) -> None:
+        """Change the theme."""
+        self.colours = colours
+        self.renderer.SetBackground(*fractions(colours.background))
+        self.ground.set_colours(colours)
+        self.camera_glyph.set_colours(colours)
+        self.sensor_glyph.set_colours(colours, self._hot)
+        self.body.shadow.GetProperty().SetColor(*fractions(colours.shadow))
+        self._stale_colours = True
+
+    # Where it is seen from
+
+    def preset_pose(self, preset: Preset, size_px: tuple[float, float]) -> EyePose:
+        """Pose of one of the ready-made views for a widget of this size."""
+        body, sensor = self.extent, np.asarray(self.sensor.position_m)
+        if preset in ("camera", "sensor"):
+            position = np.zeros(3) if preset == "camera" else sensor
+            azimuth = 0.0 if preset == "camera" else self.sensor.azimuth_deg
+            elevation = 0.0 if preset == "camera" else self.sensor.elevation_deg
+            return self._looking_from(position, azimuth, elevation, size_px)
+        points = [body.points_m]
+        if np.linalg.norm(body.centre_m) < _FAR_OFF_M:
+            points.append(_box(np.zeros(3), CameraGlyph.SIZE_M))
+        if np.linalg.norm(body.centre_m - sensor) < _FAR_OFF_M:
+            points.append(_box(sensor, 0.25))
+            points.append(np.array([[sensor[0], body.floor_m, sensor[2]]]))
+        azimuth, elevation = {
+            "overview": (-52.0, -16.0),
+            "side": (-90.0, 0.0),
+            "top": (0.0, -89.5),
+        }[preset]
+        pose = EyePose(azimuth_deg=azimuth, elevation_deg=elevation)
+        margins = Margins(left=28.0, top=36.0, right=96.0, bottom=30.0)
+        return pose.framed(np.concatenate(points), size_px, margins)
+
+    def _looking_from(
+        self,
+        position: NDArray[np.float64],
+        azimuth_deg: float,
+        elevation_deg: float,
+        size_px: tuple[float, float],
+    ) -> EyePose:
+        # The eye stays put, so the angle has to open until the body fits.
+        pose = EyePose(tuple(position), azimuth_deg, elevation_deg, distance_m=1e-9)
+        right, down, forward = pose.axes
+        relative = self.extent.points_m - position
+        depth = relative @ forward
+        distance = max(float((self.extent.centre_m - position) @ forward), 0.5)
+        ahead = depth > 0.1
+        tangent = 0.45
+        if ahead.any():
+            aspect = size_px[1] / size_px[0]
+            across = np.abs(relative[ahead] @ right) * aspect
+            tallest = np.maximum(np.abs(relative[ahead] @ down), across) / depth[ahead]
+            tangent = float(np.clip(1.06 * tallest.max(), 0.12, 1.4))
+        focus = position + distance * forward
+        return EyePose(
+            (float(focus[0]), float(focus[1]), float(focus[2])),
+            azimuth_deg,
+            elevation_deg,
+            distance,
+            2 * float(np.degrees(np.arctan(tangent))),
+        )
+
+    # Before a rendering
+
+    def prepare(self, size_px: tuple[float, float], pixel_scale: float) -> None:
+        """Bring everything up to date for the next rendering.
+
+        Parameters
+        ----------
+        size_px : tuple of 2 floats
+            Size of the widget in device-independent pixels.
+        pixel_scale : float
+            Pixels of the render window per device-independent pixel.
+        """
+        if self._stale_colours:
+            self._colour_mesh()
+        for part in (self.body, self.sensor_glyph, self.camera_glyph, self.ground):
+            part.set_pixel_scale(pixel_scale)
+        eye = self.pose.position
+        self.sensor_glyph.set_radius(self.sensor_radius_m(size_px))
+        self.sensor_glyph.show(self.sensor_shown)
+        self.camera_glyph.show(self.camera_shown)
+        _, down, forward = self.pose.axes
+        camera = self.renderer.GetActiveCamera()
+        camera.SetPosition(*eye)
+        camera.SetFocalPoint(*(eye + forward))
+        camera.SetViewUp(*-down)
+        camera.SetViewAngle(self.pose.angle_deg)
+        camera.SetClippingRange(
+            max(0.02, 0.03 * self.pose.distance_m), self.pose.distance_m + 2 * _FAR_OFF_M
+        )
+
+    @property
+    def sensor_shown(self) -> bool:
+        """Whether the sensor is drawn: not while the eye is inside it."""
+        offset = self.pose.position - np.asarray(self.sensor.position_m)
+        return bool(np.linalg.norm(offset) > _INSIDE_M)
+
+    @property
+    def camera_shown(self) -> bool:
+        """Whether the camera is drawn."""
+        return bool(np.linalg.norm(self.pose.position) > _INSIDE_M)
+
+    @property
+    def knows_hidden(self) -> bool:
+        """Whether it is known which vertices the sensor sees."""
+        return self._visible is not None
+
+    def sensor_radius_m(self, size_px: tuple[float, float]) -> float:
+        """Radius of the sphere: never too small on screen to take hold of."""
+        pixel = self.pose.metres_per_pixel(self.sensor.position_m, size_px[1])
+        return max(SENSOR_RADIUS_M, SENSOR_LEAST_PX * pixel) if np.isfinite(pixel) else 0.01
+
+    def _colour_mesh(self) -> None:
+        self._stale_colours = False
+        if not self._has_mesh:
+            return
+        ranges = None
+        if self._mode == "range":
+            offset = self.vertices_m - np.asarray(self.sensor.position_m, np.float32)
+            ranges = np.sqrt(np.einsum("ij,ij->i", offset, offset))
+        self.body.set_point_colours(
+            mesh_colours(
+                self._mode,
+                self.colours,
+                len(self.vertices_m),
+                velocity_mps=self._velocity,
+                v_max_mps=self._v_max_mps,
+                range_m=ranges,
+                range_limits_m=self.range_limits_m,
+                visible=self._visible,
+                as_dots=self.body.drawn_as_dots,
+            )
+        )
+
+    def _of_this_mesh(self, values: NDArray | None) -> NDArray | None:
+        fits = values is not None and self._has_mesh and len(values) == len(self.vertices_m)
+        return values if fits else None
+
+    def _set_floor(self) -> None:
+        self.body.set_floor(self.extent.floor_m)
+        low, high = self.extent.low_m, self.extent.high_m
+        if np.linalg.norm(self.extent.centre_m) < _FAR_OFF_M:
+            low, high = np.minimum(low, 0.0), np.maximum(high, 0.0)
+        ground = shapes.ground(self.extent.floor_m, low, high)
+        self.labels = ground.labels
+        self.ground.set_ground(ground, self.colours)
+
+    def _light_up(self) -> None:
+        # One light beside the eye gives shape, a weak one from the other side
+        # keeps shadows readable; both turn with the view.
+        self.renderer.AutomaticLightCreationOff()
+        self.renderer.RemoveAllLights()
+        for position, strength in (((-0.5, 0.7, 1.0), 0.86), ((0.9, 0.1, 0.6), 0.22)):
+            light = vtkLight()
+            light.SetLightTypeToCameraLight()
+            light.SetPosition(*position)
+            light.SetFocalPoint(0.0, 0.0, 0.0)
+            light.SetIntensity(strength)
+            self.renderer.AddLight(light)
+
+
+def _box(centre: NDArray[np.float64], half: float) -> NDArray[np.float64]:
+    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
+    return centre + half * signs

@@ -1,0 +1,173 @@
+"""Points and cells of everything in the scene that is not the mesh; no VTK."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2app.views.scene3d.colours import nice_step
+
+_LONGEST_GRID_M = 24.0
+
+
+@dataclass(frozen=True)
+class Lines:
+    """Line segments with an opacity per point."""
+
+    points: NDArray[np.float32]  # (n, 3)
+    segments: NDArray[np.int32]  # (m, 2)
+    opacity: NDArray[np.float32]  # (n,)
+
+
+@dataclass(frozen=True)
+class Ground:
+    """Grid lines on the floor, and where its metre labels stand."""
+
+    minor: Lines
+    major: Lines
+    labels: tuple[tuple[str, tuple[float, float, float]], ...]
+
+
+def cone(field_of_view_deg: float, sides: int = 48) -> tuple[NDArray, NDArray, NDArray]:
+    """Unit-length cone along +z with its apex at the origin.
+
+    Returns
+    -------
+    points (sides + 1, 3), triangles (sides, 3), wire segments (sides + 4, 2)
+        Point 0 is the apex. Rays that leave at the edge of the field of view
+        have length one, so a wide angle does not make a huge rim. The wire is
+        the rim and four ribs.
+    """
+    half = math.radians(field_of_view_deg) / 2
+    angle = np.arange(sides) * (2 * math.pi / sides)
+    rim = np.stack(
+        [
+            math.sin(half) * np.cos(angle),
+            math.sin(half) * np.sin(angle),
+            np.full(sides, math.cos(half)),
+        ],
+        axis=1,
+    )
+    points = np.concatenate([np.zeros((1, 3)), rim]).astype(np.float32)
+    here = np.arange(sides, dtype=np.int32) + 1
+    following = np.roll(here, -1)
+    triangles = np.stack([np.zeros_like(here), here, following], axis=1)
+    corners = here[sides // 8 :: sides // 4]
+    ribs = np.stack([np.zeros_like(corners), corners], axis=1)
+    rim_segments = np.stack([here, following], axis=1)
+    return points, triangles, np.concatenate([rim_segments, ribs])
+
+
+def ring(sides: int = 32) -> tuple[NDArray, NDArray]:
+    """Unit circle in the xz plane: points and segments."""
+    angle = np.arange(sides) * (2 * math.pi / sides)
+    points = np.stack([np.cos(angle), np.zeros(sides), np.sin(angle)], axis=1)
+    here = np.arange(sides, dtype=np.int32)
+    return points.astype(np.float32), np.stack([here, np.roll(here, -1)], axis=1)
+
+
+def frustum(width: float = 4.0, height: float = 3.0, depth: float = 3.4) -> tuple[NDArray, NDArray]:
+    """Wire camera along +z with its optical centre at the origin: points and segments."""
+    w, h = width / 2, height / 2
+    points = np.array(
+        [
+            (0, 0, 0),
+            (-w, -h, depth),
+            (w, -h, depth),
+            (w, h, depth),
+            (-w, h, depth),
+            (-0.35 * w, -1.12 * h, depth),
+            (0.35 * w, -1.12 * h, depth),
+            (0, -1.5 * h, depth),
+        ],
+        np.float32,
+    )
+    segments = np.array(
+        [
+            (0, 1), (0, 2), (0, 3), (0, 4), (1, 2), (2, 3), (3, 4), (4, 1),
+            (5, 6), (6, 7), (7, 5),
+        ],
+        np.int32,
+    )  # fmt: skip
+    return points / depth, segments
+
+
+def rotation_to(direction: tuple[float, float, float]) -> NDArray[np.float64]:
+    """Rotation (3, 3) that turns +z into ``direction`` and keeps the horizon level."""
+    forward = np.asarray(direction, np.float64)
+    forward = forward / np.linalg.norm(forward)
+    level = np.array([forward[2], 0.0, -forward[0]])
+    length = np.linalg.norm(level)
+    right = level / length if length > 1e-9 else np.array([1.0, 0.0, 0.0])
+    return np.stack([right, np.cross(forward, right), forward], axis=1)
+
+
+def ground(floor_m: float, low: NDArray[np.float64], high: NDArray[np.float64]) -> Ground:
+    """A grid on the floor around the box ``low`` to ``high``, fading outwards."""
+    middle = 0.5 * (low + high)
+    span = min(float(max(high[0] - low[0], high[2] - low[2])) + 1.6, _LONGEST_GRID_M)
+    step = max(nice_step(span, 12), 0.5)
+    if step >= 1.0 and span <= _LONGEST_GRID_M:
+        step = 1.0
+    half = np.array([max(high[0] - low[0], 1.2), high[2] - low[2]]) / 2 + 0.8
+    half = np.minimum(half, _LONGEST_GRID_M / 2)
+    major_step = 2 * step if step < 1.0 else step
+    x0, x1 = _snapped(middle[0] - half[0], middle[0] + half[0], step)
+    z0, z1 = _snapped(middle[2] - half[1], middle[2] + half[1], step)
+    lines: dict[bool, list[tuple[NDArray, NDArray]]] = {False: [], True: []}
+    xs, zs = _ticks(x0, x1, step), _ticks(z0, z1, step)
+    for x in xs:
+        lines[_is_major(x, major_step)].append((np.full(len(zs), x), zs))
+    for z in zs:
+        lines[_is_major(z, major_step)].append((xs, np.full(len(xs), z)))
+    centre = np.array([(x0 + x1) / 2, (z0 + z1) / 2])
+    reach = np.array([(x1 - x0) / 2, (z1 - z0) / 2]) + 1e-9
+    label_x = xs[-1]
+    labels = tuple(
+        (f"{z:g} m", (float(label_x), floor_m, float(z)))
+        for z in zs
+        if _is_major(z, major_step) and abs(z) < 1e4
+    )
+    minor, major = (_joined(lines[kind], floor_m, centre, reach) for kind in (False, True))
+    return Ground(minor, major, labels)
+
+
+def _snapped(low: float, high: float, step: float) -> tuple[float, float]:
+    return math.floor(low / step) * step, math.ceil(high / step) * step
+
+
+def _ticks(low: float, high: float, step: float) -> NDArray[np.float64]:
+    return low + step * np.arange(round((high - low) / step) + 1)
+
+
+def _is_major(value: float, step: float) -> bool:
+    return abs(value / step - round(value / step)) < 1e-6
+
+
+def _joined(
+    strips: list[tuple[NDArray, NDArray]],
+    floor_m: float,
+    centre: NDArray[np.float64],
+    reach: NDArray[np.float64],
+) -> Lines:
+    points: list[NDArray] = []
+    segments: list[NDArray] = []
+    count = 0
+    for x, z in strips:
+        points.append(np.stack([x, np.full(len(x), floor_m), z], axis=1))
+        first = np.arange(count, count + len(x) - 1)
+        segments.append(np.stack([first, first + 1], axis=1))
+        count += len(x)
+    if not points:
+        return Lines(np.zeros((0, 3), np.float32), np.zeros((0, 2), np.int32), np.zeros(0, "f4"))
+    together = np.concatenate(points)
+    away = np.abs((together[:, [0, 2]] - centre) / reach).max(axis=1)
+    opacity = np.clip(1.25 - away**2, 0.12, 1.0)
+    return Lines(
+        together.astype(np.float32),
+        np.concatenate(segments).astype(np.int32),
+        opacity.astype(np.float32),
+    )

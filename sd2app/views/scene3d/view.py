@@ -1,0 +1,294 @@
+"""The 3D view of the window."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, get_args
+
+from PySide6.QtCore import QEvent, QObject, QSize, Qt
+from PySide6.QtGui import QCloseEvent, QMouseEvent, QResizeEvent, QWheelEvent
+from PySide6.QtWidgets import QLabel, QWidget
+
+from sd2app.views.scene3d.backend import Backend, NoOpenGL
+from sd2app.views.scene3d.choose import chosen_backend
+from sd2app.views.scene3d.colours import SceneColours
+from sd2app.views.scene3d.navigation import Button, Navigator, Position
+from sd2app.views.scene3d.overlay import Overlay
+from sd2app.views.scene3d.scene import Preset, Scene
+
+if TYPE_CHECKING:
+    from sd2app.models.display import DisplayModel
+    from sd2app.models.document import DocumentModel
+    from sd2app.models.playback import PlaybackModel
+    from sd2app.models.sensor import SensorModel
+    from sd2app.models.synthesis import SynthesisModel
+
+_BUTTONS: dict[Qt.MouseButton, Button] = {
+    Qt.MouseButton.LeftButton: "left",
+    Qt.MouseButton.MiddleButton: "middle",
+    Qt.MouseButton.RightButton: "right",
+}
+
+
+class SceneView(QWidget):
+    """Mesh, sensor and camera; the sensor can be dragged.
+
+    It changes no model: a drag goes to the three callables, and what is on
+    screen follows the models' signals. Vertices and colours are fetched when
+    the picture is drawn, so a hidden view costs nothing.
+
+    Parameters
+    ----------
+    begin_drag, drag, end_drag : callables
+        Receive a drag of the sensor; ``drag`` gets its position in metres.
+    """
+
+    def __init__(
+        self,
+        document: DocumentModel,
+        playback: PlaybackModel,
+        sensor: SensorModel,
+        display: DisplayModel,
+        synthesis: SynthesisModel,
+        *,
+        begin_drag: Callable[[], None],
+        drag: Callable[[Position], None],
+        end_drag: Callable[[], None],
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._document = document
+        self._playback = playback
+        self._sensor = sensor
+        self._display = display
+        self._synthesis = synthesis
+        self._backend: Backend | None = None
+        self.setMinimumSize(200, 150)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        try:
+            self._backend = make_backend(self)
+        except NoOpenGL as problem:
+            self._explain(str(problem))
+            return
+        self.scene = Scene(self._backend.renderer)
+        self.navigator = Navigator(
+            self.scene, begin_drag, drag, end_drag, size_px=self._size_px, changed=self._moved
+        )
+        self.overlay = Overlay(self.scene, self.navigator, self)
+        self._preset: Preset | None = "overview"
+        self._framed: tuple[Preset, tuple[float, float]] | None = None
+        self._frame: int | None = None
+        self._stale_scattering = True
+        self._backend.widget.installEventFilter(self)
+        document.opened.connect(self._take_over)
+        playback.time_changed.connect(self._follow_clock)
+        sensor.changed.connect(self._follow_sensor)
+        display.mesh_changed.connect(self._follow_colour)
+        display.theme_changed.connect(self._follow_theme)
+        synthesis.frame_changed.connect(self._follow_scattering)
+        self._follow_theme()
+        self._follow_colour()
+        self._take_over()
+        self._lay_out()
+        self._backend.start(self._prepare)
+
+    @property
+    def backend_name(self) -> str | None:
+        """``gl``, ``image``, or None when there is no OpenGL."""
+        return self._backend.name if self._backend is not None else None
+
+    def sizeHint(self) -> QSize:
+        """A comfortable size."""
+        return QSize(600, 450)
+
+    def set_view(self, preset: Preset) -> None:
+        """Look from one of the ready-made places."""
+        if preset not in get_args(Preset):
+            raise ValueError(f"view {preset!r} is not one of {get_args(Preset)}")
+        if self._backend is not None:
+            self._preset, self._framed = preset, None
+            self.request_render()
+
+    def reset_view(self) -> None:
+        """Look at sensor, camera and body from beside them."""
+        self.set_view("overview")
+
+    def request_render(self) -> None:
+        """Draw anew."""
+        if self._backend is not None:
+            self._backend.request_render()
+            self.overlay.update()
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        """Release everything of VTK."""
+        self._shut_down()
+        event.accept()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Fill the view."""
+        self._lay_out()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Handle the mouse for the widget that shows the picture."""
+        if self._backend is None:
+            return False
+        kind = event.type()
+        if kind == QEvent.Type.MouseMove:
+            self.navigator.move(*_place(event), *_modifiers(event))
+        elif kind == QEvent.Type.MouseButtonPress:
+            if event.button() in _BUTTONS:
+                self.navigator.press(*_place(event), _BUTTONS[event.button()], *_modifiers(event))
+        elif kind == QEvent.Type.MouseButtonRelease:
+            self.navigator.release(*_place(event))
+        elif kind == QEvent.Type.MouseButtonDblClick:
+            if not self.navigator.sensor_at(*_place(event)):
+                self.reset_view()
+        elif kind == QEvent.Type.Wheel:
+            notches = event.angleDelta().y() / 120.0
+            self.navigator.wheel(*_place(event), notches)
+        elif kind == QEvent.Type.Leave:
+            self.navigator.leave()
+        elif kind not in (QEvent.Type.KeyPress, QEvent.Type.KeyRelease):
+            return False
+        if kind in (QEvent.Type.KeyPress, QEvent.Type.KeyRelease):
+            event.ignore()
+        else:
+            self._choose_cursor()
+        return True
+
+    # What changed
+
+    def _take_over(self) -> None:
+        self._preset, self._framed = "overview", None
+        self._frame = None
+        mesh = self._document.mesh
+        if mesh is None:
+            self.scene.clear_mesh()
+        else:
+            self._frame = mesh.timebase.frame_at(self._playback.time_s)
+            self.scene.set_mesh(mesh, self._frame)
+        self.overlay.message = "" if mesh is not None else "No mesh in this recording"
+        self._follow_sensor()
+
+    def _follow_clock(self) -> None:
+        mesh = self._document.mesh
+        if mesh is not None and mesh.timebase.frame_at(self._playback.time_s) != self._frame:
+            self._stale_scattering = True
+            self.request_render()
+
+    def _follow_sensor(self) -> None:
+        self.scene.set_sensor(self._sensor.sensor)
+        self._follow_scattering()
+
+    def _follow_scattering(self) -> None:
+        self._stale_scattering = True
+        self.request_render()
+
+    def _follow_colour(self) -> None:
+        self.scene.set_mode(self._display.mesh_colour)
+        self.scene.set_as_dots(self._display.as_dots)
+        self._follow_scattering()
+
+    def _follow_theme(self) -> None:
+        self.scene.set_colours(SceneColours.of(self._display.palette, self._display.dark))
+        self.request_render()
+
+    def _moved(self) -> None:
+        if self.navigator.turning:
+            self._preset = None
+        self.request_render()
+
+    # Drawing
+
+    def _prepare(self, size_px: tuple[float, float], pixel_scale: float) -> None:
+        """Fetch what changed since the last picture, right before the next."""
+        mesh = self._document.mesh
+        if mesh is not None and self.scene.has_mesh:
+            frame = mesh.timebase.frame_at(self._playback.time_s)
+            if frame != self._frame:
+                self._frame = frame
+                self.scene.set_vertices(mesh.frame(frame))
+            if self._stale_scattering:
+                self._fetch_scattering()
+        # A ready-made view is kept when the widget is resized, but not while the
+        # sensor moves: it would slip from under the pointer.
+        if self._preset is not None and self._framed != (self._preset, size_px):
+            self._framed = (self._preset, size_px)
+            self.scene.pose = self.scene.preset_pose(self._preset, size_px)
+        self.scene.prepare(size_px, pixel_scale)
+
+    def _fetch_scattering(self) -> None:
+        self._stale_scattering = False
+        if self.scene.mode == "plain":
+            return
+        scattering = self._synthesis.frame
+        self.scene.set_v_max(self._synthesis.v_max_mps)
+        if scattering is None:
+            self.scene.set_scattering(None, None)
+        else:
+            self.scene.set_scattering(scattering.velocity_mps, scattering.visible)
+
+    def _size_px(self) -> tuple[float, float]:
+        return (max(self.width(), 1), max(self.height(), 1))
+
+    def _lay_out(self) -> None:
+        for child in self.findChildren(QWidget, options=Qt.FindChildOption.FindDirectChildrenOnly):
+            child.setGeometry(self.rect())
+
+    def _choose_cursor(self) -> None:
+        if self._backend is None:
+            return
+        if self.navigator.holds_sensor:
+            shape = Qt.CursorShape.ClosedHandCursor
+        elif self.navigator.hovers_sensor:
+            shape = Qt.CursorShape.OpenHandCursor
+        else:
+            shape = Qt.CursorShape.ArrowCursor
+        if self._backend.widget.cursor().shape() != shape:
+            self._backend.widget.setCursor(shape)
+
+    def _explain(self, problem: str) -> None:
+        label = QLabel(problem, self)
+        label.setObjectName("muted")
+        label.setWordWrap(True)
+        label.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        label.setMargin(24)
+
+    def _shut_down(self) -> None:
+        if self._backend is None:
+            return
+        backend, self._backend = self._backend, None
+        backend.widget.removeEventFilter(self)
+        backend.shut_down()
+
+
+def make_backend(parent: QWidget) -> Backend:
+    """The way to draw that suits the machine.
+
+    Raises
+    ------
+    NoOpenGL
+        When neither works; its message is for the user.
+    """
+    try:
+        if chosen_backend() == "gl":
+            from sd2app.views.scene3d.interactor_backend import InteractorBackend
+
+            return InteractorBackend(parent)
+        from sd2app.views.scene3d.image_backend import ImageBackend
+
+        return ImageBackend(parent)
+    except ImportError as error:
+        raise NoOpenGL(f"The 3D view cannot be loaded: {error}.") from error
+
+
+def _place(event: QMouseEvent | QWheelEvent) -> tuple[float, float]:
+    return (event.position().x(), event.position().y())
+
+
+def _modifiers(event: QMouseEvent) -> tuple[bool, bool]:
+    held = event.modifiers()
+    return (
+        bool(held & Qt.KeyboardModifier.ShiftModifier),
+        bool(held & Qt.KeyboardModifier.ControlModifier),
+    )
