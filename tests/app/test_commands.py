@@ -6,15 +6,23 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sd2app.commands import Edits
+from sd2app.models.content import load_content, recording_of
 from sd2app.models.document import DocumentModel
 from sd2app.models.jobs import JobsModel
 from sd2app.models.sensor import SensorModel
 from sd2core.sensor import VirtualSensor
 
 
+def write_points(path):
+    vertices = np.random.default_rng(0).normal(size=(4, 5, 3))
+    vertices[..., 2] += 3.0
+    np.savez(path, vertices=vertices)
+    return path
+
+
 def open_document(qtbot, path):
     document = DocumentModel(JobsModel())
-    np.savez(path, vertices=np.random.default_rng(0).normal(size=(4, 5, 3)) + [0, 0, 3])
+    write_points(path)
     with qtbot.waitSignal(document.opened):
         document.open([path])
     return document
@@ -66,10 +74,7 @@ def test_undo_restores_every_former_state(moves, qapp, tmp_path_factory):
     document = DocumentModel(JobsModel())
     sensor = SensorModel()
     edits = Edits(document, sensor)
-    from sd2app.models.content import load_content, recording_of
-
-    path = tmp_path_factory.mktemp("points") / "points.npz"
-    np.savez(path, vertices=np.random.default_rng(0).normal(size=(4, 5, 3)) + [0, 0, 3])
+    path = write_points(tmp_path_factory.mktemp("points") / "points.npz")
     document._receive(load_content(recording_of([path]), "mean", lambda *_: None))
 
     def state():

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -61,7 +63,7 @@ def test_looping_starts_again(playback, qtbot):
     playback.play()
     seen = []
     playback.frame_changed.connect(seen.append)
-    qtbot.waitUntil(lambda: any(a > b for a, b in zip(seen, seen[1:], strict=False)))
+    qtbot.waitUntil(lambda: any(a > b for a, b in itertools.pairwise(seen)))
     assert playback.playing
 
 

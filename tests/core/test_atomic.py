@@ -13,9 +13,8 @@ from sd2core.errors import Sd2Error
 def test_a_block_that_raises_leaves_the_old_file_and_no_other(tmp_path):
     path = tmp_path / "file.json"
     atomic_write_text(path, "old")
-    with pytest.raises(RuntimeError), atomic_write(path) as stream:
-        stream.write(b"half of the new")
-        raise RuntimeError
+    with pytest.raises(TypeError), atomic_write(path) as stream:
+        stream.writelines([b"half of the new", None])
     assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]
 

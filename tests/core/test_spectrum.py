@@ -82,7 +82,7 @@ def test_files_that_are_no_map_are_explained(tmp_path):
     np.savez(other, vertices=np.zeros(3))
     with pytest.raises(Sd2Error, match=r"has no meta, times_s, values, velocity_mps"):
         DopplerMap.load(other)
-    with pytest.raises(Sd2Error, match="missing.npz"):
+    with pytest.raises(Sd2Error, match=r"missing\.npz"):
         DopplerMap.load(tmp_path / "missing.npz")
 
 

@@ -91,7 +91,7 @@ def test_one_frame_has_a_duration():
     ],
 )
 def test_impossible_times_are_explained(times, words):
-    with pytest.raises(Sd2Error, match="Frame|frame") as caught:
+    with pytest.raises(Sd2Error, match=r"Frame|frame") as caught:
         Timebase(times)
     assert words in str(caught.value)
 
