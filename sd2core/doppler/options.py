@@ -1,0 +1,126 @@
+"""What can be chosen when a Doppler map is synthesised, and the presets."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from sd2core.errors import Sd2Error
+from sd2core.sensor import VelocityAxis
+
+Visibility = Literal["none", "facing", "exact"]
+Weight = Literal["count", "area"]
+Beyond = Literal["drop", "wrap", "clip"]
+VelocityRule = Literal["central", "vid2doppler"]
+
+MOST_BINS = 254
+"""Bin numbers are bytes, and two values say "beyond the axis" and "hidden"."""
+
+
+@dataclass(frozen=True)
+class SynthesisOptions:
+    """How a mesh becomes a Doppler map.
+
+    Parameters
+    ----------
+    visibility : {"none", "facing", "exact"}
+        Which vertices count: all, those whose normal faces the sensor, or those
+        that nothing hides.
+    weight : {"count", "area"}
+        A vertex counts 1 (the map is a share of all vertices) or its area (a
+        share of the surface).
+    axis : VelocityAxis
+        Up to 254 bins.
+    null_bins : tuple of int
+        Bins set to zero: the static surroundings that a radar's clutter removal
+        takes away.
+    beyond : {"drop", "wrap", "clip"}
+        What happens to velocities off the axis: left out, folded back as an
+        undersampled radar would, or counted in the last bin.
+    range_exponent : float
+        A vertex at range R counts (reference_range_m / R) ** range_exponent.
+        4 is the radar equation; 0 turns the law off.
+    reference_range_m : float
+        Where a vertex counts fully.
+    velocity : {"central", "vid2doppler"}
+        Central difference of the exact range, or that tool's own arithmetic
+        (see :mod:`sd2core.doppler.vid2doppler`).
+    oversampling : int
+        Odd; each frame's histogram is the mean over that many moments around it.
+    trajectory_smoothing_s : float
+        Sigma of the zero-phase Gaussian on the vertices' paths; 0 is off.
+    velocity_sigma_bins, time_sigma_s : float
+        Sigmas of the Gaussian on the map; 0 is off.
+    null_after_smoothing : bool
+        Whether nulled bins are emptied again after the smoothing has spilt into
+        them.
+    """
+
+    visibility: Visibility = "exact"
+    weight: Weight = "count"
+    axis: VelocityAxis = VelocityAxis()
+    null_bins: tuple[int, ...] = (14, 15, 16)
+    beyond: Beyond = "drop"
+    range_exponent: float = 4.0
+    reference_range_m: float = 2.2
+    velocity: VelocityRule = "central"
+    oversampling: int = 1
+    trajectory_smoothing_s: float = 0.0
+    velocity_sigma_bins: float = 1.0
+    time_sigma_s: float = 1.0 / 30.0
+    null_after_smoothing: bool = True
+
+    def __post_init__(self) -> None:
+        for name, allowed in (
+            ("visibility", Visibility),
+            ("weight", Weight),
+            ("beyond", Beyond),
+            ("velocity", VelocityRule),
+        ):
+            value = getattr(self, name)
+            if value not in get_args(allowed):
+                raise Sd2Error(f"{name} is {value!r}", f"one of {', '.join(get_args(allowed))}")
+        if self.axis.bins > MOST_BINS:
+            raise Sd2Error(f"The velocity axis has {self.axis.bins} bins", f"up to {MOST_BINS}")
+        nulled = tuple(sorted({int(number) for number in self.null_bins}))
+        if nulled and not 0 <= nulled[0] <= nulled[-1] < self.axis.bins:
+            raise Sd2Error(f"null_bins is {nulled}", f"bins from 0 to {self.axis.bins - 1}")
+        object.__setattr__(self, "null_bins", nulled)
+        for name in (
+            "range_exponent",
+            "trajectory_smoothing_s",
+            "velocity_sigma_bins",
+            "time_sigma_s",
+        ):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0):
+                raise Sd2Error(f"{name} is {value}", "0 or more")
+        if not (math.isfinite(self.reference_range_m) and self.reference_range_m > 0):
+            raise Sd2Error(
+                f"The reference range is {self.reference_range_m} m", "a positive distance"
+            )
+        if self.oversampling < 1 or self.oversampling % 2 == 0:
+            raise Sd2Error(f"The oversampling is {self.oversampling}", "an odd number: 1, 3, 5 …")
+        if self.velocity == "vid2doppler" and self.oversampling > 1:
+            raise Sd2Error(
+                f"The oversampling is {self.oversampling} with vid2doppler's velocities",
+                "1: that tool works on the video's frames",
+            )
+
+
+PRESETS: dict[str, SynthesisOptions] = {
+    # The paper's chain. It says "Gaussian smoothing" without widths: one bin
+    # (0.125 m/s, about the resolution of 64 windowed chirps) and one frame of
+    # its 30 frames/s are ours.
+    "paper": SynthesisOptions(),
+    "vid2doppler": SynthesisOptions(
+        range_exponent=0.0,
+        velocity="vid2doppler",
+        velocity_sigma_bins=5.0,
+        time_sigma_s=0.0,
+        # That tool blurs over its own notch.
+        null_after_smoothing=False,
+    ),
+}
+"""Named options; ``paper`` is the default."""

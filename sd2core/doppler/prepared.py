@@ -1,0 +1,294 @@
+"""What does not depend on the sensor, prepared in blocks of frames under a byte budget."""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.compiled import kernels_ready
+from sd2core.doppler import vid2doppler
+from sd2core.doppler.histogram import Frames
+from sd2core.doppler.options import SynthesisOptions
+from sd2core.errors import Sd2Error
+from sd2core.mesh import MeshSequence
+from sd2core.scattering import amplitude, visibility
+from sd2core.scattering.trajectory import Trajectory
+from sd2core.scattering.velocity import central_difference
+
+_BLOCK_BYTES = 16 << 20
+_FEWEST_FRAMES = 8
+
+
+class ByteBudget:
+    """Keeps the most recently used arrays within a number of bytes.
+
+    An entry larger than the budget is handed out but not kept.
+    """
+
+    def __init__(self, limit_bytes: int) -> None:
+        self.limit_bytes = limit_bytes
+        self.used_bytes = 0
+        self._entries: OrderedDict[Hashable, tuple[Any, int]] = OrderedDict()
+        self._making: dict[Hashable, threading.Lock] = {}
+        self._lock = threading.Lock()
+
+    def get(self, key: Hashable) -> Any:
+        """The entry, or None."""
+        with self._lock:
+            if key not in self._entries:
+                return None
+            self._entries.move_to_end(key)
+            return self._entries[key][0]
+
+    def put(self, key: Hashable, value: Any, size_bytes: int) -> None:
+        """Keep an entry and let go of the least recently used ones beyond the limit."""
+        with self._lock:
+            if key in self._entries:
+                self.used_bytes -= self._entries.pop(key)[1]
+            if size_bytes > self.limit_bytes:
+                return
+            self._entries[key] = (value, size_bytes)
+            self.used_bytes += size_bytes
+            while self.used_bytes > self.limit_bytes:
+                self.used_bytes -= self._entries.popitem(last=False)[1][1]
+
+    def get_or_make(self, key: Hashable, make: Callable[[], tuple[Any, int]]) -> Any:
+        """The entry; made once, even when several threads ask for it."""
+        value = self.get(key)
+        if value is not None:
+            return value
+        with self._lock:
+            making = self._making.setdefault(key, threading.Lock())
+        with making:
+            value = self.get(key)
+            if value is None:
+                value, size_bytes = make()
+                self.put(key, value, size_bytes)
+        with self._lock:
+            self._making.pop(key, None)
+        return value
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Prepared frames ``start`` to ``stop`` of a clip.
+
+    Parameters
+    ----------
+    index, start, stop : int
+    frames : Frames
+    first_knot : int
+        Number, in the whole clip, of the first knot in ``frames.positions``.
+    """
+
+    index: int
+    start: int
+    stop: int
+    frames: Frames
+    first_knot: int
+
+
+@dataclass(eq=False)
+class BlockMask:
+    """Exact visibility of one block's frames from one place.
+
+    ``visible`` (n, V) holds the facing test where visibility cannot change the
+    map; ``done`` (n,) says which frames have been worked out.
+    """
+
+    visible: NDArray[np.uint8]
+    done: NDArray[np.bool_]
+
+
+@dataclass(eq=False)
+class PreparedMesh:
+    """A mesh as the kernels take it, block by block.
+
+    Parameters
+    ----------
+    mesh : MeshSequence
+    options : SynthesisOptions
+    budget : ByteBudget
+    """
+
+    mesh: MeshSequence
+    options: SynthesisOptions
+    budget: ByteBudget
+    origin_m: NDArray[np.float64] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._reading = threading.Lock()
+        self._compatible = self.options.velocity == "vid2doppler"
+        self._trajectory = Trajectory(
+            self.mesh.times_s, self.options.oversampling, self.options.trajectory_smoothing_s
+        )
+        self._knot_times_s = self._trajectory.knot_times_s
+        self._stencil = central_difference(self._knot_times_s)
+        # The faces a kernel gets must be plain memory: a read-only or mapped
+        # array is another type to the compiler, and would be compiled for again.
+        self.faces = None if self.mesh.faces is None else np.array(self.mesh.faces, np.int32)
+        # Points are kept in single precision around the clip's own origin, so
+        # that large coordinates cost nothing. The compatible rule works on the
+        # numbers as they come, so that its bin edges fall where that tool's do.
+        self.origin_m = np.zeros(3)
+        if not self._compatible:
+            points = self.mesh.frame(0).astype(np.float64)
+            middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+            rounded = np.where(np.isfinite(middle), middle, 0.0).astype(np.float32)
+            self.origin_m = rounded.astype(np.float64)
+        per_frame = self.mesh.vertex_count * 12 * self.options.oversampling
+        self.block_frames = max(_FEWEST_FRAMES, _BLOCK_BYTES // per_frame)
+
+    @property
+    def block_count(self) -> int:
+        """Number of blocks in the clip."""
+        return -(-self.mesh.frame_count // self.block_frames)
+
+    def sensor(self, position_m: tuple[float, float, float]) -> NDArray[np.float64]:
+        """A sensor's place in the frame of the prepared positions."""
+        return np.asarray(position_m, np.float64) - self.origin_m
+
+    def has(self, index: int) -> bool:
+        """Whether a block is in memory."""
+        return self.budget.get(("block", index)) is not None
+
+    def block(self, index: int) -> Block:
+        """Prepared positions, from memory or read now."""
+
+        def make() -> tuple[Block, int]:
+            block = self._prepare(index)
+            return block, block.frames.positions.nbytes
+
+        block: Block = self.budget.get_or_make(("block", index), make)
+        return block
+
+    def normals(self, block: Block) -> NDArray[np.int8]:
+        """Vertex normals of a block's frames, int8 (n, 3, V)."""
+
+        def make() -> tuple[NDArray[np.int8], int]:
+            points, faces = self._at_frames(block), self._faces()
+            if kernels_ready():
+                normals = np.empty(points.shape, np.int8)
+                visibility.vertex_normals_kernel(points, faces, 0, len(points), normals)
+            else:
+                normals = visibility.vertex_normals(points, faces)
+            return normals, normals.nbytes
+
+        normals: NDArray[np.int8] = self.budget.get_or_make(("normals", block.index), make)
+        return normals
+
+    def areas(self, block: Block) -> NDArray[np.float32]:
+        """Vertex areas of a block's frames in m², float32 (n, V)."""
+
+        def make() -> tuple[NDArray[np.float32], int]:
+            points, faces = self._at_frames(block), self._faces()
+            if kernels_ready():
+                areas = np.empty((len(points), points.shape[2]), np.float32)
+                amplitude.vertex_areas_kernel(points, faces, 0, len(points), areas)
+            else:
+                areas = amplitude.vertex_areas(points, faces)
+            return areas, areas.nbytes
+
+        areas: NDArray[np.float32] = self.budget.get_or_make(("areas", block.index), make)
+        return areas
+
+    def mask(self, block: Block, position_m: tuple[float, float, float]) -> BlockMask:
+        """Exact visibility from a place, as far as it has been worked out."""
+
+        def make() -> tuple[BlockMask, int]:
+            frames = block.stop - block.start
+            visible = np.zeros((frames, self.mesh.vertex_count), np.uint8)
+            return BlockMask(visible, np.zeros(frames, bool)), visible.nbytes
+
+        mask: BlockMask = self.budget.get_or_make(("mask", block.index, position_m), make)
+        return mask
+
+    def kept_mask(self, index: int, position_m: tuple[float, float, float]) -> BlockMask | None:
+        """Exact visibility from a place, if it is in memory."""
+        mask: BlockMask | None = self.budget.get(("mask", index, position_m))
+        return mask
+
+    def velocities_vid2doppler(
+        self, block: Block, start: int, stop: int, sensor: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Vid2Doppler's velocities of the clip's frames ``start`` to ``stop``, (n, V)."""
+        return vid2doppler.velocities(
+            block.frames.positions,
+            block.first_knot,
+            start,
+            stop,
+            self.mesh.frame_count,
+            sensor,
+            self.mesh.timebase.frames_per_s,
+        )
+
+    def _faces(self) -> NDArray[np.int32]:
+        if self.faces is None:
+            raise ValueError("a point cloud has neither normals nor areas")
+        return self.faces
+
+    def _at_frames(self, block: Block) -> NDArray[np.float32]:
+        """Positions of the block's own frames in single precision, (n, 3, V)."""
+        points = block.frames.positions[block.frames.centre]
+        return np.ascontiguousarray(points, np.float32)
+
+    def _prepare(self, index: int) -> Block:
+        start = index * self.block_frames
+        stop = min(start + self.block_frames, self.mesh.frame_count)
+        every = self.options.oversampling
+        half = every // 2
+        if self._compatible:
+            reach_before, reach_after = vid2doppler.REACH_BEFORE, vid2doppler.REACH_AFTER
+        else:
+            reach_before = reach_after = half + 1
+        first = max(start * every - reach_before, 0)
+        last = min((stop - 1) * every + reach_after + 1, len(self._knot_times_s))
+        positions = self._positions(first, last)
+
+        centre = np.arange(start, stop) * every
+        samples = centre[:, None] + np.arange(-half, half + 1)
+        within = (samples >= 0) & (samples < len(self._knot_times_s))
+        samples = np.clip(samples, 0, len(self._knot_times_s) - 1)
+        return Block(
+            index,
+            start,
+            stop,
+            Frames(
+                positions,
+                centre - first,
+                np.maximum(self._stencil.before[samples] - first, 0),
+                np.minimum(self._stencil.after[samples] - first, last - first - 1),
+                np.where(within, self._stencil.duration_s[samples], 0.0),
+            ),
+            first,
+        )
+
+    def _positions(self, first: int, last: int) -> NDArray[Any]:
+        """Knots ``first`` to ``last`` around the clip's origin, (knots, 3, V)."""
+        low, high = self._trajectory.frames_needed(first, last)
+        with self._reading:
+            vertices = self.mesh.read(low, high)
+        if not np.isfinite(vertices).all():
+            frame, vertex = np.argwhere(~np.isfinite(vertices))[0][:2]
+            raise Sd2Error(
+                f"{self.mesh.source or 'The mesh'}: vertex {vertex} of frame {low + frame} is"
+                f" {vertices[frame, vertex].tolist()}",
+                "finite coordinates in metres",
+            )
+        knots = self._trajectory.knots(vertices, low, first, last)
+        precise = self._compatible and (knots.dtype != np.float32)
+        positions = np.empty(
+            (last - first, 3, self.mesh.vertex_count), np.float64 if precise else np.float32
+        )
+        origin = self.origin_m.astype(knots.dtype)
+        for axis in range(3):
+            np.subtract(
+                knots[:, :, axis], origin[axis], out=positions[:, axis], casting="same_kind"
+            )
+        return positions

@@ -1,0 +1,80 @@
+"""Gaussian smoothing of a Doppler map on velocity and on time."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+_REACH = 4.0
+"""Where the Gaussian on time is cut, in sigmas."""
+
+_SLACK_S = 1e-9
+"""Frames that lie on the cut are looked up generously and judged once, by distance."""
+
+
+def velocity_kernel(bins: int, sigma_bins: float) -> NDArray[np.float64]:
+    """Matrix (bins, bins) that smooths along velocity, reflecting at the axis's ends."""
+    if sigma_bins == 0:
+        return np.eye(bins)
+    from scipy.ndimage import gaussian_filter1d
+
+    smoothed: NDArray[np.float64] = gaussian_filter1d(np.eye(bins), sigma_bins, axis=0)
+    return smoothed
+
+
+def frames_within_reach(
+    times_s: NDArray[np.float64], start: int, stop: int, sigma_s: float
+) -> tuple[int, int]:
+    """Half-open range of frames that smoothing frames ``start`` to ``stop`` looks at."""
+    if sigma_s == 0:
+        return start, stop
+    reach = _REACH * sigma_s + _SLACK_S
+    first = int(np.searchsorted(times_s, times_s[start] - reach))
+    last = int(np.searchsorted(times_s, times_s[stop - 1] + reach, side="right"))
+    return first, last
+
+
+def smooth_time(
+    values: NDArray[np.float64],
+    times_s: NDArray[np.float64],
+    first: int,
+    start: int,
+    stop: int,
+    sigma_s: float,
+) -> NDArray[np.float64]:
+    """Gaussian mean over real times for frames ``start`` to ``stop``.
+
+    Parameters
+    ----------
+    values : float64 array, shape (bins, n)
+        Columns of the frames that :func:`frames_within_reach` names, from
+        frame ``first`` on.
+    times_s : float64 array, shape (T,)
+        Times of all frames, so that the result does not depend on how a
+        recording is cut into stretches.
+
+    Returns
+    -------
+    float64 array, shape (bins, stop - start)
+    """
+    frames = np.arange(start, stop)
+    if sigma_s == 0:
+        return values[:, frames - first]
+    last = first + values.shape[1]
+    centres = times_s[frames]
+    reach = _REACH * sigma_s
+    slack = reach + _SLACK_S
+    before = int((frames - np.searchsorted(times_s, centres - slack)).max())
+    after = int((np.searchsorted(times_s, centres + slack, side="right") - frames).max())
+    total = np.zeros((values.shape[0], len(frames)))
+    weights = np.zeros(len(frames))
+    for offset in range(-before, after):
+        neighbour = frames + offset
+        inside = (neighbour >= first) & (neighbour < last)
+        neighbour = np.clip(neighbour, first, last - 1)
+        distance = times_s[neighbour] - centres
+        bell = np.exp(-0.5 * (distance / sigma_s) ** 2)
+        bell[~inside | (np.abs(distance) > reach)] = 0
+        total += bell * values[:, neighbour - first]
+        weights += bell
+    return total / weights

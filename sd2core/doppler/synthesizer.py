@@ -1,0 +1,532 @@
+"""From a mesh and a sensor to a synthetic Doppler map."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core import __version__
+from sd2core.compiled import compile_in_background, kernels_ready
+from sd2core.doppler import histogram, vid2doppler
+from sd2core.doppler.histogram import ALL, FACING, MASK, Counting, Counts
+from sd2core.doppler.options import PRESETS, SynthesisOptions
+from sd2core.doppler.parallel import Ticket, run_jobs
+from sd2core.doppler.prepared import Block, BlockMask, ByteBudget, PreparedMesh
+from sd2core.doppler.smoothing import frames_within_reach, smooth_time, velocity_kernel
+from sd2core.errors import Sd2Error
+from sd2core.mesh import MeshSequence
+from sd2core.progress import Progress, silent
+from sd2core.scattering import exact_plain
+from sd2core.scattering.amplitude import range_weight
+from sd2core.scattering.exact import exact_visibility_kernel
+from sd2core.scattering.velocity import radial_velocity
+from sd2core.scattering.visibility import facing_mask
+from sd2core.sensor import VirtualSensor
+from sd2core.spectrum import DopplerMap
+from sd2core.timebase import Timebase
+
+Visibility = Literal["none", "facing", "exact", "frozen"]
+"""``frozen``: the last exact visibility, kept while the sensor is dragged."""
+
+Quality = Literal["none", "facing", "exact", "frozen"]
+
+_MEMORY_BUDGET_BYTES = 512 << 20
+_FAST_FRAMES = 64
+_EXACT_FRAMES = 4
+
+Position = tuple[float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """A stretch of a synthetic Doppler map.
+
+    Parameters
+    ----------
+    values : float32 array, shape (bins, n)
+    visible_share : float32 array, shape (n,)
+        Share of all vertices that the sensor sees. Vertices that cannot change
+        the map (still, or off the axis) are judged by the facing test.
+    beyond_share : float32 array, shape (n,)
+        Share of those whose velocity lies beyond the axis.
+    quality : {"none", "facing", "frozen", "exact"}
+        The weakest visibility that was used: ``frozen`` falls back to facing
+        where no exact visibility is kept.
+    """
+
+    values: NDArray[np.float32]
+    visible_share: NDArray[np.float32]
+    beyond_share: NDArray[np.float32]
+    quality: Quality
+
+
+@dataclass(frozen=True, eq=False)
+class FrameScattering:
+    """What a sensor gets back from one frame.
+
+    Parameters
+    ----------
+    velocity_mps : float32 array, shape (V,)
+        Radial velocity, positive when approaching.
+    range_m : float32 array, shape (V,)
+        Distance from the sensor.
+    visible : bool array, shape (V,)
+    quality : {"none", "facing", "frozen", "exact"}
+        How ``visible`` was found.
+    """
+
+    velocity_mps: NDArray[np.float32]
+    range_m: NDArray[np.float32]
+    visible: NDArray[np.bool_]
+    quality: Quality
+
+
+class Synthesizer:
+    """Turns one mesh into Doppler maps for any sensor position.
+
+    What does not depend on the sensor is prepared once, in blocks of frames that
+    are kept under a byte budget; a long recording is streamed. Calls may come
+    from several threads.
+
+    Parameters
+    ----------
+    mesh : MeshSequence
+    options : SynthesisOptions or str
+        Or the name of a preset.
+    memory_budget_bytes : int
+        For prepared blocks and visibility.
+
+    Raises
+    ------
+    Sd2Error
+        For an unknown preset, or area weighting of a point cloud.
+    """
+
+    def __init__(
+        self,
+        mesh: MeshSequence,
+        options: SynthesisOptions | str = "paper",
+        *,
+        memory_budget_bytes: int = _MEMORY_BUDGET_BYTES,
+    ) -> None:
+        if isinstance(options, str):
+            if options not in PRESETS:
+                raise Sd2Error(f"The preset is {options!r}", f"one of {', '.join(PRESETS)}")
+            options = PRESETS[options]
+        if mesh.faces is None and options.weight == "area":
+            raise _no_surface(mesh, "Area weighting")
+        self.mesh = mesh
+        self.options = options
+        self.prepared = PreparedMesh(mesh, options, ByteBudget(memory_budget_bytes))
+        self._counting = Counting(
+            options.axis.bins,
+            options.axis.v_max_mps,
+            {"drop": histogram.DROP, "wrap": histogram.WRAP, "clip": histogram.CLIP}[
+                options.beyond
+            ],
+            options.range_exponent,
+            options.reference_range_m,
+        )
+        live = np.ones(options.axis.bins + 1, np.uint8)
+        live[list(options.null_bins)] = 0
+        live[-1] = 0
+        self._live = live
+        self._smooth_velocity = velocity_kernel(options.axis.bins, options.velocity_sigma_bins)
+        self._frozen_at: dict[int, Position] = {}
+
+    def prepare(self, progress: Progress = silent) -> None:
+        """Read and prepare as many blocks as the budget holds, before they are asked for."""
+        prepared = self.prepared
+        bytes_per_block = prepared.block_frames * self.mesh.vertex_count * 15
+        fitting = max(1, prepared.budget.limit_bytes // bytes_per_block)
+        blocks = range(min(fitting, prepared.block_count))
+
+        def job(index: int) -> Callable[[Ticket], None]:
+            def work(ticket: Ticket) -> None:
+                ticket.advance(0)
+                block = prepared.block(index)
+                if self.mesh.faces is not None:
+                    prepared.normals(block)
+                ticket.advance(1)
+
+            return work
+
+        run_jobs([job(index) for index in blocks], len(blocks), progress)
+
+    def map(
+        self,
+        sensor: VirtualSensor,
+        *,
+        visibility: Visibility | None = None,
+        frames: tuple[int, int] | None = None,
+        progress: Progress = silent,
+    ) -> DopplerMap:
+        """Doppler map of the whole clip, or of ``frames`` (half-open).
+
+        Parameters
+        ----------
+        sensor : VirtualSensor
+        visibility : {"none", "facing", "exact", "frozen"}, optional
+            Otherwise that of the options.
+        frames : tuple of int, optional
+        progress : Progress
+            Called with frames done; may raise Cancelled.
+
+        Returns
+        -------
+        DopplerMap
+            Of kind ``synthetic``. Its meta names sensor, options, source and
+            version, the quality of the visibility, and per frame
+            ``visible_share`` and ``beyond_share``.
+        """
+        start, stop = frames or (0, self.mesh.frame_count)
+        stretch = self.stretch(sensor, start, stop, visibility, progress)
+        options = self.options
+        per = {"count": "share of vertices", "area": "share of the surface"}[options.weight]
+        return DopplerMap(
+            values=stretch.values,
+            axis=options.axis,
+            timebase=Timebase(self.mesh.times_s[start:stop]),
+            kind="synthetic",
+            unit=f"{per} at {options.reference_range_m:g} m" if options.range_exponent else per,
+            null_bins=options.null_bins,
+            meta={
+                "sensor": asdict(sensor),
+                "options": asdict(options),
+                "visibility": stretch.quality,
+                "source": self.mesh.source,
+                "version": __version__,
+                "visible_share": _rounded(stretch.visible_share),
+                "beyond_share": _rounded(stretch.beyond_share),
+            },
+        )
+
+    def stretch(
+        self,
+        sensor: VirtualSensor,
+        start: int,
+        stop: int,
+        visibility: Visibility | None = None,
+        progress: Progress = silent,
+    ) -> Stretch:
+        """Doppler values of frames ``start`` to ``stop`` (exclusive).
+
+        The same as these columns of the whole map: smoothing over time looks
+        beyond the stretch.
+        """
+        if not 0 <= start < stop <= self.mesh.frame_count:
+            raise IndexError(f"frames {start} to {stop} of {self.mesh.frame_count}")
+        options, times_s = self.options, self.mesh.times_s
+        first, last = frames_within_reach(times_s, start, stop, options.time_sigma_s)
+        counts, totals, quality = self._count(
+            sensor, first, last, self._choose(visibility), progress
+        )
+
+        share = np.divide(
+            counts.histogram.T, totals, out=np.zeros(counts.histogram.T.shape), where=totals > 0
+        )
+        nulled = list(options.null_bins)
+        share[nulled] = 0
+        share = self._smooth_velocity @ share
+        share = smooth_time(share, times_s, first, start, stop, options.time_sigma_s)
+        if options.null_after_smoothing:
+            share[nulled] = 0
+
+        inside = slice(start - first, stop - first)
+        visible, beyond = counts.visible[inside], counts.beyond[inside]
+        return Stretch(
+            share.astype(np.float32),
+            (visible / self.mesh.vertex_count).astype(np.float32),
+            (beyond / np.maximum(visible, 1)).astype(np.float32),
+            quality,
+        )
+
+    def frame(
+        self, sensor: VirtualSensor, index: int, visibility: Visibility | None = None
+    ) -> FrameScattering:
+        """Velocity, range and visibility of every vertex of one frame."""
+        chosen = self._choose(visibility)
+        block = self._block_of(index)
+        local = index - block.start
+        place = self.prepared.sensor(sensor.position_m)
+        frames = block.frames
+        points = frames.positions[frames.centre[local]]
+        ray = points.astype(np.float64) - place[:, None]
+        if self.options.velocity == "vid2doppler":
+            velocity = self.prepared.velocities_vid2doppler(block, index, index + 1, place)[0]
+        else:
+            middle = frames.before.shape[1] // 2
+            velocity = radial_velocity(
+                frames.positions[frames.before[local, middle]],
+                frames.positions[frames.after[local, middle]],
+                place,
+                frames.duration_s[local, middle],
+            )
+        visible, quality = self._visible_in_frame(block, local, sensor.position_m, chosen)
+        return FrameScattering(
+            velocity.astype(np.float32),
+            np.sqrt((ray * ray).sum(axis=0)).astype(np.float32),
+            visible,
+            quality,
+        )
+
+    def cached_mask(
+        self, sensor: VirtualSensor, start: int = 0, stop: int | None = None
+    ) -> NDArray[np.uint8] | None:
+        """Exact visibility of frames ``start`` to ``stop`` from this place, if it is kept.
+
+        Returns
+        -------
+        uint8 array, shape (n, V), or None
+            Vertices that cannot change the map hold the facing test.
+        """
+        stop = self.mesh.frame_count if stop is None else stop
+        parts = []
+        for index, low, high in self._blocks_between(start, stop):
+            mask = self.prepared.kept_mask(index, sensor.position_m)
+            rows = self._rows(index, low, high)
+            if mask is None or not mask.done[rows].all():
+                return None
+            parts.append(mask.visible[rows])
+        return np.concatenate(parts)
+
+    # How frames become counts.
+
+    def _choose(self, visibility: Visibility | None) -> Visibility:
+        chosen: Visibility = self.options.visibility if visibility is None else visibility
+        if chosen not in ("none", "facing", "exact", "frozen"):
+            raise Sd2Error(f"visibility is {chosen!r}", "none, facing, exact or frozen")
+        if self.mesh.faces is None and chosen != "none":
+            raise _no_surface(self.mesh, f"Visibility {chosen}")
+        return chosen
+
+    def _count(
+        self,
+        sensor: VirtualSensor,
+        start: int,
+        stop: int,
+        visibility: Visibility,
+        progress: Progress,
+    ) -> tuple[Counts, NDArray[np.float64], Quality]:
+        """Counts per frame, what they are shares of, and the visibility that was used."""
+        if not kernels_ready():
+            compile_in_background()
+        counts = Counts.empty(stop - start, self.options.axis.bins)
+        totals = np.full(stop - start, float(self.mesh.vertex_count))
+        qualities: set[Quality] = set()
+
+        def job(index: int, low: int, high: int) -> Callable[[Ticket], None]:
+            def work(ticket: Ticket) -> None:
+                small = visibility == "exact" or not kernels_ready()
+                step = _EXACT_FRAMES if small else _FAST_FRAMES
+                for first in range(low, high, step):
+                    last = min(first + step, high)
+                    ticket.advance(0)
+                    block = self.prepared.block(index)
+                    rows = slice(first - block.start, last - block.start)
+                    target = slice(first - start, last - start)
+                    qualities.add(
+                        self._count_rows(
+                            block,
+                            rows,
+                            sensor.position_m,
+                            visibility,
+                            counts.rows(target),
+                            totals[target],
+                        )  # fmt: skip
+                    )
+                    ticket.advance(last - first)
+
+            return work
+
+        jobs = []
+        for index, low, high in self._blocks_between(start, stop):
+            # A block that must be read first is one job: its readers would wait.
+            pieces = -(-(high - low) // _FAST_FRAMES) if self.prepared.has(index) else 1
+            cuts = np.linspace(low, high, pieces + 1).astype(int).tolist()
+            jobs += [job(index, a, b) for a, b in zip(cuts[:-1], cuts[1:], strict=True)]
+        run_jobs(jobs, stop - start, progress)
+        if visibility == "frozen":
+            quality: Quality = "frozen" if qualities == {"frozen"} else "facing"
+        else:
+            quality = visibility
+        return counts, totals, quality
+
+    def _count_rows(
+        self,
+        block: Block,
+        rows: slice,
+        position_m: Position,
+        visibility: Visibility,
+        into: Counts,
+        totals: NDArray[np.float64],
+    ) -> Quality:
+        """Count some of a block's frames; returns the visibility that was used."""
+        place = self.prepared.sensor(position_m)
+        areas = None
+        if self.options.weight == "area":
+            areas = self.prepared.areas(block)[rows]
+            totals[:] = areas.sum(axis=1, dtype=np.float64)
+
+        mask: NDArray[np.uint8] | None = None
+        quality: Quality = visibility
+        if visibility == "exact":
+            mask = self._exact(block, rows, position_m).visible[rows]
+        elif visibility == "frozen":
+            kept = self._frozen(block.index)
+            if kept is not None and kept.done[rows].all():
+                mask = kept.visible[rows]
+            else:
+                quality = "facing"
+        which = MASK if mask is not None else FACING if quality == "facing" else ALL
+        normals = self.prepared.normals(block)[rows] if which == FACING else None
+
+        if self.options.velocity == "vid2doppler":
+            self._count_vid2doppler(block, rows, place, which, normals, mask, areas, into)
+        else:
+            count = histogram.count if kernels_ready() else histogram.count_plain
+            frames = block.frames.rows(rows)
+            count(frames, place, self._counting, which, normals, mask, areas, into)
+        return quality
+
+    def _count_vid2doppler(
+        self,
+        block: Block,
+        rows: slice,
+        place: NDArray[np.float64],
+        which: int,
+        normals: NDArray[np.int8] | None,
+        mask: NDArray[np.uint8] | None,
+        areas: NDArray[np.float32] | None,
+        into: Counts,
+    ) -> None:
+        bins, options = self.options.axis.bins, self.options
+        numbers, beyond = self._bins_vid2doppler(block, rows, place)
+        for row, knot in enumerate(block.frames.centre[rows]):
+            points = block.frames.positions[knot]
+            seen = np.ones(points.shape[1], bool)
+            if mask is not None:
+                seen = mask[row] > 0
+            elif normals is not None:
+                seen = facing_mask(points[None], normals[row : row + 1], place)[0] > 0
+            weight = np.ones(points.shape[1]) if areas is None else areas[row].astype(float)
+            if options.range_exponent:
+                distance = np.linalg.norm(points - place[:, None], axis=0)
+                weight *= range_weight(distance, options.range_exponent, options.reference_range_m)
+            into.visible[row] = seen.sum()
+            # With one frame there is no velocity, not a velocity of zero.
+            if self.mesh.frame_count > 1:
+                total = np.bincount(numbers[row][seen], weight[seen], bins + 1)
+                into.histogram[row] = total[:bins]
+                into.beyond[row] = (beyond[row] & seen).sum()
+
+    def _bins_vid2doppler(
+        self, block: Block, rows: slice, place: NDArray[np.float64]
+    ) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+        velocity = self.prepared.velocities_vid2doppler(
+            block, block.start + rows.start, block.start + rows.stop, place
+        )
+        return vid2doppler.place_in_bins(velocity, self.options.axis.edges_mps, self._counting)
+
+    # Visibility.
+
+    def _exact(self, block: Block, rows: slice, position_m: Position) -> BlockMask:
+        """The block's exact mask with these rows worked out."""
+        mask = self.prepared.mask(block, position_m)
+        self._frozen_at[block.index] = position_m
+        if mask.done[rows].all():
+            return mask
+        place = self.prepared.sensor(position_m)
+        needed = self._needed(block, rows, place)
+        points = block.frames.positions[block.frames.centre[rows]].astype(np.float32, copy=False)
+        normals = self.prepared.normals(block)[rows]
+        visible = facing_mask(points, normals, place)
+        self._test(points, place, needed, visible)
+        mask.visible[rows] = visible
+        mask.done[rows] = True
+        return mask
+
+    def _needed(self, block: Block, rows: slice, place: NDArray[np.float64]) -> NDArray[np.uint8]:
+        """Which vertices' visibility can change the map, uint8 (n, V)."""
+        if self.options.velocity == "vid2doppler":
+            return self._live[self._bins_vid2doppler(block, rows, place)[0]]
+        mark = histogram.mark_needed if kernels_ready() else histogram.mark_needed_plain
+        return mark(block.frames.rows(rows), place, self._counting, self._live)
+
+    def _test(
+        self,
+        points: NDArray[np.float32],
+        place: NDArray[np.float64],
+        needed: NDArray[np.uint8],
+        visible: NDArray[np.uint8],
+    ) -> None:
+        """Write the exact visibility of the needed vertices into ``visible``."""
+        faces = self.prepared.faces
+        if faces is None:
+            raise _no_surface(self.mesh, "Exact visibility")
+        if kernels_ready():
+            exact_visibility_kernel(points, faces, place, needed, 0, len(points), visible)
+            return
+        for t in np.flatnonzero(needed.any(axis=1)):
+            wanted = needed[t] > 0
+            seen = exact_plain.exact_visibility(points[t], faces, place, wanted)
+            visible[t][wanted] = seen[wanted]
+
+    def _frozen(self, index: int) -> BlockMask | None:
+        """The exact mask that was last worked out for a block, if it is still kept."""
+        position_m = self._frozen_at.get(index)
+        return None if position_m is None else self.prepared.kept_mask(index, position_m)
+
+    def _visible_in_frame(
+        self, block: Block, local: int, position_m: Position, visibility: Visibility
+    ) -> tuple[NDArray[np.bool_], Quality]:
+        rows = slice(local, local + 1)
+        points = block.frames.positions[block.frames.centre[rows]].astype(np.float32, copy=False)
+        place = self.prepared.sensor(position_m)
+        if visibility == "none":
+            return np.ones(self.mesh.vertex_count, bool), "none"
+        if visibility == "exact":
+            visible = np.empty((1, self.mesh.vertex_count), np.uint8)
+            self._test(points, place, np.ones_like(visible), visible)
+            return visible[0] > 0, "exact"
+        kept = self._frozen(block.index) if visibility == "frozen" else None
+        if kept is not None and kept.done[local]:
+            return kept.visible[local] > 0, "frozen"
+        normals = self.prepared.normals(block)[rows]
+        return facing_mask(points, normals, place)[0] > 0, "facing"
+
+    # Blocks and threads.
+
+    def _block_of(self, frame: int) -> Block:
+        if not 0 <= frame < self.mesh.frame_count:
+            raise IndexError(f"frame {frame} of {self.mesh.frame_count}")
+        return self.prepared.block(frame // self.prepared.block_frames)
+
+    def _blocks_between(self, start: int, stop: int) -> list[tuple[int, int, int]]:
+        """Block number and the frames it holds of ``start`` to ``stop``."""
+        size = self.prepared.block_frames
+        return [
+            (index, max(start, index * size), min(stop, (index + 1) * size))
+            for index in range(start // size, (stop - 1) // size + 1)
+        ]
+
+    def _rows(self, index: int, start: int, stop: int) -> slice:
+        base = index * self.prepared.block_frames
+        return slice(start - base, stop - base)
+
+
+def _no_surface(mesh: MeshSequence, wanted: str) -> Sd2Error:
+    return Sd2Error(
+        f"{wanted} was asked for, but {mesh.source or 'the mesh'} has no faces: it is a point cloud",
+        "visibility none and count weighting",
+        "Choose those, or give the faces (--faces)",
+    )
+
+
+def _rounded(shares: NDArray[np.float32]) -> list[float]:
+    rounded: list[float] = np.round(shares.astype(np.float64), 5).tolist()
+    return rounded

@@ -1,0 +1,85 @@
+"""Vid2Doppler's arithmetic, for comparison with that tool.
+
+After Ahuja et al., "Vid2Doppler: Synthesizing Doppler radar data from videos for
+training privacy-preserving activity recognition" (CHI 2021) and its published
+code, with its properties: the backward difference lags half a frame, the first
+and last two frames are attenuated, and the typical frame rate stands for all.
+Bin edges decide here, so everything is double precision.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.doppler.histogram import CLIP, DROP, WRAP, Counting
+
+TAPS = 5
+"""Frames in its mean over time."""
+
+REACH_BEFORE, REACH_AFTER = TAPS // 2 + 1, TAPS // 2
+"""How many frames before and after a frame its velocity depends on."""
+
+
+def velocities(
+    positions: NDArray[Any],
+    first: int,
+    start: int,
+    stop: int,
+    frame_count: int,
+    sensor: NDArray[np.float64],
+    frames_per_s: float,
+) -> NDArray[np.float64]:
+    """Velocity −(Δp·p)/|p|·fps of each vertex, then its zero-padded mean over five frames.
+
+    Parameters
+    ----------
+    positions : float array, shape (n, 3, V)
+        Frames from ``first`` on: at least from ``start - 3`` to ``stop + 2``, as
+        far as the recording goes.
+    start, stop : int
+        Frames wanted.
+    frame_count : int
+        Length of the recording, where the zero padding begins.
+    sensor : float64 array, shape (3,)
+    frames_per_s : float
+
+    Returns
+    -------
+    float64 array, shape (stop - start, V)
+        m/s, positive when approaching.
+    """
+    low, high = max(start - TAPS // 2, 0), min(stop + TAPS // 2, frame_count)
+    instant = np.zeros((stop - start + TAPS - 1, positions.shape[2]))
+    place = sensor[:, None]
+    for frame in range(max(low, 1), high):
+        now = positions[frame - first].astype(np.float64)
+        step = now - positions[frame - first - 1]
+        ray = now - place
+        distance = np.sqrt((ray * ray).sum(axis=0))
+        approach = -(step * ray).sum(axis=0) * frames_per_s
+        np.divide(approach, distance, out=instant[frame - start + TAPS // 2], where=distance > 0)
+    mean = np.zeros((stop - start, positions.shape[2]))
+    for tap in range(TAPS):
+        mean += instant[tap : tap + stop - start]
+    mean /= TAPS
+    return mean
+
+
+def place_in_bins(
+    velocity_mps: NDArray[np.float64], edges_mps: NDArray[np.float64], counting: Counting
+) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Bin numbers as ``np.histogram`` finds them (``bins`` where dropped); what is beyond."""
+    beyond = (velocity_mps < edges_mps[0]) | (velocity_mps > edges_mps[-1])
+    if counting.beyond == WRAP:
+        span = edges_mps[-1] - edges_mps[0]
+        wrapped = edges_mps[0] + np.mod(velocity_mps - edges_mps[0], span)
+        velocity_mps = np.where(beyond, wrapped, velocity_mps)
+    elif counting.beyond == CLIP:
+        velocity_mps = np.clip(velocity_mps, edges_mps[0], edges_mps[-1])
+    number = np.searchsorted(edges_mps[1:-1], velocity_mps, side="right")
+    if counting.beyond == DROP:
+        number[beyond] = counting.bins
+    return number, beyond

@@ -1,0 +1,1 @@
+"""What a sensor gets back from a moving mesh: velocity, visibility, amplitude."""

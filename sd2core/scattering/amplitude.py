@@ -1,0 +1,80 @@
+"""How much a vertex sends back: its share of the surface and the range law."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.compiled import compiled
+
+NEAREST_RANGE_M = 0.1
+"""The range law is a far-field law; whatever is nearer counts as at this range."""
+
+
+def vertex_areas(positions: NDArray[Any], faces: NDArray[np.int32]) -> NDArray[np.float32]:
+    """Area that each vertex stands for: a third of its adjacent triangles.
+
+    Parameters
+    ----------
+    positions : float array, shape (n, 3, V)
+        Metres.
+    faces : int32 array, shape (F, 3)
+
+    Returns
+    -------
+    float32 array, shape (n, V)
+        Square metres; a frame's sum is the area of the surface.
+    """
+    areas = np.empty((positions.shape[0], positions.shape[2]), np.float32)
+    for frame, points in enumerate(positions.astype(np.float64, copy=False)):
+        corner = points[:, faces]  # (3, F, 3)
+        edge1, edge2 = corner[:, :, 1] - corner[:, :, 0], corner[:, :, 2] - corner[:, :, 0]
+        third = np.linalg.norm(np.cross(edge1, edge2, axis=0), axis=0) / 6.0
+        areas[frame] = np.bincount(faces.ravel(), np.repeat(third, 3), points.shape[1])
+    return areas
+
+
+@compiled
+def vertex_areas_kernel(
+    positions: NDArray[np.float32],  # (n, 3, V)
+    faces: NDArray[np.int32],
+    first: int,
+    last: int,
+    areas: NDArray[np.float32],  # (n, V), written
+) -> None:
+    """Compiled form of :func:`vertex_areas` for frames ``first`` to ``last``."""
+    for t in range(first, last):
+        x, y, z = positions[t, 0], positions[t, 1], positions[t, 2]
+        area = areas[t]
+        area[:] = 0
+        for f in range(faces.shape[0]):
+            i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
+            ax, ay, az = x[j] - x[i], y[j] - y[i], z[j] - z[i]
+            bx, by, bz = x[k] - x[i], y[k] - y[i], z[k] - z[i]
+            nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+            third = np.sqrt(nx * nx + ny * ny + nz * nz) * np.float32(1.0 / 6.0)
+            area[i] += third
+            area[j] += third
+            area[k] += third
+
+
+def range_weight(
+    range_m: NDArray[Any], exponent: float, reference_range_m: float
+) -> NDArray[np.float32]:
+    """Power relative to the reference range, ``(R_ref / R) ** exponent``.
+
+    The radar equation gives an exponent of 4 for a point scatterer. Ranges below
+    :data:`NEAREST_RANGE_M` count as that range.
+    """
+    ratio = reference_range_m / np.maximum(range_m, NEAREST_RANGE_M)
+    weight: NDArray[np.float32] = np.power(ratio, exponent).astype(np.float32)
+    return weight
+
+
+def compile_kernels() -> None:
+    """Call every kernel of this module once."""
+    positions = np.zeros((1, 3, 3), np.float32)
+    faces = np.array([[0, 1, 2]], np.int32)
+    vertex_areas_kernel(positions, faces, 0, 1, np.empty((1, 3), np.float32))

@@ -1,0 +1,335 @@
+"""Exact visibility: compiled search on the sensor's image plane.
+
+All rays meet at the sensor. Vertices are sorted into the cells of the sensor's
+image plane; each triangle then meets only the few vertices in the cells that it
+covers, and leaves out those in front of it. This search is single precision with
+a safety margin, so it can only propose too much. What hides a vertex is decided
+in double precision, in space: the triangle must cross the open segment between
+vertex and sensor (see docs/decisions/0003).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.compiled import compiled
+
+CONTACT = 1e-6
+"""Nearer to either end of the segment than this share of the body's size, a
+triangle touches and does not hide (doubled seam vertices, a sensor on the skin)."""
+
+EDGE = 1e-9
+"""A triangle is this much larger in barycentric terms, so that a ray through a
+common edge cannot slip between two triangles."""
+
+_FLAT = 1e-13
+"""Triangles seen more exactly edge-on than this, or without area, hide nothing."""
+
+_WIDEST = 2.0
+"""Up to this tangent from the axis one image plane serves; beyond, six (a cube)."""
+
+_ROUNDING = np.float32(1e-6)
+"""Error of single-precision image coordinates, generously, relative to their size."""
+
+_MOST_CELLS = 256
+
+
+@compiled
+def hides(  # type: ignore[no-untyped-def]
+    x, y, z, i: int, j: int, k: int, v: int, gx: float, gy: float, gz: float, contact: float
+) -> bool:
+    """Whether triangle (i, j, k) crosses the open segment from vertex v along g.
+
+    ``g`` is the vector from the vertex to the sensor. Möller and Trumbore's test
+    in double precision, with everything relative to the vertex.
+    """
+    length = np.sqrt(gx * gx + gy * gy + gz * gz)
+    if length <= 2 * contact:
+        return False
+    dx, dy, dz = gx / length, gy / length, gz / length
+    px, py, pz = np.float64(x[v]), np.float64(y[v]), np.float64(z[v])
+    ax, ay, az = x[i] - px, y[i] - py, z[i] - pz
+    e1x, e1y, e1z = x[j] - px - ax, y[j] - py - ay, z[j] - pz - az
+    e2x, e2y, e2z = x[k] - px - ax, y[k] - py - ay, z[k] - pz - az
+    hx, hy, hz = dy * e2z - dz * e2y, dz * e2x - dx * e2z, dx * e2y - dy * e2x
+    det = e1x * hx + e1y * hy + e1z * hz
+    size = (e1x * e1x + e1y * e1y + e1z * e1z) * (e2x * e2x + e2y * e2y + e2z * e2z)
+    if det * det <= _FLAT * _FLAT * size:
+        return False
+    u = -(ax * hx + ay * hy + az * hz) / det
+    if u < -EDGE or u > 1 + EDGE:
+        return False
+    qx, qy, qz = e1y * az - e1z * ay, e1z * ax - e1x * az, e1x * ay - e1y * ax
+    w = (dx * qx + dy * qy + dz * qz) / det
+    if w < -EDGE or u + w > 1 + EDGE:
+        return False
+    along = (e2x * qx + e2y * qy + e2z * qz) / det
+    return contact < along < length - contact
+
+
+@compiled
+def _clipped_bounds(a: NDArray[Any], near: float, bounds: NDArray[Any]) -> bool:
+    """Image bounds of the part of a triangle beyond ``near``.
+
+    ``a`` holds the corners' x, y, z per row in the view's frame; ``bounds``
+    receives xmin, xmax, ymin, ymax of x/z and y/z. False: no such part.
+    """
+    found = False
+    for corner in range(3):
+        other = (corner + 1) % 3
+        z0, z1 = a[corner, 2], a[other, 2]
+        for end in range(2):
+            if end == 0:
+                if z0 < near:
+                    continue
+                px, py = a[corner, 0] / z0, a[corner, 1] / z0
+            else:
+                if (z0 < near) == (z1 < near):
+                    continue
+                s = (near - z0) / (z1 - z0)
+                px = (a[corner, 0] + s * (a[other, 0] - a[corner, 0])) / near
+                py = (a[corner, 1] + s * (a[other, 1] - a[corner, 1])) / near
+            if not found:
+                bounds[0] = bounds[1] = px
+                bounds[2] = bounds[3] = py
+                found = True
+            bounds[0], bounds[1] = min(bounds[0], px), max(bounds[1], px)
+            bounds[2], bounds[3] = min(bounds[2], py), max(bounds[3], py)
+    return found
+
+
+@compiled
+def _search_view(  # type: ignore[no-untyped-def]
+    x, y, z, faces, g, axes, near, contact, owned, owned_count, image, depth, cell, start,
+    order, sorted_image, sorted_depth, hidden,
+) -> None:  # fmt: skip
+    """Find what hides the owned vertices in one view and clear their ``hidden`` flag.
+
+    ``g`` (3, V) float64 is sensor − vertex, ``axes`` (3, 3) the view's right, up
+    and forward; ``image`` (2, V) and ``depth`` (V,) float32 hold each vertex's
+    image coordinates and depth. In a view that looks in one direction only,
+    ``near`` cuts what lies behind.
+    """
+    vertices = depth.shape[0]
+    xmin = ymin = dmin = np.float32(np.inf)
+    xmax = ymax = dmax = np.float32(-np.inf)
+    for v in range(vertices):
+        if owned[v]:
+            xmin, xmax = min(xmin, image[0, v]), max(xmax, image[0, v])
+            ymin, ymax = min(ymin, image[1, v]), max(ymax, image[1, v])
+            dmin, dmax = min(dmin, depth[v]), max(dmax, depth[v])
+    extent = max(xmax - xmin, ymax - ymin)
+    cells = min(_MOST_CELLS, max(4, int(2 * np.sqrt(owned_count))))
+    scale = np.float32(0)
+    if extent > 0:
+        scale = np.float32(cells) / extent
+    columns = min(int((xmax - xmin) * scale), cells) + 1
+    rows = min(int((ymax - ymin) * scale), cells) + 1
+
+    start[: columns * rows + 1] = 0
+    for v in range(vertices):
+        if owned[v]:
+            column = min(int((image[0, v] - xmin) * scale), columns - 1)
+            row = min(int((image[1, v] - ymin) * scale), rows - 1)
+            cell[v] = row * columns + column
+            start[cell[v] + 1] += 1
+    for c in range(columns * rows):
+        start[c + 1] += start[c]
+    for v in range(vertices - 1, -1, -1):
+        if owned[v]:
+            # Filling each cell from its end leaves start one cell ahead; see below.
+            start[cell[v] + 1] -= 1
+            at = start[cell[v] + 1]
+            order[at] = v
+            sorted_image[0, at], sorted_image[1, at] = image[0, v], image[1, v]
+            sorted_depth[at] = depth[v]
+            hidden[at] = 0
+    start[columns * rows + 1] = owned_count
+
+    corners = np.empty((3, 3), np.float64)
+    bounds = np.empty(4, np.float64)
+    for f in range(faces.shape[0]):
+        i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
+        d0, d1, d2 = depth[i], depth[j], depth[k]
+        nearest = min(d0, d1, d2)
+        if nearest > dmax:
+            continue
+        plain = nearest > near
+        if plain:
+            x0, x1, x2 = image[0, i], image[0, j], image[0, k]
+            y0, y1, y2 = image[1, i], image[1, j], image[1, k]
+            left, right = min(x0, x1, x2), max(x0, x1, x2)
+            top, bottom = min(y0, y1, y2), max(y0, y1, y2)
+        else:
+            if max(d0, d1, d2) <= near:
+                continue
+            x0 = x1 = x2 = y0 = y1 = y2 = np.float32(0)
+            for corner in range(3):
+                v = faces[f, corner]
+                for axis in range(3):
+                    corners[corner, axis] = -(
+                        axes[axis, 0] * g[0, v] + axes[axis, 1] * g[1, v] + axes[axis, 2] * g[2, v]
+                    )
+            if not _clipped_bounds(corners, np.float64(near), bounds):
+                continue
+            left, right = np.float32(bounds[0]), np.float32(bounds[1])
+            top, bottom = np.float32(bounds[2]), np.float32(bounds[3])
+            nearest = np.float32(0)
+        reach = _ROUNDING * max(max(abs(left), abs(right)), max(abs(top), abs(bottom)))
+        left, right, top, bottom = left - reach, right + reach, top - reach, bottom + reach
+        if right < xmin or left > xmax or bottom < ymin or top > ymax:
+            continue
+        edge = np.float32(4) * reach * ((right - left) + (bottom - top))
+        c0 = int((max(left, xmin) - xmin) * scale)
+        c1 = min(int((min(right, xmax) - xmin) * scale), columns - 1)
+        r0 = int((max(top, ymin) - ymin) * scale)
+        r1 = min(int((min(bottom, ymax) - ymin) * scale), rows - 1)
+        c0, r0 = min(c0, columns - 1), min(r0, rows - 1)
+        for row in range(r0, r1 + 1):
+            for at in range(start[row * columns + c0 + 1], start[row * columns + c1 + 2]):
+                if hidden[at] or sorted_depth[at] < nearest:
+                    continue
+                px, py = sorted_image[0, at], sorted_image[1, at]
+                if px < left or px > right or py < top or py > bottom:
+                    continue
+                if plain:
+                    ax, ay, bx, by, cx, cy = x0 - px, y0 - py, x1 - px, y1 - py, x2 - px, y2 - py
+                    wa, wb, wc = bx * cy - cx * by, cx * ay - ax * cy, ax * by - bx * ay
+                    if not (
+                        (wa >= -edge and wb >= -edge and wc >= -edge)
+                        or (wa <= edge and wb <= edge and wc <= edge)
+                    ):
+                        continue
+                v = order[at]
+                if v == i or v == j or v == k:
+                    continue
+                if hides(x, y, z, i, j, k, v, g[0, v], g[1, v], g[2, v], contact):
+                    hidden[at] = 1
+
+
+@compiled
+def exact_visibility_kernel(
+    positions: NDArray[np.float32],  # (n, 3, V)
+    faces: NDArray[np.int32],  # (F, 3)
+    sensor: NDArray[np.float64],  # (3,), in the frame of positions
+    needed: NDArray[np.uint8],  # (n, V): which vertices to test
+    first: int,
+    last: int,
+    visible: NDArray[np.uint8],  # (n, V), written where needed
+) -> None:
+    """Set ``visible`` of the needed vertices in frames ``first`` to ``last``."""
+    vertices = positions.shape[2]
+    g = np.empty((3, vertices), np.float64)
+    image = np.empty((2, vertices), np.float32)
+    depth = np.empty(vertices, np.float32)
+    owned = np.empty(vertices, np.uint8)
+    cell = np.empty(vertices, np.int32)
+    start = np.empty((_MOST_CELLS + 1) * (_MOST_CELLS + 1) + 2, np.int32)
+    order = np.empty(vertices, np.int32)
+    sorted_image = np.empty((2, vertices), np.float32)
+    sorted_depth = np.empty(vertices, np.float32)
+    hidden = np.empty(vertices, np.uint8)
+    axes = np.empty((3, 3), np.float64)
+    for t in range(first, last):
+        count = 0
+        for v in range(vertices):
+            if needed[t, v]:
+                visible[t, v] = 1
+                count += 1
+        if count == 0:
+            continue
+        x, y, z = positions[t, 0], positions[t, 1], positions[t, 2]
+        size = 0.0
+        away = np.empty(3, np.float64)
+        for axis in range(3):
+            p = positions[t, axis]
+            low = high = p[0]
+            for v in range(vertices):
+                g[axis, v] = sensor[axis] - p[v]
+                low, high = min(low, p[v]), max(high, p[v])
+            size += (np.float64(high) - low) ** 2
+            away[axis] = 0.5 * (np.float64(low) + high) - sensor[axis]
+        size = np.sqrt(size)
+        contact = CONTACT * size
+        distance = np.sqrt(away[0] ** 2 + away[1] ** 2 + away[2] ** 2)
+
+        narrow = distance > 0
+        if narrow:
+            _axes_along(away[0] / distance, away[1] / distance, away[2] / distance, axes)
+            for v in range(vertices):
+                gx, gy, gz = -g[0, v], -g[1, v], -g[2, v]
+                right = axes[0, 0] * gx + axes[0, 1] * gy + axes[0, 2] * gz
+                up = axes[1, 0] * gx + axes[1, 1] * gy + axes[1, 2] * gz
+                forward = axes[2, 0] * gx + axes[2, 1] * gy + axes[2, 2] * gz
+                if forward <= 0 or abs(right) + abs(up) > _WIDEST * forward:
+                    narrow = False
+                    break
+                # Scaled to metres at the body, and depth counted from there:
+                # a far sensor becomes an orthographic view without losing digits.
+                image[0, v] = right * distance / forward
+                image[1, v] = up * distance / forward
+                depth[v] = forward - distance
+        if narrow:
+            _search_view(
+                x, y, z, faces, g, axes, np.float32(-np.inf), contact, needed[t], count, image,
+                depth, cell, start, order, sorted_image, sorted_depth, hidden,
+            )  # fmt: skip
+            for at in range(count):
+                if hidden[at]:
+                    visible[t, order[at]] = 0
+            continue
+
+        for side in range(6):
+            sign = 1.0 - 2.0 * (side % 2)
+            main = side // 2
+            axes[:] = 0
+            axes[0, (main + 1) % 3] = 1
+            axes[1, (main + 2) % 3] = 1
+            axes[2, main] = sign
+            mine = 0
+            for v in range(vertices):
+                right, up = -g[(main + 1) % 3, v], -g[(main + 2) % 3, v]
+                forward = -g[main, v] * sign
+                depth[v] = forward
+                owned[v] = 0
+                if forward > contact:
+                    image[0, v], image[1, v] = right / forward, up / forward
+                    # Ties on the cube's edges belong to both sides: no harm.
+                    if needed[t, v] and abs(right) <= forward and abs(up) <= forward:
+                        owned[v] = 1
+                        mine += 1
+            if mine == 0:
+                continue
+            _search_view(
+                x, y, z, faces, g, axes, np.float32(contact), contact, owned, mine, image,
+                depth, cell, start, order, sorted_image, sorted_depth, hidden,
+            )  # fmt: skip
+            for at in range(mine):
+                if hidden[at]:
+                    visible[t, order[at]] = 0
+
+
+@compiled
+def _axes_along(fx: float, fy: float, fz: float, axes: NDArray[np.float64]) -> None:
+    """Right, up and forward of a view along the unit vector f."""
+    if abs(fz) < 0.9:
+        rx, ry, rz = fy, -fx, 0.0
+    else:
+        rx, ry, rz = 0.0, fz, -fy
+    length = np.sqrt(rx * rx + ry * ry + rz * rz)
+    axes[0, 0], axes[0, 1], axes[0, 2] = rx / length, ry / length, rz / length
+    axes[2, 0], axes[2, 1], axes[2, 2] = fx, fy, fz
+    for a in range(3):
+        b, c = (a + 1) % 3, (a + 2) % 3
+        axes[1, a] = axes[2, b] * axes[0, c] - axes[2, c] * axes[0, b]
+
+
+def compile_kernels() -> None:
+    """Call every kernel of this module once."""
+    positions = np.array([[[0, 1, 0], [0, 0, 1], [2, 2, 2]]], np.float32)
+    faces = np.array([[0, 1, 2]], np.int32)
+    marks = np.ones((1, 3), np.uint8)
+    exact_visibility_kernel(positions, faces, np.zeros(3), marks, 0, 1, marks.copy())

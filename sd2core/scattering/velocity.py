@@ -1,0 +1,77 @@
+"""Radial velocity from the exact change of range."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+
+def radial_velocity(
+    before: NDArray[Any], after: NDArray[Any], sensor: ArrayLike, duration_s: ArrayLike
+) -> NDArray[Any]:
+    """Mean radial velocity of points that moved from ``before`` to ``after``.
+
+    With a = before − s and b = after − s the change of range is
+    |b| − |a| = Δp·(a + b) / (|a| + |b|): exact, and free of the cancellation
+    that spoils |b| − |a| for a far sensor in single precision.
+
+    Parameters
+    ----------
+    before, after : float array, shape (..., 3, V)
+        Metres. Take the origin near the points.
+    sensor : array_like, shape (3,)
+        In the same frame.
+    duration_s : array_like, shape broadcasting with (..., V)
+        Time between the two; 0 gives velocity 0.
+
+    Returns
+    -------
+    float array, shape (..., V)
+        m/s in the precision of ``before``; positive when approaching.
+    """
+    precision = before.dtype.type
+    place = np.asarray(sensor, dtype=precision)[:, None]
+    a, b = before - place, after - place
+    step, middle = after - before, a + b
+    ranges = np.sqrt(_dot(a, a)) + np.sqrt(_dot(b, b))
+    # Both ends on the sensor: nothing moved, and the velocity is 0 instead of 0/0.
+    ranges = np.maximum(ranges, precision(1e-30))
+    duration = np.asarray(duration_s, dtype=precision)
+    rate = np.divide(1, duration, out=np.zeros_like(duration), where=duration > 0)
+    velocity: NDArray[Any] = -_dot(step, middle) / ranges * rate
+    return velocity
+
+
+def _dot(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
+    product: NDArray[Any] = a[..., 0, :] * b[..., 0, :]
+    for axis in (1, 2):
+        product = product + a[..., axis, :] * b[..., axis, :]
+    return product
+
+
+@dataclass(frozen=True, eq=False)
+class Stencil:
+    """Between which knots of a trajectory a velocity is measured.
+
+    Parameters
+    ----------
+    before, after : int64 array, shape (knots,)
+        Knot numbers.
+    duration_s : float64 array, shape (knots,)
+        Time between the two; 0 where there is only one knot.
+    """
+
+    before: NDArray[np.int64]
+    after: NDArray[np.int64]
+    duration_s: NDArray[np.float64]
+
+
+def central_difference(times_s: NDArray[np.float64]) -> Stencil:
+    """Each knot between its neighbours, one-sided at the two ends, on real times."""
+    knots = np.arange(len(times_s))
+    before = np.maximum(knots - 1, 0)
+    after = np.minimum(knots + 1, len(times_s) - 1)
+    return Stencil(before, after, times_s[after] - times_s[before])

@@ -1,0 +1,125 @@
+"""Which vertices a sensor sees: facing it, or truly not hidden.
+
+``facing`` asks each vertex's normal and relies on faces that are oriented
+outwards. ``exact`` asks whether anything stands between vertex and sensor and
+does not care about orientation. A vertex without a surface around it (loose, or
+with zero-area faces only) has no normal and counts as facing.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.compiled import compiled
+
+NORMAL_SCALE = 127
+"""A unit normal's component as a signed byte: directions are right to 0.4 degrees."""
+
+
+def vertex_normals(positions: NDArray[Any], faces: NDArray[np.int32]) -> NDArray[np.int8]:
+    """Area-weighted vertex normals as signed bytes.
+
+    Parameters
+    ----------
+    positions : float array, shape (n, 3, V)
+    faces : int32 array, shape (F, 3)
+        Counter-clockwise seen from outside.
+
+    Returns
+    -------
+    int8 array, shape (n, 3, V)
+        127 times the outward unit normal; zero where there is no surface.
+    """
+    normals = np.empty(positions.shape, np.int8)
+    for frame, points in enumerate(positions):
+        corner = points.astype(np.float64)[:, faces]  # (3, F, 3)
+        edge1, edge2 = corner[:, :, 1] - corner[:, :, 0], corner[:, :, 2] - corner[:, :, 0]
+        cross = np.cross(edge1, edge2, axis=0)
+        total = np.stack(
+            [np.bincount(faces.ravel(), np.repeat(c, 3), points.shape[1]) for c in cross]
+        )
+        length = np.sqrt((total * total).sum(axis=0))
+        factor = np.divide(NORMAL_SCALE, length, out=np.zeros_like(length), where=length > 0)
+        normals[frame] = np.rint(total * factor)
+    return normals
+
+
+@compiled
+def vertex_normals_kernel(
+    positions: NDArray[np.float32],  # (n, 3, V)
+    faces: NDArray[np.int32],
+    first: int,
+    last: int,
+    normals: NDArray[np.int8],  # (n, 3, V), written
+) -> None:
+    """Compiled form of :func:`vertex_normals` for frames ``first`` to ``last``."""
+    vertices = positions.shape[2]
+    total = np.empty((vertices, 3), np.float64)
+    for t in range(first, last):
+        x, y, z = positions[t, 0], positions[t, 1], positions[t, 2]
+        total[:] = 0
+        for f in range(faces.shape[0]):
+            i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
+            px, py, pz = np.float64(x[i]), np.float64(y[i]), np.float64(z[i])
+            ax, ay, az = x[j] - px, y[j] - py, z[j] - pz
+            bx, by, bz = x[k] - px, y[k] - py, z[k] - pz
+            nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+            for v in (i, j, k):
+                total[v, 0] += nx
+                total[v, 1] += ny
+                total[v, 2] += nz
+        for v in range(vertices):
+            length = np.sqrt(total[v, 0] ** 2 + total[v, 1] ** 2 + total[v, 2] ** 2)
+            factor = NORMAL_SCALE / length if length > 0 else 0.0
+            for axis in range(3):
+                normals[t, axis, v] = np.int8(np.rint(total[v, axis] * factor))
+
+
+def facing_mask(
+    positions: NDArray[np.float32], normals: NDArray[np.int8], sensor: NDArray[np.float64]
+) -> NDArray[np.uint8]:
+    """1 where a vertex's normal does not point away from the sensor.
+
+    Parameters
+    ----------
+    positions : float32 array, shape (n, 3, V)
+    normals : int8 array, shape (n, 3, V)
+    sensor : float64 array, shape (3,)
+        In the frame of the positions.
+
+    Returns
+    -------
+    uint8 array, shape (n, V)
+    """
+    place = sensor.astype(np.float32)
+    cosine = np.zeros((positions.shape[0], positions.shape[2]), np.float32)
+    for axis in range(3):
+        cosine += (place[axis] - positions[:, axis]) * normals[:, axis]
+    return (cosine >= 0).astype(np.uint8)
+
+
+@compiled
+def facing_kernel(  # type: ignore[no-untyped-def]
+    x, y, z, nx, ny, nz, sx: np.float32, sy: np.float32, sz: np.float32, visible
+) -> None:
+    """Compiled form of :func:`facing_mask` for a run of vertices of one frame."""
+    for v in range(visible.shape[0]):
+        cosine = (
+            (sx - x[v]) * np.float32(nx[v])
+            + (sy - y[v]) * np.float32(ny[v])
+            + (sz - z[v]) * np.float32(nz[v])
+        )
+        visible[v] = np.uint8(1) if cosine >= np.float32(0) else np.uint8(0)
+
+
+def compile_kernels() -> None:
+    """Call every kernel of this module once."""
+    positions = np.zeros((1, 3, 3), np.float32)
+    faces = np.array([[0, 1, 2]], np.int32)
+    normals = np.empty((1, 3, 3), np.int8)
+    vertex_normals_kernel(positions, faces, 0, 1, normals)
+    zero = np.float32(0)
+    facing_kernel(*positions[0], *normals[0], zero, zero, zero, np.empty(3, np.uint8))
