@@ -1,0 +1,156 @@
+"""A built wheel works in an environment of its own, away from the checkout."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import sysconfig
+import venv
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+REPOSITORY = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel of this checkout."""
+    folder = tmp_path_factory.mktemp("wheel")
+    build = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", folder]
+    call(*build, REPOSITORY, cwd=folder)
+    (built,) = folder.glob("*.whl")
+    return built
+
+
+@pytest.fixture(scope="module")
+def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Environment with the wheel and, of this environment, the dependencies only."""
+    environment = tmp_path_factory.mktemp("installed") / "environment"
+    venv.create(environment, with_pip=False)
+    install(environment, "--no-deps", "--no-index", wheel)
+    # Paths in a .pth file are searched, but .pth files found there are not read:
+    # the editable installation of the checkout stays out.
+    paths = {sysconfig.get_path("purelib"), sysconfig.get_path("platlib")}
+    (site_packages(environment) / "dependencies.pth").write_text("\n".join(sorted(paths)))
+    return environment
+
+
+@pytest.fixture
+def away(tmp_path: Path) -> Path:
+    """An empty folder to work in, outside the checkout."""
+    assert not tmp_path.is_relative_to(REPOSITORY)
+    return tmp_path
+
+
+def call(*command: object, cwd: Path) -> str:
+    """Run a program without anything that leads to the checkout; return its output."""
+    environment = {
+        name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "SD2_"))
+    }
+    environment["QT_QPA_PLATFORM"] = ""
+    done = subprocess.run(
+        [str(part) for part in command],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def install(environment: Path, *arguments: object) -> None:
+    pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--no-input"]
+    python = scripts(environment) / "python"
+    call(*pip, "--python", python, "install", "--quiet", *arguments, cwd=environment)
+
+
+def scripts(environment: Path) -> Path:
+    return environment / ("Scripts" if os.name == "nt" else "bin")
+
+
+def site_packages(environment: Path) -> Path:
+    variables = {"base": str(environment), "platbase": str(environment)}
+    return Path(sysconfig.get_path("purelib", "venv", variables))
+
+
+def check(environment: Path, away: Path) -> None:
+    """What someone does first after installing."""
+    from sd2core import __version__
+
+    sd2, python = scripts(environment) / "sd2", scripts(environment) / "python"
+    assert call(sd2, "--version", cwd=away).split()[-1] == __version__
+
+    where = "import sd2core, sd2app; print(sd2core.__file__, sd2app.__file__, sep='\\n')"
+    for file in call(python, "-c", where, cwd=away).splitlines():
+        assert Path(file).is_relative_to(environment)
+
+    where = "from sd2core.resources import resource_path as p; print(p('swipes.sd2'))"
+    sample = Path(call(python, "-c", where, cwd=away).strip())
+    assert sample.is_relative_to(environment)
+    told = call(sd2, "info", sample, cwd=away)
+    assert "(simulated)" in told
+    for part in ("Video", "Mesh", "Radar capture"):
+        assert f"{part} {sample}" in told
+
+    call(sd2, "demo", "--screenshot", "window.png", cwd=away)
+    assert_shows_a_window(away / "window.png")
+
+
+def assert_shows_a_window(picture: Path) -> None:
+    import av
+
+    with av.open(str(picture)) as container:
+        pixels = next(container.decode(video=0)).to_ndarray(format="rgb24")
+    height, width, _ = pixels.shape
+    assert width >= 800
+    assert height >= 600
+    # Heatmap, video and scene are full of colours; an empty window has a few.
+    assert len(np.unique(pixels.reshape(-1, 3), axis=0)) > 500
+
+
+def test_the_wheel_holds_the_program_and_nothing_else(wheel: Path) -> None:
+    with zipfile.ZipFile(wheel) as archive:
+        names = set(archive.namelist())
+    assert {name.split("/")[0].split("-")[0] for name in names} == {
+        "sd2core",
+        "sd2app",
+        "sd2_studio",
+    }
+    sources = {
+        path.relative_to(REPOSITORY).as_posix()
+        for package in ("sd2core", "sd2app")
+        for path in (REPOSITORY / package).rglob("*.py")
+    }
+    assert sources <= names
+    resources = {
+        f"sd2core/{path.relative_to(REPOSITORY).as_posix()}"
+        for path in (REPOSITORY / "resources").rglob("*")
+        if path.is_file()
+    }
+    assert "sd2core/resources/swipes.sd2/recording.json" in resources
+    assert resources <= names
+    others = {name for name in names if ".dist-info/" not in name} - sources - resources
+    assert not others
+    assert any(name.endswith("/LICENSE") for name in names)
+
+
+def test_the_wheel_works_away_from_the_checkout(installed: Path, away: Path) -> None:
+    check(installed, away)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+def test_the_wheel_brings_its_dependencies(
+    wheel: Path, away: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    environment = tmp_path_factory.mktemp("empty") / "environment"
+    venv.create(environment, with_pip=False)
+    install(environment, "--constraint", REPOSITORY / "constraints.txt", wheel)
+    check(environment, away)
