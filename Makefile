@@ -24,31 +24,31 @@ help:
 	@echo "make screenshots  the pictures in docs/"
 	@echo "make clean        remove what the above made, .venv included"
 
-setup: system-libraries $(COMPILED)
+setup: system-packages $(COMPILED)
 
-.PHONY: system-libraries system-libraries-for-tests
-system-libraries:
-	@scripts/system_libraries.sh window
+.PHONY: system-packages system-packages-for-tests
+system-packages:
+	@scripts/system_packages.sh
 
-system-libraries-for-tests:
-	@scripts/system_libraries.sh window tests
+system-packages-for-tests:
+	@scripts/system_packages.sh tests
 
-$(INSTALLED): pyproject.toml constraints.txt scripts/virtual_environment.sh
+$(INSTALLED): pyproject.toml constraints.txt scripts/virtual_environment.sh | system-packages
 	@scripts/virtual_environment.sh
 	@touch $@
 
 $(COMPILED): $(INSTALLED) $(KERNELS)
-	@echo "Compiling the kernels …"
+	@echo "Compiling the kernels (half a minute, once)"
 	@$(BIN)/sd2 warm-up
 	@touch $@
 
 demo: setup
 	@scripts/demo.sh
 
-test: system-libraries-for-tests setup
+test: system-packages-for-tests setup
 	@scripts/test.sh "not slow"
 
-test-slow: system-libraries-for-tests setup
+test-slow: system-packages-for-tests setup
 	@scripts/test.sh "slow"
 
 lint: $(INSTALLED)
@@ -67,7 +67,7 @@ bench: setup
 wheel: $(INSTALLED)
 	$(BIN)/python -m build --wheel --no-isolation
 
-screenshots: system-libraries-for-tests setup
+screenshots: system-packages-for-tests setup
 	$(BIN)/python docs/screenshots.py
 
 clean:
