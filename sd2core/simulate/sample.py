@@ -1,0 +1,194 @@
+"""The bundled sample: a body makes eight swipes in front of a camera and a radar.
+
+Video, mesh and radar come from the same motion. The picture and the radar signal are
+made from the fine surface; the recording carries a coarser one, as a body fitted to a
+video would be, with coordinates rounded so that it is small.
+"""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.compiled import worker_count, workers
+from sd2core.errors import Sd2Error
+from sd2core.fmcw.signal import Reflector, SignalOptions, simulate_capture
+from sd2core.io.radar.infineon import write_capture
+from sd2core.mesh import MeshSequence
+from sd2core.progress import Progress, silent
+from sd2core.recording import FILE_NAME, SUFFIX, Recording, Span
+from sd2core.scattering.exact import exact_visibility_kernel
+from sd2core.sensor import PAPER_RADAR, VirtualSensor
+from sd2core.simulate.bodies import Body, Resolution
+from sd2core.simulate.encode import write_compact_mesh, write_video
+from sd2core.simulate.gestures import DURATION_S, SPANS, swipes
+from sd2core.simulate.render import Camera, Renderer
+from sd2core.timebase import Timebase
+
+FRAMES_PER_S = 30
+DISTANCE_M = 2.2
+TITLE = "Eight swipes at 2.2 m"
+RECORDED: Resolution = "low"
+
+_ROUNDING_M = 2.0**-14
+_PLACE_ACROSS_M = 0.05
+_SENSOR = VirtualSensor()
+
+# The room as the radar sees it: wall, skirting corner, a cabinet, a lamp.
+_ROOM = (
+    Reflector((0.15, 0.05, 3.5), 0.020),
+    Reflector((-0.6, 1.0, 3.5), 0.008),
+    Reflector((1.3, 0.3, 2.9), 0.010),
+    Reflector((-1.1, -0.5, 1.6), 0.002),
+)
+_SNR_DB = 12.0
+_SEED = 2
+
+
+def make_sample(out: Path, progress: Progress = silent, *, duration_s: float = DURATION_S) -> Path:
+    """Make the sample recording; the same bytes every time, except for the video.
+
+    Parameters
+    ----------
+    out : Path
+        The recording's folder; ``.sd2`` is appended to a name without it. It
+        appears when it is complete.
+    progress : Progress
+        Counts frames: each is drawn once and seen by the radar once.
+    duration_s : float
+        The motion's beginning only; gestures that do not fit are left out.
+
+    Returns
+    -------
+    Path
+        The folder.
+
+    Raises
+    ------
+    Sd2Error
+        When the folder exists and is not empty.
+    """
+    out = Path(out)
+    if out.suffix != SUFFIX:
+        out = out.with_name(out.name + SUFFIX)
+    if out.exists() and not (out.is_dir() and not any(out.iterdir())):
+        raise Sd2Error(f"{out} exists", "a new folder", "Choose another name, or delete it first")
+    if not out.absolute().parent.is_dir():
+        raise Sd2Error(f"The folder {out.absolute().parent} does not exist", "an existing folder")
+    times_s = np.arange(max(round(duration_s * FRAMES_PER_S), 2)) / FRAMES_PER_S
+    workspace = Path(tempfile.mkdtemp(prefix=f".{out.name}.", suffix=".tmp", dir=out.parent))
+    try:
+        folder = workspace / out.name
+        folder.mkdir()
+        _fill(folder, times_s, progress)
+        folder.chmod(0o755)
+        if out.exists():
+            out.rmdir()
+        folder.rename(out)
+    finally:
+        shutil.rmtree(workspace, ignore_errors=True)
+    return out
+
+
+def _fill(folder: Path, times_s: NDArray[np.float64], progress: Progress) -> None:
+    frames = len(times_s)
+    total = 2 * frames
+    camera = Camera()
+    fine = body_sequence("high", times_s, camera)
+    write_video(
+        folder / "video.mp4",
+        _pictures(fine, camera, progress, total),
+        FRAMES_PER_S,
+        (camera.width, camera.height),
+    )
+    recorded = body_sequence(RECORDED, times_s, camera)
+    rounded = np.rint(recorded.vertices / _ROUNDING_M) * _ROUNDING_M
+    write_compact_mesh(
+        MeshSequence(rounded.astype(np.float32), recorded.faces, recorded.timebase),
+        folder / "mesh.zarr",
+    )
+    capture = simulate_capture(
+        fine,
+        PAPER_RADAR,
+        sensor=_SENSOR,
+        visibility=facet_visibility(fine, _SENSOR),
+        options=SignalOptions(snr_db=_SNR_DB, reflectors=_ROOM, seed=_SEED),
+        progress=lambda done, _: progress(frames + done, total),
+    )
+    write_capture(
+        folder / "radar",
+        capture.samples,
+        capture.config,
+        capture.timebase.times_s,
+        simulated=True,
+        meta=capture.meta,
+    )
+    end_s = float(times_s[-1]) + 1.0 / FRAMES_PER_S
+    Recording.create(
+        folder,
+        video=folder / "video.mp4",
+        mesh=folder / "mesh.zarr",
+        radar=folder / "radar",
+        sensor=_SENSOR,
+        spans=tuple(
+            Span(start_s=span.start_s, end_s=span.end_s, label=span.label)
+            for span in SPANS
+            if span.end_s <= end_s
+        ),
+        title=TITLE,
+        simulated=True,
+    )
+
+
+def body_sequence(
+    resolution: Resolution, times_s: NDArray[np.float64], camera: Camera
+) -> MeshSequence:
+    """The moving body in the camera frame, (T, V, 3) float64, not rounded."""
+    body = Body.load(resolution)
+    motion = swipes(body.skeleton, times_s)
+    place = np.array([_PLACE_ACROSS_M, camera.above_floor_m, DISTANCE_M])
+    vertices = body.pose(motion.rotations, motion.translation_m + place)
+    return MeshSequence(vertices, body.faces, Timebase(times_s), source="simulated body")
+
+
+def facet_visibility(mesh: MeshSequence, sensor: VirtualSensor) -> NDArray[np.bool_]:
+    """Which facets face the sensor and have a centre that nothing hides, (T, F)."""
+    assert mesh.faces is not None
+    visible = np.zeros((mesh.frame_count, len(mesh.faces)), dtype=np.bool_)
+    place = np.asarray(sensor.position_m)
+
+    def fill(frame: int) -> None:
+        vertices = np.asarray(mesh.frame(frame), dtype=np.float64)
+        corners = vertices[mesh.faces]  # (F, 3, 3)
+        centres = corners.mean(axis=1)
+        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        facing = ((place - centres) * across).sum(axis=1) > 0
+        # The centres go along as loose vertices, which the surface may hide.
+        points = np.concatenate([vertices, centres]).T[None]  # (1, 3, V + F)
+        needed = np.concatenate([np.zeros(len(vertices), bool), facing])[None].astype(np.uint8)
+        seen = np.zeros_like(needed)
+        exact_visibility_kernel(
+            np.ascontiguousarray(points, dtype=np.float32), mesh.faces, place, needed, 0, 1, seen
+        )
+        visible[frame] = seen[0, len(vertices) :].astype(bool)
+
+    list(workers().map(fill, range(mesh.frame_count)))
+    return visible
+
+
+def _pictures(
+    mesh: MeshSequence, camera: Camera, progress: Progress, total: int
+) -> Iterator[NDArray[np.uint8]]:
+    renderer = Renderer(Body.load("high"), camera)
+    progress(0, total)
+    yield renderer.frame(mesh.frame(0))
+    step = worker_count()
+    for start in range(1, mesh.frame_count, step):
+        progress(start, total)
+        stop = min(start + step, mesh.frame_count)
+        yield from workers().map(renderer.frame, mesh.read(start, stop))
