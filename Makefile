@@ -6,6 +6,8 @@ BIN := .venv/bin
 PYTEST := $(BIN)/python -m pytest
 export PYTHON
 
+.NOTPARALLEL:
+
 INSTALLED := .venv/.installed
 COMPILED := .venv/.compiled
 KERNELS := $(wildcard sd2core/compiled.py sd2core/scattering/*.py sd2core/doppler/*.py)
