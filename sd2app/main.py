@@ -39,7 +39,7 @@ def run(paths: Sequence[Path] = (), *, screenshot: Path | None = None) -> int:
     assert isinstance(application, QApplication)
     application.setApplicationName("SD² Studio")
     application.setDesktopFileName("sd2-studio")
-    settings = Settings()
+    settings = Settings() if screenshot is None else Settings.forgetful()
     apply_theme(application, is_dark(settings))
     window = MainWindow(settings)
     window.show()

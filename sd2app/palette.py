@@ -21,6 +21,7 @@ class Palette:
     real: str
     hatch: str
     warning: str
+    overlay: str
 
 
 LIGHT = Palette(
@@ -36,6 +37,7 @@ LIGHT = Palette(
     real="#b4520b",
     hatch="#9aa1ab",
     warning="#a33a00",
+    overlay="#38a9ff",
 )
 DARK = Palette(
     window="#17191d",
@@ -50,6 +52,7 @@ DARK = Palette(
     real="#f5a45a",
     hatch="#5a616c",
     warning="#ffb07a",
+    overlay="#38a9ff",
 )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from pathlib import Path
 
 from PySide6.QtCore import QByteArray, QSettings
@@ -12,8 +13,18 @@ _RECENT = 10
 class Settings:
     """Typed access to the user's settings."""
 
+    @classmethod
+    def forgetful(cls) -> Settings:
+        """Settings that start empty and are not kept."""
+        folder = tempfile.TemporaryDirectory(prefix="sd2-settings-")
+        store = QSettings(str(Path(folder.name) / "settings.ini"), QSettings.Format.IniFormat)
+        settings = cls(store)
+        settings._folder = folder
+        return settings
+
     def __init__(self, store: QSettings | None = None) -> None:
         self._store = store if store is not None else QSettings("SD2 Studio", "SD2 Studio")
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
 
     @property
     def recent(self) -> list[Path]:

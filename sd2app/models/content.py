@@ -10,21 +10,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sd2core.errors import Sd2Error
-from sd2core.io.kinds import kind_of
+from sd2core.io.kinds import Kind, kind_of
 from sd2core.mesh import MeshSequence
 from sd2core.progress import Progress
 from sd2core.recording import Recording, open_recording
+from sd2core.sensor import VelocityAxis
 from sd2core.spectrum import DopplerMap
 from sd2core.timebase import Timebase
 
 if TYPE_CHECKING:
+    from sd2core.fmcw.processing import Clutter
     from sd2core.io.radar import RadarCapture
     from sd2core.io.video import VideoReader
 
 UNTITLED = Path()
 """Folder of a recording that was not saved yet."""
 
-CLUTTER_CHOICES = ("mean", "moving", "none")
+CLUTTER_CHOICES: tuple[Clutter, ...] = ("mean", "moving", "none")
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +61,7 @@ def recording_of(paths: Sequence[Path], base: Recording | None = None) -> Record
     Sd2Error
         When a path is of no known kind, or two are of the same.
     """
-    kinds: dict[str, Path] = {}
+    kinds: dict[Kind, Path] = {}
     for path in paths:
         kind = kind_of(path)
         if kind == "map":
@@ -87,7 +89,7 @@ def recording_of(paths: Sequence[Path], base: Recording | None = None) -> Record
     return recording
 
 
-def load_content(recording: Recording, clutter: str, progress: Progress) -> Content:
+def load_content(recording: Recording, clutter: Clutter, progress: Progress) -> Content:
     """Open every part of a recording.
 
     A part that is missing or damaged does not keep the others from being
@@ -116,7 +118,9 @@ def load_content(recording: Recording, clutter: str, progress: Progress) -> Cont
     progress(3, 4)
     radar_map = attempt(
         capture,
-        lambda: doppler_map(capture, clutter=clutter, progress=lambda *_: progress(3, 4)),
+        lambda: doppler_map(
+            capture, axis=VelocityAxis(), clutter=clutter, progress=lambda *_: progress(3, 4)
+        ),
     )
     progress(4, 4)
     parts = [part for part in (video, mesh, capture) if part is not None]

@@ -15,10 +15,12 @@ from sd2app.models.content import UNTITLED, Content, load_content, recording_of
 from sd2app.models.jobs import Job, JobsModel
 from sd2core.mesh import MeshSequence
 from sd2core.recording import Recording, Relinked, Span
+from sd2core.sensor import VelocityAxis
 from sd2core.spectrum import DopplerMap
 from sd2core.timebase import Timebase
 
 if TYPE_CHECKING:
+    from sd2core.fmcw.processing import Clutter
     from sd2core.io.radar import RadarCapture
     from sd2core.io.video import VideoReader
 
@@ -50,7 +52,7 @@ class DocumentModel(QObject):
         self._jobs = jobs
         self._job: Job | None = None
         self._content: Content | None = None
-        self._clutter = "mean"
+        self._clutter: Clutter = "mean"
         self._runner = LatestRunner("open", self)
         self._runner.partial.connect(self._report)
         self._runner.finished.connect(self._receive)
@@ -119,7 +121,7 @@ class DocumentModel(QObject):
         return FOCAL_PER_WIDTH * self._content.video.width
 
     @property
-    def clutter(self) -> str:
+    def clutter(self) -> Clutter:
         """How static echoes are removed from the capture."""
         return self._clutter
 
@@ -204,7 +206,7 @@ class DocumentModel(QObject):
             recording.radar_offset_s = offset_s
             self.changed.emit()
 
-    def set_clutter(self, clutter: str) -> None:
+    def set_clutter(self, clutter: Clutter) -> None:
         """Remove static echoes another way."""
         if clutter == self._clutter:
             return
@@ -217,7 +219,9 @@ class DocumentModel(QObject):
         def process(emit: Emit) -> DopplerMap:
             from sd2core.fmcw.processing import doppler_map
 
-            return doppler_map(capture, clutter=clutter, progress=lambda *_: emit(None))
+            return doppler_map(
+                capture, axis=VelocityAxis(), clutter=clutter, progress=lambda *_: emit(None)
+            )
 
         self._maps.submit(process)
 

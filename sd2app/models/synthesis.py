@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QObject, QTimer, Signal
-from sd2core.doppler.synthesizer import FrameScattering, Stretch, Synthesizer
 
 from sd2app.jobs.latest import Emit, LatestRunner
+from sd2app.models.canvas import FINAL, RANK, Canvas, pieces
 from sd2app.models.content import reference_of
 from sd2app.models.document import DocumentModel
 from sd2app.models.jobs import Job, JobsModel
@@ -21,6 +19,8 @@ from sd2app.models.sensor import SensorModel
 from sd2app.models.tracks import TrackModel
 from sd2app.models.visible_span import VisibleSpanModel
 from sd2core.compiled import compile_in_background, kernels_ready
+from sd2core.doppler.options import PRESETS
+from sd2core.doppler.synthesizer import FrameScattering, Stretch, Synthesizer, Visibility
 from sd2core.errors import Sd2Error
 from sd2core.progress import Cancelled
 from sd2core.sensor import Vector, VirtualSensor
@@ -31,11 +31,13 @@ _AT_ONCE = 12_000_000
 _EXACT_PARTS = 16
 _KERNELS_POLL_MS = 500
 
-_RANK = {"none": 3, "facing": 1, "frozen": 2, "exact": 3}
 _WORDS = {
-    "none": "all vertices (point cloud)",
-    "facing": "preview: vertices facing the sensor",
-    "frozen": "preview: visibility of the last exact placement",
+    RANK["facing"]: "preview: vertices facing the sensor",
+    RANK["frozen"]: "preview: visibility of the last exact placement",
+}
+_FINAL_WORDS = {
+    "none": "all vertices of the point cloud",
+    "facing": "vertices facing the sensor",
     "exact": "exact visibility",
 }
 
@@ -92,6 +94,9 @@ class SynthesisModel(QObject):
         self._jobs = jobs
         self._job: Job | None = None
         self._synthesizer: Synthesizer | None = None
+        self._canvas = Canvas.blank(2, 0)
+        self._frame: tuple[Any, FrameScattering] | None = None
+        self._torso: tuple[int, Vector] | None = None
         self._forget()
         self._runner = LatestRunner("synthesis", self)
         self._runner.partial.connect(self._receive)
@@ -120,9 +125,7 @@ class SynthesisModel(QObject):
     @property
     def complete(self) -> bool:
         """Whether every frame is exact for the sensor where it stands."""
-        return self._values_for == self._sensor.sensor and bool(
-            self._rank.size and self._rank.min() >= _RANK["exact"]
-        )
+        return self._canvas.final and self._canvas.sensor == self._sensor.sensor
 
     @property
     def torso_m(self) -> Vector | None:
@@ -150,13 +153,14 @@ class SynthesisModel(QObject):
     def readout(self) -> Readout | None:
         """Numbers beside the sensor, None without a mesh on screen."""
         index, torso = self._mesh_frame(), self.torso_m
-        if index is None or torso is None or not self._rank[index]:
+        canvas = self._canvas
+        if index is None or torso is None or not (canvas.frames and canvas.rank[index]):
             return None
         offset = np.subtract(self._sensor.sensor.position_m, torso)
         return Readout(
             torso_range_m=float(np.linalg.norm(offset)),
-            visible_share=float(self._visible[index]),
-            beyond_share=float(self._beyond[index]),
+            visible_share=float(canvas.visible[index]),
+            beyond_share=float(canvas.beyond[index]),
         )
 
     # --- requests -------------------------------------------------------------------------
@@ -172,17 +176,15 @@ class SynthesisModel(QObject):
         if mesh is None:
             self._announce()
             return
-        visibility = "none" if mesh.faces is None else "exact"
+        options = PRESETS["paper"]
+        if mesh.faces is None:
+            options = replace(options, visibility="none")
         try:
-            self._synthesizer = Synthesizer(mesh, _options(visibility))
+            self._synthesizer = Synthesizer(mesh, options)
         except Sd2Error as error:
             self.failed.emit(str(error))
             return
-        frames, bins = mesh.frame_count, self._synthesizer.options.axis.bins
-        self._values = np.zeros((bins, frames), np.float32)
-        self._visible = np.zeros(frames, np.float32)
-        self._beyond = np.zeros(frames, np.float32)
-        self._rank = np.zeros(frames, np.uint8)
+        self._canvas = Canvas.blank(options.axis.bins, mesh.frame_count)
         if compile_in_background() is not None:
             self._kernels.start()
         self._announce()
@@ -191,14 +193,13 @@ class SynthesisModel(QObject):
     def reset_reference(self) -> None:
         """Make the strongest bin of the map 0 dB."""
         if self._track.map is not None:
-            self._track.set_reference(reference_of(self._values))
+            self._track.set_reference(reference_of(self._canvas.values))
 
     def export(self, path: Path) -> None:
         """Write the exact map with its provenance."""
         if self._synthesizer is None or not self.complete:
             raise Sd2Error("The synthetic map is not complete yet", "an exact map", "Wait for it")
-        values, sensor = self._values.copy(), self._sensor.sensor
-        self._synthesizer.describe(values, sensor).save(path)
+        self._synthesizer.map(self._sensor.sensor).save(path)
 
     def close(self) -> None:
         """Stop computing."""
@@ -209,13 +210,9 @@ class SynthesisModel(QObject):
     # --- following ------------------------------------------------------------------------
 
     def _forget(self) -> None:
-        self._values = np.zeros((2, 0), np.float32)
-        self._visible: NDArray[np.float32] = np.zeros(0, np.float32)
-        self._beyond: NDArray[np.float32] = np.zeros(0, np.float32)
-        self._rank: NDArray[np.uint8] = np.zeros(0, np.uint8)
-        self._values_for: VirtualSensor | None = None
-        self._frame: tuple[Any, FrameScattering] | None = None
-        self._torso: tuple[int, Vector] | None = None
+        self._canvas = Canvas.blank(2, 0)
+        self._frame = None
+        self._torso = None
         self._needs_reference = True
         self._again = False
         self._sweeping = False
@@ -249,8 +246,8 @@ class SynthesisModel(QObject):
         self._again, self._sweeping = False, True
         synthesizer, sensor = self._synthesizer, self._sensor.sensor
         start, stop = self._frames_in_view()
-        if synthesizer.mesh.vertex_count * len(self._rank) <= _AT_ONCE:
-            start, stop = 0, len(self._rank)
+        if synthesizer.mesh.vertex_count * self._canvas.frames <= _AT_ONCE:
+            start, stop = 0, self._canvas.frames
         rough = self._rough()
 
         def work(emit: Emit) -> _Part:
@@ -265,14 +262,14 @@ class SynthesisModel(QObject):
         self._end_job()
         self._again = self._sweeping = False
         synthesizer, sensor = self._synthesizer, self._sensor.sensor
-        rank = self._rank.copy() if self._values_for == sensor else np.zeros_like(self._rank)
-        if rank.min() >= _RANK["exact"]:
+        rank = self._canvas.ranks_for(sensor)
+        if rank.min() >= FINAL:
             return
         view, rough = self._frames_in_view(), self._rough()
         final = synthesizer.options.visibility
         rough_size = max(_AT_ONCE // synthesizer.mesh.vertex_count, 64)
         exact_size = min(max(len(rank) // _EXACT_PARTS, 8), max(rough_size // 16, 8))
-        total = int((rank < _RANK["exact"]).sum())
+        total = int((rank < FINAL).sum())
         if kernels_ready() or final == "none":
             self._job = self._jobs.start("Exact visibility", self._cancel)
 
@@ -280,20 +277,20 @@ class SynthesisModel(QObject):
             def check(*_: int) -> None:
                 emit(None)
 
-            def run(below: int, size: int, visibility: str) -> None:
+            def run(below: int, size: int, visibility: Visibility) -> None:
                 done = 0
-                for start, stop in _pieces(rank, below, view, size):
+                for start, stop in pieces(rank, below, view, size):
                     stretch = synthesizer.stretch(sensor, start, stop, visibility, check)
-                    rank[start:stop] = _RANK[stretch.visibility]
+                    rank[start:stop] = RANK[stretch.quality]
                     emit(_Part(sensor, start, stretch, synthesizer))
                     done += stop - start
                     if visibility == final:
                         emit((done, total))
 
             if rough != final:
-                run(_RANK["facing"], rough_size, rough)
+                run(1, rough_size, rough)
             if kernels_ready() or final != "exact":
-                run(_RANK["exact"], exact_size, final)
+                run(FINAL, exact_size, final)
 
         self._runner.submit(work)
 
@@ -301,7 +298,7 @@ class SynthesisModel(QObject):
         start, stop = self._frames_in_view()
         if self._synthesizer is None or self._sensor.dragging or stop <= start:
             return
-        if self._rank[start:stop].min() < _RANK["exact"] and len(self._rank) > stop - start:
+        if self._canvas.rank[start:stop].min() < FINAL and self._canvas.frames > stop - start:
             self._settle()
 
     def _cancel(self) -> None:
@@ -335,39 +332,36 @@ class SynthesisModel(QObject):
     def _take(self, part: _Part) -> None:
         if part.synthesizer is not self._synthesizer:
             return
-        if part.sensor != self._values_for:
-            self._values_for = part.sensor
-            self._rank[:] = 0
-        stretch = part.stretch
-        stop = part.start + stretch.values.shape[1]
-        self._values[:, part.start : stop] = stretch.values
-        self._visible[part.start : stop] = stretch.visible_share
-        self._beyond[part.start : stop] = stretch.beyond_share
-        self._rank[part.start : stop] = _RANK[stretch.visibility]
-        if self._needs_reference and self._rank.min() > 0:
+        self._canvas.paint(part.sensor, part.start, part.stretch)
+        if self._needs_reference and self._canvas.full:
             self._needs_reference = False
-            self._track.set_reference(reference_of(self._values))
-        covered = None if self._rank.min() > 0 else self._rank > 0
+            self._track.set_reference(reference_of(self._canvas.values))
+        covered = None if self._canvas.full else self._canvas.rank > 0
         self._track.set_map(self._map(), covered)
         self._say_quality()
         self.readout_changed.emit()
 
     def _map(self) -> DopplerMap:
         assert self._synthesizer is not None
-        return self._synthesizer.describe(self._values, self._sensor.sensor)
+        options, mesh = self._synthesizer.options, self._synthesizer.mesh
+        return DopplerMap(
+            values=self._canvas.values,
+            axis=options.axis,
+            timebase=mesh.timebase,
+            kind="synthetic",
+            unit="share of vertices",
+            null_bins=options.null_bins,
+        )
 
     def _say_quality(self) -> None:
-        if not self._rank.size:
+        rank = self._canvas.rank
+        if self._synthesizer is None or not rank.any():
             return
-        final = self._synthesizer.options.visibility if self._synthesizer else "exact"
-        exact = float((self._rank >= _RANK["exact"]).mean())
-        if exact == 1.0:
-            words = _WORDS[final]
-        else:
-            lowest = int(self._rank[self._rank > 0].min(initial=_RANK["exact"]))
-            words = _WORDS["frozen" if lowest == _RANK["frozen"] else "facing"]
-            if exact > 0:
-                words = f"{words}, {100 * exact:.0f} % exact"
+        final = float((rank >= FINAL).mean())
+        lowest = int(rank[rank > 0].min())
+        words = _WORDS.get(lowest) or _FINAL_WORDS[self._synthesizer.options.visibility]
+        if 0 < final < 1 and lowest < FINAL:
+            words = f"{words}, {100 * final:.0f} % exact"
         if not kernels_ready():
             words += " · preparing fast kernels"
         self._track.set_status(words)
@@ -385,13 +379,14 @@ class SynthesisModel(QObject):
 
     # --- helpers --------------------------------------------------------------------------
 
-    def _rough(self) -> str:
+    def _rough(self) -> Visibility:
         assert self._synthesizer is not None
         if self._synthesizer.options.visibility == "none":
             return "none"
-        return "frozen" if self._synthesizer.has_frozen_mask else "facing"
+        # Falls back to the facing test where no exact visibility is kept.
+        return "frozen"
 
-    def _frame_visibility(self) -> str:
+    def _frame_visibility(self) -> Visibility:
         assert self._synthesizer is not None
         final = self._synthesizer.options.visibility
         if final == "exact" and (self._sensor.dragging or not kernels_ready()):
@@ -410,30 +405,3 @@ class SynthesisModel(QObject):
         if mesh is None:
             return (0, 0)
         return mesh.timebase.frames_between(self._span.start_s, self._span.end_s)
-
-
-def _options(visibility: str) -> Any:
-    from dataclasses import replace
-
-    from sd2core.doppler.options import PRESETS
-
-    return replace(PRESETS["paper"], visibility=visibility)
-
-
-def _pieces(
-    rank: NDArray[np.uint8], below: int, view: tuple[int, int], size: int
-) -> Iterator[tuple[int, int]]:
-    """Stretches of frames whose rank is below, from the view onwards, then before it."""
-    frames = len(rank)
-    first, last = view if view[1] > view[0] else (0, 0)
-    for begin, end in ((first, last), (last, frames), (0, first)):
-        start = begin
-        while start < end:
-            if rank[start] >= below:
-                start += 1
-                continue
-            stop = start
-            while stop < min(end, start + size) and rank[stop] < below:
-                stop += 1
-            yield start, stop
-            start = stop

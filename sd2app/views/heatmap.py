@@ -16,6 +16,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from sd2app.colour_maps import lookup_table
 from sd2app.models.display import DisplayModel
 from sd2app.models.playback import PlaybackModel
 from sd2app.models.tracks import PointerModel, TrackModel
@@ -157,7 +158,8 @@ class HeatmapView(QWidget):
         doppler_map = self._track.map
         assert doppler_map is not None
         edges = doppler_map.axis.edges_mps
-        colours = self._display.palette
+        nothing = QColor.fromRgb(int(lookup_table(self._display.levels.colour_map)[0]))
+        hatch = QColor(255, 255, 255, 80)
         painter.save()
         painter.setClipRect(plot)
         painter.setPen(Qt.PenStyle.NoPen)
@@ -168,8 +170,8 @@ class HeatmapView(QWidget):
             for index in bins:
                 top, bottom = self.y_of(edges[index + 1]), self.y_of(edges[index])
                 band = QRectF(plot.left(), top, plot.width(), bottom - top)
-                painter.fillRect(band, QColor(colours.well))
-                painter.fillRect(band, QBrush(QColor(colours.hatch), pattern))
+                painter.fillRect(band, nothing)
+                painter.fillRect(band, QBrush(hatch, pattern))
         painter.restore()
 
     def _paint_axis(self, painter: QPainter, plot: QRectF) -> None:

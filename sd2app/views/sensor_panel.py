@@ -11,6 +11,7 @@ from PySide6.QtWidgets import (
     QDoubleSpinBox,
     QFormLayout,
     QFrame,
+    QGridLayout,
     QLabel,
     QPushButton,
     QVBoxLayout,
@@ -73,28 +74,41 @@ class SensorPanel(QWidget):
 
     # --- building -------------------------------------------------------------------------
 
-    def _placement_form(self) -> QFormLayout:
-        form = _form()
+    def _placement_form(self) -> QGridLayout:
+        grid = QGridLayout()
+        grid.setHorizontalSpacing(6)
+        grid.setVerticalSpacing(4)
         self._xyz = [
             _number(self, -100.0, 100.0, " m", f"Sensor position, {axis}: {meaning}")
             for axis, meaning in (("x", "to the right"), ("y", "down"), ("z", "forward"))
         ]
-        for box, name in zip(self._xyz, ("x right", "y down", "z forward"), strict=True):
+        self._spherical = [
+            _number(self, 0.05, 100.0, " m", "Range: distance from the body's centre"),
+            _number(
+                self, -180.0, 180.0, "°",
+                "Azimuth: 0° is between body and camera, positive to the right", 1,
+            ),
+            _number(
+                self, -90.0, 90.0, "°", "Elevation: positive is above the body's centre", 1
+            ),
+        ]  # fmt: skip
+        names = (("x", "range"), ("y", "azim."), ("z", "elev."))
+        for row, (left, right) in enumerate(names):
+            for column, (name, box) in enumerate(
+                ((left, self._xyz[row]), (right, self._spherical[row]))
+            ):
+                label = QLabel(name, self)
+                label.setObjectName("muted")
+                label.setToolTip(box.toolTip())
+                box.setAccessibleName(box.toolTip())
+                grid.addWidget(label, row, 2 * column)
+                grid.addWidget(box, row, 2 * column + 1)
+                grid.setColumnStretch(2 * column + 1, 1)
+        for box in self._xyz:
             box.valueChanged.connect(self._place_by_xyz)
-            form.addRow(name, box)
-        self._range = _number(self, 0.05, 100.0, " m", "Distance from the body's centre")
-        self._azimuth = _number(
-            self, -180.0, 180.0, "°", "0° is between body and camera, positive to the right", 1
-        )
-        self._elevation = _number(self, -90.0, 90.0, "°", "Positive is above the body's centre", 1)
-        for box, name in (
-            (self._range, "Range"),
-            (self._azimuth, "Azimuth"),
-            (self._elevation, "Elevation"),
-        ):
+        for box in self._spherical:
             box.valueChanged.connect(self._place_by_angles)
-            form.addRow(name, box)
-        return form
+        return grid
 
     def _readout_form(self) -> QFormLayout:
         form = _form()
@@ -159,20 +173,20 @@ class SensorPanel(QWidget):
     def _place_by_xyz(self) -> None:
         x, y, z = (box.value() for box in self._xyz)
         now = self._sensor.sensor
-        if any(abs(a - b) > 5e-4 for a, b in zip((x, y, z), now.position_m, strict=True)):
+        if any(abs(a - b) > 5e-3 for a, b in zip((x, y, z), now.position_m, strict=True)):
             self._edits.place_sensor(replace(now, position_m=(x, y, z)))
 
     def _place_by_angles(self) -> None:
         target = self._synthesis.torso_m
         if target is None:
             return
-        wanted = (self._range.value(), self._azimuth.value(), self._elevation.value())
+        range_m, azimuth_deg, elevation_deg = wanted = [box.value() for box in self._spherical]
         now = spherical_from_position(target, self._sensor.sensor.position_m)
         if any(
             abs(a - b) > tolerance
-            for a, b, tolerance in zip(wanted, now, (5e-4, 0.05, 0.05), strict=True)
+            for a, b, tolerance in zip(wanted, now, (5e-3, 0.05, 0.05), strict=True)
         ):
-            position = position_from_spherical(target, *wanted)
+            position = position_from_spherical(target, range_m, azimuth_deg, elevation_deg)
             self._edits.place_sensor(replace(self._sensor.sensor, position_m=position))
 
     # --- showing --------------------------------------------------------------------------
@@ -180,13 +194,12 @@ class SensorPanel(QWidget):
     def _refresh_placement(self) -> None:
         position = self._sensor.sensor.position_m
         target = self._synthesis.torso_m
-        for box in (self._range, self._azimuth, self._elevation):
+        for box in self._spherical:
             box.setEnabled(target is not None)
         shown = [*zip(self._xyz, position, strict=True)]
         if target is not None:
             spherical = spherical_from_position(target, position)
-            boxes = (self._range, self._azimuth, self._elevation)
-            shown += [*zip(boxes, spherical, strict=True)]
+            shown += [*zip(self._spherical, spherical, strict=True)]
         for box, value in shown:
             with QSignalBlocker(box):
                 box.setValue(value)
@@ -264,7 +277,7 @@ def _value(parent: QWidget, tip: str) -> QLabel:
 
 
 def _number(
-    parent: QWidget, low: float, high: float, suffix: str, tip: str, decimals: int = 3
+    parent: QWidget, low: float, high: float, suffix: str, tip: str, decimals: int = 2
 ) -> QDoubleSpinBox:
     box = QDoubleSpinBox(parent)
     box.setRange(low, high)
@@ -273,4 +286,5 @@ def _number(
     box.setSuffix(suffix)
     box.setToolTip(tip)
     box.setKeyboardTracking(False)
+    box.setMinimumWidth(72)
     return box

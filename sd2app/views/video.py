@@ -12,8 +12,7 @@ from sd2app.models.display import DisplayModel
 from sd2app.models.document import DocumentModel
 from sd2app.models.playback import PlaybackModel
 from sd2app.models.video import VideoModel
-
-_OPACITY = 0.55
+from sd2app.views.mesh_overlay import blend, covered_pixels, project
 
 
 class VideoView(QWidget):
@@ -75,30 +74,6 @@ class VideoView(QWidget):
         vertices = mesh.frame(mesh.timebase.frame_at(time_s))
         height, width = picture.shape[:2]
         pixels = project(vertices, self._document.focal_px, width, height)
-        return draw_dots(picture, pixels, QColor(self._display.palette.accent).getRgb()[:3])
-
-
-def project(
-    vertices: NDArray[np.floating], focal_px: float, width: int, height: int
-) -> NDArray[np.int64]:
-    """Pixels (x, y) of the vertices that fall into the picture, (n, 2).
-
-    Pinhole camera at the origin, optical axis +z, principal point in the centre.
-    """
-    vertices = vertices[vertices[:, 2] > 0.01]
-    x = np.floor(focal_px * vertices[:, 0] / vertices[:, 2] + width / 2)
-    y = np.floor(focal_px * vertices[:, 1] / vertices[:, 2] + height / 2)
-    inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
-    return np.stack([x[inside], y[inside]], axis=1).astype(np.int64)
-
-
-def draw_dots(
-    picture: NDArray[np.uint8], pixels: NDArray[np.int64], colour: tuple[int, ...]
-) -> NDArray[np.uint8]:
-    """A copy of the picture with a translucent dot on every pixel given."""
-    covered = np.zeros(picture.shape[:2], bool)
-    covered[pixels[:, 1], pixels[:, 0]] = True
-    result = picture.copy()
-    blend = picture[covered] * (1.0 - _OPACITY) + np.array(colour) * _OPACITY
-    result[covered] = blend.astype(np.uint8)
-    return result
+        faces = None if self._display.as_dots else mesh.faces
+        covered = covered_pixels(pixels, faces, width, height)
+        return blend(picture, covered, QColor(self._display.palette.overlay).getRgb()[:3])

@@ -42,6 +42,7 @@ class MainWindow(QMainWindow):
         self._ready = False
         self.setWindowTitle("SD² Studio")
         self.setAcceptDrops(True)
+        self.setMinimumSize(960, 640)
         self.resize(1280, 800)
         self._panels = {name: _panel(name) for name in _PANELS}
         self._build_skeleton()
@@ -69,12 +70,12 @@ class MainWindow(QMainWindow):
         self._top = _splitter(
             Qt.Orientation.Horizontal,
             [self._panels[name] for name in ("video", "scene", "sensor")],
-            (370, 640, 254),
+            (360, 620, 284),
         )
         self._bottom = _splitter(
             Qt.Orientation.Horizontal,
             [self._panels["tracks"], self._panels["spectrum"]],
-            (1016, 248),
+            (992, 272),
         )
         self._rows = _splitter(Qt.Orientation.Vertical, [self._top, self._bottom], (360, 380))
         self._column = QVBoxLayout()

@@ -1,0 +1,99 @@
+"""A Doppler map that is filled stretch by stretch, each frame with its quality."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.doppler.synthesizer import Quality, Stretch
+from sd2core.sensor import VirtualSensor
+
+RANK: dict[Quality, int] = {"facing": 1, "frozen": 2, "none": 3, "exact": 3}
+"""How good a frame is; 0 is not computed. ``none`` is final for a point cloud."""
+
+FINAL = 3
+
+View = tuple[int, int]
+
+
+@dataclass(eq=False)
+class Canvas:
+    """What is known of the map so far.
+
+    Parameters
+    ----------
+    values : float32 array, shape (bins, T)
+    visible, beyond : float32 arrays, shape (T,)
+        Shares per frame.
+    rank : uint8 array, shape (T,)
+        See :data:`RANK`.
+    sensor : VirtualSensor or None
+        Placement that all of it is for.
+    """
+
+    values: NDArray[np.float32]
+    visible: NDArray[np.float32]
+    beyond: NDArray[np.float32]
+    rank: NDArray[np.uint8]
+    sensor: VirtualSensor | None = None
+
+    @classmethod
+    def blank(cls, bins: int, frames: int) -> Canvas:
+        """Nothing known."""
+        return cls(
+            np.zeros((bins, frames), np.float32),
+            np.zeros(frames, np.float32),
+            np.zeros(frames, np.float32),
+            np.zeros(frames, np.uint8),
+        )
+
+    @property
+    def frames(self) -> int:
+        """Number of frames T."""
+        return len(self.rank)
+
+    @property
+    def full(self) -> bool:
+        """Whether every frame holds something."""
+        return bool(self.frames and self.rank.min() > 0)
+
+    @property
+    def final(self) -> bool:
+        """Whether every frame is as good as it gets."""
+        return bool(self.frames and self.rank.min() >= FINAL)
+
+    def paint(self, sensor: VirtualSensor, start: int, stretch: Stretch) -> None:
+        """Take a stretch over; what was there for another placement is forgotten."""
+        if sensor != self.sensor:
+            self.sensor = sensor
+            self.rank[:] = 0
+        inside = slice(start, start + stretch.values.shape[1])
+        self.values[:, inside] = stretch.values
+        self.visible[inside] = stretch.visible_share
+        self.beyond[inside] = stretch.beyond_share
+        self.rank[inside] = RANK[stretch.quality]
+
+    def ranks_for(self, sensor: VirtualSensor) -> NDArray[np.uint8]:
+        """A copy of the ranks as far as they hold for a placement."""
+        return self.rank.copy() if sensor == self.sensor else np.zeros_like(self.rank)
+
+
+def pieces(rank: NDArray[np.uint8], below: int, view: View, size: int) -> Iterator[tuple[int, int]]:
+    """Stretches of at most ``size`` frames whose rank is below: the view first, then on, then back.
+
+    ``rank`` may change while iterating.
+    """
+    first, last = view if view[1] > view[0] else (0, 0)
+    for begin, end in ((first, last), (last, len(rank)), (0, first)):
+        start = begin
+        while start < end:
+            if rank[start] >= below:
+                start += 1
+                continue
+            inside = rank[start : min(end, start + size)] < below
+            stop = start + (len(inside) if inside.all() else int(inside.argmin()))
+            yield start, stop
+            start = stop
