@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from sd2app.palette import Palette
 
@@ -97,10 +97,10 @@ class SceneColours:
         return cls(
             background=background,
             grid=mixed(background, palette.muted, 0.42 if dark else 0.38),
-            shadow=mixed(background, "#000000", 0.42 if dark else 0.13),
+            shadow=mixed(background, "#000000", 0.32 if dark else 0.13),
             plain="#aab1bb" if dark else "#c3c9d1",
             hidden="#5f6670" if dark else "#8b929c",
-            visible=palette.accent,
+            visible=palette.accent if dark else mixed(palette.accent, "#ffffff", 0.28),
             sensor=palette.accent,
             sensor_hot=mixed(palette.accent, "#ffffff", 0.35),
             camera=palette.muted,
@@ -132,7 +132,7 @@ def range_limits(nearest_m: float, farthest_m: float) -> tuple[float, float]:
     The step grows with the span, so that moving the sensor a little does not
     change the limits at every step.
     """
-    step = nice_step(max(farthest_m - nearest_m, 0.05 * abs(farthest_m), 0.1), 4)
+    step = nice_step(max(farthest_m - nearest_m, 0.05 * abs(farthest_m), 0.1), 8)
     low = max(math.floor(nearest_m / step + 1e-9) * step, 0.0)
     high = math.ceil(farthest_m / step - 1e-9) * step
     return (low, max(high, low + step))
@@ -165,7 +165,6 @@ def mesh_colours(
     What is not known yet is drawn plain. Hidden vertices are muted in every
     mode but ``plain``: they do not contribute to the spectrum.
     """
-    plain: ArrayLike = rgb(colours.plain)
     if mode == "velocity" and velocity_mps is not None:
         result = velocity_colours(velocity_mps, v_max_mps)
     elif mode == "range" and range_m is not None:
@@ -173,12 +172,20 @@ def mesh_colours(
     elif mode == "visibility" and visible is not None:
         result = np.tile(rgb(colours.visible), (count, 1))
     else:
-        return np.tile(np.asarray(plain, np.uint8), (count, 1))
+        return _dimmed(np.tile(rgb(colours.plain), (count, 1)), colours, as_dots)
+    result = _dimmed(result, colours, as_dots)
     if visible is None:
         return result
     # Dots do not cover one another: what is hidden has to step back further.
-    hidden = mixed(colours.hidden, colours.background, 0.6) if as_dots else colours.hidden
+    hidden = mixed(colours.hidden, colours.background, 0.7) if as_dots else colours.hidden
     if mode == "range" and not as_dots:
         muted = (0.3 * result + 0.7 * rgb(hidden)).astype(np.uint8)
         return np.where(visible[:, None], result, muted)
     return np.where(visible[:, None], result, rgb(hidden))
+
+
+def _dimmed(result: Rgb, colours: SceneColours, as_dots: bool) -> Rgb:
+    # Dots have no shading: on a light ground the pale middle would vanish.
+    if not as_dots or rgb(colours.background).mean() < 128:
+        return result
+    return (0.76 * result).astype(np.uint8)

@@ -123,6 +123,11 @@ class Navigator:
         self._hover(self.sensor_at(x_px, y_px))
         self._show_hot()
 
+    def look_again(self) -> None:
+        """Something moved under a resting pointer."""
+        if self._hovering and self._held is None:
+            self._hover(self.sensor_at(*self._last_px))
+
     def leave(self) -> None:
         """The pointer left the view."""
         self._hover(False)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QImage, QPainter, QPaintEvent, QPen
@@ -25,6 +27,7 @@ class Overlay(QWidget):
         self._scene = scene
         self._navigator = navigator
         self.message = ""
+        self._legend = QRectF()
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
 
@@ -33,7 +36,7 @@ class Overlay(QWidget):
         return self._scene.colours
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Everything, from far to near."""
+        """Everything there is to say."""
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setFont(self._font())
@@ -42,10 +45,11 @@ class Overlay(QWidget):
             rows = self.rect().adjusted(16, 8, -16, -12)
             where = Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignBottom
             painter.drawText(rows, where | Qt.TextFlag.TextWordWrap, self.message)
+        self._legend = QRectF()
+        self._paint_legend(painter)
         self._paint_metres(painter)
         self._paint_axes(painter)
         self._paint_names(painter)
-        self._paint_legend(painter)
         if self._navigator.holds_sensor:
             self._paint_coordinates(painter)
         elif self._navigator.hovers_sensor:
@@ -60,23 +64,50 @@ class Overlay(QWidget):
         return (self.width(), self.height())
 
     def _paint_metres(self, painter: QPainter) -> None:
-        labels = self._scene.labels
+        labels = self._scene.metre_labels
         if not labels:
             return
-        metrics = QFontMetricsF(painter.font())
         painter.setPen(QColor(self._colours.muted))
-        taken: list[QRectF] = []
-        places = self._scene.pose.project([place for _, place in labels], self._size())
-        for (text, _), (x, y, depth) in zip(labels, places, strict=True):
+        texts = [label.text for label in labels]
+        sides = [
+            self._metre_boxes(painter, texts, [label.left_m for label in labels]),
+            self._metre_boxes(painter, texts, [label.right_m for label in labels]),
+        ]
+        for text, box in max(sides, key=len):
+            painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)
+
+    def _metre_boxes(
+        self,
+        painter: QPainter,
+        texts: list[str],
+        places: list[tuple[float, float, float]],
+    ) -> list[tuple[str, QRectF]]:
+        """Boxes of the labels that fit into the view without touching anything."""
+        metrics = QFontMetricsF(painter.font())
+        view = QRectF(self.rect())
+        body = self._body_box()
+        occupied = [self._legend, body]
+        boxes: list[tuple[str, QRectF]] = []
+        pixels = self._scene.pose.project(places, self._size())
+        for text, (x, y, depth) in zip(texts, pixels, strict=True):
             if not depth > 0.1:
                 continue
-            box = metrics.boundingRect(text)
-            box.moveTo(x + 5.0, y - box.height() / 2)
-            spaced = box.adjusted(-4, -2, 4, 2)
-            if not QRectF(self.rect()).contains(box) or any(map(spaced.intersects, taken)):
-                continue
-            taken.append(box)
-            painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)
+            outwards = 1.0 if x > body.center().x() else -1.0
+            box = QRectF(0.0, 0.0, metrics.horizontalAdvance(text), metrics.height())
+            box.moveCenter(QPointF(x + outwards * (box.width() / 2 + 6.0), y))
+            if view.contains(box) and not any(box.intersects(other) for other in occupied):
+                boxes.append((text, box))
+                occupied.append(box.adjusted(-6.0, -3.0, 6.0, 3.0))
+        return boxes
+
+    def _body_box(self) -> QRectF:
+        """Where in the picture the body moves; empty when it is behind the eye."""
+        pixels = self._scene.pose.project(self._scene.extent.points_m, self._size())
+        pixels = pixels[pixels[:, 2] > 0.1]
+        if not len(pixels):
+            return QRectF()
+        (left, top), (right, bottom) = pixels[:, :2].min(axis=0), pixels[:, :2].max(axis=0)
+        return QRectF(left, top, right - left, bottom - top)
 
     def _paint_axes(self, painter: QPainter) -> None:
         right, down, forward = self._scene.pose.axes
@@ -106,8 +137,8 @@ class Overlay(QWidget):
             )
             text = "Sensor"
             at = QPointF(
-                places[0, 0] - metrics.horizontalAdvance(text) / 2,
-                places[0, 1] - radius - 6.0,
+                places[0, 0] - radius - 8.0 - metrics.horizontalAdvance(text),
+                places[0, 1] + 0.35 * metrics.ascent(),
             )
             painter.drawText(at, text)
         apart = float(np.hypot(*(places[0, :2] - places[1, :2])))
@@ -140,7 +171,8 @@ class Overlay(QWidget):
             step = nice_step(high - low, 6)
             values = np.arange(np.ceil(high / step - 1e-9) * step, low - 1e-9, -step)
             values = values[values <= high + 1e-9]
-            ticks = [f"{value:.6g}" for value in np.round(values, 9)]
+            decimals = max(-math.floor(math.log10(step) + 1e-9), 0)
+            ticks = [f"{value:.{decimals}f}" for value in values]
             shares = [float((high - value) / (high - low)) for value in values]
             title, table, ends = "Range, m", SEQUENTIAL[::-1], ("far", "near")
         self._paint_bar(painter, title, table, ticks, shares, ends)
@@ -162,7 +194,7 @@ class Overlay(QWidget):
         words = max(metrics.horizontalAdvance(word) for word in ends)
         width = max(metrics.horizontalAdvance(title), words, _BAR_WIDTH + _GAP + tick_width)
         knows_hidden = self._scene.knows_hidden
-        height = length + 3.0 * line + 2 * _GAP + (line + _GAP if knows_hidden else 0.0)
+        height = length + 4.0 * line + _GAP + (line + _GAP if knows_hidden else 0.0)
         card = self._card(painter, width, height)
         right = card.right() - _PAD
         y = card.top() + _PAD
@@ -172,7 +204,8 @@ class Overlay(QWidget):
         painter.setPen(QColor(colours.muted))
         text_box.translate(0.0, line + _GAP)
         painter.drawText(text_box, Qt.AlignmentFlag.AlignRight, ends[0])
-        bar = QRectF(right - _BAR_WIDTH, text_box.bottom() + 2.0, _BAR_WIDTH, length - 4.0)
+        # Half a line more than needed: the first and last tick reach beyond the bar.
+        bar = QRectF(right - _BAR_WIDTH, text_box.bottom() + line / 2, _BAR_WIDTH, length)
         strip = np.ascontiguousarray(table).reshape(-1, 1, 3)
         image = QImage(strip.data, 1, len(strip), 3, QImage.Format.Format_RGB888)
         painter.drawImage(bar, image)
@@ -185,7 +218,7 @@ class Overlay(QWidget):
             where = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
             painter.drawText(tick, where, text.replace("-", "−"))
         painter.setPen(QColor(colours.muted))
-        text_box.moveTop(bar.bottom() + 2.0)
+        text_box.moveTop(bar.bottom() + line / 2)
         painter.drawText(text_box, Qt.AlignmentFlag.AlignRight, ends[1])
         if knows_hidden:
             text_box.translate(0.0, line + _GAP)
@@ -221,6 +254,7 @@ class Overlay(QWidget):
             self.width() - width - 2 * _PAD - 8.0, 8.0, width + 2 * _PAD, height + 2 * _PAD
         )
         self._chip(painter, card)
+        self._legend = card
         return card
 
     def _chip(self, painter: QPainter, box: QRectF) -> None:

@@ -14,7 +14,7 @@ from vtkmodules.vtkFiltersCore import vtkTriangleMeshPointNormals
 from vtkmodules.vtkFiltersSources import vtkSphereSource
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkRenderer
 
-from sd2app.views.scene3d import shapes
+from sd2app.views.scene3d import shapes, surface
 from sd2app.views.scene3d.colours import SceneColours, fractions, mixed, rgb
 from sd2core.sensor import VirtualSensor
 
@@ -134,11 +134,13 @@ class Body(Shape):
         self._normals.SetInputData(self.data)
         self._dots = False
         self._has_faces = False
-        self._shadow_mapper = vtkPolyDataMapper()
-        self._shadow_mapper.SetInputData(self.data)
-        self._shadow_mapper.ScalarVisibilityOff()
+        # The shadow shares the vertices, has fewer faces, and is flattened by its matrix.
+        self._shadow_data = vtkPolyData()
+        self._shadow_data.SetPoints(self._points)
+        mapper = vtkPolyDataMapper()
+        mapper.SetInputData(self._shadow_data)
         self.shadow = vtkActor()
-        self.shadow.SetMapper(self._shadow_mapper)
+        self.shadow.SetMapper(mapper)
         self.shadow.PickableOff()
         self.shadow.GetProperty().SetLighting(False)
         renderer.AddActor(self.shadow)
@@ -152,12 +154,22 @@ class Body(Shape):
         """Take over another mesh."""
         self.set_shape(vertices, triangles=faces)
         self._has_faces = faces is not None and len(faces) > 0
+        look = self.actor.GetProperty()
+        look.BackfaceCullingOff()
+        if faces is not None and self._has_faces:
+            self._shadow_data.SetPolys(_cells(surface.coarse_faces(vertices, faces)))
+            look.SetBackfaceCulling(surface.is_closed_outward(vertices, faces))
         self.set_as_dots(self._dots)
 
     def set_vertices(self, vertices: NDArray[np.floating]) -> None:
         """Move the vertices of the same mesh."""
         self.points[:] = vertices
         self.moved()
+
+    def moved(self) -> None:
+        """Tell VTK that ``points`` changed."""
+        super().moved()
+        self._shadow_data.Modified()
 
     @property
     def drawn_as_dots(self) -> bool:

@@ -29,7 +29,7 @@ SENSOR_LEAST_PX = 7.0
 _INSIDE_M = 0.25
 _FAR_OFF_M = 30.0
 _SAMPLED_FRAMES = 9
-_SAMPLED_VERTICES = 1500
+_SAMPLED_VERTICES = 400
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +98,7 @@ class Scene:
         self.pose = EyePose()
         self.extent = _NOTHING
         self.sensor = VirtualSensor()
-        self.labels: tuple[tuple[str, tuple[float, float, float]], ...] = ()
+        self.metre_labels: tuple[shapes.MetreLabel, ...] = ()
         self.range_limits_m = (0.0, 1.0)
         self._mode: MeshColour = "velocity"
         self._v_max_mps = 2.0
@@ -107,7 +107,10 @@ class Scene:
         self._has_mesh = False
         self._hot = False
         self._stale_colours = False
+        self._covered: shapes.GridRectangle | None = None
         self._light_up()
+        # One convex cone needs no sorting, which costs 4 ms on a CPU.
+        renderer.SetUseOIT(False)
         self.ground = GroundGrid(renderer)
         self.body = Body(renderer)
         self.camera_glyph = CameraGlyph(renderer)
@@ -197,6 +200,7 @@ class Scene:
         )
         ranges = np.linalg.norm(self.extent.points_m - position, axis=1)
         self.range_limits_m = range_limits(float(ranges.min()), float(ranges.max()))
+        self._lay_ground()
         self._stale_colours = True
 
     def set_hot(self, hot: bool) -> None:
@@ -348,11 +352,21 @@ class Scene:
 
     def _set_floor(self) -> None:
         self.body.set_floor(self.extent.floor_m)
+        self._covered = None
+        self._lay_ground()
+
+    def _lay_ground(self) -> None:
+        """Grid under body, camera and sensor; in steps, so that it rarely changes."""
         low, high = self.extent.low_m, self.extent.high_m
-        if np.linalg.norm(self.extent.centre_m) < _FAR_OFF_M:
-            low, high = np.minimum(low, 0.0), np.maximum(high, 0.0)
-        ground = shapes.ground(self.extent.floor_m, low, high)
-        self.labels = ground.labels
+        for place in (np.zeros(3), np.asarray(self.sensor.position_m)):
+            if np.linalg.norm(self.extent.centre_m - place) < _FAR_OFF_M:
+                low, high = np.minimum(low, place), np.maximum(high, place)
+        covered = shapes.grid_rectangle(low[[0, 2]], high[[0, 2]])
+        if covered == self._covered:
+            return
+        self._covered = covered
+        ground = shapes.ground(self.extent.floor_m, *covered)
+        self.metre_labels = ground.labels
         self.ground.set_ground(ground, self.colours)
 
     def _light_up(self) -> None:

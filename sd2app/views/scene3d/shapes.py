@@ -8,9 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2app.views.scene3d.colours import nice_step
-
 _LONGEST_GRID_M = 24.0
+
+
+GridRectangle = tuple[float, float, float, float, float]
+"""x0, z0, x1, z1 and the distance of the lines, metres."""
 
 
 @dataclass(frozen=True)
@@ -23,12 +25,21 @@ class Lines:
 
 
 @dataclass(frozen=True)
+class MetreLabel:
+    """Distance along z, written at either end of a grid line."""
+
+    text: str
+    left_m: tuple[float, float, float]
+    right_m: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
 class Ground:
-    """Grid lines on the floor, and where its metre labels stand."""
+    """Grid lines on the floor, and their metre labels."""
 
     minor: Lines
     major: Lines
-    labels: tuple[tuple[str, tuple[float, float, float]], ...]
+    labels: tuple[MetreLabel, ...]
 
 
 def cone(field_of_view_deg: float, sides: int = 48) -> tuple[NDArray, NDArray, NDArray]:
@@ -105,46 +116,45 @@ def rotation_to(direction: tuple[float, float, float]) -> NDArray[np.float64]:
     return np.stack([right, np.cross(forward, right), forward], axis=1)
 
 
-def ground(floor_m: float, low: NDArray[np.float64], high: NDArray[np.float64]) -> Ground:
-    """A grid on the floor around the box ``low`` to ``high``, fading outwards."""
-    middle = 0.5 * (low + high)
-    span = min(float(max(high[0] - low[0], high[2] - low[2])) + 1.6, _LONGEST_GRID_M)
-    step = max(nice_step(span, 12), 0.5)
-    if step >= 1.0 and span <= _LONGEST_GRID_M:
-        step = 1.0
-    half = np.array([max(high[0] - low[0], 1.2), high[2] - low[2]]) / 2 + 0.8
-    half = np.minimum(half, _LONGEST_GRID_M / 2)
-    major_step = 2 * step if step < 1.0 else step
-    x0, x1 = _snapped(middle[0] - half[0], middle[0] + half[0], step)
-    z0, z1 = _snapped(middle[2] - half[1], middle[2] + half[1], step)
-    lines: dict[bool, list[tuple[NDArray, NDArray]]] = {False: [], True: []}
+def grid_rectangle(low_xz: NDArray[np.float64], high_xz: NDArray[np.float64]) -> GridRectangle:
+    """Rectangle of whole grid cells around another, with room around it."""
+    half = np.clip((high_xz - low_xz) / 2 + 0.6, 1.2, _LONGEST_GRID_M / 2)
+    middle = (low_xz + high_xz) / 2
+    step = 0.5 if half.max() <= 4.0 else 1.0
+    x0, z0 = np.floor((middle - half) / step) * step
+    x1, z1 = np.ceil((middle + half) / step) * step
+    return (float(x0), float(z0), float(x1), float(z1), step)
+
+
+def ground(floor_m: float, x0: float, z0: float, x1: float, z1: float, step: float) -> Ground:
+    """A grid on the floor that fades outwards, with a label at every metre."""
     xs, zs = _ticks(x0, x1, step), _ticks(z0, z1, step)
+    lines: dict[bool, list[tuple[NDArray, NDArray]]] = {False: [], True: []}
     for x in xs:
-        lines[_is_major(x, major_step)].append((np.full(len(zs), x), zs))
+        lines[_is_major(x)].append((np.full(len(zs), x), zs))
     for z in zs:
-        lines[_is_major(z, major_step)].append((xs, np.full(len(xs), z)))
+        lines[_is_major(z)].append((xs, np.full(len(xs), z)))
     centre = np.array([(x0 + x1) / 2, (z0 + z1) / 2])
-    reach = np.array([(x1 - x0) / 2, (z1 - z0) / 2]) + 1e-9
-    label_x = xs[-1]
+    reach = np.array([(x1 - x0) / 2, (z1 - z0) / 2])
     labels = tuple(
-        (f"{z:g} m", (float(label_x), floor_m, float(z)))
+        MetreLabel(
+            f"{z:.0f} m".replace("-", "\u2212"),
+            (float(x0), floor_m, float(z)),
+            (float(x1), floor_m, float(z)),
+        )
         for z in zs
-        if _is_major(z, major_step) and abs(z) < 1e4
+        if _is_major(z)
     )
     minor, major = (_joined(lines[kind], floor_m, centre, reach) for kind in (False, True))
     return Ground(minor, major, labels)
-
-
-def _snapped(low: float, high: float, step: float) -> tuple[float, float]:
-    return math.floor(low / step) * step, math.ceil(high / step) * step
 
 
 def _ticks(low: float, high: float, step: float) -> NDArray[np.float64]:
     return low + step * np.arange(round((high - low) / step) + 1)
 
 
-def _is_major(value: float, step: float) -> bool:
-    return abs(value / step - round(value / step)) < 1e-6
+def _is_major(value: float) -> bool:
+    return abs(value - round(value)) < 1e-6
 
 
 def _joined(

@@ -178,6 +178,7 @@ class SceneView(QWidget):
 
     def _follow_sensor(self) -> None:
         self.scene.set_sensor(self._sensor.sensor)
+        self.navigator.look_again()
         self._follow_scattering()
 
     def _follow_scattering(self) -> None:
