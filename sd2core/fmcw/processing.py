@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 import scipy.fft
@@ -45,7 +45,7 @@ _COSINES: dict[str, tuple[float, ...]] = {
     "none": (1.0,),
 }
 _ZERO_PADDING = 4
-_BLOCK_BYTES = 8_000_000
+_BLOCK_BYTES = 4_000_000
 """Small enough that progress is reported, and a cancel obeyed, every few ms."""
 
 
@@ -160,7 +160,7 @@ def doppler_map(
     inside = everything = 0.0
     progress(0, capture.frame_count)
     for start, stop in chain.blocks():
-        power = chain.power(start, stop).sum(axis=1)  # (n, doppler)
+        power = chain.doppler_power(start, stop)  # (n, doppler)
         values[:, start:stop] = weights @ power.T
         inside += float(values[:, start:stop].sum(dtype=np.float64))
         everything += float(power.sum(dtype=np.float64))
@@ -206,8 +206,8 @@ def range_doppler(
     axis = _axis(capture.config, axis, None, None)
     chain = _Chain(capture, ProcessingOptions(clutter, clutter_window_s, range_m, window))
     weights = rebinning(capture.config, axis, chain.doppler_bins).astype(np.float32)
-    power = chain.power(frame, frame + 1)[0]  # (gates, doppler)
-    return RangeDoppler(power @ weights.T, chain.range_m, axis, capture.timebase.time_of(frame))
+    power = chain.cell_power(frame)  # (doppler, gates)
+    return RangeDoppler((weights @ power).T, chain.range_m, axis, capture.timebase.time_of(frame))
 
 
 def limits(config: RadarConfig) -> dict[str, float]:
@@ -310,15 +310,25 @@ class _Chain:
         for start in range(0, frames, size):
             yield start, min(start + size, frames)
 
-    def power(self, start: int, stop: int) -> NDArray[np.float32]:
-        """Power of frames [start, stop) summed over receivers, (n, gates, doppler)."""
-        signal = self._without_clutter(start, stop)  # (n, rx, chirps, samples)
-        profiles = scipy.fft.rfft(signal * self._fast, axis=3)[..., self.gates]
-        profiles *= self._slow
-        spectra = scipy.fft.fft(profiles, n=self.doppler_bins, axis=2)  # (n, rx, doppler, gates)
-        power = spectra.real**2 + spectra.imag**2
-        summed: NDArray[np.float32] = np.ascontiguousarray(power.sum(axis=1).swapaxes(1, 2))
+    def doppler_power(self, start: int, stop: int) -> NDArray[np.float32]:
+        """Power of frames [start, stop) summed over receivers and gates, (n, doppler)."""
+        parts = self._spectra(start, stop).view(np.float32)  # real, imaginary, real …
+        summed: NDArray[np.float32] = np.einsum("nrdk,nrdk->nd", parts, parts)
         return summed
+
+    def cell_power(self, frame: int) -> NDArray[np.float32]:
+        """Power of one frame summed over receivers, (doppler, gates)."""
+        spectra = self._spectra(frame, frame + 1)[0]
+        power: NDArray[np.float32] = (spectra.real**2 + spectra.imag**2).sum(axis=0)
+        return power
+
+    def _spectra(self, start: int, stop: int) -> NDArray[np.complex64]:
+        """Spectra of frames [start, stop), (n, receivers, doppler, gates)."""
+        signal = self._without_clutter(start, stop)  # (n, receivers, chirps, samples)
+        signal *= self._fast
+        profiles = scipy.fft.rfft(signal, axis=3)[..., self.gates] * self._slow
+        spectra: NDArray[np.complex64] = scipy.fft.fft(profiles, n=self.doppler_bins, axis=2)
+        return spectra
 
     def _without_clutter(self, start: int, stop: int) -> NDArray[np.float32]:
         signal = self.capture.read(start, stop)
@@ -399,7 +409,7 @@ def _notes(
     beyond: float,
     clipped: float,
 ) -> list[str]:
-    notes: list[Any] = []
+    notes = []
     if axis.v_max_mps > config.v_max_mps * (1 + 1e-9):
         notes.append(
             f"The axis reaches ±{axis.v_max_mps:g} m/s, this radar only"

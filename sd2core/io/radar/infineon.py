@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import shutil
 import tempfile
 from pathlib import Path
@@ -22,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from sd2core.atomic import atomic_write, atomic_write_text
 from sd2core.errors import Sd2Error
 from sd2core.io.radar.capture import RadarCapture, check_cube
 from sd2core.sensor import RadarConfig
@@ -78,7 +78,7 @@ def find_recording(path: Path) -> Path | None:
         return path.parent if path.name == _DATA else None
     if (path / _DATA).is_file():
         return path
-    inside = sorted(entry.parent for entry in path.glob(f"*/{_DATA}"))
+    inside = sorted(entry.parent for entry in path.glob(f"[!.]*/{_DATA}"))
     if len(inside) > 1:
         names = ", ".join(folder.name for folder in inside)
         raise Sd2Error(
@@ -178,13 +178,11 @@ def write_capture(
     folder.parent.mkdir(parents=True, exist_ok=True)
     new = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", suffix=".tmp", dir=folder.parent))
     try:
-        (new / _CONFIG).write_text(_json({"device_config": {"fmcw_single_shape": shape}}), "utf-8")
-        (new / _META).write_text(_json(described), "utf-8")
-        (new / _TIMES).write_text("".join(f"{time!r}\n" for time in times.tolist()), "utf-8")
-        with (new / _DATA).open("wb") as stream:
+        atomic_write_text(new / _CONFIG, _json({"device_config": {"fmcw_single_shape": shape}}))
+        atomic_write_text(new / _META, _json(described))
+        atomic_write_text(new / _TIMES, "".join(f"{time!r}\n" for time in times.tolist()))
+        with atomic_write(new / _DATA) as stream:
             np.save(stream, cube, allow_pickle=False)
-            stream.flush()
-            os.fsync(stream.fileno())
         new.chmod(0o755)
         _swap(new, folder)
     finally:
