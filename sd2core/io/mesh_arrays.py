@@ -84,13 +84,11 @@ class StoredVertices:
 def read_npz(path: Path) -> RawMesh:
     """Read ``vertices`` and, where present, ``faces``, ``times_s`` and ``fps``."""
     try:
-        with np.load(path, allow_pickle=False) as archive:
-            if not hasattr(archive, "files"):
-                raise ValueError("a single array")
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
             wanted = VERTEX_NAMES + FACE_NAMES + TIME_NAMES + RATE_NAMES
             arrays = {name: archive[name] for name in archive.files if name in wanted}
             names = list(archive.files)
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error, KeyError) as error:
+    except (OSError, ValueError, TypeError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise Sd2Error(
             f"{path} cannot be read as .npz ({error})",
             "a complete .npz file that holds plain numbers",

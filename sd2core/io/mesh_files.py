@@ -22,10 +22,10 @@ def is_pattern(path: Path) -> bool:
     return glob.has_magic(str(path)) and not path.exists()
 
 
-def natural_key(name: str) -> tuple[tuple[int, int | str], ...]:
+def natural_key(name: str) -> tuple[Any, ...]:
     """Sort key by which ``frame9`` comes before ``frame10``."""
     parts = re.findall(r"[0-9]+|[^0-9]+", name)
-    return tuple((0, int(part)) if part[0] in "0123456789" else (1, part) for part in parts)
+    return (*((0, int(p)) if p[0] in "0123456789" else (1, p) for p in parts), (2, name))
 
 
 def read_mesh_files(path: Path, progress: Progress = silent) -> RawMesh:
@@ -99,21 +99,18 @@ def read_faces(path: Path) -> NDArray[Any]:
     if suffix not in {".npy", ".npz"}:
         raise Sd2Error(f"{path} is no file of faces", "a .npy, .npz or .obj file")
     try:
-        loaded = np.load(path, allow_pickle=False)
-        if isinstance(loaded, np.ndarray):
-            return loaded
-        with loaded:
-            names = [name for name in (*FACE_NAMES, "f") if name in loaded.files]
-            if not names and len(loaded.files) == 1:
-                names = list(loaded.files)
-            if names:
-                array: NDArray[Any] = loaded[names[0]]
-                return array
-            held = ", ".join(loaded.files)
+        with path.open("rb") as file:
+            loaded = np.load(file, allow_pickle=False)
+            arrays = {"": loaded} if isinstance(loaded, np.ndarray) else dict(loaded)
     except Exception as error:  # a damaged archive fails in many ways
         raise Sd2Error(
             f"{path} cannot be read ({error})", "a complete .npy or .npz file of plain numbers"
         ) from error
+    names = [name for name in (*FACE_NAMES, "f") if name in arrays]
+    if names or len(arrays) == 1:
+        array: NDArray[Any] = arrays[names[0]] if names else next(iter(arrays.values()))
+        return array
+    held = ", ".join(arrays) or "nothing"
     raise Sd2Error(f"{path} holds {held}", "an array 'faces' of shape (faces, 3)")
 
 
@@ -138,7 +135,7 @@ def _files(path: Path) -> list[Path]:
             "one .obj, .ply or .glb file per frame",
             "Check the folder or the pattern",
         )
-    return sorted(found, key=lambda file: natural_key(file.name))
+    return sorted(found, key=lambda file: natural_key(str(file)))
 
 
 def _same_faces(first: NDArray[Any] | None, second: NDArray[Any] | None) -> bool:
