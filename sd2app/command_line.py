@@ -24,15 +24,22 @@ def _add_window_commands(commands: argparse._SubParsersAction) -> None:
     opening = add_command(
         commands,
         "open",
-        "open a recording, a video or a mesh in the window",
+        "open a recording, or a video, a mesh or a radar capture, in the window",
         handler=_open,
         examples=(
             "  sd2 open walk.sd2\n"
-            "  sd2 open walk.npz\n"
+            "  sd2 open walk.mkv walk.npz capture/    (what belongs together)\n"
             "  sd2 open walk.sd2 --screenshot window.png    (needs no display)"
         ),
     )
-    opening.add_argument("path", type=Path, metavar="PATH")
+    opening.add_argument(
+        "paths",
+        nargs="*",
+        type=Path,
+        metavar="PATH",
+        help="a recording; or a video, a mesh and a radar capture, each or together"
+        " (default: an empty window)",
+    )
     demo = add_command(
         commands,
         "demo",
@@ -51,18 +58,19 @@ def _add_window_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _open(options: argparse.Namespace) -> int:
-    if not options.path.exists():
-        raise Sd2Error(f"{options.path} does not exist", "a recording, a video or a mesh")
-    return _show(options.path, options.screenshot)
+    for path in options.paths:
+        if not path.exists():
+            raise Sd2Error(f"{path} does not exist", "a recording, a video, a mesh or a capture")
+    return _show(options.paths, options.screenshot)
 
 
 def _demo(options: argparse.Namespace) -> int:
     from sd2core.resources import resource_path
 
-    return _show(resource_path("swipes.sd2"), options.screenshot)
+    return _show([resource_path("swipes.sd2")], options.screenshot)
 
 
-def _show(path: Path, screenshot: Path | None) -> int:
+def _show(paths: Sequence[Path], screenshot: Path | None) -> int:
     if screenshot is not None:
         _check_screenshot(screenshot)
         os.environ["QT_QPA_PLATFORM"] = "offscreen"
@@ -73,7 +81,7 @@ def _show(path: Path, screenshot: Path | None) -> int:
         )
     from sd2app.main import run as run_window
 
-    return run_window(path, screenshot=screenshot)
+    return run_window(paths, screenshot=screenshot)
 
 
 def has_display(platform: str, environment: Mapping[str, str]) -> bool:

@@ -133,7 +133,9 @@ HEAVY = ("numpy", "scipy", "numba", "zarr", "av", "trimesh", "pydantic", "torch"
 WINDOW = ("PySide6", "shiboken6", "vtk", "vtkmodules", "pyvista", "pyvistaqt", "pyqtgraph")
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["synth", "--help"], ["open"]])
+@pytest.mark.parametrize(
+    "arguments", [["--help"], ["--version"], ["synth", "--help"], ["open", "-h"]]
+)
 def test_help_loads_nothing_heavy(arguments: list[str]) -> None:
     script = f"""
 import sys

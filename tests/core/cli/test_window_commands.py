@@ -13,12 +13,12 @@ from sd2app.command_line import has_display
 
 
 @pytest.fixture
-def window(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Path | None, Path | None]]:
+def window(monkeypatch: pytest.MonkeyPatch) -> list[tuple[list[Path], Path | None]]:
     """Stands in for the window and notes what it was asked to show."""
-    shown: list[tuple[Path | None, Path | None]] = []
+    shown: list[tuple[list[Path], Path | None]] = []
 
-    def run(path: Path | None, *, screenshot: Path | None = None) -> int:
-        shown.append((path, screenshot))
+    def run(paths: list[Path], *, screenshot: Path | None = None) -> int:
+        shown.append((paths, screenshot))
         return 0
 
     module = ModuleType("sd2app.main")
@@ -71,7 +71,7 @@ def test_a_screenshot_needs_no_display(
     monkeypatch.setenv("QT_QPA_PLATFORM", "xcb")
     picture = tmp_path / "window.png"
     assert sd2("open", plate, "--screenshot", picture).code == 0
-    assert window == [(plate, picture)]
+    assert window == [([plate], picture)]
     assert os.environ["QT_QPA_PLATFORM"] == "offscreen"
 
 
@@ -79,8 +79,10 @@ def test_a_display_is_used(
     sd2: Sd2, window: list, plate: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("DISPLAY", ":0")
-    assert sd2("open", plate).code == 0
-    assert window == [(plate, None)]
+    assert sd2("open", plate, plate.parent).code == 0
+    assert window == [([plate, plate.parent], None)]
+    assert sd2("open").code == 0
+    assert window[1:] == [([], None)]
 
 
 @pytest.mark.parametrize(
