@@ -24,6 +24,7 @@ TIME_NAMES = ("times_s", "times")
 RATE_NAMES = ("frames_per_s", "fps")
 
 _CHUNK_BYTES = 2 * 2**20
+_LARGEST_CHUNK_BYTES = 64 * 2**20
 _FORMAT = "sd2-mesh"
 
 
@@ -52,6 +53,7 @@ class StoredVertices:
     def __init__(self, array: Any, source: str) -> None:
         self._array = array
         self._source = source
+        self._last: tuple[int, NDArray[Any]] | None = None  # chunk number, its frames
         self.scale = 1.0
         self.shift_m = np.zeros(3, np.float32)
         self.shape: tuple[int, ...] = tuple(array.shape)
@@ -62,8 +64,19 @@ class StoredVertices:
         """Frames that come from the disk together."""
         return int(self._array.chunks[0])
 
+    @property
+    def chunk_bytes(self) -> int:
+        """Memory that those frames take."""
+        return self.frames_per_chunk * int(np.prod(self.shape[1:])) * self.dtype.itemsize
+
     def __getitem__(self, key: Any) -> NDArray[Any]:
-        part: NDArray[Any] = np.asarray(self._array[key], dtype=self.dtype)
+        if isinstance(key, int | np.integer):
+            frame = range(self.shape[0])[key]
+            part = self._stretch(frame, frame + 1)[0]
+        elif isinstance(key, slice) and key.step in (None, 1):
+            part = self._stretch(*key.indices(self.shape[0])[:2])
+        else:
+            part = np.asarray(self._array[key], dtype=self.dtype)
         # A sum is finite only when its terms are, and costs next to nothing
         # beside the reading; a sum that overflowed is looked at again.
         with np.errstate(all="ignore"):
@@ -79,6 +92,27 @@ class StoredVertices:
         if self.shift_m.any():
             part = part + self.shift_m.astype(part.dtype)
         return part
+
+    def _stretch(self, start: int, stop: int) -> NDArray[Any]:
+        """Frames ``start`` to ``stop``, chunk by chunk: Zarr is slower on many at once."""
+        if self.chunk_bytes > _LARGEST_CHUNK_BYTES or stop <= start:
+            return np.asarray(self._array[start:stop], dtype=self.dtype)
+        part = np.empty((stop - start, *self.shape[1:]), self.dtype)
+        step = self.frames_per_chunk
+        for number in range(start // step, (stop - 1) // step + 1):
+            first, last = max(start, number * step), min(stop, (number + 1) * step)
+            chunk = self._chunk(number)
+            part[first - start : last - start] = chunk[first - number * step :][: last - first]
+        return part
+
+    def _chunk(self, number: int) -> NDArray[Any]:
+        """One chunk; the last one is kept, because frames are played one by one."""
+        kept = self._last
+        if kept is None or kept[0] != number:
+            step = self.frames_per_chunk
+            kept = (number, np.asarray(self._array[number * step : (number + 1) * step]))
+            self._last = kept
+        return kept[1]
 
 
 def read_npz(path: Path) -> RawMesh:
@@ -137,7 +171,14 @@ def read_zarr(path: Path) -> RawMesh:
     raw = named_arrays(arrays, names, str(path))
     if raw.faces is not None and not len(raw.faces):
         raw.faces = None
-    raw.vertices = StoredVertices(raw.vertices, str(path))
+    stored = StoredVertices(raw.vertices, str(path))
+    if len(stored.shape) == 3 and stored.chunk_bytes > _LARGEST_CHUNK_BYTES:
+        raw.notes.append(
+            f"The vertices are stored in chunks of {stored.frames_per_chunk:,} frames "
+            f"({stored.chunk_bytes / 2**20:,.0f} MiB), which are read whole for every frame shown. "
+            "Saving the mesh again makes it fast."
+        )
+    raw.vertices = stored
     return raw
 
 

@@ -135,6 +135,24 @@ def test_a_zarr_mesh_stays_on_disk(
     assert mesh.vertices.frames_per_chunk == 10
 
 
+@pytest.mark.parametrize("limit", [0, 2**26])
+def test_stored_vertices_are_indexed_like_an_array(
+    tmp_path: Path, limit: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(mesh_arrays, "_CHUNK_BYTES", 42 * 12 * 7)
+    vertices, faces = body(40)
+    save_mesh(MeshSequence(vertices, faces, Timebase(times(40))), tmp_path / "m.zarr")
+    monkeypatch.setattr(mesh_arrays, "_LARGEST_CHUNK_BYTES", limit)
+    mesh = load_mesh(tmp_path / "m.zarr")
+    assert ("chunks of 7 frames" in "".join(mesh.notes)) == (limit == 0)
+    keys = [0, -1, 13, np.int64(14), slice(3, 30), slice(6, 7), slice(7, 14), slice(35, 99),
+            slice(None), slice(2, 30, 5), slice(9, 9), (slice(1, 3), 4)]  # fmt: skip
+    for key in keys:
+        np.testing.assert_array_equal(mesh.vertices[key], vertices[key])
+    with pytest.raises(IndexError):
+        mesh.vertices[40]
+
+
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_saving_replaces_the_old_file_only_when_it_succeeds(tmp_path: Path, suffix: str) -> None:
     vertices, faces = body()
