@@ -58,9 +58,11 @@ def _add_window_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _open(options: argparse.Namespace) -> int:
+    from sd2core.io.kinds import kind_of
+
+    # Says what is wrong before the window is there.
     for path in options.paths:
-        if not path.exists():
-            raise Sd2Error(f"{path} does not exist", "a recording, a video, a mesh or a capture")
+        kind_of(path)
     return _show(options.paths, options.screenshot)
 
 

@@ -29,6 +29,8 @@ from sd2core.recording_document import (
 from sd2core.relative_paths import (
     common_suffix_length,
     is_absolute,
+    is_pattern,
+    is_there,
     located_path,
     paths_named,
     plain_path,
@@ -160,9 +162,8 @@ class Recording:
         folder = _new_folder(Path(folder))
         files: dict[Role, Path] = {}
         for role, path in self._files().items():
-            if not Path(path).exists():
-                remedy = "Give the folder that holds the files" if "*" in str(path) else ""
-                raise Sd2Error(f"The {role} {path} does not exist", "a file or folder", remedy)
+            if not is_there(Path(path)):
+                raise Sd2Error(f"The {role} {path} does not exist", "a file or folder")
             files[role] = plain_path(Path(path))
         if not files.keys() - {"faces"}:
             raise Sd2Error(
@@ -200,7 +201,7 @@ class Recording:
 
     def missing(self) -> dict[Role, Path]:
         """Files that are not where the recording says."""
-        return {role: path for role, path in self._files().items() if not path.exists()}
+        return {role: path for role, path in self._files().items() if not is_there(path)}
 
     def relink(self, folder: Path, progress: Progress = silent) -> Relinked:
         """Find all missing files by name under one folder, and save.
@@ -219,11 +220,15 @@ class Recording:
         if not folder.is_dir():
             raise Sd2Error(f"{folder} is not a folder", "the folder to search for missing files")
         missing = self.missing()
-        candidates = paths_named({path.name for path in missing.values()}, folder, progress)
+        # Files of a pattern are found by their folder.
+        sought = {role: path.parent if is_pattern(path) else path for role, path in missing.items()}
+        candidates = paths_named({path.name for path in sought.values()}, folder, progress)
         found: dict[Role, Path] = {}
         ambiguous: dict[Role, tuple[Path, ...]] = {}
-        for role, old in missing.items():
-            same_name = candidates.get(old.name, [])
+        for role, path in missing.items():
+            old = sought[role]
+            rest = path.relative_to(old)
+            same_name = [p for p in candidates.get(old.name, []) if is_there(p / rest)]
             agreement = [common_suffix_length(path, old) for path in same_name]
             best = [
                 path
@@ -231,7 +236,7 @@ class Recording:
                 if parts == max(agreement)
             ]
             if len(best) == 1:
-                found[role] = best[0]
+                found[role] = best[0] / rest
             elif best:
                 ambiguous[role] = tuple(sorted(best))
         for role, path in found.items():
@@ -292,7 +297,7 @@ class Recording:
         if path is None:
             has = ", ".join(self._files()) or "nothing"
             raise Sd2Error(f"{self.folder} holds no {role}", f"a {role}; it has {has}")
-        if not path.exists():
+        if not is_there(path):
             raise Sd2Error(
                 f"The {role} of {self.folder} is not at {path}",
                 "the file where the recording says",
@@ -370,6 +375,10 @@ def _copied(
     inside: dict[Role, Path] = {}
     for done, (role, source) in enumerate(files.items()):
         progress(done, len(files))
+        if is_pattern(source):
+            raise Sd2Error(
+                f"{source} stands for several files", "a folder, for copying", "Give their folder"
+            )
         if source.is_relative_to(folder):
             inside[role] = source
             continue

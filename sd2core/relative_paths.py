@@ -30,6 +30,16 @@ def located_path(stored: str | None, folder: Path) -> Path | None:
     return Path(stored) if is_absolute(stored) else Path(os.path.normpath(folder / stored))
 
 
+def is_pattern(path: Path) -> bool:
+    """Whether a name such as ``*.obj`` stands for several files."""
+    return any(character in path.name for character in "*?[") and not path.exists()
+
+
+def is_there(path: Path) -> bool:
+    """Whether a file, a folder, or any file of a pattern exists."""
+    return any(path.parent.glob(path.name)) if is_pattern(path) else path.exists()
+
+
 def is_absolute(stored: str) -> bool:
     """Whether a stored path is written in full, on whatever system it was written."""
     return PurePosixPath(stored).is_absolute() or PureWindowsPath(stored).is_absolute()

@@ -343,6 +343,32 @@ class TestRelink:
             make(files).relink(files / "walk.mkv")
 
 
+class TestPattern:
+    """A mesh may be ``frames/*.obj``."""
+
+    @pytest.fixture
+    def made(self, files: Path) -> Recording:
+        (files / "frames").mkdir()
+        for number in range(3):
+            (files / "frames" / f"{number}.obj").write_text("v")
+        return Recording.create(files.parent / "p.sd2", mesh=files / "frames" / "*.obj")
+
+    def test_is_stored_and_there(self, made: Recording) -> None:
+        assert content(made)["mesh"] == "../one/frames/*.obj"
+        assert not open_recording(made.folder).missing()
+
+    def test_is_found_by_its_folder(self, made: Recording, files: Path, tmp_path: Path) -> None:
+        (files / "frames").rename(tmp_path / "frames")
+        (tmp_path / "other" / "frames").mkdir(parents=True)
+        assert made.missing()
+        assert made.relink(tmp_path).found == {"mesh": tmp_path / "frames" / "*.obj"}
+
+    def test_is_not_copied(self, made: Recording, tmp_path: Path) -> None:
+        with pytest.raises(Sd2Error, match="Give their folder"):
+            made.save_as(tmp_path / "copy", copy=True)
+        assert not (tmp_path / "copy.sd2").exists()
+
+
 def test_a_missing_file_is_explained_when_it_is_opened(files: Path) -> None:
     made = make(files)
     (files / "walk.npz").unlink()

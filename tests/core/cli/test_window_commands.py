@@ -79,8 +79,11 @@ def test_a_display_is_used(
     sd2: Sd2, window: list, plate: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("DISPLAY", ":0")
-    assert sd2("open", plate, plate.parent).code == 0
-    assert window == [([plate, plate.parent], None)]
+    capture = plate.parent / "capture"
+    capture.mkdir()
+    (capture / "radar.npy").touch()
+    assert sd2("open", plate, capture).code == 0
+    assert window == [([plate, capture], None)]
     assert sd2("open").code == 0
     assert window[1:] == [([], None)]
 
