@@ -83,7 +83,7 @@ def check_mesh(raw: RawMesh, source: str, check_size: bool) -> None:
         raw.notes.append(
             f"The mesh is at a mean depth of {depth_m:.2f} m, at or behind the camera. Expected is "
             "the camera's frame: x right, y down, z forward. A mesh with y up and z backward needs "
-            "a half turn about x; one centred on its root needs its distance from the camera."
+            "a half turn about x; one centred on its root needs its distance (--distance-m)."
         )
     if raw.faces is None:
         _note_missing_faces(raw)

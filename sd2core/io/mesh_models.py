@@ -208,14 +208,12 @@ def _place_in_front(
     camera, boxes = entry.get("pred_cam"), entry.get("bboxes")
     have_camera = isinstance(camera, np.ndarray) and isinstance(boxes, np.ndarray)
     if not have_camera or image_size is None:
-        how = (
-            "Give the video's size (image_size) to place it by the camera that is in the file, or"
-            if have_camera
-            else "Give"
-        )
+        how = "Give its distance (--distance-m)"
+        if have_camera:
+            how += ", or the video's size (image_size) to place it by the camera in the file"
         raw.notes.append(
             "The mesh is centred on the body's root, so it stands around the camera and walking "
-            f"gives no Doppler. {how} its distance (distance_m)."
+            f"gives no Doppler. {how}."
         )
         return
     camera, boxes = np.asarray(camera, np.float64), np.asarray(boxes, np.float64)
@@ -230,7 +228,7 @@ def _place_in_front(
             f"{path}: frame {bad} has camera scale {camera[bad, 0]:g} and box width "
             f"{boxes[bad, 2]:g}",
             "positive ones",
-            "Read it without image_size and give distance_m",
+            "Read it without the video's size and give --distance-m",
         )
     focal = float(np.hypot(*image_size)) if focal_px is None else focal_px
     shift_m = weak_perspective_shift(camera, boxes, image_size, focal)

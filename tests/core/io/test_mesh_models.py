@@ -133,7 +133,7 @@ def test_a_root_centred_mesh_says_what_it_lacks(tmp_path: Path) -> None:
     joblib.dump({1: vibe(4)}, tmp_path / "v.pkl")
     notes = load_mesh(tmp_path / "v.pkl").notes
     assert any(
-        "walking gives no Doppler" in n and "image_size" in n and "distance_m" in n for n in notes
+        "walking gives no Doppler" in n and "image_size" in n and "--distance-m" in n for n in notes
     )
     mesh = load_mesh(tmp_path / "v.pkl", distance_m=3.0)
     assert mesh.read(0, 4)[..., 2].mean() == pytest.approx(3.0, abs=0.02)
@@ -143,7 +143,7 @@ def test_an_impossible_camera_is_named(tmp_path: Path) -> None:
     person = vibe(4)
     person["pred_cam"][2, 0] = -0.1
     joblib.dump({1: person}, tmp_path / "v.pkl")
-    with pytest.raises(Sd2Error, match=r"v\.pkl: frame 2 has camera scale -0\.1.*distance_m"):
+    with pytest.raises(Sd2Error, match=r"v\.pkl: frame 2 has camera scale -0\.1.*--distance-m"):
         load_mesh(tmp_path / "v.pkl", image_size=(WIDTH, HEIGHT))
 
 
