@@ -22,7 +22,7 @@ VERSION = 1
 INFLUENCES = 8
 """Bones per vertex, at most."""
 
-Resolution = Literal["low", "high"]
+Resolution = Literal["low", "medium", "high"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,8 +121,9 @@ class Body:
 
         Parameters
         ----------
-        resolution : {"high", "low"}
-            13,348 or 1,229 vertices; both are one closed component.
+        resolution : {"high", "medium", "low"}
+            13,348, 5,000 or 1,229 vertices; each is one closed component. The
+            vertices of ``medium`` are vertices of ``high``.
         path : Path, optional
 
         Raises

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,7 +86,7 @@ def _ink(word: str) -> Singles:
     distance = np.full((height, width), np.inf)
     for stroke in strokes:
         scaled = stroke * _HEIGHT_PX
-        for start, end in zip(scaled[:-1], scaled[1:], strict=True):
+        for start, end in pairwise(scaled):
             distance = np.minimum(distance, _distance(pixels, start, end))
     return np.clip(0.5 + 0.5 * _STROKE_PX - distance, 0.0, 1.0).astype(np.float32)
 
@@ -103,7 +104,7 @@ def _distance(
 ) -> NDArray[np.float64]:
     """Distance of pixels (H, W, 2) to a line segment."""
     line = end - start
-    along = np.clip((pixels - start) @ line / max(line @ line, 1e-12), 0.0, 1.0)
+    along = np.clip((pixels - start) @ line / max(float(line @ line), 1e-12), 0.0, 1.0)
     distance: NDArray[np.float64] = np.linalg.norm(
         pixels - start - along[..., None] * line, axis=-1
     )

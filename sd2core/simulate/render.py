@@ -137,10 +137,10 @@ class Renderer:
         self, positions: Singles, normals: Singles, fields: Singles, shadow: Singles
     ) -> Singles:
         albedo, gloss = self._clothes.colours(fields)  # linear (N, 3), (N,)
-        normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
-        view = -positions / np.linalg.norm(positions, axis=1, keepdims=True)
+        normals, view = _units(normals), _units(-positions)
         key, fill, rim = (
-            _unit(direction) for direction in (self.studio.key, self.studio.fill, self.studio.rim)
+            _unit(direction).astype(np.float32)
+            for direction in (self.studio.key, self.studio.fill, self.studio.rim)
         )
         lit = np.empty(len(positions), np.float32)
         points, nearness = self._seen_by_light(positions)
@@ -150,15 +150,14 @@ class Renderer:
         fill_light = np.clip((normals @ fill + 0.3) / 1.3, 0.0, None)
         sky = 0.5 - 0.5 * normals[:, 1]
         light = (
-            1.7 * key_light[:, None] * np.float32([1.0, 0.965, 0.91])
-            + 0.30 * fill_light[:, None] * np.float32([0.86, 0.93, 1.0])
-            + (0.20 + 0.28 * sky)[:, None] * np.float32([0.95, 0.98, 1.0])
+            1.7 * key_light[:, None] * np.array([1.0, 0.965, 0.91], np.float32)
+            + 0.30 * fill_light[:, None] * np.array([0.86, 0.93, 1.0], np.float32)
+            + (0.20 + 0.28 * sky)[:, None] * np.array([0.95, 0.98, 1.0], np.float32)
         )
-        facing = np.clip((normals * view).sum(axis=1), 0.0, 1.0)
+        facing = np.clip(_dots(normals, view), 0.0, 1.0)
         edge = (1.0 - facing) ** 3 * np.clip(normals @ rim, 0.0, 1.0)
-        half = key + view
-        half = half / np.linalg.norm(half, axis=1, keepdims=True)
-        highlight = np.clip((normals * half).sum(axis=1), 0.0, 1.0) ** 28 * lit * gloss
+        half = _units(key + view)
+        highlight = np.clip(_dots(normals, half), 0.0, 1.0) ** 28 * lit * gloss
         colours: Singles = (
             albedo * light + 0.55 * edge[:, None] * (0.25 + albedo) + 0.22 * highlight[:, None]
         )
@@ -174,7 +173,9 @@ class Renderer:
     def _seen_by_light(self, positions: NDArray[np.floating]) -> tuple[Singles, Singles]:
         """Pixels in the light's image, and nearness to it in metres."""
         centre = np.array([0.0, self.camera.above_floor_m - 0.95, 2.2])
-        seen = (positions - centre) @ self._light_axes.T
+        # Kept in its own precision: the matrix product of mixed types is slow.
+        axes = self._light_axes.astype(positions.dtype)
+        seen = (positions - centre.astype(positions.dtype)) @ axes.T
         scale = _LIGHT_PIXELS / _LIGHT_WIDTH_M
         points = seen[..., :2] * scale + _LIGHT_PIXELS / 2
         return points.astype(np.float32), seen[..., 2].astype(np.float32)
@@ -267,6 +268,18 @@ def _tone(picture: Singles) -> Singles:
     return np.minimum(picture, knee) + over / (1.0 + over / (1.0 - knee))
 
 
+def _dots(left: Singles, right: Singles) -> Singles:
+    """Dot products of rows."""
+    products: Singles = np.einsum("ni,ni->n", left, right)
+    return products
+
+
+def _units(vectors: Singles) -> Singles:
+    """Rows of length 1."""
+    lengths: Singles = np.sqrt(_dots(vectors, vectors))
+    return np.divide(vectors, lengths[:, None], dtype=np.float32)
+
+
 def _unit(direction: tuple[float, ...]) -> NDArray[np.float64]:
     vector = np.asarray(direction, dtype=np.float64)
     return vector / np.linalg.norm(vector)
@@ -274,10 +287,11 @@ def _unit(direction: tuple[float, ...]) -> NDArray[np.float64]:
 
 def _shrunk(picture: Singles, factor: int) -> Singles:
     """Mean over blocks of pixels."""
-    height, width = picture.shape[0] // factor, picture.shape[1] // factor
-    blocks = picture.reshape(height, factor, width, factor, *picture.shape[2:])
-    mean: Singles = blocks.mean(axis=(1, 3))
-    return mean
+    total = picture[::factor, ::factor].copy()
+    for k in range(1, factor * factor):
+        total += picture[k // factor :: factor, k % factor :: factor]
+    total /= factor * factor
+    return total
 
 
 def _box_blurred(picture: Singles, size: int) -> Singles:

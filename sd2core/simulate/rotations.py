@@ -18,7 +18,7 @@ def about(axis: Floats, angle_deg: Floats) -> Floats:
 
 
 def frame(first: Floats, normal: Floats) -> Floats:
-    """Right-handed axes in columns: along ``first``, along ``normal`` (made orthogonal), their cross."""
+    """Right-handed axes in columns: ``first``, ``normal`` made orthogonal to it, their cross."""
     x = first / np.linalg.norm(first, axis=-1, keepdims=True)
     y = normal - (normal * x).sum(axis=-1, keepdims=True) * x
     y = y / np.linalg.norm(y, axis=-1, keepdims=True)
