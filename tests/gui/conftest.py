@@ -1,0 +1,115 @@
+"""A small recording, and the whole window on it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+import trimesh
+
+from sd2core.io.mesh import save_mesh
+from sd2core.io.radar.infineon import write_capture
+from sd2core.mesh import MeshSequence
+from sd2core.recording import Recording, Span
+from sd2core.sensor import PAPER_RADAR
+from sd2core.timebase import Timebase
+
+FRAMES = 60
+RATE = 30.0
+
+
+def swinging_ball() -> MeshSequence:
+    """A ball of 0.3 m at 2 m that swings by 0.2 m along the line of sight, once a second."""
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=0.3)
+    times_s = np.arange(FRAMES) / RATE
+    depth = 2.0 + 0.2 * np.sin(2 * np.pi * times_s)
+    vertices = np.repeat(ball.vertices[None], FRAMES, axis=0).astype(np.float32)
+    vertices[:, :, 2] += depth[:, None].astype(np.float32)
+    return MeshSequence(vertices, np.asarray(ball.faces, np.int32), Timebase(times_s))
+
+
+def write_video(path: Path) -> None:
+    """A grey video whose brightness is the frame number."""
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("mpeg4", rate=int(RATE))
+        stream.width, stream.height, stream.pix_fmt = 160, 120, "yuv420p"
+        for number in range(FRAMES):
+            picture = np.full((120, 160, 3), 40 + 3 * number, np.uint8)
+            for packet in stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")):
+                container.mux(packet)
+        for packet in stream.encode():
+            container.mux(packet)
+
+
+@pytest.fixture(scope="session")
+def small_recording(tmp_path_factory) -> Path:
+    """Folder of a recording with video, mesh, simulated radar and two spans."""
+    folder = tmp_path_factory.mktemp("recordings") / "ball.sd2"
+    folder.mkdir()
+    write_video(folder / "video.mp4")
+    save_mesh(swinging_ball(), folder / "mesh.npz")
+    samples = np.random.default_rng(1).integers(
+        1800, 2200, (FRAMES, 1, PAPER_RADAR.chirps_per_frame, PAPER_RADAR.samples_per_chirp)
+    )
+    write_capture(
+        folder / "radar",
+        samples.astype(np.uint16),
+        PAPER_RADAR,
+        np.arange(FRAMES) / RATE,
+        simulated=True,
+    )
+    Recording.create(
+        folder,
+        video=folder / "video.mp4",
+        mesh=folder / "mesh.npz",
+        radar=folder / "radar",
+        spans=(Span(start_s=0.2, end_s=0.8, label="there"), Span(start_s=1, end_s=2, label="back")),
+        title="ball",
+        simulated=True,
+    )
+    return folder
+
+
+@pytest.fixture
+def recording_copy(small_recording, tmp_path) -> Path:
+    """The small recording in a folder of its own, to be changed."""
+    import shutil
+
+    return Path(shutil.copytree(small_recording, tmp_path / small_recording.name))
+
+
+@pytest.fixture(scope="session")
+def compiled_kernels() -> None:
+    """Machine code on disk, as after set-up."""
+    from sd2core.compiled import warm_up
+
+    warm_up()
+
+
+@pytest.fixture
+def empty_window(qtbot, compiled_kernels):
+    """The window without a recording, all views in place."""
+    from sd2app.settings import Settings
+    from sd2app.views.window import MainWindow
+
+    window = MainWindow(Settings.forgetful())
+    window.resize(1280, 800)
+    window.show()
+    window.populate()
+    qtbot.waitUntil(lambda: window.settled, timeout=20_000)
+    yield window
+    if window.ready:
+        window.context.document.undo_stack.clear()
+    window.close()
+
+
+@pytest.fixture
+def window(empty_window, small_recording, qtbot):
+    """The window on the small recording, everything computed."""
+    with qtbot.waitSignal(empty_window.context.document.opened, timeout=20_000):
+        empty_window.open_paths([small_recording])
+    qtbot.waitUntil(lambda: empty_window.settled, timeout=20_000)
+    qtbot.waitUntil(lambda: empty_window.context.synthesis.complete, timeout=20_000)
+    return empty_window
