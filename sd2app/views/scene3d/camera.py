@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -55,7 +56,7 @@ class EyePose:
     distance_m: float = 5.0
     angle_deg: float = STANDARD_ANGLE_DEG
 
-    @property
+    @cached_property
     def axes(self) -> tuple[Vector, Vector, Vector]:
         """Unit vectors right, down and forward of the picture."""
         azimuth, elevation = math.radians(self.azimuth_deg), math.radians(self.elevation_deg)
@@ -66,7 +67,7 @@ class EyePose:
         right = np.array([math.cos(azimuth), 0.0, -math.sin(azimuth)])
         return right, np.cross(forward, right), forward
 
-    @property
+    @cached_property
     def position(self) -> Vector:
         """The eye, metres."""
         return np.asarray(self.focus) - self.distance_m * self.axes[2]
@@ -142,7 +143,9 @@ class EyePose:
         room_x = _tangents(width, margins.left, margins.right, scale)
         room_y = _tangents(height, margins.top, margins.bottom, scale)
         distance = max(
-            _least_distance(x, z, *room_x), _least_distance(y, z, *room_y), 2.0 * _NEAREST_M
+            _least_distance(x, z, *room_x),
+            _least_distance(y, z, *room_y),
+            2.0 * _NEAREST_M - float(z.min()),
         )
         across = _offset(x, z, *room_x, distance)
         downward = _offset(y, z, *room_y, distance)

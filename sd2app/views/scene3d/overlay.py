@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QFont, QFontMetricsF, QImage, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QFont, QFontMetricsF, QImage, QPainter, QPaintEvent, QPen, QPixmap
 from PySide6.QtWidgets import QWidget
 
 from sd2app.views.scene3d.colours import DIVERGING, SEQUENTIAL, SceneColours, nice_step
@@ -28,6 +28,8 @@ class Overlay(QWidget):
         self._navigator = navigator
         self.message = ""
         self._legend = QRectF()
+        self._state: tuple[object, ...] | None = None
+        self._picture = QPixmap()
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
 
@@ -36,8 +38,33 @@ class Overlay(QWidget):
         return self._scene.colours
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Everything there is to say."""
-        painter = QPainter(self)
+        """Everything there is to say; drawn anew only when it changed."""
+        scene = self._scene
+        state = (
+            self.message,
+            self.size(),
+            self.devicePixelRatioF(),
+            self.font(),
+            scene.pose,
+            scene.sensor,
+            scene.colours,
+            scene.legend_state,
+            scene.metre_labels,
+            self._navigator.hovers_sensor,
+            self._navigator.holds_sensor,
+        )
+        if state != self._state:
+            self._state = state
+            ratio = self.devicePixelRatioF()
+            self._picture = QPixmap(self.size() * ratio)
+            self._picture.setDevicePixelRatio(ratio)
+            self._picture.fill(Qt.GlobalColor.transparent)
+            painter = QPainter(self._picture)
+            self._paint_all(painter)
+            painter.end()
+        QPainter(self).drawPixmap(0, 0, self._picture)
+
+    def _paint_all(self, painter: QPainter) -> None:
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setFont(self._font())
         if self.message:

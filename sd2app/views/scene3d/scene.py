@@ -319,6 +319,17 @@ class Scene:
         """Whether it is known which vertices the sensor sees."""
         return self._visible is not None
 
+    @property
+    def legend_state(self) -> tuple[object, ...]:
+        """Everything that a legend depends on."""
+        return (
+            self._has_mesh,
+            self._mode,
+            self._v_max_mps,
+            self.range_limits_m,
+            self.knows_hidden,
+        )
+
     def sensor_radius_m(self, size_px: tuple[float, float]) -> float:
         """Radius of the sphere: never too small on screen to take hold of."""
         pixel = self.pose.metres_per_pixel(self.sensor.position_m, size_px[1])
