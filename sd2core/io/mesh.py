@@ -18,14 +18,13 @@ from sd2core.io.mesh_arrays import (
     write_zarr,
 )
 from sd2core.io.mesh_checks import check_mesh, drop_empty_frames
-from sd2core.io.mesh_files import is_pattern, read_faces, read_mesh_files
+from sd2core.io.mesh_files import SURFACE_SUFFIXES, is_pattern, read_faces, read_mesh_files
 from sd2core.io.mesh_models import read_model_output
 from sd2core.mesh import MeshSequence
 from sd2core.progress import Progress, silent
 from sd2core.timebase import Timebase
 
 _PICKLES = {".pkl", ".pickle", ".joblib"}
-_SURFACES = {".obj", ".ply", ".glb", ".gltf", ".off", ".stl"}
 _KNOWN = (
     ".npz, .zarr, .zarr.zip, .obj/.ply/.glb (one, a folder or a pattern such as 'frames/*.obj'), "
     "or the .pkl of VIBE, WHAM or another tool that holds 'verts'"
@@ -152,7 +151,7 @@ def _read(
         return read_npz(path)
     if suffix in _PICKLES:
         return read_model_output(path, person, image_size, focal_px)
-    if suffix in _SURFACES:
+    if suffix in SURFACE_SUFFIXES:
         return read_mesh_files(path, progress)
     if suffix in {".pt", ".pth", ".ckpt"}:
         raise Sd2Error(

@@ -14,7 +14,7 @@ from sd2core.errors import Sd2Error
 from sd2core.io.mesh_arrays import FACE_NAMES, RawMesh
 from sd2core.progress import Progress, silent
 
-_SUFFIXES = (".obj", ".ply", ".glb", ".gltf", ".off", ".stl")
+SURFACE_SUFFIXES = (".obj", ".ply", ".glb")
 
 
 def is_pattern(path: Path) -> bool:
@@ -91,7 +91,7 @@ def read_faces(path: Path) -> NDArray[Any]:
             f"The faces file {path} does not exist", "a .npy, .npz or .obj file", "Check the path"
         )
     suffix = path.suffix.lower()
-    if suffix in _SUFFIXES:
+    if suffix in SURFACE_SUFFIXES:
         faces = read_surface(path)[1]
         if faces is None:
             raise Sd2Error(f"{path} holds no faces", "a mesh with triangles")
@@ -118,7 +118,7 @@ def _files(path: Path) -> list[Path]:
     if path.is_file():
         return [path]
     if path.is_dir():
-        found = [file for file in path.iterdir() if file.suffix.lower() in _SUFFIXES]
+        found = [file for file in path.iterdir() if file.suffix.lower() in SURFACE_SUFFIXES]
         kinds = sorted({file.suffix.lower() for file in found})
         if len(kinds) > 1:
             raise Sd2Error(
@@ -128,7 +128,7 @@ def _files(path: Path) -> list[Path]:
             )
     else:
         found = [Path(name) for name in glob.glob(str(path))]
-        found = [file for file in found if file.suffix.lower() in _SUFFIXES]
+        found = [file for file in found if file.suffix.lower() in SURFACE_SUFFIXES]
     if not found:
         raise Sd2Error(
             f"{path} matches no mesh file",

@@ -10,6 +10,7 @@ from types import TracebackType
 from typing import Any
 
 import numpy as np
+from av.error import FFmpegError
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
@@ -172,17 +173,22 @@ class VideoReader:
 
     def _begin(self, entry: int) -> None:
         """Make decoding continue at ``entry`` (0 is the start of the file)."""
-        self._entry = entry
+        begin: int | None = None
+        if entry > 0:
+            seek = int(self._index.entry_seeks[entry])
+            try:
+                self._container.seek(seek, stream=self._stream, backward=True)
+                begin = int(self._index.entry_keys[entry])
+            except (FFmpegError, OSError):
+                entry = 0  # a format that cannot seek
         if entry == 0:
             # Opening anew reaches the start of every file; seeking does not.
+            container, stream = open_stream(self.path)
             self._container.close()
-            self._container, self._stream = open_stream(self.path)
-            self._next = 0
-        else:
-            seek = int(self._index.entry_seeks[entry])
-            self._container.seek(seek, stream=self._stream, backward=True)
-            self._next = int(np.searchsorted(self._index.keys, self._index.entry_keys[entry]))
-        self._frames = self._numbered(None if entry == 0 else self._index.entry_keys[entry])
+            self._container, self._stream = container, stream
+        self._entry = entry
+        self._next = 0 if begin is None else int(np.searchsorted(self._index.keys, begin))
+        self._frames = self._numbered(begin)
 
     def _numbered(self, begin: int | None) -> Iterator[tuple[int, Any]]:
         """Decoded frames with their numbers; what precedes ``begin`` may be incomplete."""

@@ -9,6 +9,8 @@ file is decoded whole.
 
 from __future__ import annotations
 
+import os
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -79,7 +81,8 @@ def open_stream(path: Path) -> tuple[Any, Any]:
     if path.is_dir():
         raise Sd2Error(f"{path} is a folder", "a video file", "Name the file in it")
     try:
-        container = av.open(str(path))
+        # A file may be a playlist: it must not make the program open a connection.
+        container = av.open(f"file:{path}", options={"protocol_whitelist": "file"})
     except (FFmpegError, OSError, ValueError) as error:
         raise Sd2Error(
             f"{path} cannot be read as a video ({_reason(error)})",
@@ -93,7 +96,9 @@ def open_stream(path: Path) -> tuple[Any, Any]:
             f"{path} holds no video stream (format {container.format.name})", "a video file"
         )
     stream = streams[0]
+    # More threads hold back more frames and make every seek dearer.
     stream.thread_type = "AUTO"
+    stream.codec_context.thread_count = min(os.cpu_count() or 1, 4)
     return container, stream
 
 
@@ -136,7 +141,7 @@ def build_index(path: Path, progress: Progress = silent) -> FrameIndex:
     container, stream = open_stream(path)
     with container:
         claimed = int(stream.frames)
-        rate = float(stream.average_rate or stream.guessed_rate or 0)
+        rates = [float(r) for r in (stream.average_rate, stream.guessed_rate) if r]
         time_base = stream.time_base
         seconds = _stated_seconds(container, stream)
         megapixels = stream.codec_context.width * stream.codec_context.height / 1e6
@@ -162,18 +167,18 @@ def build_index(path: Path, progress: Progress = silent) -> FrameIndex:
 
     notes = []
     if counted:
-        stated = rate if rate > 0 else 30.0
+        stated = rates[0] if rates else 30.0
         times_s = keys / stated
         notes.append(
             f"The file holds no usable frame times: frames are counted and placed at "
             f"{stated:g} frames/s. Jumping back is slow; 'ffmpeg -i FILE copy.mp4' cures both."
         )
     else:
-        times_s = _unrounded((keys - keys[0]) * float(time_base), rate, float(time_base))
+        times_s = _unrounded((keys - keys[0]) * float(time_base), rates, float(time_base))
         inside = entries[0] <= keys[-1]
         entries = entries[0][inside], entries[1][inside]
-    if claimed == 0 and _is_regular(times_s, rate):
-        claimed = round(seconds * rate)
+    if claimed == 0 and len(times_s) > 1 and np.ptp(np.diff(times_s)) < 1e-6:
+        claimed = round(seconds * (len(times_s) - 1) / times_s[-1])
     if claimed > len(keys):
         notes.append(
             f"The file claims {claimed:,} frames, {len(keys):,} decode; it is used up to its "
@@ -262,25 +267,31 @@ def _decode_all(path: Path, packets: int, progress: Progress) -> list[Any]:
 
 
 def _stated_seconds(container: Any, stream: Any) -> float:
+    """How long the video lasts by what the file says; 0 when it does not say."""
     if stream.duration is not None:
         return float(stream.duration * stream.time_base)
+    tag = re.fullmatch(r"(\d+):(\d+):([\d.]+)", stream.metadata.get("DURATION", ""))
+    if tag:
+        hours, minutes, seconds = (float(part) for part in tag.groups())
+        return 3600 * hours + 60 * minutes + seconds
+    if len(container.streams) > 1:
+        return 0.0  # the container's duration may be that of the sound
     return float(container.duration or 0) / 1e6
 
 
-def _unrounded(times_s: NDArray[np.float64], rate: float, tick_s: float) -> NDArray[np.float64]:
+def _unrounded(
+    times_s: NDArray[np.float64], rates: list[float], tick_s: float
+) -> NDArray[np.float64]:
     """Undo the rounding of a regular clock to the container's ticks.
 
     Matroska keeps milliseconds, which turns steps of 1/30 s into 33 and 34 ms
     and would put 3 % of jitter on every velocity.
     """
-    if rate <= 0:
-        return times_s
-    regular = np.arange(len(times_s)) / rate
-    return regular if (np.abs(times_s - regular) < tick_s).all() else times_s
-
-
-def _is_regular(times_s: NDArray[np.float64], rate: float) -> bool:
-    return rate > 0 and bool((np.abs(times_s - np.arange(len(times_s)) / rate) < 1e-6).all())
+    for rate in rates:
+        regular = np.arange(len(times_s)) / rate
+        if (np.abs(times_s - regular) < tick_s).all():
+            return regular
+    return times_s
 
 
 def _is_cover_art(stream: Any) -> bool:

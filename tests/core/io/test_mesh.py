@@ -135,6 +135,17 @@ def test_a_zarr_mesh_stays_on_disk(
     assert mesh.vertices.frames_per_chunk == 10
 
 
+def test_zarr_2_groups_are_read(tmp_path: Path) -> None:
+    vertices, faces = body()
+    group = zarr.open_group(str(tmp_path / "old.zarr"), mode="w", zarr_format=2)
+    for name, array in (("vertices", vertices), ("faces", faces), ("times_s", times(6))):
+        group.create_array(name, data=array)
+    mesh = load_mesh(tmp_path / "old.zarr")
+    np.testing.assert_array_equal(mesh.read(0, 6), vertices)
+    np.testing.assert_array_equal(mesh.faces, faces)
+    assert mesh.notes == ()
+
+
 @pytest.mark.parametrize("limit", [0, 2**26])
 def test_stored_vertices_are_indexed_like_an_array(
     tmp_path: Path, limit: int, monkeypatch: pytest.MonkeyPatch

@@ -230,6 +230,47 @@ def test_threads_read_their_own_frames(tmp_path: Path) -> None:
     assert wrong == []
 
 
+def test_longer_sound_is_no_claim_of_more_frames(tmp_path: Path) -> None:
+    path = tmp_path / "v.mkv"
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("libx264", rate=30)
+        stream.width, stream.height, stream.pix_fmt = 128, 64, "yuv420p"
+        sound = container.add_stream("pcm_s16le", rate=8000, layout="mono")
+        for k in range(10):
+            frame = av.VideoFrame.from_ndarray(picture(k, 128, 64), format="rgb24")
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+        for k in range(20):
+            frame = av.AudioFrame.from_ndarray(np.zeros((1, 800), np.int16), "s16", "mono")
+            frame.sample_rate, frame.pts = 8000, 800 * k
+            container.mux(sound.encode(frame))
+        container.mux(sound.encode())
+    with open_video(path) as reader:
+        assert [number_in(image) for image in reader.frames()] == list(range(10))
+        assert reader.notes == ()
+
+
+def test_a_file_that_vanishes_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(video, "_CACHE_BYTES", 0)
+    path = write_video(tmp_path / "v.mp4", 30, options={"g": "10"})
+    with open_video(path) as reader:
+        reader.read(25)
+        path.rename(tmp_path / "elsewhere.mp4")
+        with pytest.raises(Sd2Error, match=r"v\.mp4 does not exist"):
+            reader.read(2)
+        (tmp_path / "elsewhere.mp4").rename(path)
+        assert number_in(reader.read(2)) == 2
+
+
+def test_a_playlist_opens_no_connection(tmp_path: Path) -> None:
+    path = tmp_path / "list.m3u8"
+    path.write_text(
+        "#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\nhttp://localhost:9/a.ts\n#EXT-X-ENDLIST\n"
+    )
+    with pytest.raises(Sd2Error, match=r"list\.m3u8"):
+        open_video(path)
+
+
 def test_a_closed_reader_says_so(tmp_path: Path) -> None:
     reader = open_video(write_video(tmp_path / "v.mp4", 3))
     reader.close()
