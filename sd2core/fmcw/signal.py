@@ -80,8 +80,8 @@ class SignalOptions:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if math.isnan(self.snr_db):
-            raise Sd2Error("snr_db is not a number", "decibels, or inf for no noise")
+        if not self.snr_db > -math.inf:
+            raise Sd2Error(f"snr_db is {self.snr_db}", "decibels, or inf for no noise")
         if not 0 < self.peak_share <= 1:
             raise Sd2Error(f"peak_share is {self.peak_share}", "a share above 0, up to 1")
 
@@ -147,7 +147,9 @@ def capture_scene(
     scatterers_at : callable
         Time in seconds → :class:`~sd2core.fmcw.scene.Scatterers`.
     times_s : float64 array, shape (frames,)
-        Middle of every frame's burst of chirps.
+        Middle of every frame's burst of chirps, increasing.
+
+    Other parameters and the result are those of :func:`simulate_capture`.
     """
     sensor, options = sensor or VirtualSensor(), options or SignalOptions()
     if config.adc_bits > 16:

@@ -277,6 +277,19 @@ def test_a_point_cloud_and_a_wide_converter_are_refused() -> None:
         simulate_capture(plate(0.1, 2.0), replace(PAPER_RADAR, adc_bits=24))
 
 
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"snr_db": -math.inf}, "snr_db is -inf"),
+        ({"snr_db": math.nan}, "snr_db is nan"),
+        ({"peak_share": 0.0}, "peak_share is 0.0"),
+    ],
+)
+def test_levels_that_make_no_sense_are_refused(options: dict, sentence: str) -> None:
+    with pytest.raises(Sd2Error, match=sentence):
+        SignalOptions(**options)
+
+
 def test_it_reports_and_stops_when_told() -> None:
     mesh = plate(0.1, 2.4, frames=6)
     steps: list[tuple[int, int]] = []
