@@ -42,15 +42,15 @@ def run(paths: Sequence[Path] = (), *, screenshot: Path | None = None) -> int:
     settings = Settings() if screenshot is None else Settings.forgetful()
     apply_theme(application, is_dark(settings))
     window = MainWindow(settings)
-    window.show()
 
     def fill() -> None:
         window.populate()
         if paths:
             window.open_paths(list(paths))
 
-    # One turn of the event loop later, so that the skeleton is painted first.
-    QTimer.singleShot(0, fill)
+    # Queued, so that the skeleton reaches the screen before the imports begin.
+    window.first_painted.connect(lambda: QTimer.singleShot(0, fill))
+    window.show()
     if screenshot is None:
         return application.exec()
     from sd2app.screenshot import take_screenshot

@@ -5,8 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Qt, QTimer
-from PySide6.QtGui import QAction, QCloseEvent, QDragEnterEvent, QDropEvent, QKeySequence
+from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtGui import (
+    QAction,
+    QCloseEvent,
+    QDragEnterEvent,
+    QDropEvent,
+    QKeySequence,
+    QPaintEvent,
+)
 from PySide6.QtWidgets import (
     QApplication,
     QFrame,
@@ -32,6 +39,8 @@ _PANELS = ("video", "scene", "sensor", "tracks", "spectrum")
 class MainWindow(QMainWindow):
     """One recording: frame-wise views on top, time-wise tracks below."""
 
+    first_painted = Signal()
+
     context: Context
     dialogs: Dialogs
 
@@ -40,6 +49,7 @@ class MainWindow(QMainWindow):
         self._settings = settings
         self._scene: SceneView | None = None
         self._ready = False
+        self._painted = False
         self.setWindowTitle("SD² Studio")
         self.setAcceptDrops(True)
         self.setMinimumSize(960, 640)
@@ -320,6 +330,13 @@ class MainWindow(QMainWindow):
             self.open_paths([path])
 
     # --- Qt events ------------------------------------------------------------------------
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Say when the skeleton is on screen."""
+        super().paintEvent(event)
+        if not self._painted:
+            self._painted = True
+            self.first_painted.emit()
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         """Take files."""
