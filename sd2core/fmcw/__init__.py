@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-from sd2core.fmcw.processing import (
-    ProcessingOptions,
-    RangeDoppler,
-    doppler_map,
-    limits,
-    range_doppler,
-)
+from sd2core.fmcw.chain import ProcessingOptions
+from sd2core.fmcw.processing import RangeDoppler, doppler_map, limits, range_doppler
 from sd2core.fmcw.signal import Reflector, SignalOptions, capture_scene, simulate_capture
 
 __all__ = [

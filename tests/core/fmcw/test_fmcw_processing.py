@@ -11,8 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
-from sd2core.fmcw import processing
-from sd2core.fmcw.processing import doppler_map, range_doppler, rebinning, taper
+from sd2core.fmcw import chain
+from sd2core.fmcw.chain import taper
+from sd2core.fmcw.processing import doppler_map, range_doppler, rebinning
 from sd2core.io.radar import RadarCapture, load_capture
 from sd2core.progress import Cancelled
 from sd2core.sensor import PAPER_RADAR, SPEED_OF_LIGHT_MPS, RadarConfig, VelocityAxis
@@ -254,7 +255,7 @@ def test_blocks_and_single_frames_give_the_same(
     capture = noise_capture(replace(FINE, receivers=2), 90)
     options = {"clutter": clutter, "clutter_window_s": 0.5}
     whole = doppler_map(capture, **options)  # type: ignore[arg-type]
-    monkeypatch.setattr(processing, "_BLOCK_BYTES", 1)
+    monkeypatch.setattr(chain, "_BLOCK_BYTES", 1)
     steps: list[tuple[int, int]] = []
     blocks = doppler_map(
         capture,

@@ -1,0 +1,211 @@
+"""From raw samples to power over range and Doppler, block by block.
+
+One capture and one set of options; where the power goes on a velocity axis is
+:mod:`sd2core.fmcw.processing`'s business.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, get_args
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+from sd2core.io.radar.capture import RadarCapture
+from sd2core.sensor import RadarConfig
+
+Clutter = Literal["none", "mean", "moving"]
+"""none; mean: each frame's mean over its chirps; moving: that mean averaged over frames."""
+
+Window = Literal["hann", "blackman", "none"]
+
+_COSINES: dict[str, tuple[float, ...]] = {
+    "hann": (0.5, 0.5),
+    "blackman": (0.42, 0.5, 0.08),
+    "none": (1.0,),
+}
+_ZERO_PADDING = 4
+_BLOCK_BYTES = 4_000_000
+"""Small enough that progress is reported, and a cancel obeyed, every few ms."""
+
+
+@dataclass(frozen=True)
+class ProcessingOptions:
+    """How raw samples become power over range and velocity.
+
+    Parameters
+    ----------
+    clutter : {"none", "mean", "moving"}
+        What to subtract as static. ``mean`` takes each frame's mean over its
+        chirps, which also removes what moves slower than about one Doppler
+        bin; ``moving`` takes that mean averaged over ``clutter_window_s``,
+        which keeps a slow mover.
+    clutter_window_s : float
+        Length of the centred average of ``moving``; shorter at the ends.
+    range_m : (float, float) or None
+        Gates whose cell overlaps this stretch count; None takes all. Gates
+        within the window's main lobe around zero range (0 and 1 for Hann) hold
+        the transmitter's own leakage and never count, nor does the gate at
+        R_max, where beat frequencies fold.
+    window : {"hann", "blackman", "none"}
+        For both FFTs.
+    """
+
+    clutter: Clutter = "none"
+    clutter_window_s: float = 2.0
+    range_m: tuple[float, float] | None = None
+    window: Window = "hann"
+
+    def __post_init__(self) -> None:
+        for name, choices in (("clutter", get_args(Clutter)), ("window", get_args(Window))):
+            if getattr(self, name) not in choices:
+                raise Sd2Error(f"{name} is {getattr(self, name)!r}", f"one of {', '.join(choices)}")
+        if not self.clutter_window_s > 0:
+            raise Sd2Error(f"clutter_window_s is {self.clutter_window_s}", "a positive time")
+        if self.range_m is not None and not 0 <= self.range_m[0] < self.range_m[1]:
+            raise Sd2Error(f"range_m is {self.range_m}", "two ranges in metres, the nearer first")
+
+
+def taper(window: Window, length: int) -> NDArray[np.float32]:
+    """Cosine window sampled at half steps: symmetric, and without zeros at its ends."""
+    phase = 2.0 * np.pi * (np.arange(length) + 0.5) / length
+    terms = (
+        (-1) ** order * weight * np.cos(order * phase)
+        for order, weight in enumerate(_COSINES[window])
+    )
+    return np.sum(list(terms), axis=0).astype(np.float32)
+
+
+class Chain:
+    """Everything of one capture and one set of options that frames have in common.
+
+    ``range_m`` (gates,) are the centres of the gates that count, ``doppler_bins``
+    the length of the zero-padded Doppler FFT.
+    """
+
+    def __init__(self, capture: RadarCapture, options: ProcessingOptions) -> None:
+        config = capture.config
+        self.capture = capture
+        self.options = options
+        self.doppler_bins = _ZERO_PADDING * config.chirps_per_frame
+        self.gates = _gates(config, options)
+        self.range_m = np.arange(self.gates.start, self.gates.stop) * config.range_resolution_m
+        fast = taper(options.window, config.samples_per_chirp).astype(np.float64)
+        slow = taper(options.window, config.chirps_per_frame).astype(np.float64)
+        # One-sided spectrum (2), sine power 1/2 (2), window energies, zero padding.
+        norm = 4.0 / (
+            config.samples_per_chirp
+            * config.chirps_per_frame
+            * (fast**2).sum()
+            * (slow**2).sum()
+            * _ZERO_PADDING
+        )
+        self._fast = fast.astype(np.float32)
+        self._slow = (slow * np.sqrt(norm)).astype(np.float32)[:, None]
+        self._clipped = 0
+        self._read = 0
+
+    @property
+    def clipped_share(self) -> float:
+        """Share of the samples processed so far that sit at the converter's ends."""
+        return self._clipped / max(self._read, 1)
+
+    @cached_property
+    def _reach(self) -> int:
+        """Frames to either side that the moving average needs."""
+        if self.options.clutter != "moving":
+            return 0
+        frame_s = self.capture.config.frame_repetition_s
+        return min(round(0.5 * self.options.clutter_window_s / frame_s), self.capture.frame_count)
+
+    def blocks(self) -> Iterator[tuple[int, int]]:
+        """Half-open stretches of frames that fit into a few megabytes."""
+        config = self.capture.config
+        gates = len(self.range_m)
+        per_frame = (
+            8
+            * config.receivers
+            * max(self.doppler_bins * gates, config.chirps_per_frame * config.samples_per_chirp)
+        )
+        # A block reads its neighbourhood as well, so it may not be much shorter.
+        size = max(1, _BLOCK_BYTES // per_frame, self._reach)
+        frames = self.capture.frame_count
+        for start in range(0, frames, size):
+            yield start, min(start + size, frames)
+
+    def doppler_power(self, start: int, stop: int) -> NDArray[np.float32]:
+        """Power of frames [start, stop) summed over receivers and gates, (n, doppler)."""
+        parts = self._spectra(start, stop).view(np.float32)  # real, imaginary, real …
+        summed: NDArray[np.float32] = np.einsum("nrdk,nrdk->nd", parts, parts)
+        return summed
+
+    def cell_power(self, frame: int) -> NDArray[np.float32]:
+        """Power of one frame summed over receivers, (doppler, gates)."""
+        spectra = self._spectra(frame, frame + 1)[0]
+        power: NDArray[np.float32] = (spectra.real**2 + spectra.imag**2).sum(axis=0)
+        return power
+
+    def _spectra(self, start: int, stop: int) -> NDArray[np.complex64]:
+        """Spectra of frames [start, stop), (n, receivers, doppler, gates)."""
+        signal = self._without_clutter(start, stop)  # (n, receivers, chirps, samples)
+        signal *= self._fast
+        profiles = scipy.fft.rfft(signal, axis=3)[..., self.gates] * self._slow
+        spectra: NDArray[np.complex64] = scipy.fft.fft(profiles, n=self.doppler_bins, axis=2)
+        return spectra
+
+    def _without_clutter(self, start: int, stop: int) -> NDArray[np.float32]:
+        signal = self.capture.read(start, stop)
+        top = 1.0 - 2.0 ** (1 - self.capture.config.adc_bits)
+        self._clipped += int(np.count_nonzero((signal <= -1.0) | (signal >= top)))
+        self._read += signal.size
+        signal -= signal.mean(axis=3, keepdims=True)
+        if self.options.clutter == "none":
+            return signal
+        if self.options.clutter == "mean":
+            signal -= signal.mean(axis=2, keepdims=True)
+            return signal
+        first = max(start - self._reach, 0)
+        last = min(stop + self._reach, self.capture.frame_count)
+        around = [self._mean_chirp(k, min(k + 64, last)) for k in range(first, last, 64)]
+        # float64, or the running sum would lose the small samples of a long stretch.
+        total = np.cumsum(np.concatenate(around), axis=0, dtype=np.float64)
+        total = np.concatenate([np.zeros_like(total[:1]), total])  # (frames + 1, rx, samples)
+        frames = np.arange(start, stop)
+        low = np.maximum(frames - self._reach, 0) - first
+        high = np.minimum(frames + self._reach + 1, self.capture.frame_count) - first
+        mean = (total[high] - total[low]) / (high - low)[:, None, None]
+        signal -= mean[:, :, None, :].astype(np.float32)
+        return signal
+
+    def _mean_chirp(self, start: int, stop: int) -> NDArray[np.float32]:
+        signal = self.capture.read(start, stop)
+        signal -= signal.mean(axis=3, keepdims=True)
+        mean: NDArray[np.float32] = signal.mean(axis=2)  # (n, rx, samples)
+        return mean
+
+
+def _gates(config: RadarConfig, options: ProcessingOptions) -> slice:
+    first = len(_COSINES[options.window])
+    end = (config.samples_per_chirp + 1) // 2
+    step_m = config.range_resolution_m
+    if options.range_m is not None:
+        # Gate k is the cell from (k - 1/2) to (k + 1/2) times the resolution.
+        low, high = options.range_m
+        first = max(first, int(np.floor(low / step_m + 0.5)))
+        end = min(end, int(np.ceil(high / step_m + 0.5)))
+    if first >= end:
+        wanted = "" if options.range_m is None else f" from {low:g} m to {high:g} m"
+        raise Sd2Error(
+            f"No range gate is left{wanted}: {config.samples_per_chirp} samples per chirp give"
+            f" gates every {step_m:.3g} m up to {config.range_max_m:.3g} m, and the nearest"
+            f" {len(_COSINES[options.window])} hold the transmitter's own leakage",
+            f"ranges between {len(_COSINES[options.window]) * step_m:.3g} m"
+            f" and {config.range_max_m:.3g} m",
+            "Choose other ranges, or window='none' for a radar with very few samples",
+        )
+    return slice(first, end)
