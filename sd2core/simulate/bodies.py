@@ -133,7 +133,7 @@ class Body:
         """
         path = resource_path("body.npz") if path is None else Path(path)
         try:
-            with np.load(path, allow_pickle=False) as data:
+            with path.open("rb") as stream, np.load(stream, allow_pickle=False) as data:
                 meta = json.loads(str(data["meta"]))
                 if meta.get("format") != FORMAT or meta.get("version", 0) > VERSION:
                     raise Sd2Error(

@@ -16,7 +16,7 @@ from sd2core.simulate.bodies import Body, Skeleton
 Singles = NDArray[np.float32]
 
 SKIN = (0.80, 0.61, 0.50)
-HAIR = (0.20, 0.155, 0.13)
+HAIR = (0.23, 0.175, 0.145)
 SHIRT = (0.13, 0.40, 0.56)
 TROUSERS = (0.20, 0.215, 0.25)
 SHOES = (0.86, 0.86, 0.85)
@@ -62,7 +62,7 @@ class Clothes:
         eye = np.abs(p[:, 0]) - skeleton.heads_m[skeleton.index["eye.L"], 0]
         eye_height = height + skeleton.heads_m[skeleton.index["eye.L"], 1]
         front = (-z - 0.03) * 40.0
-        brows = 1.0 - (eye / 0.021) ** 2 - ((eye_height - 0.021 + 4.0 * eye**2) / 0.0045) ** 2
+        brows = 1.0 - (eye / 0.021) ** 2 - ((eye_height - 0.0175 + 4.0 * eye**2) / 0.0045) ** 2
         whites = 1.0 - (eye / 0.0145) ** 2 - ((eye_height + 0.0004) / 0.0043) ** 2
         eyes = 1.0 - (eye / 0.0068) ** 2 - (eye_height / 0.0062) ** 2
         lips = 1.0 - (p[:, 0] / 0.024) ** 2 - ((eye_height + 0.071) / 0.0075) ** 2

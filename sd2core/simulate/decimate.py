@@ -100,8 +100,10 @@ class _Surface:
 
     def _allowed(self, gone: int, onto: int) -> bool:
         # Link condition: an edge of a closed surface has two triangles and, when its
-        # collapse is to change no topology, no other common neighbours.
-        if len(self._neighbours(gone) & self._neighbours(onto)) != 2:
+        # collapse is to change no topology, no other common neighbours. Four vertices
+        # in all are a tetrahedron, the smallest closed surface.
+        beside_gone, beside_onto = self._neighbours(gone), self._neighbours(onto)
+        if len(beside_gone & beside_onto) != 2 or len(beside_gone | beside_onto) <= 4:
             return False
         for number in self.around[gone] - self.around[onto]:
             face = self._face(number)

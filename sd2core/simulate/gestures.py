@@ -217,7 +217,8 @@ def _reach(skeleton: Skeleton, rotations: Floats, side: str, arm: Floats) -> Non
     rotations[:, upper] = product(transposed(above[..., :3]), upper_turn)
     rotations[:, lower] = product(transposed(upper_turn), lower_turn)
     # The forearm's two bones share the turn of the hand, as radius and ulna do.
-    along = lower_rest / np.linalg.norm(lower_rest)
+    along = heads[wrist] - heads[forearm]
+    along = along / np.linalg.norm(along)
     half = about(along, -across * 0.5 * arm[:, 6])
     rotations[:, forearm] = half
     knuckles = heads[index[f"finger5-1.{side}"]] - heads[index[f"finger2-1.{side}"]]
