@@ -36,13 +36,15 @@ class ImageBackend(QWidget):
     name = "image"
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+        # Before the widget: one that was made half must not remain in its parent.
         library = missing_library("image")
         if library is not None:
             raise NoOpenGL(GL_MISSING.format(library=library))
-        self._window = _off_screen_window()
+        window = _off_screen_window()
+        super().__init__(parent)
+        self._window: vtkRenderWindow | None = window
         self.renderer = vtkRenderer()
-        self._window.AddRenderer(self.renderer)
+        window.AddRenderer(self.renderer)
         self._pixels = vtkUnsignedCharArray()
         self._prepare: Prepare | None = None
         self._picture: QImage | None = None
@@ -99,15 +101,15 @@ class ImageBackend(QWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Render if something changed, then paint the picture."""
-        painter = QPainter(self)
-        if self._prepare is None or self._window is None:
-            painter.fillRect(self.rect(), self.palette().window())
-            return
-        if self._dirty or self._picture is None:
+        if self._prepare is not None and self._window is not None and self._dirty:
             self._picture = self._rendered(self._prepare, self._window)
             self._dirty = False
             if not self._fine:
                 self._idle.start()
+        painter = QPainter(self)
+        if self._picture is None:
+            painter.fillRect(self.rect(), self.palette().window())
+            return
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
         painter.drawImage(self.rect(), self._picture)
 
@@ -150,17 +152,21 @@ def _off_screen_window() -> vtkRenderWindow:
         When no driver answers: rendering would end the program.
     """
     uses_egl = sys.platform.startswith("linux") and hasattr(opengl, "vtkEGLRenderWindow")
-    # Without this VTK would try the X server first and complain when there is none.
+    # Left to itself VTK tries the X server first and complains when there is none.
     window = opengl.vtkEGLRenderWindow() if uses_egl else vtkRenderWindow()
     window.SetOffScreenRendering(True)
     window.SetMultiSamples(0)
     window.SetSize(64, 48)
+    if not _answers(window):
+        raise NoOpenGL(GL_BROKEN)
+    return window
+
+
+def _answers(window: vtkRenderWindow) -> bool:
+    """Whether OpenGL works; VTK's own words on it are not for the user."""
     warned = vtkObject.GetGlobalWarningDisplay()
     vtkObject.GlobalWarningDisplayOff()
     try:
-        works = bool(window.SupportsOpenGL())
+        return bool(window.SupportsOpenGL())
     finally:
         vtkObject.SetGlobalWarningDisplay(warned)
-    if not works:
-        raise NoOpenGL(GL_BROKEN)
-    return window

@@ -26,6 +26,7 @@ from sd2core.sensor import VirtualSensor
 Preset = Literal["overview", "camera", "sensor", "side", "top"]
 SENSOR_RADIUS_M = 0.045
 SENSOR_LEAST_PX = 7.0
+_MARGINS = Margins(left=28.0, top=36.0, right=104.0, bottom=30.0)
 _INSIDE_M = 0.25
 _FAR_OFF_M = 30.0
 _SAMPLED_FRAMES = 9
@@ -241,8 +242,7 @@ class Scene:
             "top": (0.0, -89.5),
         }[preset]
         pose = EyePose(azimuth_deg=azimuth, elevation_deg=elevation)
-        margins = Margins(left=28.0, top=36.0, right=96.0, bottom=30.0)
-        return pose.framed(np.concatenate(points), size_px, margins)
+        return pose.framed(np.concatenate(points), size_px, _MARGINS)
 
     def _looking_from(
         self,
@@ -260,9 +260,12 @@ class Scene:
         ahead = depth > 0.1
         tangent = 0.45
         if ahead.any():
-            aspect = size_px[1] / size_px[0]
-            across = np.abs(relative[ahead] @ right) * aspect
-            tallest = np.maximum(np.abs(relative[ahead] @ down), across) / depth[ahead]
+            # Half the picture's height is one unit; the colour bar keeps its place free.
+            unit = size_px[1] / 2
+            room_left = size_px[0] / 2 / unit
+            room_right = max(size_px[0] / 2 - _MARGINS.right, 0.1 * size_px[0]) / unit
+            x, y = relative[ahead] @ right, np.abs(relative[ahead] @ down)
+            tallest = np.maximum(np.maximum(x / room_right, -x / room_left), y) / depth[ahead]
             tangent = float(np.clip(1.06 * tallest.max(), 0.12, 1.4))
         focus = position + distance * forward
         return EyePose(

@@ -57,19 +57,20 @@ def hand() -> Hand:
 
 def test_the_sensor_stays_under_the_pointer_where_it_was_taken(hand: Hand) -> None:
     start = hand.sensor_px
-    hand.navigator.press(*(start + (5, -3)), "left", False, False)
+    grip = np.add(start, (5, -3))
+    hand.navigator.press(*grip, "left", False, False)
     for step in ((40, 10), (-120, 70), (33.5, -80.25)):
-        hand.navigator.move(*(start + (5, -3) + step), False, False)
-        np.testing.assert_allclose(hand.sensor_px, start + step, atol=1e-6)
-    hand.navigator.release(*(start + (5, -3) + step))
+        hand.navigator.move(*np.add(grip, step), False, False)
+        np.testing.assert_allclose(hand.sensor_px, np.add(start, step), atol=1e-6)
+    hand.navigator.release(*np.add(grip, step))
     assert hand.log == ["begin", "drag", "drag", "drag", "end"]
     assert not hand.navigator.holds_sensor
 
 
 def test_a_press_alone_does_not_move_the_sensor(hand: Hand) -> None:
     before = hand.sensor_m
-    hand.navigator.press(*(hand.sensor_px + (6, 6)), "left", False, False)
-    hand.navigator.release(*(hand.sensor_px + (6, 6)))
+    hand.navigator.press(*np.add(hand.sensor_px, 6), "left", False, False)
+    hand.navigator.release(*np.add(hand.sensor_px, 6))
     assert hand.log == ["begin", "end"]
     np.testing.assert_array_equal(hand.sensor_m, before)
 
