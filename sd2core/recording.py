@@ -277,7 +277,8 @@ class Recording:
         options = self.mesh_reading.options()
         if self.faces is not None:
             options["faces"] = self._present("faces")
-        if path.suffix.lower() in _PLACED_BY_VIDEO and self.video and self.video.exists():
+        by_video = path.suffix.lower() in _PLACED_BY_VIDEO and self.video and self.video.exists()
+        if by_video and "image_size" not in options:
             with self.open_video() as video:
                 options["image_size"] = (video.width, video.height)
         return load_mesh(path, **options, progress=progress)

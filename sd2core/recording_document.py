@@ -50,6 +50,7 @@ class MeshReading(BaseModel):
     frames_per_s: FiniteFloat | None = None
     scale: FiniteFloat | None = None
     person: int | str | None = None
+    image_size: tuple[int, int] | None = None
     focal_px: FiniteFloat | None = None
     distance_m: FiniteFloat | None = None
 

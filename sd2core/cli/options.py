@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -82,10 +83,17 @@ def add_mesh_reading(parser: argparse.ArgumentParser) -> None:
         help="move a mesh that is centred on the body's root this far forward",
     )
     parser.add_argument(
+        "--image-size",
+        type=image_size,
+        metavar="WxH",
+        help="size of the video in pixels, to place the output of VIBE (default: that of the"
+        " recording's video)",
+    )
+    parser.add_argument(
         "--focal-px",
         type=positive_float,
         metavar="F",
-        help="focal length of the video, to place the output of VIBE (default: the diagonal)",
+        help="focal length of the video in pixels, likewise (default: the diagonal)",
     )
 
 
@@ -95,6 +103,14 @@ def position(text: str) -> tuple[float, float, float]:
     if len(values) != 3:
         raise argparse.ArgumentTypeError(f"{text!r} is not X,Y,Z in metres, e.g. -1,0,2.5")
     return values[0], values[1], values[2]
+
+
+def image_size(text: str) -> tuple[int, int]:
+    """Parse ``WxH`` in pixels."""
+    match = re.fullmatch(r"([1-9]\d*)x([1-9]\d*)", text)
+    if match is None:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a size in pixels, e.g. 640x480")
+    return int(match[1]), int(match[2])
 
 
 def span_m(text: str) -> tuple[float, float]:

@@ -23,6 +23,7 @@ def mesh_reading(options: argparse.Namespace) -> MeshReading:
         scale=options.scale,
         person=options.person,
         distance_m=options.distance_m,
+        image_size=options.image_size,
         focal_px=options.focal_px,
     )
 

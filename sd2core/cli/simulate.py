@@ -43,9 +43,9 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 def _sample(options: argparse.Namespace) -> None:
     from sd2core.simulate.sample import make_sample
 
-    with progress_bar("Simulating", unit="step") as progress:
-        make_sample(options.out, progress)
-    print(f"Made {options.out}")
+    with progress_bar("Simulating", unit="frame") as progress:
+        made = make_sample(options.out, progress)
+    print(f"Made {made}")
 
 
 def _export_body(options: argparse.Namespace) -> None:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import pickle
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -20,6 +22,7 @@ from sd2core.recording import (
     is_recording,
     open_recording,
 )
+from sd2core.recording_document import Document
 from sd2core.relative_paths import is_absolute, located_path, stored_path
 from sd2core.sensor import VirtualSensor
 
@@ -52,7 +55,7 @@ def content(recording: Recording) -> dict:
 def test_everything_is_read_back(files: Path) -> None:
     made = make(
         files,
-        mesh_reading=MeshReading(frames_per_s=25.0, scale=0.001, person="2"),
+        mesh_reading=MeshReading(frames_per_s=25.0, person="2", image_size=(640, 480)),
         radar_offset_s=-0.35,
         sensor=VirtualSensor((-1.0, 0.5, 2.0), 10.0, -5.0, 60.0),
         spans=(Span(start_s=0.5, end_s=1.25, label="left → right"),),
@@ -343,6 +346,27 @@ class TestRelink:
             make(files).relink(files / "walk.mkv")
 
 
+def test_the_video_places_a_mesh_that_is_centred_on_its_root(
+    shared_data: Path, tmp_path: Path
+) -> None:
+    """As in the output of VIBE: a box of 240 pixels in the middle of a 640 x 480 video."""
+    frames = 3
+    person = {
+        "verts": np.random.default_rng(0).normal(0, 0.3, (frames, 20, 3)),
+        "pred_cam": np.tile([1.0, 0.0, 0.0], (frames, 1)),
+        "bboxes": np.tile([320.0, 240.0, 240.0, 240.0], (frames, 1)),
+    }
+    person["verts"] -= person["verts"].mean(axis=1, keepdims=True)
+    (tmp_path / "vibe.pkl").write_bytes(pickle.dumps({1: person}))
+    video = shared_data / "video" / "help.mkv"
+    made = Recording.create(tmp_path / "a.sd2", video=video, mesh=tmp_path / "vibe.pkl")
+    made.mesh_reading = MeshReading(focal_px=600.0)
+    # Half the box, 120 pixels, is 1 m at a focal length of 600 pixels: 5 m away.
+    assert made.load_mesh().frame(0).mean(axis=0) == pytest.approx([0, 0, 5.0], abs=1e-5)
+    made.mesh_reading = MeshReading(focal_px=600.0, image_size=(400, 480))
+    assert made.load_mesh().frame(0).mean(axis=0) == pytest.approx([1.0, 0, 5.0], abs=1e-5)
+
+
 class TestPattern:
     """A mesh may be ``frames/*.obj``."""
 
@@ -367,6 +391,15 @@ class TestPattern:
         with pytest.raises(Sd2Error, match="Give their folder"):
             made.save_as(tmp_path / "copy", copy=True)
         assert not (tmp_path / "copy.sd2").exists()
+
+
+def test_the_documented_example_is_complete_and_true() -> None:
+    documentation = Path(__file__).resolve().parents[2] / "docs" / "formats.md"
+    section = documentation.read_text(encoding="utf-8").split("## Recordings")[1]
+    example = json.loads(section.split("```json")[1].split("```")[0])
+    assert Document.model_validate(example).model_dump(mode="json") == example
+    assert example.keys() == Document.model_fields.keys()
+    assert example["mesh_reading"].keys() == MeshReading.model_fields.keys()
 
 
 def test_a_missing_file_is_explained_when_it_is_opened(files: Path) -> None:

@@ -121,6 +121,8 @@ def test_negative_sensor_position_is_parsed() -> None:
         ["--null-bins", "14;15"],
         ["--visibility", "depth"],
         ["--range-exponent", "-2"],
+        ["--image-size", "640"],
+        ["--image-size", "640x0"],
     ],
 )
 def test_wrong_values_are_usage_errors(sd2: Sd2, arguments: list[str]) -> None:
