@@ -8,14 +8,9 @@ containers around them. Every other name ends the reading.
 
 from __future__ import annotations
 
-import bz2
 import collections
-import gzip
-import io
-import lzma
 import pickle
 import re
-import zlib
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -23,20 +18,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
+from sd2core.io.limited import LimitedFile, Refused, decompressed
 
 LIMIT_BYTES = 4 * 2**30
 """More than this is refused: a small compressed file may claim to hold anything."""
 
-_PIECE = 16 * 2**20
 _NUMBERS = re.compile(r"[<>=|]?(?:[biufc]\d+|[?bBhHiIlLqQefdgFD]|[SUa]\d+)")
 _REMEDY = (
     "Save the vertices where the file was written: "
     "numpy.savez('mesh.npz', vertices=verts, faces=faces, times_s=times)"
 )
-
-
-class _Refused(Exception):
-    """What a file asked for and does not get."""
 
 
 def read_pickle(path: Path, limit_bytes: int = LIMIT_BYTES) -> Any:
@@ -63,9 +54,9 @@ def read_pickle(path: Path, limit_bytes: int = LIMIT_BYTES) -> Any:
     """
     try:
         with path.open("rb") as file:
-            source = _Limited(_decompressed(file), limit_bytes)
+            source = LimitedFile(decompressed(file), limit_bytes)
             return _DataUnpickler(source).load()
-    except _Refused as refusal:
+    except Refused as refusal:
         raise Sd2Error(
             f"{path} {refusal}",
             "plain NumPy arrays, numbers, text, lists and dictionaries",
@@ -89,8 +80,8 @@ class _Array(np.ndarray):
     """An array that takes its content from a pickle only when it is plain numbers."""
 
     def __setstate__(self, state: Any) -> None:
-        if not isinstance(state, tuple) or len(state) not in (4, 5):
-            raise _Refused("holds an array in a form that is not known")
+        if not isinstance(state, tuple) or len(state) not in (4, 5) or self.size:
+            raise Refused("holds an array in a form that is not known")
         shape, dtype, fortran, content = state[-4:]
         if isinstance(content, str):  # written by Python 2
             content = content.encode("latin1")
@@ -103,16 +94,18 @@ class _Dtype:
 
     def __init__(self, code: Any, align: Any = False, copy: Any = False) -> None:
         if code in ("O", "O8", "|O", "O4"):
-            raise _Refused("holds an array of Python objects (dtype object)")
-        if not isinstance(code, str) or not _NUMBERS.fullmatch(code):
-            raise _Refused(f"holds an array of dtype {str(code)[:60]}")
+            raise Refused("holds an array of Python objects (dtype object)")
+        if not isinstance(code, str):
+            raise Refused(f"holds a dtype that is given by a {type(code).__name__}")
+        if not _NUMBERS.fullmatch(code) or np.dtype(code).itemsize == 0:
+            raise Refused(f"holds an array of dtype {code[:60]}")
         self.plain: np.dtype[Any] = np.dtype(code)
 
     def __setstate__(self, state: Any) -> None:
         if not isinstance(state, tuple) or len(state) < 5:
-            raise _Refused("holds a dtype in a form that is not known")
+            raise Refused("holds a dtype in a form that is not known")
         if any(part is not None for part in state[2:5]):
-            raise _Refused("holds a structured array")
+            raise Refused("holds a structured array")
         if state[1] in ("<", ">"):
             self.plain = self.plain.newbyteorder(state[1])
 
@@ -122,16 +115,16 @@ class _JoblibArray:
 
     def __setstate__(self, state: Any) -> None:
         if not isinstance(state, dict):
-            raise _Refused("holds a joblib array in a form that is not known")
+            raise Refused("holds a joblib array in a form that is not known")
         self.shape = state.get("shape")
         self.order = state.get("order")
         self.dtype = state.get("dtype")
         self.aligned = state.get("numpy_array_alignment_bytes") is not None
 
-    def read(self, source: _Limited) -> NDArray[Any]:
+    def read(self, source: LimitedFile) -> NDArray[Any]:
         """Read the bytes that follow."""
         if not isinstance(self.dtype, _Dtype):
-            raise _Refused("holds a joblib array without a dtype")
+            raise Refused("holds a joblib array without a dtype")
         size = _size(self.shape, self.dtype.plain, source.left)
         if self.aligned:
             source.read_exactly(source.read_exactly(1)[0])
@@ -150,26 +143,26 @@ def _array(content: Any, dtype: Any, shape: Any, order: Any) -> NDArray[Any]:
 def _checked_dtype(content: Any, dtype: Any, shape: Any) -> np.dtype[Any]:
     """The dtype, when it, the shape and the bytes agree."""
     if not isinstance(dtype, _Dtype):
-        raise _Refused("holds an array without a dtype")
+        raise Refused("holds an array without a dtype")
     if not isinstance(content, bytes | bytearray):
-        raise _Refused("holds an array whose content is not bytes")
+        raise Refused("holds an array whose content is not bytes")
     size = _size(shape, dtype.plain, len(content))
     if size != len(content):
-        raise _Refused(f"holds an array of shape {shape} with {len(content):,} bytes, not {size:,}")
+        raise Refused(f"holds an array of shape {shape} with {len(content):,} bytes, not {size:,}")
     return dtype.plain
 
 
 def _size(shape: Any, dtype: np.dtype[Any], left: int) -> int:
     """Bytes of an array; refused when more than there can be."""
     if not isinstance(shape, tuple) or len(shape) > 32:
-        raise _Refused("holds an array without a shape")
+        raise Refused("holds an array without a shape")
     size = dtype.itemsize
     for length in shape:
         if not isinstance(length, int) or length < 0:
-            raise _Refused("holds an array with an impossible shape")
+            raise Refused("holds an array with an impossible shape")
         size *= length
     if size > left:
-        raise _Refused(
+        raise Refused(
             f"claims an array of shape {shape}, {size / 2**30:,.1f} GiB, more than the "
             f"{left / 2**30:,.1f} GiB that can be there"
         )
@@ -196,7 +189,7 @@ def _scalar(dtype: Any, content: Any = b"") -> Any:
 def _encode(text: Any, coding: Any = "latin1") -> bytes:
     """``_codecs.encode``, by which old protocols store bytes."""
     if not isinstance(text, str) or coding not in ("latin1", "latin-1"):
-        raise _Refused("stores bytes in a way that is not known")
+        raise Refused("stores bytes in a way that is not known")
     return text.encode("latin1")
 
 
@@ -205,21 +198,21 @@ def _bytearray(content: Any = b"", coding: Any = "latin1") -> bytearray:
     if isinstance(content, str):
         return bytearray(_encode(content, coding))
     if not isinstance(content, bytes):
-        raise _Refused("builds a bytearray from something else than bytes")
+        raise Refused("builds a bytearray from something else than bytes")
     return bytearray(content)
 
 
 def _bytes(content: Any = b"") -> bytes:
     """``bytes`` of a list of numbers, as old protocols store it."""
     if not isinstance(content, bytes | list | tuple):
-        raise _Refused("builds bytes from something else than bytes")
+        raise Refused("builds bytes from something else than bytes")
     return bytes(content)
 
 
 def _default_dict(factory: Any = None, *content: Any) -> collections.defaultdict[Any, Any]:
     """``collections.defaultdict`` with one of the plain types as its factory."""
     if factory is not None and factory not in _FACTORIES:
-        raise _Refused("holds a defaultdict with a factory that is not a plain type")
+        raise Refused("holds a defaultdict with a factory that is not a plain type")
     return collections.defaultdict(factory, *content)
 
 
@@ -265,7 +258,7 @@ class _DataUnpickler(_Machine):
 
     dispatch: ClassVar[dict[int, Any]] = dict(_Machine.dispatch)
 
-    def __init__(self, source: _Limited) -> None:
+    def __init__(self, source: LimitedFile) -> None:
         super().__init__(source, encoding="latin1")
         self._source = source
 
@@ -275,41 +268,41 @@ class _DataUnpickler(_Machine):
         if (home, name) in _ALLOWED:
             return _ALLOWED[home, name]
         if home.split(".")[0] == "torch":
-            raise _Refused(
+            raise Refused(
                 f"holds torch tensors ('{module}.{name}'); save them as NumPy arrays "
                 "(tensor.cpu().numpy())"
             )
-        raise _Refused(f"asks for '{module}.{name}', which is forbidden; nothing was executed")
+        raise Refused(f"asks for '{module}.{name}', which is forbidden; nothing was executed")
 
     def get_extension(self, code: int) -> None:
         """Refuse names that are given by number."""
-        raise _Refused(f"asks for the registered extension {code}, which is forbidden")
+        raise Refused(f"asks for the registered extension {code}, which is forbidden")
 
     def persistent_load(self, identity: Any) -> Any:
         """Refuse objects that another program would supply."""
-        raise _Refused("refers to objects outside the file (a persistent id)")
+        raise Refused("refers to objects outside the file (a persistent id)")
 
     def load_reduce(self) -> None:
         """Call only what stands in the list, containers only with a list."""
         function, arguments = self.stack[-2:]
         if not any(function is called for called in _CALLED):
-            raise _Refused(f"calls {_named(function)}, which is forbidden")
+            raise Refused(f"calls {_named(function)}, which is forbidden")
         if function in _OF_A_LIST and not all(isinstance(a, list | tuple) for a in arguments):
-            raise _Refused(f"builds {_named(function)} from something else than a list")
+            raise Refused(f"builds {_named(function)} from something else than a list")
         super().load_reduce()
 
     def load_newobj(self) -> None:
         """Make the one kind of object that joblib makes this way."""
         kind, arguments = self.stack[-2:]
         if kind is not _JoblibArray or arguments:
-            raise _Refused(f"makes {_named(kind)} without its constructor, which is forbidden")
+            raise Refused(f"makes {_named(kind)} without its constructor, which is forbidden")
         super().load_newobj()
 
     def load_build(self) -> None:
         """Fill arrays and dtypes; nothing else has a state to be set."""
         target = self.stack[-2]
         if not isinstance(target, _Array | _Dtype | _JoblibArray):
-            raise _Refused(f"sets the state of {_named(target)}, which is forbidden")
+            raise Refused(f"sets the state of {_named(target)}, which is forbidden")
         super().load_build()
         if isinstance(target, _JoblibArray):
             self.stack[-1] = target.read(self._source)
@@ -318,11 +311,11 @@ class _DataUnpickler(_Machine):
         """Refuse an instance of a class, by the class's name."""
         module, name = (self.readline()[:-1].decode("utf-8") for _ in range(2))
         self.find_class(module, name)
-        raise _Refused(f"makes an instance of '{module}.{name}', which is forbidden")
+        raise Refused(f"makes an instance of '{module}.{name}', which is forbidden")
 
     def load_forbidden(self) -> None:
         """Refuse the instructions that plain data does not need."""
-        raise _Refused("makes objects in a way that plain data does not need, which is forbidden")
+        raise Refused("makes objects in a way that plain data does not need, which is forbidden")
 
     dispatch[pickle.REDUCE[0]] = load_reduce
     dispatch[pickle.NEWOBJ[0]] = load_newobj
@@ -334,89 +327,3 @@ class _DataUnpickler(_Machine):
 
 def _named(thing: Any) -> str:
     return f"'{thing.__name__}'" if isinstance(thing, type) else f"a {type(thing).__name__}"
-
-
-class _Limited:
-    """A file that gives no more than so many bytes in all."""
-
-    def __init__(self, stream: Any, limit_bytes: int) -> None:
-        self._stream = stream
-        self.left = limit_bytes
-
-    def read(self, size: int) -> bytes:
-        """Up to ``size`` bytes."""
-        return bytes(self._upto(size))
-
-    def read_exactly(self, size: int) -> bytearray:
-        """``size`` bytes; an error when the file ends before."""
-        content = self._upto(size)
-        if len(content) < size:
-            raise EOFError("the file ends inside an array")
-        return content
-
-    def readinto(self, buffer: Any) -> int:
-        """Fill ``buffer`` as far as the file goes."""
-        content = self._upto(len(buffer))
-        buffer[: len(content)] = content
-        return len(content)
-
-    def readline(self) -> bytes:
-        """Up to the next line break."""
-        line: bytes = self._stream.readline(min(_PIECE, self.left))
-        self.left -= len(line)
-        return line
-
-    def _upto(self, size: int) -> bytearray:
-        if not 0 <= size <= self.left:
-            raise _Refused(f"claims {size:,} bytes where {self.left:,} are still accepted")
-        content = bytearray()
-        # In pieces, so that a false claim takes no memory.
-        while len(content) < size:
-            piece = self._stream.read(min(size - len(content), _PIECE))
-            if not piece:
-                break
-            content += piece
-        self.left -= len(content)
-        return content
-
-
-class _Zlib(io.RawIOBase):
-    """A bare zlib stream, joblib's usual compression, as a file."""
-
-    def __init__(self, file: Any) -> None:
-        self._file = file
-        self._machine = zlib.decompressobj()
-
-    def readable(self) -> bool:
-        """Say that it can be read."""
-        return True
-
-    def readinto(self, buffer: Any) -> int:
-        """Decompress into ``buffer``."""
-        while not self._machine.eof:
-            source = self._machine.unconsumed_tail or self._file.read(2**16)
-            content = self._machine.decompress(source, len(buffer))
-            if content:
-                buffer[: len(content)] = content
-                return len(content)
-            if not source:
-                raise EOFError("the compressed file breaks off")
-        return 0
-
-
-def _decompressed(file: Any) -> Any:
-    start = file.read(6)
-    file.seek(0)
-    if start[:2] == b"\x1f\x8b":
-        return gzip.GzipFile(fileobj=file)
-    if start[:3] == b"BZh":
-        return bz2.BZ2File(file)
-    if start == b"\xfd7zXZ\x00" or start[:3] == b"\x5d\x00\x00":
-        return lzma.LZMAFile(file)
-    if start[:4] == b"\x04\x22\x4d\x18":
-        raise _Refused("is compressed with lz4, which is not read here")
-    if start[:4] == b"PK\x03\x04":
-        raise _Refused("is a zip archive, as torch.save writes; torch files are not read here")
-    if start[:1] == b"\x78" and int.from_bytes(start[:2], "big") % 31 == 0:
-        return io.BufferedReader(_Zlib(file), 2**16)
-    return file

@@ -175,12 +175,11 @@ class VideoReader:
         """Make decoding continue at ``entry`` (0 is the start of the file)."""
         begin: int | None = None
         if entry > 0:
-            seek = int(self._index.entry_seeks[entry])
+            begin = int(self._index.entry_keys[entry])
             try:
-                self._container.seek(seek, stream=self._stream, backward=True)
-                begin = int(self._index.entry_keys[entry])
+                self._container.seek(begin, stream=self._stream, backward=True)
             except (FFmpegError, OSError):
-                entry = 0  # a format that cannot seek
+                entry, begin = 0, None  # a format that cannot seek
         if entry == 0:
             # Opening anew reaches the start of every file; seeking does not.
             container, stream = open_stream(self.path)

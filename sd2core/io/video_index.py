@@ -43,8 +43,8 @@ class FrameIndex:
         place in the file when the file holds no usable times (``counted``).
     times_s : float64 array, shape (T,)
         Seconds, the first frame at 0.
-    entry_keys, entry_seeks : int64 arrays, shape (E,)
-        Places where decoding can begin: key of the frame, time to seek to.
+    entry_keys : int64 array, shape (E,)
+        Frames at which decoding can begin, by their keys; also the time to seek to.
     counted : bool
         Frames can only be found by counting from the start.
     notes : tuple of str
@@ -54,7 +54,6 @@ class FrameIndex:
     keys: NDArray[np.int64]
     times_s: NDArray[np.float64]
     entry_keys: NDArray[np.int64]
-    entry_seeks: NDArray[np.int64]
     counted: bool
     notes: tuple[str, ...]
 
@@ -63,7 +62,6 @@ class FrameIndex:
 class _Packets:
     pts: NDArray[np.int64]  # in the order of the file, those that are shown
     entry_pts: NDArray[np.int64]
-    entry_seeks: NDArray[np.int64]
     count: int
     usable: bool
 
@@ -151,8 +149,8 @@ def build_index(path: Path, progress: Progress = silent) -> FrameIndex:
 
     keys = None
     if packets.usable and packets.count * megapixels > _WHOLE_MEGAPIXELS:
-        keys = _keys_from_ends(path, packets)
-    entries = packets.entry_pts, packets.entry_seeks
+        keys = _keys_from_ends(path, packets, progress)
+    entries = packets.entry_pts
     counted = False
     if keys is None:
         shown = _decode_all(path, packets.count, progress)
@@ -162,7 +160,7 @@ def build_index(path: Path, progress: Progress = silent) -> FrameIndex:
             keys = np.array(shown, dtype=np.int64)
         else:
             keys = np.arange(len(shown), dtype=np.int64)
-            entries = np.zeros(1, np.int64), np.zeros(1, np.int64)
+            entries = np.zeros(1, np.int64)
             counted = True
 
     notes = []
@@ -175,8 +173,7 @@ def build_index(path: Path, progress: Progress = silent) -> FrameIndex:
         )
     else:
         times_s = _unrounded((keys - keys[0]) * float(time_base), rates, float(time_base))
-        inside = entries[0] <= keys[-1]
-        entries = entries[0][inside], entries[1][inside]
+        entries = entries[entries <= keys[-1]]
     if claimed == 0 and len(times_s) > 1 and np.ptp(np.diff(times_s)) < 1e-6:
         claimed = round(seconds * (len(times_s) - 1) / times_s[-1])
     if claimed > len(keys):
@@ -184,13 +181,12 @@ def build_index(path: Path, progress: Progress = silent) -> FrameIndex:
             f"The file claims {claimed:,} frames, {len(keys):,} decode; it is used up to its "
             "last frame that decodes."
         )
-    return FrameIndex(keys, times_s, entries[0], entries[1], counted, tuple(notes))
+    return FrameIndex(keys, times_s, entries, counted, tuple(notes))
 
 
 def _read_packets(container: Any, stream: Any, progress: Progress) -> _Packets:
     pts: list[int] = []
     entry_pts: list[int] = []
-    entry_seeks: list[int] = []
     count = 0
     usable = True
     total = max(int(stream.frames), 1)
@@ -211,24 +207,23 @@ def _read_packets(container: Any, stream: Any, progress: Progress) -> _Packets:
             pts.append(packet.pts)
         if packet.is_keyframe and packet.pts is not None:
             entry_pts.append(packet.pts)
-            entry_seeks.append(packet.pts if packet.dts is None else min(packet.pts, packet.dts))
     if (np.diff(entry_pts) <= 0).any() or not pts:
         usable = False
     return _Packets(
         np.array(pts, np.int64),
         np.array(entry_pts, np.int64),
-        np.array(entry_seeks, np.int64),
         count,
         usable,
     )
 
 
-def _keys_from_ends(path: Path, packets: _Packets) -> NDArray[np.int64] | None:
+def _keys_from_ends(path: Path, packets: _Packets, progress: Progress) -> NDArray[np.int64] | None:
     """Packet times corrected at both ends; None when only decoding all can tell."""
     keys = np.unique(packets.pts)
     container, stream = open_stream(path)
     with container:
-        head = [frame.pts for frame in decoded_frames(container, stream, _HEAD_PACKETS)]
+        frames = decoded_frames(container, stream, _HEAD_PACKETS)
+        head = _shown_times(frames, _HEAD_PACKETS, progress)
     if not head or None in head or (np.diff(head) <= 0).any():
         return None
     within = keys[(keys >= head[0]) & (keys <= head[-1])]
@@ -240,11 +235,11 @@ def _keys_from_ends(path: Path, packets: _Packets) -> NDArray[np.int64] | None:
     if not last.size:
         return None
     begin = int(last[-1])
-    seek = int(packets.entry_seeks[len(last) - 1])
     container, stream = open_stream(path)
     with container:
-        container.seek(seek, stream=stream, backward=True)
-        tail = [frame.pts for frame in decoded_frames(container, stream)]
+        container.seek(begin, stream=stream, backward=True)
+        expected = int((keys >= begin).sum())
+        tail = _shown_times(decoded_frames(container, stream), expected, progress)
     if not tail or None in tail or (np.diff(tail) <= 0).any() or tail[0] > begin:
         return None
     decoded = np.array([t for t in tail if t >= begin], np.int64)
@@ -257,12 +252,17 @@ def _keys_from_ends(path: Path, packets: _Packets) -> NDArray[np.int64] | None:
 
 def _decode_all(path: Path, packets: int, progress: Progress) -> list[Any]:
     container, stream = open_stream(path)
-    shown = []
     with container:
-        for frame in decoded_frames(container, stream):
-            shown.append(frame.pts)
-            if len(shown) % 8 == 0:
-                progress(min(len(shown), packets), packets)
+        return _shown_times(decoded_frames(container, stream), packets, progress)
+
+
+def _shown_times(frames: Iterator[Any], expected: int, progress: Progress) -> list[Any]:
+    """Presentation times of decoded frames; None for those without."""
+    shown = []
+    for frame in frames:
+        shown.append(frame.pts)
+        if len(shown) % 8 == 0:
+            progress(min(len(shown), expected), expected)
     return shown
 
 

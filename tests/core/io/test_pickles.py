@@ -22,7 +22,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
-from sd2core.io.pickles import _decompressed, read_pickle
+from sd2core.io.limited import decompressed
+from sd2core.io.pickles import read_pickle
 
 PROTOCOLS = range(pickle.HIGHEST_PROTOCOL + 1)
 
@@ -233,6 +234,14 @@ def test_the_hostile_files_are_hostile(tmp_path: Path) -> None:
         (b"cbuiltins\ndict\n}(Vx\nK\x01ub.", "sets the state of 'dict'"),
         (b"c_codecs\nencode\n(Vx\nVrot13\ntR.", "stores bytes"),
         (b"ccollections\ndefaultdict\n(c_codecs\nencode\ntR.", "factory"),
+        (b"cnumpy\ndtype\n(VS0\ntR.", "dtype S0"),
+        (b"cnumpy\ndtype\n(K\x01tR.", "given by a int"),
+        (
+            b"cnumpy._core.multiarray\n_reconstruct\n(NNNtRq\x00"
+            + 2 * b"h\x00(K\x01(K\x03tcnumpy\ndtype\n(Vu1\ntR\x89C\x03abctb"
+            + b".",
+            "form that is not known",
+        ),
         (b"cnumpy\ndtype\n(VO8\ntR.", "object"),
         (b"cnumpy\ndtype\n(Vf8,f8\ntR.", "dtype f8,f8"),
         (b"cnumpy\ndtype\n(VV8\ntR(K\x03V|\nN(Va\nt}NNNtb.", "dtype V8"),
@@ -333,4 +342,4 @@ def test_damage_gives_a_sentence_or_data(
 @settings(deadline=None, max_examples=20)
 def test_compressions_are_recognised(compress: Callable[[bytes], bytes], content: bytes) -> None:
     content = b"\x80\x04" + content
-    assert _decompressed(io.BytesIO(compress(content))).read(10_000) == content
+    assert decompressed(io.BytesIO(compress(content))).read(10_000) == content

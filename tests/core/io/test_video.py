@@ -21,6 +21,8 @@ FILES = {
     "b_frames.mp4": (60, {"options": {"bf": "3", "g": "12", "b-pyramid": "normal"}}),
     "one_gop.mkv": (60, {"options": {"bf": "3", "g": "600"}}),
     "open_gop.mkv": (60, {"options": {"bf": "3", "x264-params": "open-gop=1:keyint=12"}}),
+    "short_gop.mp4": (60, {"options": {"bf": "3", "g": "5", "sc_threshold": "0"}}),
+    "short_gop.mkv": (60, {"options": {"bf": "3", "g": "5", "sc_threshold": "0"}}),
     "uneven.mp4": (60, {"times_ms": UNEVEN_MS, "options": {"bf": "3", "g": "12"}}),
     "uneven.mkv": (60, {"times_ms": UNEVEN_MS, "options": {"bf": "2", "g": "10"}}),
     "transport.ts": (60, {"options": {"bf": "2", "g": "10"}}),
