@@ -126,7 +126,8 @@ def test_the_wheel_holds_the_program_and_nothing_else(wheel: Path) -> None:
     sources = {
         path.relative_to(REPOSITORY).as_posix()
         for package in ("sd2core", "sd2app")
-        for path in (REPOSITORY / package).rglob("*.py")
+        for path in (REPOSITORY / package).rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts
     }
     assert sources <= names
     resources = {
