@@ -96,7 +96,7 @@ class _Dtype:
         if code in ("O", "O8", "|O", "O4"):
             raise Refused("holds an array of Python objects (dtype object)")
         if not isinstance(code, str):
-            raise Refused(f"holds a dtype that is given by a {type(code).__name__}")
+            raise Refused(f"holds a dtype given as {type(code).__name__}")
         if not _NUMBERS.fullmatch(code) or np.dtype(code).itemsize == 0:
             raise Refused(f"holds an array of dtype {code[:60]}")
         self.plain: np.dtype[Any] = np.dtype(code)

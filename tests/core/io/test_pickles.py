@@ -235,7 +235,7 @@ def test_the_hostile_files_are_hostile(tmp_path: Path) -> None:
         (b"c_codecs\nencode\n(Vx\nVrot13\ntR.", "stores bytes"),
         (b"ccollections\ndefaultdict\n(c_codecs\nencode\ntR.", "factory"),
         (b"cnumpy\ndtype\n(VS0\ntR.", "dtype S0"),
-        (b"cnumpy\ndtype\n(K\x01tR.", "given by a int"),
+        (b"cnumpy\ndtype\n(K\x01tR.", "given as int"),
         (
             b"cnumpy._core.multiarray\n_reconstruct\n(NNNtRq\x00"
             + 2 * b"h\x00(K\x01(K\x03tcnumpy\ndtype\n(Vu1\ntR\x89C\x03abctb"
