@@ -114,7 +114,7 @@ def _fingerprint() -> str:
     Numba itself notices a change of a kernel's own file only, not of a function
     that was inlined from another file.
     """
-    import llvmlite.binding
+    import llvmlite.binding  # type: ignore[import-untyped]
 
     digest = hashlib.sha256()
     for module in (*KERNEL_MODULES, "sd2core.compiled"):

@@ -18,7 +18,8 @@ from sd2core.scattering.amplitude import NEAREST_RANGE_M, range_weight
 from sd2core.scattering.velocity import radial_velocity
 from sd2core.scattering.visibility import facing_kernel, facing_mask
 
-_RUN = 1024
+_RUN = 4096
+_TABLES = 8
 
 ALL, FACING, MASK = 0, 1, 2
 """Which vertices count: all, those facing the sensor, those marked in a mask."""
@@ -174,7 +175,7 @@ def count_plain(
                 distance, counting.range_exponent, counting.reference_range_m
             )
         measured = max(1, int((frames.duration_s[t] > 0).sum()))
-        for sample in np.flatnonzero(frames.duration_s[t] > 0):
+        for sample in np.flatnonzero(frames.duration_s[t] > 0).tolist():
             number, beyond = bins_plain(frames, t, sample, sensor, counting)
             total = np.bincount(number[seen], weight[seen], counting.bins + 1)
             into.histogram[t] += total[: counting.bins] / measured
@@ -297,26 +298,26 @@ def _squared_ratios(x, y, z, sx, sy, sz, reference, weight):  # type: ignore[no-
 @compiled
 def _raise_to(weight, exponent, spare):  # type: ignore[no-untyped-def]
     """Squared ratios to ratios to the power of ``exponent``, in place."""
-    half = exponent * 0.5
     if exponent != np.floor(exponent):
-        power = np.float32(half)
+        power = np.float32(exponent * 0.5)
         for v in range(weight.shape[0]):
             weight[v] = weight[v] ** power
         return
-    whole = int(half)
+    whole, odd = int(exponent) // 2, int(exponent) % 2
+    while odd == 0 and whole > 1 and whole % 2 == 0:
+        for v in range(weight.shape[0]):
+            weight[v] *= weight[v]
+        whole //= 2
+    if odd == 0 and whole == 1:
+        return
     for v in range(weight.shape[0]):
         spare[v] = weight[v]
-    if half != whole:
-        for v in range(weight.shape[0]):
-            weight[v] = np.sqrt(weight[v])
-    else:
-        for v in range(weight.shape[0]):
-            weight[v] = np.float32(1)
+        weight[v] = np.sqrt(weight[v]) if odd == 1 else np.float32(1)
     while whole > 0:
-        if whole & 1:
+        if whole % 2 == 1:
             for v in range(weight.shape[0]):
                 weight[v] *= spare[v]
-        whole >>= 1
+        whole //= 2
         if whole > 0:
             for v in range(weight.shape[0]):
                 spare[v] *= spare[v]
@@ -324,25 +325,21 @@ def _raise_to(weight, exponent, spare):  # type: ignore[no-untyped-def]
 
 @compiled
 def _tally(slot, counts):  # type: ignore[no-untyped-def]
-    """Add 1 per vertex; four tables in turn, so that equal slots do not wait for each other."""
-    whole = slot.shape[0] // 4 * 4
-    for v in range(0, whole, 4):
-        counts[0, slot[v]] += np.int32(1)
-        counts[1, slot[v + 1]] += np.int32(1)
-        counts[2, slot[v + 2]] += np.int32(1)
-        counts[3, slot[v + 3]] += np.int32(1)
+    """Add 1 per vertex; several tables in turn, so that equal slots do not wait."""
+    whole = slot.shape[0] // _TABLES * _TABLES
+    for v in range(0, whole, _TABLES):
+        for table in range(_TABLES):
+            counts[table, slot[v + table]] += np.int32(1)
     for v in range(whole, slot.shape[0]):
         counts[0, slot[v]] += np.int32(1)
 
 
 @compiled
 def _tally_weights(slot, weight, sums):  # type: ignore[no-untyped-def]
-    whole = slot.shape[0] // 4 * 4
-    for v in range(0, whole, 4):
-        sums[0, slot[v]] += np.float64(weight[v])
-        sums[1, slot[v + 1]] += np.float64(weight[v + 1])
-        sums[2, slot[v + 2]] += np.float64(weight[v + 2])
-        sums[3, slot[v + 3]] += np.float64(weight[v + 3])
+    whole = slot.shape[0] // _TABLES * _TABLES
+    for v in range(0, whole, _TABLES):
+        for table in range(_TABLES):
+            sums[table, slot[v + table]] += np.float64(weight[v + table])
     for v in range(whole, slot.shape[0]):
         sums[0, slot[v]] += np.float64(weight[v])
 
@@ -361,13 +358,13 @@ def _count_kernel(  # type: ignore[no-untyped-def]
     spare = np.empty(_RUN, np.float32)
     seen = np.ones(_RUN, np.uint8)
     slot = np.empty(_RUN, np.uint8)
-    counts = np.zeros((4, 256), np.int32)
-    sums = np.zeros((4, 256), np.float64)
+    counts = np.zeros((_TABLES, 256), np.int32)
+    sums = np.zeros((_TABLES, 256), np.float64)
     weights = weighted or exponent != 0
     for t in range(centre.shape[0]):
         counts[:, : bins + 2] = 0
         sums[:, : bins + 2] = 0
-        seen_count = 0
+        seen_count = np.int64(0)
         outside_count = 0
         measured = 0
         for sample in range(samples):
@@ -415,15 +412,9 @@ def _count_kernel(  # type: ignore[no-untyped-def]
                 else:
                     _tally(slot[:n], counts)
         for bin_number in range(bins):
-            if weights:
-                total = (sums[0, bin_number] + sums[1, bin_number]) + (
-                    sums[2, bin_number] + sums[3, bin_number]
-                )
-            else:
-                total = np.float64(
-                    counts[0, bin_number] + counts[1, bin_number]
-                    + counts[2, bin_number] + counts[3, bin_number]
-                )  # fmt: skip
+            total = 0.0
+            for table in range(_TABLES):
+                total += sums[table, bin_number] if weights else counts[table, bin_number]
             histogram[t, bin_number] = total / measured
         visible[t] = seen_count
         outside[t] = outside_count / measured

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 from sd2core.errors import Sd2Error
@@ -59,7 +59,7 @@ class SynthesisOptions:
 
     visibility: Visibility = "exact"
     weight: Weight = "count"
-    axis: VelocityAxis = VelocityAxis()
+    axis: VelocityAxis = field(default_factory=VelocityAxis)
     null_bins: tuple[int, ...] = (14, 15, 16)
     beyond: Beyond = "drop"
     range_exponent: float = 4.0

@@ -143,7 +143,9 @@ class PreparedMesh:
             rounded = np.where(np.isfinite(middle), middle, 0.0).astype(np.float32)
             self.origin_m = rounded.astype(np.float64)
         per_frame = self.mesh.vertex_count * 12 * self.options.oversampling
-        self.block_frames = max(_FEWEST_FRAMES, _BLOCK_BYTES // per_frame)
+        # Several blocks with their normals must fit, or each would push out the other.
+        bytes_per_block = min(_BLOCK_BYTES, self.budget.limit_bytes // 8)
+        self.block_frames = max(_FEWEST_FRAMES, bytes_per_block // per_frame)
 
     @property
     def block_count(self) -> int:

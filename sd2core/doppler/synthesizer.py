@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -323,21 +324,15 @@ class Synthesizer:
             def work(ticket: Ticket) -> None:
                 small = visibility == "exact" or not kernels_ready()
                 step = _EXACT_FRAMES if small else _FAST_FRAMES
+                ticket.advance(0)
+                block = self.prepared.block(index)
                 for first in range(low, high, step):
                     last = min(first + step, high)
-                    ticket.advance(0)
-                    block = self.prepared.block(index)
                     rows = slice(first - block.start, last - block.start)
                     target = slice(first - start, last - start)
+                    part = counts.rows(target), totals[target]
                     qualities.add(
-                        self._count_rows(
-                            block,
-                            rows,
-                            sensor.position_m,
-                            visibility,
-                            counts.rows(target),
-                            totals[target],
-                        )  # fmt: skip
+                        self._count_rows(block, rows, sensor.position_m, visibility, *part)
                     )
                     ticket.advance(last - first)
 
@@ -348,7 +343,7 @@ class Synthesizer:
             # A block that must be read first is one job: its readers would wait.
             pieces = -(-(high - low) // _FAST_FRAMES) if self.prepared.has(index) else 1
             cuts = np.linspace(low, high, pieces + 1).astype(int).tolist()
-            jobs += [job(index, a, b) for a, b in zip(cuts[:-1], cuts[1:], strict=True)]
+            jobs += [job(index, a, b) for a, b in pairwise(cuts)]
         run_jobs(jobs, stop - start, progress)
         if visibility == "frozen":
             quality: Quality = "frozen" if qualities == {"frozen"} else "facing"
@@ -521,7 +516,7 @@ class Synthesizer:
 
 def _no_surface(mesh: MeshSequence, wanted: str) -> Sd2Error:
     return Sd2Error(
-        f"{wanted} was asked for, but {mesh.source or 'the mesh'} has no faces: it is a point cloud",
+        f"{wanted}: {mesh.source or 'the mesh'} has no faces, it is a point cloud",
         "visibility none and count weighting",
         "Choose those, or give the faces (--faces)",
     )

@@ -34,7 +34,9 @@ _WIDEST = 2.0
 _ROUNDING = np.float32(1e-6)
 """Error of single-precision image coordinates, generously, relative to their size."""
 
-_MOST_CELLS = 256
+_CELLS_PER_ROOT = 3.0
+_MOST_CELLS = 384
+"""The image plane has about this many cells per vertex and axis, up to that many."""
 
 
 @compiled
@@ -121,19 +123,17 @@ def _search_view(  # type: ignore[no-untyped-def]
             xmin, xmax = min(xmin, image[0, v]), max(xmax, image[0, v])
             ymin, ymax = min(ymin, image[1, v]), max(ymax, image[1, v])
             dmin, dmax = min(dmin, depth[v]), max(dmax, depth[v])
-    extent = max(xmax - xmin, ymax - ymin)
-    cells = min(_MOST_CELLS, max(4, int(2 * np.sqrt(owned_count))))
-    scale = np.float32(0)
-    if extent > 0:
-        scale = np.float32(cells) / extent
-    columns = min(int((xmax - xmin) * scale), cells) + 1
-    rows = min(int((ymax - ymin) * scale), cells) + 1
+    # Each axis has its own cell size: a standing body is narrow and tall.
+    columns = rows = min(_MOST_CELLS, max(4, int(_CELLS_PER_ROOT * np.sqrt(owned_count))))
+    wide, high = xmax - xmin, ymax - ymin
+    xscale = np.float32(columns) / wide if wide > 0 else np.float32(0)
+    yscale = np.float32(rows) / high if high > 0 else np.float32(0)
 
     start[: columns * rows + 1] = 0
     for v in range(vertices):
         if owned[v]:
-            column = min(int((image[0, v] - xmin) * scale), columns - 1)
-            row = min(int((image[1, v] - ymin) * scale), rows - 1)
+            column = min(int((image[0, v] - xmin) * xscale), columns - 1)
+            row = min(int((image[1, v] - ymin) * yscale), rows - 1)
             cell[v] = row * columns + column
             start[cell[v] + 1] += 1
     for c in range(columns * rows):
@@ -149,6 +149,7 @@ def _search_view(  # type: ignore[no-untyped-def]
             hidden[at] = 0
     start[columns * rows + 1] = owned_count
 
+    sorted_x, sorted_y = sorted_image[0], sorted_image[1]
     corners = np.empty((3, 3), np.float64)
     bounds = np.empty(4, np.float64)
     for f in range(faces.shape[0]):
@@ -182,31 +183,33 @@ def _search_view(  # type: ignore[no-untyped-def]
         left, right, top, bottom = left - reach, right + reach, top - reach, bottom + reach
         if right < xmin or left > xmax or bottom < ymin or top > ymax:
             continue
-        edge = np.float32(4) * reach * ((right - left) + (bottom - top))
-        c0 = int((max(left, xmin) - xmin) * scale)
-        c1 = min(int((min(right, xmax) - xmin) * scale), columns - 1)
-        r0 = int((max(top, ymin) - ymin) * scale)
-        r1 = min(int((min(bottom, ymax) - ymin) * scale), rows - 1)
-        c0, r0 = min(c0, columns - 1), min(r0, rows - 1)
+        # An area test is this far from certain; a clipped triangle skips it.
+        least = np.float32(-np.inf)
+        if plain:
+            least = np.float32(-8) * reach * ((right - left) + (bottom - top))
+        c0 = min(int((max(left, xmin) - xmin) * xscale), columns - 1)
+        c1 = min(int((min(right, xmax) - xmin) * xscale), columns - 1)
+        r0 = min(int((max(top, ymin) - ymin) * yscale), rows - 1)
+        r1 = min(int((min(bottom, ymax) - ymin) * yscale), rows - 1)
+        if (x1 - x0) * (y2 - y0) < (x2 - x0) * (y1 - y0):
+            x1, x2, y1, y2 = x2, x1, y2, y1
+        # Nearly everything fails some condition, and which one cannot be
+        # predicted: the least of all margins takes one branch instead of eight.
         for row in range(r0, r1 + 1):
             for at in range(start[row * columns + c0 + 1], start[row * columns + c1 + 2]):
-                if hidden[at] or sorted_depth[at] < nearest:
-                    continue
-                px, py = sorted_image[0, at], sorted_image[1, at]
-                if px < left or px > right or py < top or py > bottom:
-                    continue
-                if plain:
-                    ax, ay, bx, by, cx, cy = x0 - px, y0 - py, x1 - px, y1 - py, x2 - px, y2 - py
-                    wa, wb, wc = bx * cy - cx * by, cx * ay - ax * cy, ax * by - bx * ay
-                    if not (
-                        (wa >= -edge and wb >= -edge and wc >= -edge)
-                        or (wa <= edge and wb <= edge and wc <= edge)
-                    ):
-                        continue
+                px, py = sorted_x[at], sorted_y[at]
+                ax, ay, bx, by, cx, cy = x0 - px, y0 - py, x1 - px, y1 - py, x2 - px, y2 - py
+                wa, wb, wc = bx * cy - cx * by, cx * ay - ax * cy, ax * by - bx * ay
+                within = min(min(px - left, right - px), min(py - top, bottom - py))
+                within = min(within, min(min(wa, wb), wc) - least)
+                # Zero for the triangle's own corners.
                 v = order[at]
-                if v == i or v == j or v == k:
+                own = np.float32(abs((v - i) * (v - j) * (v - k))) - np.float32(0.5)
+                if min(min(within, own), sorted_depth[at] - nearest) < 0:
                     continue
                 if hides(x, y, z, i, j, k, v, g[0, v], g[1, v], g[2, v], contact):
+                    # Nothing more can be behind a triangle here.
+                    sorted_depth[at] = -np.inf
                     hidden[at] = 1
 
 
@@ -227,7 +230,7 @@ def exact_visibility_kernel(
     depth = np.empty(vertices, np.float32)
     owned = np.empty(vertices, np.uint8)
     cell = np.empty(vertices, np.int32)
-    start = np.empty((_MOST_CELLS + 1) * (_MOST_CELLS + 1) + 2, np.int32)
+    start = np.empty(_MOST_CELLS * _MOST_CELLS + 2, np.int32)
     order = np.empty(vertices, np.int32)
     sorted_image = np.empty((2, vertices), np.float32)
     sorted_depth = np.empty(vertices, np.float32)

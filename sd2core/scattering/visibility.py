@@ -122,4 +122,5 @@ def compile_kernels() -> None:
     normals = np.empty((1, 3, 3), np.int8)
     vertex_normals_kernel(positions, faces, 0, 1, normals)
     zero = np.float32(0)
-    facing_kernel(*positions[0], *normals[0], zero, zero, zero, np.empty(3, np.uint8))
+    x, nx = positions[0, 0], normals[0, 0]
+    facing_kernel(x, x, x, nx, nx, nx, zero, zero, zero, np.empty(3, np.uint8))
