@@ -81,19 +81,16 @@ class Canvas:
         return self.rank.copy() if sensor == self.sensor else np.zeros_like(self.rank)
 
 
-def pieces(rank: NDArray[np.uint8], below: int, view: View, size: int) -> Iterator[tuple[int, int]]:
-    """Stretches of at most ``size`` frames whose rank is below: the view first, then on, then back.
+def pieces(rank: NDArray[np.uint8], below: int, start: int, stop: int, size: int) -> Iterator[View]:
+    """Stretches of at most ``size`` frames from ``start`` to ``stop`` whose rank is below.
 
     ``rank`` may change while iterating.
     """
-    first, last = view if view[1] > view[0] else (0, 0)
-    for begin, end in ((first, last), (last, len(rank)), (0, first)):
-        start = begin
-        while start < end:
-            if rank[start] >= below:
-                start += 1
-                continue
-            inside = rank[start : min(end, start + size)] < below
-            stop = start + (len(inside) if inside.all() else int(inside.argmin()))
-            yield start, stop
-            start = stop
+    while start < stop:
+        if rank[start] >= below:
+            start += 1
+            continue
+        inside = rank[start : min(stop, start + size)] < below
+        end = start + (len(inside) if inside.all() else int(inside.argmin()))
+        yield start, end
+        start = end

@@ -10,7 +10,7 @@ import numpy as np
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from sd2app.jobs.latest import Emit, LatestRunner
-from sd2app.models.canvas import FINAL, RANK, Canvas, pieces
+from sd2app.models.canvas import FINAL, RANK, Canvas, View, pieces
 from sd2app.models.content import reference_of
 from sd2app.models.document import DocumentModel
 from sd2app.models.jobs import Job, JobsModel
@@ -277,20 +277,24 @@ class SynthesisModel(QObject):
             def check(*_: int) -> None:
                 emit(None)
 
-            def run(below: int, size: int, visibility: Visibility) -> None:
-                done = 0
-                for start, stop in pieces(rank, below, view, size):
+            done = 0
+
+            def run(below: int, view: View, size: int, visibility: Visibility) -> None:
+                nonlocal done
+                for start, stop in pieces(rank, below, *view, size):
                     stretch = synthesizer.stretch(sensor, start, stop, visibility, check)
                     rank[start:stop] = RANK[stretch.quality]
                     emit(_Part(sensor, start, stretch, synthesizer))
-                    done += stop - start
                     if visibility == final:
+                        done += stop - start
                         emit((done, total))
 
-            if rough != final:
-                run(1, rough_size, rough)
-            if kernels_ready() or final != "exact":
-                run(FINAL, exact_size, final)
+            # What is on screen first, at once and then exactly; then what follows it.
+            for part in (view, (view[1], len(rank)), (0, view[0])):
+                if rough != final:
+                    run(RANK["facing"], part, rough_size, rough)
+                if kernels_ready() or final != "exact":
+                    run(FINAL, part, exact_size, final)
 
         self._runner.submit(work)
 
@@ -354,7 +358,8 @@ class SynthesisModel(QObject):
         )
 
     def _say_quality(self) -> None:
-        rank = self._canvas.rank
+        start, stop = self._frames_in_view()
+        rank = self._canvas.rank[start:stop]
         if self._synthesizer is None or not rank.any():
             return
         final = float((rank >= FINAL).mean())
@@ -400,7 +405,7 @@ class SynthesisModel(QObject):
             return None
         return mesh.timebase.frame_at(time_s)
 
-    def _frames_in_view(self) -> tuple[int, int]:
+    def _frames_in_view(self) -> View:
         mesh = self._document.mesh
         if mesh is None:
             return (0, 0)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import (
     QAction,
     QCloseEvent,
@@ -25,6 +26,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from sd2app.jobs.latest import LatestRunner
 from sd2app.settings import Settings
 from sd2app.theme import apply_theme
 
@@ -123,8 +125,10 @@ class MainWindow(QMainWindow):
             if (state := self._settings.layout(name)) is not None:
                 getattr(self, f"_{name}").restoreState(state)
         self._ready = True
-        # VTK last: everything else is usable while it loads.
-        QTimer.singleShot(0, self._add_scene)
+        # VTK last, imported in a thread: everything else is usable while it loads.
+        self._importer = LatestRunner("import", self)
+        self._importer.finished.connect(self._add_scene)
+        self._importer.submit(lambda emit: import_module("sd2app.views.scene3d"))
 
     def _fill_panels(self) -> None:
         from sd2app.views.heatmap import HeatmapView
@@ -164,6 +168,8 @@ class MainWindow(QMainWindow):
         _fill_layout(self._panels["spectrum"], side)
 
     def _add_scene(self) -> None:
+        if not self._ready:
+            return
         from sd2app.views.scene3d import SceneView
         from sd2app.views.scene_bar import SceneBar
 
@@ -366,6 +372,7 @@ class MainWindow(QMainWindow):
         for name in ("top", "bottom", "rows"):
             self._settings.set_layout(name, getattr(self, f"_{name}").saveState())
         self._ready = False
+        self._importer.close()
         self.context.close()
         if self._scene is not None:
             self._scene.close()

@@ -1,0 +1,55 @@
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sd2app.models.canvas import FINAL, RANK, Canvas, pieces
+from sd2core.doppler.synthesizer import Stretch
+from sd2core.sensor import VirtualSensor
+
+
+def stretch_of(frames, value, quality):
+    ones = np.ones(frames, np.float32)
+    return Stretch(np.full((2, frames), value, np.float32), ones, 0 * ones, quality)
+
+
+@given(
+    st.lists(st.integers(0, 3), min_size=1, max_size=80),
+    st.integers(1, 3),
+    st.integers(1, 20),
+    st.data(),
+)
+def test_pieces_cover_what_is_below_once_and_nothing_else(ranks, below, size, data):
+    rank = np.array(ranks, np.uint8)
+    start = data.draw(st.integers(0, len(ranks)))
+    stop = data.draw(st.integers(start, len(ranks)))
+    covered = np.zeros(len(ranks), int)
+    for first, last in pieces(rank, below, start, stop, size):
+        assert 0 < last - first <= size
+        covered[first:last] += 1
+    inside = np.zeros(len(ranks), bool)
+    inside[start:stop] = True
+    np.testing.assert_array_equal(covered, (inside & (rank < below)).astype(int))
+
+
+def test_a_new_placement_forgets_the_old_one():
+    canvas = Canvas.blank(2, 10)
+    here, there = VirtualSensor(), VirtualSensor(position_m=(1, 0, 0))
+    canvas.paint(here, 0, stretch_of(10, 1.0, "exact"))
+    assert canvas.final
+    canvas.paint(there, 4, stretch_of(3, 2.0, "facing"))
+    assert not canvas.full
+    assert canvas.rank.tolist() == [0] * 4 + [RANK["facing"]] * 3 + [0] * 3
+    assert not canvas.ranks_for(here).any()
+    np.testing.assert_array_equal(canvas.ranks_for(there), canvas.rank)
+
+
+def test_ranks_rise_to_final():
+    canvas = Canvas.blank(2, 4)
+    assert not canvas.full
+    canvas.paint(VirtualSensor(), 0, stretch_of(4, 1.0, "facing"))
+    assert canvas.full
+    assert not canvas.final
+    canvas.paint(VirtualSensor(), 0, stretch_of(4, 1.0, "none"))
+    assert canvas.rank.min() == FINAL
