@@ -88,7 +88,7 @@ def load_mesh(
     path = Path(path)
     if scale is not None and not (np.isfinite(scale) and scale > 0):
         raise Sd2Error(f"The scale is {scale}", "a positive factor to metres, such as 0.001")
-    raw = _read(path, person, image_size, focal_px, progress)
+    raw = _read(path, person, image_size, focal_px, distance_m, progress)
     source = str(path)
     if faces is not None:
         raw.faces = read_faces(Path(faces))
@@ -133,6 +133,7 @@ def _read(
     person: int | str | None,
     image_size: tuple[int, int] | None,
     focal_px: float | None,
+    distance_m: float | None,
     progress: Progress,
 ) -> RawMesh:
     if is_pattern(path):
@@ -150,7 +151,7 @@ def _read(
     if suffix == ".npz":
         return read_npz(path)
     if suffix in _PICKLES:
-        return read_model_output(path, person, image_size, focal_px)
+        return read_model_output(path, person, image_size, focal_px, distance_m)
     if suffix in SURFACE_SUFFIXES:
         return read_mesh_files(path, progress)
     if suffix in {".pt", ".pth", ".ckpt"}:

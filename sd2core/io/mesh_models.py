@@ -32,6 +32,7 @@ def read_model_output(
     person: int | str | None = None,
     image_size: tuple[int, int] | None = None,
     focal_px: float | None = None,
+    distance_m: float | None = None,
 ) -> RawMesh:
     """Read vertices from a pickle or joblib file without executing anything in it.
 
@@ -44,6 +45,8 @@ def read_model_output(
         Of the video; with VIBE's camera it places the body.
     focal_px : float, optional
         Focal length for that; by default the image's diagonal.
+    distance_m : float, optional
+        Where the caller moves a root-centred body instead.
 
     Raises
     ------
@@ -73,7 +76,7 @@ def read_model_output(
     rate = _array(entry, content, RATE_NAMES)
     raw.frames_per_s = None if rate is None or not rate.size else float(rate.reshape(-1)[0])
     _number_frames(raw, entry, path)
-    _place_in_front(raw, entry, path, image_size, focal_px)
+    _place_in_front(raw, entry, path, image_size, focal_px, distance_m)
     return raw
 
 
@@ -198,6 +201,7 @@ def _place_in_front(
     path: Path,
     image_size: tuple[int, int] | None,
     focal_px: float | None,
+    distance_m: float | None,
 ) -> None:
     vertices = np.asarray(raw.vertices)
     if vertices.ndim != 3 or not np.isfinite(vertices).any():
@@ -206,6 +210,12 @@ def _place_in_front(
     if np.nanmax(np.linalg.norm(centres, axis=1)) > _AT_ROOT_M:
         return
     camera, boxes = entry.get("pred_cam"), entry.get("bboxes")
+    if distance_m is not None:
+        raw.notes.append(
+            f"The mesh is centred on the body's root and moved {distance_m:g} m forward; walking "
+            "gives no Doppler."
+        )
+        return
     have_camera = isinstance(camera, np.ndarray) and isinstance(boxes, np.ndarray)
     if not have_camera or image_size is None:
         how = "Give its distance (--distance-m)"

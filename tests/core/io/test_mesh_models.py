@@ -137,6 +137,8 @@ def test_a_root_centred_mesh_says_what_it_lacks(tmp_path: Path) -> None:
     )
     mesh = load_mesh(tmp_path / "v.pkl", distance_m=3.0)
     assert mesh.read(0, 4)[..., 2].mean() == pytest.approx(3.0, abs=0.02)
+    assert any("moved 3 m forward; walking gives no Doppler" in n for n in mesh.notes)
+    assert not any("Give its distance" in n for n in mesh.notes)
 
 
 def test_an_impossible_camera_is_named(tmp_path: Path) -> None:
