@@ -49,6 +49,7 @@ _ROOM = (
 _SNR_DB = 34.0
 """Against the whole body; the hand echoes some 20 dB weaker than the torso."""
 _SEED = 2
+_STAGES = 5
 
 
 def make_sample(out: Path, progress: Progress = silent, *, duration_s: float = DURATION_S) -> Path:
@@ -60,7 +61,8 @@ def make_sample(out: Path, progress: Progress = silent, *, duration_s: float = D
         The recording's folder; ``.sd2`` is appended to a name without it. It
         appears when it is complete.
     progress : Progress
-        Counts frames: each is drawn once and seen by the radar once.
+        Counts frames over five stages: posed, drawn, posed for the recording,
+        looked at for what is hidden, and seen by the radar.
     duration_s : float
         The motion's beginning only; gestures that do not fit are left out.
 
@@ -98,16 +100,19 @@ def make_sample(out: Path, progress: Progress = silent, *, duration_s: float = D
 
 def _fill(folder: Path, times_s: NDArray[np.float64], progress: Progress) -> None:
     frames = len(times_s)
-    total = 2 * frames
+
+    def stage(number: int) -> Progress:
+        return lambda done, _: progress(number * frames + done, _STAGES * frames)
+
     camera = Camera()
-    fine = body_sequence("high", times_s, camera)
+    fine = body_sequence("high", times_s, camera, stage(0))
     write_video(
         folder / "video.mp4",
-        _pictures(fine, camera, progress, total),
+        _pictures(fine, camera, stage(1)),
         FRAMES_PER_S,
         (camera.width, camera.height),
     )
-    recorded = body_sequence(RECORDED, times_s, camera)
+    recorded = body_sequence(RECORDED, times_s, camera, stage(2))
     rounded = np.rint(recorded.read(0, frames) / _ROUNDING_M) * _ROUNDING_M
     write_compact_mesh(
         MeshSequence(rounded.astype(np.float32), recorded.faces, recorded.timebase),
@@ -117,9 +122,9 @@ def _fill(folder: Path, times_s: NDArray[np.float64], progress: Progress) -> Non
         fine,
         PAPER_RADAR,
         sensor=_SENSOR,
-        visibility=facet_visibility(fine, _SENSOR),
+        visibility=facet_visibility(fine, _SENSOR, stage(3)),
         options=SignalOptions(snr_db=_SNR_DB, reflectors=_ROOM, seed=_SEED),
-        progress=lambda done, _: progress(frames + done, total),
+        progress=stage(4),
     )
     write_capture(
         folder / "radar",
@@ -147,17 +152,26 @@ def _fill(folder: Path, times_s: NDArray[np.float64], progress: Progress) -> Non
 
 
 def body_sequence(
-    resolution: Resolution, times_s: NDArray[np.float64], camera: Camera
+    resolution: Resolution,
+    times_s: NDArray[np.float64],
+    camera: Camera,
+    progress: Progress = silent,
 ) -> MeshSequence:
     """The moving body in the camera frame, (T, V, 3) float64, not rounded."""
     body = Body.load(resolution)
     motion = swipes(body.skeleton, times_s)
     place = np.array([_PLACE_ACROSS_M, camera.above_floor_m, DISTANCE_M])
-    vertices = body.pose(motion.rotations, motion.translation_m + place)
+    vertices = np.empty((len(times_s), len(body.vertices_m), 3))
+    for frame in range(len(times_s)):
+        progress(frame, len(times_s))
+        one = slice(frame, frame + 1)
+        vertices[one] = body.pose(motion.rotations[one], motion.translation_m[one] + place)
     return MeshSequence(vertices, body.faces, Timebase(times_s), source="simulated body")
 
 
-def facet_visibility(mesh: MeshSequence, sensor: VirtualSensor) -> NDArray[np.bool_]:
+def facet_visibility(
+    mesh: MeshSequence, sensor: VirtualSensor, progress: Progress = silent
+) -> NDArray[np.bool_]:
     """Which facets face the sensor and have a centre that nothing hides, (T, F)."""
     faces = mesh.faces
     if faces is None:
@@ -180,18 +194,19 @@ def facet_visibility(mesh: MeshSequence, sensor: VirtualSensor) -> NDArray[np.bo
         )
         visible[frame] = seen[0, len(vertices) :].astype(bool)
 
-    list(workers().map(fill, range(mesh.frame_count)))
+    for done, _ in enumerate(workers().map(fill, range(mesh.frame_count))):
+        progress(done, mesh.frame_count)
     return visible
 
 
 def _pictures(
-    mesh: MeshSequence, camera: Camera, progress: Progress, total: int
+    mesh: MeshSequence, camera: Camera, progress: Progress
 ) -> Iterator[NDArray[np.uint8]]:
     renderer = Renderer(Body.load("high"), camera)
-    progress(0, total)
+    progress(0, mesh.frame_count)
     yield renderer.frame(mesh.frame(0))
     step = worker_count()
     for start in range(1, mesh.frame_count, step):
-        progress(start, total)
+        progress(start, mesh.frame_count)
         stop = min(start + step, mesh.frame_count)
         yield from workers().map(renderer.frame, mesh.read(start, stop))
