@@ -94,6 +94,13 @@ def open_stream(path: Path) -> tuple[Any, Any]:
             f"{path} holds no video stream (format {container.format.name})", "a video file"
         )
     stream = streams[0]
+    if stream.codec_context is None:
+        container.close()
+        raise Sd2Error(
+            f"{path} holds video of a kind that FFmpeg does not decode",
+            "H.264, HEVC, VP9, MPEG-4 or another common kind",
+            "Convert it, for example 'ffmpeg -i FILE copy.mp4'",
+        )
     # More threads hold back more frames and make every seek dearer.
     stream.thread_type = "AUTO"
     stream.codec_context.thread_count = min(os.cpu_count() or 1, 4)

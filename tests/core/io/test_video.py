@@ -308,6 +308,13 @@ def test_a_file_of_sound_only_is_named(tmp_path: Path) -> None:
         open_video(path)
 
 
+def test_an_unknown_codec_is_named(tmp_path: Path) -> None:
+    path = write_video(tmp_path / "v.mp4", 3)
+    path.write_bytes(path.read_bytes().replace(b"avc1", b"zzzz"))
+    with pytest.raises(Sd2Error, match=r"v\.mp4 holds video of a kind that FFmpeg does not decode"):
+        open_video(path)
+
+
 def test_missing_files_and_folders_are_named(tmp_path: Path) -> None:
     with pytest.raises(Sd2Error, match=r"gone\.mp4 does not exist"):
         open_video(tmp_path / "gone.mp4")
