@@ -21,7 +21,7 @@ from sd2app.views.scene3d.choose import GL_BROKEN, GL_MISSING, missing_library
 
 _IDLE_MS = 160
 _SUPERSAMPLING = 2
-_LARGEST_PX = 4096
+_MOST_PIXELS = 4_000_000
 
 
 class ImageBackend(QWidget):
@@ -121,13 +121,14 @@ class ImageBackend(QWidget):
 
     def _rendered(self, prepare: Prepare, window: vtkRenderWindow) -> QImage:
         ratio = self.devicePixelRatioF()
-        target = QSize(max(round(self.width() * ratio), 1), max(round(self.height() * ratio), 1))
+        size = QSize(max(self.width(), 1), max(self.height(), 1))
+        target = QSize(round(size.width() * ratio), round(size.height() * ratio))
         factor = _SUPERSAMPLING if self._fine else 1
-        if factor * max(target.width(), target.height()) > _LARGEST_PX:
+        if factor**2 * target.width() * target.height() > _MOST_PIXELS:
             factor = 1
         width, height = factor * target.width(), factor * target.height()
         window.SetSize(width, height)
-        prepare((self.width(), self.height()), factor * ratio)
+        prepare((size.width(), size.height()), factor * ratio)
         window.Render()
         self._renderings += 1
         window.GetRGBACharPixelData(0, 0, width - 1, height - 1, 0, self._pixels, 0)

@@ -55,6 +55,7 @@ class Navigator:
         self._end_drag = end_drag
         self._size_px = size_px
         self._changed = changed
+        self._button: Button | None = None
         self._held: _Held | None = None
         self._moving: Literal["orbit", "pan"] | None = None
         self._last_px = (0.0, 0.0)
@@ -86,7 +87,10 @@ class Navigator:
         return math.hypot(x - x_px, y - y_px) <= radius
 
     def press(self, x_px: float, y_px: float, button: Button, shift: bool, ctrl: bool) -> None:
-        """A button went down."""
+        """A button went down; a second one changes nothing."""
+        if self._button is not None:
+            return
+        self._button = button
         self._last_px = (x_px, y_px)
         if button == "left" and self.sensor_at(x_px, y_px):
             start = np.asarray(self._scene.sensor.position_m)
@@ -114,14 +118,19 @@ class Navigator:
         else:
             self._hover(self.sensor_at(x_px, y_px))
 
-    def release(self, x_px: float, y_px: float) -> None:
-        """The button went up."""
-        self._moving = None
+    def release(self, x_px: float, y_px: float, button: Button) -> None:
+        """A button went up."""
+        if button == self._button:
+            self.let_go()
+            self._hover(self.sensor_at(x_px, y_px))
+
+    def let_go(self) -> None:
+        """End whatever is going on, e.g. because the view is hidden."""
+        self._button = self._moving = None
         if self._held is not None:
             self._held = None
             self._end_drag()
-        self._hover(self.sensor_at(x_px, y_px))
-        self._show_hot()
+            self._show_hot()
 
     def look_again(self) -> None:
         """Something moved under a resting pointer."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import TYPE_CHECKING, get_args
 
 from PySide6.QtCore import QEvent, QObject, QSize, Qt
@@ -15,6 +16,7 @@ from sd2app.views.scene3d.colours import SceneColours
 from sd2app.views.scene3d.navigation import Button, Navigator, Position
 from sd2app.views.scene3d.overlay import Overlay
 from sd2app.views.scene3d.scene import Preset, Scene
+from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
     from sd2app.models.display import DisplayModel
@@ -22,12 +24,15 @@ if TYPE_CHECKING:
     from sd2app.models.playback import PlaybackModel
     from sd2app.models.sensor import SensorModel
     from sd2app.models.synthesis import SynthesisModel
+    from sd2core.mesh import MeshSequence
 
 _BUTTONS: dict[Qt.MouseButton, Button] = {
     Qt.MouseButton.LeftButton: "left",
     Qt.MouseButton.MiddleButton: "middle",
     Qt.MouseButton.RightButton: "right",
 }
+_NOTCH = 120.0
+"""Qt's measure of one notch of a wheel."""
 
 
 class SceneView(QWidget):
@@ -139,21 +144,25 @@ class SceneView(QWidget):
             if event.button() in _BUTTONS:
                 self.navigator.press(*_place(event), _BUTTONS[event.button()], *_modifiers(event))
         elif kind == QEvent.Type.MouseButtonRelease:
-            self.navigator.release(*_place(event))
+            if event.button() in _BUTTONS:
+                self.navigator.release(*_place(event), _BUTTONS[event.button()])
         elif kind == QEvent.Type.MouseButtonDblClick:
             if not self.navigator.sensor_at(*_place(event)):
                 self.reset_view()
         elif kind == QEvent.Type.Wheel:
-            notches = event.angleDelta().y() / 120.0
-            self.navigator.wheel(*_place(event), notches)
+            self.navigator.wheel(*_place(event), event.angleDelta().y() / _NOTCH)
         elif kind == QEvent.Type.Leave:
             self.navigator.leave()
-        elif kind not in (QEvent.Type.KeyPress, QEvent.Type.KeyRelease):
+        elif kind == QEvent.Type.Hide:
+            self.navigator.let_go()
             return False
-        if kind in (QEvent.Type.KeyPress, QEvent.Type.KeyRelease):
+        elif kind in (QEvent.Type.KeyPress, QEvent.Type.KeyRelease):
+            # QtInteractor would take them; they belong to the window.
             event.ignore()
+            return True
         else:
-            self._choose_cursor()
+            return False
+        self._choose_cursor()
         return True
 
     # What changed
@@ -205,18 +214,25 @@ class SceneView(QWidget):
         """Fetch what changed since the last picture, right before the next."""
         mesh = self._document.mesh
         if mesh is not None and self.scene.has_mesh:
-            frame = mesh.timebase.frame_at(self._playback.time_s)
-            if frame != self._frame:
-                self._frame = frame
-                self.scene.set_vertices(mesh.frame(frame))
-            if self._stale_scattering:
-                self._fetch_scattering()
+            try:
+                self._fetch(mesh)
+            except (Sd2Error, OSError) as error:
+                # A mesh that is read from disk frame by frame can go away.
+                self.overlay.message = f"The mesh cannot be read: {error}"
         # A ready-made view is kept when the widget is resized, but not while the
         # sensor moves: it would slip from under the pointer.
         if self._preset is not None and self._framed != (self._preset, size_px):
             self._framed = (self._preset, size_px)
             self.scene.pose = self.scene.preset_pose(self._preset, size_px)
         self.scene.prepare(size_px, pixel_scale)
+
+    def _fetch(self, mesh: MeshSequence) -> None:
+        frame = mesh.timebase.frame_at(self._playback.time_s)
+        if frame != self._frame:
+            self._frame = frame
+            self.scene.set_vertices(mesh.frame(frame))
+        if self._stale_scattering:
+            self._fetch_scattering()
 
     def _fetch_scattering(self) -> None:
         self._stale_scattering = False
@@ -264,7 +280,7 @@ class SceneView(QWidget):
 
 
 def make_backend(parent: QWidget) -> Backend:
-    """The way to draw that suits the machine.
+    """The way to draw that suits the machine, off-screen when the other one fails.
 
     Raises
     ------
@@ -273,9 +289,10 @@ def make_backend(parent: QWidget) -> Backend:
     """
     try:
         if chosen_backend() == "gl":
-            from sd2app.views.scene3d.interactor_backend import InteractorBackend
+            with suppress(NoOpenGL, ImportError):
+                from sd2app.views.scene3d.interactor_backend import InteractorBackend
 
-            return InteractorBackend(parent)
+                return InteractorBackend(parent)
         from sd2app.views.scene3d.image_backend import ImageBackend
 
         return ImageBackend(parent)

@@ -62,7 +62,7 @@ def test_the_sensor_stays_under_the_pointer_where_it_was_taken(hand: Hand) -> No
     for step in ((40, 10), (-120, 70), (33.5, -80.25)):
         hand.navigator.move(*np.add(grip, step), False, False)
         np.testing.assert_allclose(hand.sensor_px, np.add(start, step), atol=1e-6)
-    hand.navigator.release(*np.add(grip, step))
+    hand.navigator.release(*np.add(grip, step), "left")
     assert hand.log == ["begin", "drag", "drag", "drag", "end"]
     assert not hand.navigator.holds_sensor
 
@@ -70,7 +70,7 @@ def test_the_sensor_stays_under_the_pointer_where_it_was_taken(hand: Hand) -> No
 def test_a_press_alone_does_not_move_the_sensor(hand: Hand) -> None:
     before = hand.sensor_m
     hand.navigator.press(*np.add(hand.sensor_px, 6), "left", False, False)
-    hand.navigator.release(*np.add(hand.sensor_px, 6))
+    hand.navigator.release(*np.add(hand.sensor_px, 6), "left")
     assert hand.log == ["begin", "end"]
     np.testing.assert_array_equal(hand.sensor_m, before)
 
@@ -116,7 +116,7 @@ def test_the_view_moves_and_the_sensor_does_not(hand: Hand, button: str, shift: 
     before, pose = hand.sensor_m, hand.scene.pose
     hand.navigator.press(500.0, 400.0, button, shift, False)
     hand.navigator.move(520.0, 380.0, shift, False)
-    hand.navigator.release(520.0, 380.0)
+    hand.navigator.release(520.0, 380.0, button)
     assert hand.log == []
     np.testing.assert_array_equal(hand.sensor_m, before)
     turned = (pose.azimuth_deg, pose.elevation_deg) != (
@@ -163,3 +163,16 @@ def test_the_view_from_the_camera_is_the_cameras(hand: Hand) -> None:
 def test_a_sensor_far_away_does_not_shrink_the_view_to_nothing(hand: Hand) -> None:
     hand.scene.set_sensor(VirtualSensor((1e6, 0.0, 0.0)))
     assert hand.scene.preset_pose("overview", SIZE).distance_m < 30.0
+
+
+def test_another_button_does_not_end_a_drag(hand: Hand) -> None:
+    start = hand.sensor_px
+    hand.navigator.press(*start, "left", False, False)
+    hand.navigator.press(*start, "middle", False, False)
+    hand.navigator.release(*start, "middle")
+    assert hand.navigator.holds_sensor
+    hand.navigator.move(*np.add(start, 20), False, False)
+    np.testing.assert_allclose(hand.sensor_px, np.add(start, 20), atol=1e-6)
+    hand.navigator.let_go()
+    hand.navigator.release(*start, "left")
+    assert hand.log == ["begin", "drag", "end"]

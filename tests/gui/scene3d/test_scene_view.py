@@ -306,6 +306,68 @@ def test_dragging_the_sensor_does_not_move_the_view(stage: Stage) -> None:
     assert stage.view.scene.pose == pose
 
 
+def test_hiding_the_view_ends_a_drag(stage: Stage) -> None:
+    stage.view.set_view("overview")
+    stage.view.grab()
+    here = stage.pixel_of(stage.sensor.sensor.position_m)
+    QTest.mousePress(stage.view.childAt(here), Qt.MouseButton.LeftButton, pos=here)
+    stage.view.hide()
+    assert stage.log == ["begin", "end"]
+
+
+@pytest.mark.parametrize("mode", ["velocity", "range"])
+@pytest.mark.parametrize(
+    ("vertices", "sensor"),
+    [
+        ([(0, 0, 2)], (0, 0, 0)),  # a single point
+        ([(0, 0, 2)] * 3, (0, 0, 2)),  # no extent, and the sensor is on it
+        ([(1e6, 0, 2), (1e6, 1, 2), (1e6 + 1, 0, 2)], (0, 0, 0)),
+        ([(0, 0, 0), (1, 0, 0), (0, 1, 0)], (1e6, -1e6, 1e6)),
+        ([(0, 0, -2), (1, 0, -2), (0, 1, -2)], (0, 0, 0)),  # behind the camera
+    ],
+)
+@pytest.mark.parametrize("preset", ["overview", "camera", "sensor", "side", "top"])
+def test_odd_places_are_drawn_without_complaint(
+    stage: Stage, mode: str, vertices: list[Any], sensor: Any, preset: str
+) -> None:
+    points = np.asarray(vertices, np.float64)
+    faces = np.array([(0, 1, 2)]) if len(points) == 3 else None
+    stage.display.set_mesh_colour(mode)
+    stage.sensor.set_sensor(VirtualSensor(sensor))
+    stage.open(MeshSequence(points[None], faces, Timebase([0.0])))
+    stage.scatter(np.zeros(len(points)), np.ones(len(points), bool))
+    stage.view.set_view(preset)
+    picture = as_array(stage.view.grab().toImage())
+    ground = QColor(stage.view.scene.colours.background)
+    assert (picture[2, 2] == (ground.red(), ground.green(), ground.blue())).all()
+    assert np.isfinite(stage.view.scene.pose.position).all()
+
+
+def test_a_mesh_that_cannot_be_read_any_more_is_said(stage: Stage) -> None:
+    class Gone:
+        shape = (3, 8, 3)
+        dtype = np.float32
+
+        def __getitem__(self, key: slice) -> np.ndarray:
+            if stage.playback.time_s > 0.0:
+                raise OSError("the disk was taken away")
+            return np.asarray(two_plates(3).vertices)[key]
+
+    stage.open(MeshSequence(Gone(), two_plates().faces, Timebase.regular(3, 10.0)))
+    stage.view.grab()
+    stage.playback.seek(0.1)
+    stage.view.grab()
+    assert "taken away" in stage.view.overlay.message
+
+
+def test_when_the_window_cannot_be_drawn_into_the_picture_is_painted(
+    make_stage: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(choose, "_has_no_window", lambda: False)
+    monkeypatch.setitem(sys.modules, "pyvistaqt", None)
+    assert make_stage("gl").view.backend_name == "image"
+
+
 def test_an_unknown_view_is_an_error(stage: Stage) -> None:
     with pytest.raises(ValueError, match="behind"):
         stage.view.set_view("behind")
