@@ -15,9 +15,14 @@ from sd2core.errors import Sd2Error
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one ``sd2`` command and return its exit code."""
+    return run(full_parser(), sys.argv[1:] if arguments is None else arguments)
+
+
+def full_parser() -> argparse.ArgumentParser:
+    """The library's commands and those that open the window."""
     parser, commands = build_parser()
     _add_window_commands(commands)
-    return run(parser, sys.argv[1:] if arguments is None else arguments)
+    return parser
 
 
 def _add_window_commands(commands: argparse._SubParsersAction) -> None:

@@ -1,0 +1,59 @@
+"""What the README and the help texts tell one to type works."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from sd2app.command_line import full_parser
+from sd2core.cli.running import attach_negative_values
+
+REPOSITORY = Path(__file__).resolve().parent.parent
+DOCUMENTS = [REPOSITORY / name for name in ("README.md", "CONTRIBUTING.md")] + sorted(
+    (REPOSITORY / "docs").glob("*.md")
+)
+
+
+def command_lines() -> Iterator[str]:
+    for document in DOCUMENTS:
+        for block in re.findall(r"```sh\n(.*?)```", document.read_text("utf-8"), re.DOTALL):
+            yield from (line for line in block.splitlines() if line.startswith("sd2 "))
+    parsers = [full_parser()]
+    while parsers:
+        parser = parsers.pop()
+        yield from re.findall(r"^  (sd2 .*?)(?:   .*)?$", parser.epilog or "", re.MULTILINE)
+        for action in parser._actions:
+            if isinstance(action.choices, dict):
+                parsers.extend(action.choices.values())
+
+
+@pytest.mark.parametrize("line", sorted(set(command_lines())))
+def test_commands_are_understood(line: str) -> None:
+    arguments = shlex.split(line, comments=True)[1:]
+    options = full_parser().parse_args(attach_negative_values(arguments))
+    assert callable(options.handler)
+
+
+def test_the_python_of_the_readme_runs(
+    shared_data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (block,) = re.findall(
+        r"```python\n(.*?)```", (REPOSITORY / "README.md").read_text("utf-8"), re.DOTALL
+    )
+    (tmp_path / "walk.npz").symlink_to(shared_data / "mesh" / "walk.npz")
+    (tmp_path / "capture").symlink_to(shared_data / "radar" / "infineon_people")
+    monkeypatch.chdir(tmp_path)
+    names: dict = {}
+    exec(block, names)
+    assert names["m"].axis == names["real"].axis
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
+def test_links_lead_somewhere(document: Path) -> None:
+    for target in re.findall(r"\]\(([^)#]+)", document.read_text("utf-8")):
+        if "://" not in target:
+            assert (document.parent / target).exists(), target
