@@ -1,0 +1,178 @@
+"""The whole window on the sample: playing, dragging, starting.
+
+Run with a display, real or virtual; software OpenGL is what the targets are for::
+
+    make bench
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import subprocess
+import sys
+import time
+
+import pytest
+from PySide6.QtCore import QEvent, QObject, QTimer
+
+from sd2core.resources import resource_path
+
+SECONDS = 5.0
+
+START = """
+import json, sys, time
+from pathlib import Path
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import QApplication
+from sd2app.settings import Settings
+from sd2app.theme import apply_theme
+from sd2app.views.window import MainWindow
+
+begun, path = float(sys.argv[1]), Path(sys.argv[2])
+marks = {}
+
+def mark(name):
+    marks.setdefault(name, time.time() - begun)
+
+application = QApplication(sys.argv[:1])
+apply_theme(application, False)
+window = MainWindow(Settings.forgetful())
+
+def fill():
+    mark("skeleton_s")
+    window.populate()
+    window.open_paths([path])
+
+window.first_painted.connect(lambda: QTimer.singleShot(0, fill))
+window.show()
+
+def spin(until, limit_s=60):
+    deadline = time.time() + limit_s
+    while not until() and time.time() < deadline:
+        application.processEvents()
+        time.sleep(0.001)
+
+spin(lambda: "skeleton_s" in marks)
+track, video = window.context.synthetic, window.context.video
+spin(lambda: track.map is not None and track.covered is None and video.picture is not None
+     and window._scene is not None)
+mark("usable_s")
+spin(lambda: window.context.synthesis.complete)
+mark("exact_s")
+edits, dragged = window.context.edits, []
+track.changed.connect(lambda: dragged.append(time.time()))
+moved = time.time()
+edits.begin_sensor_drag()
+edits.drag_sensor((0.1, 0.0, 0.0))
+spin(lambda: dragged)
+marks["first_drag_s"] = dragged[0] - moved
+print(json.dumps(marks))
+edits.end_sensor_drag()
+window.context.document.undo_stack.clear()
+window.close()
+"""
+
+
+class PaintCounter(QObject):
+    """Counts how often each of some widgets is painted."""
+
+    def __init__(self, widgets):
+        super().__init__()
+        self.counts = dict.fromkeys(widgets, 0)
+        for widget in widgets:
+            widget.installEventFilter(self)
+
+    def eventFilter(self, watched, event):
+        if event.type() == QEvent.Type.Paint:
+            self.counts[watched] += 1
+        return False
+
+
+@pytest.fixture
+def sample_window(qtbot):
+    from sd2app.settings import Settings
+    from sd2app.views.window import MainWindow
+    from sd2core.compiled import warm_up
+
+    warm_up()
+    window = MainWindow(Settings.forgetful())
+    window.show()
+    window.populate()
+    window.open_paths([resource_path("swipes.sd2")])
+    qtbot.waitUntil(lambda: window.settled and window.context.synthesis.complete, timeout=60_000)
+    yield window
+    window.context.document.undo_stack.clear()
+    window.close()
+
+
+def play(window, qtbot, every_tick=lambda: None):
+    from sd2app.views.heatmap import HeatmapView
+    from sd2app.views.video import VideoView
+
+    counter = PaintCounter([window.findChild(VideoView), *window.findChildren(HeatmapView)])
+    context = window.context
+    shown = {"pictures": 0, "maps": 0}
+    context.video.frame_changed.connect(lambda: shown.update(pictures=shown["pictures"] + 1))
+    context.synthetic.changed.connect(lambda: shown.update(maps=shown["maps"] + 1))
+    context.playback.seek(0.0)
+    context.playback.set_loop(True)
+    ticks = QTimer()
+    ticks.setInterval(8)
+    ticks.timeout.connect(every_tick)
+    ticks.start()
+    began = time.perf_counter()
+    context.playback.play()
+    qtbot.wait(int(1000 * SECONDS))
+    elapsed = time.perf_counter() - began
+    context.playback.pause()
+    ticks.stop()
+    rates = {name: count / elapsed for name, count in shown.items()}
+    return rates | {"slowest_view": min(counter.counts.values()) / elapsed}
+
+
+def test_playing_the_sample(benchmark, sample_window, qtbot):
+    """Target: 25 pictures a second, painted in every view."""
+    rates = benchmark.pedantic(play, (sample_window, qtbot), rounds=1)
+    benchmark.extra_info.update(rates)
+    print("\nplaying:", {name: round(rate, 1) for name, rate in rates.items()})
+
+
+def test_dragging_the_sensor_while_playing(benchmark, sample_window, qtbot):
+    """Target: 20 whole-clip heatmaps a second; the hand moves at 125 Hz."""
+    edits = sample_window.context.edits
+    edits.begin_sensor_drag()
+    began = time.perf_counter()
+
+    def move():
+        phase = time.perf_counter() - began
+        edits.drag_sensor((0.5 * math.sin(2 * phase), 0.2 * math.cos(3 * phase), 0.0))
+
+    rates = benchmark.pedantic(play, (sample_window, qtbot, move), rounds=1)
+    edits.end_sensor_drag()
+    benchmark.extra_info.update(rates)
+    print("\ndragging:", {name: round(rate, 1) for name, rate in rates.items()})
+
+
+def test_starting_on_the_sample(benchmark):
+    """Targets: skeleton 0.5 s, usable 3 s, first drag answered in 0.2 s; best of three starts."""
+    from sd2core.compiled import warm_up
+
+    warm_up()
+    starts = []
+
+    def start():
+        done = subprocess.run(
+            [sys.executable, "-c", START, str(time.time()), str(resource_path("swipes.sd2"))],
+            capture_output=True,
+            text=True,
+            check=True,
+            env=os.environ,
+        )
+        starts.append(json.loads(done.stdout))
+
+    benchmark.pedantic(start, rounds=3)
+    best = {name: min(marks[name] for marks in starts) for name in starts[0]}
+    benchmark.extra_info.update(best)
+    print("\nstarting:", {name: round(value, 2) for name, value in best.items()})
