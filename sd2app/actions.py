@@ -97,6 +97,12 @@ ACTIONS: tuple[Action, ...] = (
         lambda w: w.context.edits.sensor_to_camera(), separator_before=True,
     ),
     Action(
+        "aim_sensor", "Edit", "Aim sensor at the body", ("A",),
+        "Turn the sensor towards the body in this frame",
+        lambda w: w.context.edits.aim_sensor(w.context.synthesis.torso_m),
+        lambda c: c.synthesis.torso_m is not None,
+    ),
+    Action(
         "colour_velocity", "View", "Colour by radial velocity", ("1",),
         "Blue recedes, red approaches, grey is hidden or still",
         lambda w: w.context.display.set_mesh_colour("velocity"), _has_mesh,

@@ -10,7 +10,7 @@ from PySide6.QtGui import QUndoCommand
 
 from sd2app.models.document import DocumentModel
 from sd2app.models.sensor import SensorModel
-from sd2core.sensor import Vector, VirtualSensor
+from sd2core.sensor import Vector, VirtualSensor, aimed_at
 
 
 class _Assign(QUndoCommand):
@@ -49,6 +49,10 @@ class Edits:
         """Put the sensor at the camera, looking along the optical axis."""
         view = self._sensor.sensor.field_of_view_deg
         self.place_sensor(VirtualSensor(field_of_view_deg=view), "Sensor to camera")
+
+    def aim_sensor(self, target_m: Vector) -> None:
+        """Turn the sensor towards a point."""
+        self.place_sensor(aimed_at(self._sensor.sensor, target_m), "Aim sensor")
 
     def begin_sensor_drag(self) -> None:
         """A hand takes hold of the sensor."""

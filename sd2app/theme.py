@@ -63,4 +63,6 @@ def _style_sheet(c: Palette) -> str:
     QToolButton:checked {{ background: {c.well}; border-color: {c.border}; }}
     QToolButton:focus {{ border-color: {c.accent}; }}
     QScrollArea {{ border: none; background: transparent; }}
+    QScrollArea > QWidget > QWidget#page {{ background: transparent; }}
+    QFrame#rule {{ border: none; background: {c.border}; max-height: 1px; }}
     """

@@ -7,7 +7,7 @@ is positive when approaching the sensor.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -142,6 +142,18 @@ def spherical_from_position(target_m: Vector, position_m: Vector) -> tuple[float
     azimuth_deg = math.degrees(math.atan2(dx, -dz)) if (dx or dz) else 0.0
     elevation_deg = math.degrees(math.atan2(-dy, math.hypot(dx, dz)))
     return (range_m, azimuth_deg, elevation_deg)
+
+
+def aimed_at(sensor: VirtualSensor, target_m: Vector) -> VirtualSensor:
+    """The same sensor with its boresight through a target; unchanged on the target itself."""
+    dx, dy, dz = (t - p for t, p in zip(target_m, sensor.position_m, strict=True))
+    if dx == dy == dz == 0.0:
+        return sensor
+    return replace(
+        sensor,
+        azimuth_deg=math.degrees(math.atan2(dx, dz)) if (dx or dz) else 0.0,
+        elevation_deg=math.degrees(math.atan2(-dy, math.hypot(dx, dz))),
+    )
 
 
 @dataclass(frozen=True)

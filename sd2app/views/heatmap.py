@@ -59,6 +59,7 @@ class HeatmapView(QWidget):
         self._alignable = alignable
         self._image: QImage | None = None
         self._grab: tuple[str, float] | None = None
+        self._hint = ""
         self.setMouseTracking(True)
         self.setMinimumHeight(96)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
@@ -70,6 +71,11 @@ class HeatmapView(QWidget):
     def sizeHint(self) -> QSize:
         """Room for 32 bins of 5 pixels."""
         return QSize(640, _HEADER_PX + 160)
+
+    def set_hint(self, hint: str) -> None:
+        """What to say while there is no map."""
+        self._hint = hint
+        self.update()
 
     def plot_rect(self) -> QRectF:
         """Where the map is drawn."""
@@ -112,9 +118,11 @@ class HeatmapView(QWidget):
         painter = QPainter(self)
         colours = self._display.palette
         painter.fillRect(self.rect(), QColor(colours.panel))
-        self._paint_header(painter)
         if self._track.map is None:
+            painter.setPen(QColor(colours.muted))
+            painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, self._hint)
             return
+        self._paint_header(painter)
         plot = self.plot_rect()
         if self._image is None:
             self._image = heatmap_image(

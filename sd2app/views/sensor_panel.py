@@ -23,7 +23,7 @@ from sd2app.models.content import CLUTTER_CHOICES
 from sd2app.models.document import DocumentModel
 from sd2app.models.sensor import SensorModel
 from sd2app.models.synthesis import SynthesisModel
-from sd2core.sensor import position_from_spherical, spherical_from_position
+from sd2core.sensor import aimed_at, position_from_spherical, spherical_from_position
 
 _CLUTTER_TEXT = {
     "mean": "mean over chirps",
@@ -45,6 +45,7 @@ class SensorPanel(QWidget):
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
+        self.setObjectName("page")
         self._sensor = sensor
         self._document = document
         self._synthesis = synthesis
@@ -187,7 +188,8 @@ class SensorPanel(QWidget):
             for a, b, tolerance in zip(wanted, now, (5e-3, 0.05, 0.05), strict=True)
         ):
             position = position_from_spherical(target, range_m, azimuth_deg, elevation_deg)
-            self._edits.place_sensor(replace(self._sensor.sensor, position_m=position))
+            moved = replace(self._sensor.sensor, position_m=position)
+            self._edits.place_sensor(aimed_at(moved, target))
 
     # --- showing --------------------------------------------------------------------------
 
@@ -264,7 +266,7 @@ def _title(text: str) -> QLabel:
 
 def _rule() -> QFrame:
     rule = QFrame()
-    rule.setFrameShape(QFrame.Shape.HLine)
+    rule.setFixedHeight(1)
     rule.setObjectName("rule")
     return rule
 

@@ -257,7 +257,12 @@ class MainWindow(QMainWindow):
         self._synthetic_view.setVisible(c.synthetic.map is not None or not has_any)
         self._real_view.setVisible(c.real.map is not None)
         self._overview.set_track(c.synthetic if c.synthetic.map is not None else c.real)
-        self._panels["spectrum"].setVisible(True)
+        self._synthetic_view.set_hint(
+            "Add a mesh to see its synthetic Doppler: File → Add to this recording…"
+            if c.document.content is not None
+            else "Drop a recording, video, mesh or radar capture here, or press Ctrl+O.\n\n"
+            "Help → Open the sample recording shows what it looks like."
+        )
 
     def _refresh(self) -> None:
         from sd2app.actions import ACTIONS

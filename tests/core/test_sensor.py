@@ -13,6 +13,7 @@ from sd2core.sensor import (
     PAPER_RADAR,
     VelocityAxis,
     VirtualSensor,
+    aimed_at,
     position_from_spherical,
     spherical_from_position,
 )
@@ -90,3 +91,17 @@ def test_the_boresight_looks_along_the_optical_axis():
     np.testing.assert_allclose(VirtualSensor().boresight, (0, 0, 1), atol=1e-15)
     np.testing.assert_allclose(VirtualSensor(azimuth_deg=90).boresight, (1, 0, 0), atol=1e-15)
     np.testing.assert_allclose(VirtualSensor(elevation_deg=90).boresight, (0, -1, 0), atol=1e-15)
+
+
+@given(points, points)
+def test_an_aimed_sensor_looks_at_its_target(position, target):
+    assume(math.dist(position, target) > 0.01)
+    sensor = aimed_at(VirtualSensor(position_m=position), target)
+    assert sensor.position_m == tuple(position)
+    along = np.subtract(target, position) / math.dist(position, target)
+    np.testing.assert_allclose(sensor.boresight, along, atol=1e-9)
+
+
+def test_a_sensor_on_its_target_keeps_its_direction():
+    sensor = VirtualSensor(position_m=(1, 2, 3), azimuth_deg=10)
+    assert aimed_at(sensor, (1, 2, 3)) == sensor
