@@ -153,6 +153,7 @@ def _arm_poses(times: Floats) -> Floats:
 def _turn_torso(skeleton: Skeleton, rotations: Floats, times: Floats, across_deg: Floats) -> None:
     """Sway, breathing and what the torso does for the arm; the head stays on the camera."""
     index = skeleton.index
+    # Degrees and Hz: quiet breaths, 16 a minute, and a slow sway of no common period.
     breath = np.sin(2.0 * np.pi * 0.27 * times)
     yaw = -across_deg + 0.5 * np.sin(2.0 * np.pi * 0.13 * times + 0.4)
     roll = 0.5 * np.sin(2.0 * np.pi * 0.17 * times)

@@ -37,8 +37,15 @@ def files(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.fixture(scope="module")
-def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return make_sample(tmp_path_factory.mktemp("sample") / "short", duration_s=SHORT_S)
+def steps() -> list[tuple[int, int]]:
+    """What ``short`` reported while it was made."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory: pytest.TempPathFactory, steps: list[tuple[int, int]]) -> Path:
+    folder = tmp_path_factory.mktemp("sample") / "short"
+    return make_sample(folder, lambda done, total: steps.append((done, total)), duration_s=SHORT_S)
 
 
 @pytest.fixture(scope="module")
@@ -54,17 +61,17 @@ def test_everything_but_the_video_is_the_same_every_time(short: Path, tmp_path: 
         assert first[name] == again[name], name
 
 
-def test_progress_rises_to_its_total(tmp_path: Path) -> None:
-    seen: list[tuple[int, int]] = []
-    make_sample(
-        tmp_path / "one.sd2", lambda done, total: seen.append((done, total)), duration_s=0.1
-    )
-    assert {total for _, total in seen} == {15}
-    assert [done for done, _ in seen] == sorted(done for done, _ in seen)
-    assert seen[-1] == (15, 15)
+def test_progress_rises_to_its_total(short: Path, steps: list[tuple[int, int]]) -> None:
+    assert {total for _, total in steps} == {30}  # 6 frames, 5 stages
+    assert [done for done, _ in steps] == sorted(done for done, _ in steps)
+    assert steps[-1] == (30, 30)
 
 
-@pytest.mark.parametrize("share", [0.1, 0.3, 0.7, 0.9])
+def test_the_suffix_is_appended(short: Path) -> None:
+    assert short.name == "short.sd2"
+
+
+@pytest.mark.parametrize("share", [0.3, 0.9])
 def test_a_cancelled_sample_leaves_nothing(tmp_path: Path, share: float) -> None:
     def stop(done: int, total: int) -> None:
         if done > share * total:
