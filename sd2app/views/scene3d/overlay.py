@@ -14,6 +14,7 @@ from sd2app.views.scene3d.navigation import Navigator
 from sd2app.views.scene3d.scene import Scene
 
 HINT = "Drag moves the sensor  ·  Shift: up and down  ·  Ctrl: nearer and farther"
+_VELOCITY_TITLE = "Radial velocity, m/s"
 _BAR_WIDTH = 10.0
 _PAD = 10.0
 _GAP = 6.0
@@ -36,6 +37,12 @@ class Overlay(QWidget):
     @property
     def _colours(self) -> SceneColours:
         return self._scene.colours
+
+    @property
+    def legend_room_px(self) -> float:
+        """Width to keep free on the right, the same for every colouring."""
+        words = QFontMetricsF(self._font()).horizontalAdvance(_VELOCITY_TITLE)
+        return words + 2 * _PAD + 2 * _GAP + 4.0
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Everything there is to say; drawn anew only when it changed."""
@@ -74,9 +81,9 @@ class Overlay(QWidget):
             painter.drawText(rows, where | Qt.TextFlag.TextWordWrap, self.message)
         self._legend = QRectF()
         self._paint_legend(painter)
-        self._paint_metres(painter)
+        names = self._paint_names(painter)
+        self._paint_metres(painter, [*names, self._legend, self._body_box()])
         self._paint_axes(painter)
-        self._paint_names(painter)
         if self._navigator.holds_sensor:
             self._paint_coordinates(painter)
         elif self._navigator.hovers_sensor:
@@ -90,15 +97,15 @@ class Overlay(QWidget):
     def _size(self) -> tuple[float, float]:
         return (self.width(), self.height())
 
-    def _paint_metres(self, painter: QPainter) -> None:
+    def _paint_metres(self, painter: QPainter, occupied: list[QRectF]) -> None:
         labels = self._scene.metre_labels
         if not labels:
             return
         painter.setPen(QColor(self._colours.muted))
         texts = [label.text for label in labels]
         sides = [
-            self._metre_boxes(painter, texts, [label.left_m for label in labels]),
-            self._metre_boxes(painter, texts, [label.right_m for label in labels]),
+            self._metre_boxes(painter, texts, [label.left_m for label in labels], occupied),
+            self._metre_boxes(painter, texts, [label.right_m for label in labels], occupied),
         ]
         for text, box in max(sides, key=len):
             painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)
@@ -108,33 +115,29 @@ class Overlay(QWidget):
         painter: QPainter,
         texts: list[str],
         places: list[tuple[float, float, float]],
+        occupied: list[QRectF],
     ) -> list[tuple[str, QRectF]]:
         """Boxes of the labels that fit into the view without touching anything."""
         metrics = QFontMetricsF(painter.font())
-        view = QRectF(self.rect())
-        body = self._body_box()
-        occupied = [self._legend, body]
+        view, middle = QRectF(self.rect()), self._body_box().center().x()
+        taken = list(occupied)
         boxes: list[tuple[str, QRectF]] = []
         pixels = self._scene.pose.project(places, self._size())
         for text, (x, y, depth) in zip(texts, pixels, strict=True):
             if not depth > 0.1:
                 continue
-            outwards = 1.0 if x > body.center().x() else -1.0
+            outwards = 1.0 if x > middle else -1.0
             box = QRectF(0.0, 0.0, metrics.horizontalAdvance(text), metrics.height())
             box.moveCenter(QPointF(x + outwards * (box.width() / 2 + 6.0), y))
-            if view.contains(box) and not any(box.intersects(other) for other in occupied):
+            if view.contains(box) and not any(box.intersects(other) for other in taken):
                 boxes.append((text, box))
-                occupied.append(box.adjusted(-6.0, -3.0, 6.0, 3.0))
+                taken.append(box.adjusted(-6.0, -3.0, 6.0, 3.0))
         return boxes
 
     def _body_box(self) -> QRectF:
         """Where in the picture the body moves; empty when it is behind the eye."""
-        pixels = self._scene.pose.project(self._scene.extent.points_m, self._size())
-        pixels = pixels[pixels[:, 2] > 0.1]
-        if not len(pixels):
-            return QRectF()
-        (left, top), (right, bottom) = pixels[:, :2].min(axis=0), pixels[:, :2].max(axis=0)
-        return QRectF(left, top, right - left, bottom - top)
+        box = self._scene.body_box_px(self._size())
+        return QRectF() if box is None else QRectF(QPointF(*box[:2]), QPointF(*box[2:]))
 
     def _paint_axes(self, painter: QPainter) -> None:
         right, down, forward = self._scene.pose.axes
@@ -145,6 +148,8 @@ class Overlay(QWidget):
         for depth, name, across, downward in sorted(arms, reverse=True):
             colour = QColor(self._colours.muted)
             colour.setAlphaF(1.0 if depth < 0.5 else 0.6)
+            if math.hypot(across, downward) < 0.2:
+                continue  # it points at the eye
             painter.setPen(QPen(colour, 1.4))
             tip = centre + QPointF(20.0 * across, 20.0 * downward)
             painter.drawLine(centre, tip)
@@ -152,30 +157,29 @@ class Overlay(QWidget):
             box.moveCenter(centre + QPointF(27.0 * across, 27.0 * downward))
             painter.drawText(box, Qt.AlignmentFlag.AlignCenter, name)
 
-    def _paint_names(self, painter: QPainter) -> None:
-        scene = self._scene
-        height = self._size()[1]
+    def _paint_names(self, painter: QPainter) -> list[QRectF]:
+        """Names of sensor and camera beside them; returns their boxes."""
+        scene, size = self._scene, self._size()
         metrics = QFontMetricsF(painter.font())
-        places = scene.pose.project([scene.sensor.position_m, (0.0, 0.0, 0.0)], self._size())
+        sensor, camera = scene.pose.project([scene.sensor.position_m, (0.0, 0.0, 0.0)], size)
+        names: list[tuple[str, QPointF]] = []
+        if scene.sensor_shown and sensor[2] > 0 and not self._navigator.holds_sensor:
+            pixel = scene.pose.metres_per_pixel(scene.sensor.position_m, size[1])
+            reach = scene.sensor_radius_m(size) / pixel + 8.0
+            names.append(("Sensor", QPointF(sensor[0] - reach, sensor[1])))
+        together = math.hypot(sensor[0] - camera[0], sensor[1] - camera[1]) < 48.0
+        if scene.camera_shown and camera[2] > 0 and not together:
+            names.append(("Camera", QPointF(camera[0] - 8.0, camera[1])))
         painter.setPen(QColor(self._colours.muted))
-        if scene.sensor_shown and places[0, 2] > 0 and not self._navigator.holds_sensor:
-            radius = scene.sensor_radius_m(self._size()) / scene.pose.metres_per_pixel(
-                scene.sensor.position_m, height
+        boxes = []
+        for text, right in names:
+            width = metrics.horizontalAdvance(text)
+            box = QRectF(
+                right.x() - width, right.y() - metrics.height() / 2, width, metrics.height()
             )
-            text = "Sensor"
-            at = QPointF(
-                places[0, 0] - radius - 8.0 - metrics.horizontalAdvance(text),
-                places[0, 1] + 0.35 * metrics.ascent(),
-            )
-            painter.drawText(at, text)
-        apart = float(np.hypot(*(places[0, :2] - places[1, :2])))
-        if scene.camera_shown and places[1, 2] > 0 and not apart < 48.0:
-            text = "Camera"
-            at = QPointF(
-                places[1, 0] - metrics.horizontalAdvance(text) / 2,
-                places[1, 1] + metrics.ascent() + 10.0,
-            )
-            painter.drawText(at, text)
+            painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)
+            boxes.append(box)
+        return boxes
 
     def _paint_legend(self, painter: QPainter) -> None:
         mode = self._scene.mode
@@ -189,7 +193,7 @@ class Overlay(QWidget):
             ticks = [(f"{value:+.3g}" if value else "0") for value in np.linspace(top, -top, 5)]
             shares = list(np.linspace(0.0, 1.0, 5))
             title, table, ends = (
-                "Radial velocity, m/s",
+                _VELOCITY_TITLE,
                 DIVERGING[::-1],
                 ("approaching", "receding"),
             )
@@ -257,7 +261,7 @@ class Overlay(QWidget):
         metrics = QFontMetricsF(painter.font())
         line = metrics.height()
         entries = (
-            (self._colours.visible, "seen by the sensor"),
+            (self._colours.visible, "visible"),
             (self._colours.hidden, "hidden"),
         )
         width = max(metrics.horizontalAdvance(text) for _, text in entries) + _BAR_WIDTH + _GAP
@@ -286,7 +290,7 @@ class Overlay(QWidget):
 
     def _chip(self, painter: QPainter, box: QRectF) -> None:
         colour = QColor(self._colours.background)
-        colour.setAlphaF(0.82)
+        colour.setAlphaF(0.72)
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(colour)
         painter.drawRoundedRect(box, 6.0, 6.0)

@@ -18,8 +18,6 @@ from sd2app.views.scene3d import shapes, surface
 from sd2app.views.scene3d.colours import SceneColours, fractions, mixed, rgb
 from sd2core.sensor import VirtualSensor
 
-_DOT_PX = 2.6
-
 
 def _cells(connectivity: NDArray[np.integer]) -> vtkCellArray:
     """Cells of one size from an (n, k) array."""
@@ -207,9 +205,9 @@ class Body(Shape):
     def _update_shadow(self) -> None:
         self.shadow.SetVisibility(bool(self.actor.GetVisibility()) and not self.drawn_as_dots)
 
-    def set_pixel_scale(self, scale: float) -> None:
-        """Size of dots."""
-        self.actor.GetProperty().SetPointSize(_DOT_PX * scale)
+    def set_dot_size(self, pixels: float) -> None:
+        """Size of dots in pixels of the render window."""
+        self.actor.GetProperty().SetPointSize(pixels)
 
 
 class SensorGlyph:

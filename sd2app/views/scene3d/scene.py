@@ -26,7 +26,7 @@ from sd2core.sensor import VirtualSensor
 Preset = Literal["overview", "camera", "sensor", "side", "top"]
 SENSOR_RADIUS_M = 0.045
 SENSOR_LEAST_PX = 7.0
-_MARGINS = Margins(left=28.0, top=36.0, right=104.0, bottom=30.0)
+_DOTS_PX = (1.4, 6.0)
 _INSIDE_M = 0.25
 _FAR_OFF_M = 30.0
 _SAMPLED_FRAMES = 9
@@ -97,6 +97,7 @@ class Scene:
         self.renderer = renderer
         self.colours = SceneColours.of(palette_for(False), False)
         self.pose = EyePose()
+        self.margins = Margins(left=64.0, top=28.0, right=144.0, bottom=28.0)
         self.extent = _NOTHING
         self.sensor = VirtualSensor()
         self.metre_labels: tuple[shapes.MetreLabel, ...] = ()
@@ -242,7 +243,7 @@ class Scene:
             "top": (0.0, -89.5),
         }[preset]
         pose = EyePose(azimuth_deg=azimuth, elevation_deg=elevation)
-        return pose.framed(np.concatenate(points), size_px, _MARGINS)
+        return pose.framed(np.concatenate(points), size_px, self.margins)
 
     def _looking_from(
         self,
@@ -263,7 +264,7 @@ class Scene:
             # Half the picture's height is one unit; the colour bar keeps its place free.
             unit = size_px[1] / 2
             room_left = size_px[0] / 2 / unit
-            room_right = max(size_px[0] / 2 - _MARGINS.right, 0.1 * size_px[0]) / unit
+            room_right = max(size_px[0] / 2 - self.margins.right, 0.1 * size_px[0]) / unit
             x, y = relative[ahead] @ right, np.abs(relative[ahead] @ down)
             tallest = np.maximum(np.maximum(x / room_right, -x / room_left), y) / depth[ahead]
             tangent = float(np.clip(1.06 * tallest.max(), 0.12, 1.4))
@@ -290,8 +291,10 @@ class Scene:
         """
         if self._stale_colours:
             self._colour_mesh()
-        for part in (self.body, self.sensor_glyph, self.camera_glyph, self.ground):
+        for part in (self.sensor_glyph, self.camera_glyph, self.ground):
             part.set_pixel_scale(pixel_scale)
+        if self._has_mesh and self.body.drawn_as_dots:
+            self.body.set_dot_size(self._dot_px(size_px) * pixel_scale)
         eye = self.pose.position
         self.sensor_glyph.set_radius(self.sensor_radius_m(size_px))
         self.sensor_glyph.show(self.sensor_shown)
@@ -337,6 +340,22 @@ class Scene:
         """Radius of the sphere: never too small on screen to take hold of."""
         pixel = self.pose.metres_per_pixel(self.sensor.position_m, size_px[1])
         return max(SENSOR_RADIUS_M, SENSOR_LEAST_PX * pixel) if np.isfinite(pixel) else 0.01
+
+    def body_box_px(self, size_px: tuple[float, float]) -> tuple[float, float, float, float] | None:
+        """Left, top, right and bottom of where the body moves, None behind the eye."""
+        pixels = self.pose.project(self.extent.points_m, size_px)
+        pixels = pixels[pixels[:, 2] > 0.1, :2]
+        if not len(pixels):
+            return None
+        return (*pixels.min(axis=0), *pixels.max(axis=0))
+
+    def _dot_px(self, size_px: tuple[float, float]) -> float:
+        """Size of dots that leaves gaps between those of a dense mesh."""
+        box = self.body_box_px(size_px)
+        if box is None:
+            return _DOTS_PX[0]
+        area = (box[2] - box[0]) * (box[3] - box[1])
+        return float(np.clip(0.7 * np.sqrt(area / len(self.vertices_m)), *_DOTS_PX))
 
     def _colour_mesh(self) -> None:
         self._stale_colours = False

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING, get_args
 
 from PySide6.QtCore import QEvent, QObject, QSize, Qt
@@ -223,6 +224,7 @@ class SceneView(QWidget):
         # sensor moves: it would slip from under the pointer.
         if self._preset is not None and self._framed != (self._preset, size_px):
             self._framed = (self._preset, size_px)
+            self.scene.margins = replace(self.scene.margins, right=self.overlay.legend_room_px)
             self.scene.pose = self.scene.preset_pose(self._preset, size_px)
         self.scene.prepare(size_px, pixel_scale)
 
