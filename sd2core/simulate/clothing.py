@@ -80,7 +80,7 @@ class Clothes:
 
     def colours(self, fields: Singles) -> tuple[Singles, Singles]:
         """Linear colour (N, 3) and gloss (N,) at interpolated fields (N, 8)."""
-        colours = np.tile(_linear(SKIN), (len(fields), 1))
+        colours = np.tile(linear(SKIN), (len(fields), 1))
         gloss = np.full(len(fields), 0.6, np.float32)
         painted = (
             (7, LIPS, 0.8),
@@ -94,17 +94,18 @@ class Clothes:
         )
         for field, colour, shine in painted:
             inside = fields[:, field] > 0.0
-            colours[inside] = _linear(colour)
+            colours[inside] = linear(colour)
             gloss[inside] = shine
         return colours, gloss
 
 
-def srgb(linear: Singles) -> Singles:
+def srgb(light: Singles) -> Singles:
     """The sRGB values (0 to 1) of linear light, by the plain power 1 / 2.2."""
-    return np.clip(linear, 0.0, 1.0) ** np.float32(1.0 / 2.2)
+    return np.clip(light, 0.0, 1.0) ** np.float32(1.0 / 2.2)
 
 
-def _linear(colour: tuple[float, float, float]) -> Singles:
+def linear(colour: tuple[float, float, float]) -> Singles:
+    """Linear light of sRGB values, by the plain power 2.2."""
     return (np.asarray(colour, dtype=np.float32) ** np.float32(2.2)).astype(np.float32)
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from sd2core.simulate.bodies import Body, vertex_normals
 from sd2core.simulate.caption import stamp
-from sd2core.simulate.clothing import Clothes, srgb
+from sd2core.simulate.clothing import Clothes, linear, srgb
 from sd2core.simulate.raster import interpolate, lit_share, rasterise
 
 Singles = NDArray[np.float32]
@@ -165,10 +165,14 @@ class Renderer:
 
     @cached_property
     def _light_axes(self) -> NDArray[np.float64]:
-        """Right, down and towards the light, in rows."""
+        """Right, up and towards the light, in rows.
+
+        Up, not down: the light's image is mirrored, so the triangles that face away
+        from the light are drawn into it, and a lit surface cannot shade itself.
+        """
         towards = _unit(self.studio.key)
         right = _unit(tuple(np.cross(towards, [0.0, 1.0, 0.0])))
-        return np.stack([right, np.cross(right, towards) * -1.0, towards])
+        return np.stack([right, np.cross(towards, right), towards])
 
     def _seen_by_light(self, positions: NDArray[np.floating]) -> tuple[Singles, Singles]:
         """Pixels in the light's image, and nearness to it in metres."""
@@ -254,11 +258,6 @@ class Renderer:
     def _dither(self) -> Singles:
         shape = (self.camera.height, self.camera.width)
         return np.random.default_rng(1).random(shape, dtype=np.float32)
-
-
-def linear(colour: tuple[float, float, float]) -> NDArray[np.float64]:
-    """Linear light of an sRGB colour."""
-    return np.asarray(colour) ** 2.2
 
 
 def _tone(picture: Singles) -> Singles:

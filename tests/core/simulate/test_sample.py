@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sd2core.doppler import Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.processing import doppler_map
 from sd2core.io.mesh import load_mesh
@@ -188,3 +189,25 @@ def test_the_radar_sees_which_way_the_hand_goes(
     fast = spectrum.values[np.abs(velocity) > 0.4, frames].sum(axis=1)
     ahead = fast[velocity[np.abs(velocity) > 0.4] > 0].sum() / fast.sum()
     assert (ahead > 0.75) if approaching else (ahead < 0.25)
+
+
+def test_mesh_and_radar_tell_the_same_motion(bundled: Recording) -> None:
+    """Mean velocities of the counted mesh and of the radar agree best without any lag."""
+    assert bundled.mesh is not None
+    assert bundled.radar is not None
+    synthesizer = Synthesizer(load_mesh(bundled.mesh), "paper")
+    counted = synthesizer.map(VirtualSensor(), visibility="facing")
+    seen = doppler_map(load_capture(bundled.radar), axis=counted.axis, clutter="mean")
+    noise = 4.0 * np.median(seen.values[:8])
+    means = []
+    for values in (counted.values, np.maximum(seen.values - noise, 0.0)):
+        moving = values.astype(np.float64)
+        moving[list(counted.null_bins)] = 0.0
+        means.append(counted.axis.centres_mps @ moving / np.maximum(moving.sum(axis=0), 1e-12))
+    inner = slice(10, -10)
+    correlation = {
+        lag: np.corrcoef(means[0][inner], np.roll(means[1], -lag)[inner])[0, 1]
+        for lag in range(-4, 5)
+    }
+    assert max(correlation, key=lambda lag: correlation[lag]) == 0
+    assert correlation[0] > 0.8
