@@ -45,6 +45,7 @@ class Clothes:
     @classmethod
     def of(cls, body: Body) -> Clothes:
         """Dress a body of the bundled skeleton."""
+        # All lengths are metres on this body's rest shape, fitted by looking at pictures.
         p = body.vertices_m
         height = -p[:, 1]
         skeleton = body.skeleton
