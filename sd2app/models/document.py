@@ -11,7 +11,7 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QUndoStack
 
 from sd2app.jobs.latest import Emit, LatestRunner
-from sd2app.models.content import UNTITLED, Content, load_content, recording_of
+from sd2app.models.content import Content, load_content, recording_of
 from sd2app.models.jobs import Job, JobsModel
 from sd2core.mesh import MeshSequence
 from sd2core.recording import Recording, Relinked, Span
@@ -117,8 +117,9 @@ class DocumentModel(QObject):
     def focal_px(self) -> float:
         """Focal length of the camera in pixels of the video."""
         if self._content is None or self._content.video is None:
-            return 600.0
-        return FOCAL_PER_WIDTH * self._content.video.width
+            return FOCAL_PER_WIDTH * 640
+        stated = self._content.recording.mesh_reading.focal_px
+        return stated or FOCAL_PER_WIDTH * self._content.video.width
 
     @property
     def clutter(self) -> Clutter:
@@ -249,20 +250,8 @@ class DocumentModel(QObject):
         """Make a recording folder that refers to the files where they are."""
         if self._content is None:
             return
-        now = self._content.recording
-        made = Recording.create(
-            folder,
-            video=now.video,
-            mesh=now.mesh,
-            faces=now.faces,
-            radar=now.radar,
-            mesh_reading=now.mesh_reading,
-            radar_offset_s=now.radar_offset_s,
-            sensor=now.sensor,
-            spans=now.spans,
-            title="" if now.folder == UNTITLED else now.title,
-            simulated=now.simulated,
-        )
+        title = "" if not self._content.saved else self.title
+        made = replace(self._content.recording, title=title).save_as(folder)
         self._content = replace(self._content, recording=made)
         self.undo_stack.setClean()
         self.changed.emit()

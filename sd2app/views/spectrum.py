@@ -14,7 +14,7 @@ from sd2app.models.playback import PlaybackModel
 from sd2app.models.tracks import PointerModel, TrackModel
 from sd2app.views.time_axis import ticks
 
-_LEFT_PX, _TOP_PX, _RIGHT_PX, _BOTTOM_PX = 48, 28, 12, 40
+_LEFT_PX, _TOP_PX, _RIGHT_PX, _BOTTOM_PX = 48, 50, 12, 40
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ class SpectrumView(QWidget):
             painter.setPen(QPen(QColor(colours.muted), 1, Qt.PenStyle.DotLine))
             painter.drawLine(QPointF(plot.left(), y), QPointF(plot.right(), y))
         painter.restore()
-        self._paint_legend(painter, plot, shown)
+        self._paint_legend(painter, shown)
 
     def _paint_axes(self, painter: QPainter, plot: QRectF, v_max: float) -> None:
         colours, levels = self._display.palette, self._display.levels
@@ -159,18 +159,16 @@ class SpectrumView(QWidget):
         painter.setBrush(Qt.BrushStyle.NoBrush)
         painter.drawPolyline(points)
 
-    def _paint_legend(self, painter: QPainter, plot: QRectF, shown: list[Curve]) -> None:
-        x = self.width() - _RIGHT_PX
-        for curve in reversed(shown):
+    def _paint_legend(self, painter: QPainter, shown: list[Curve]) -> None:
+        x = 8.0
+        for curve in shown:
             text = curve.track.title.lower()
-            width = painter.fontMetrics().horizontalAdvance(text)
-            x -= width
-            painter.setPen(QColor(self._display.palette.muted))
-            painter.drawText(QRectF(x, 0, width + 2, 24), Qt.AlignmentFlag.AlignVCenter, text)
-            x -= 18
             painter.setPen(QPen(QColor(getattr(self._display.palette, curve.colour)), 2))
-            painter.drawLine(QPointF(x, 12), QPointF(x + 13, 12))
-            x -= 10
+            painter.drawLine(QPointF(x, 34), QPointF(x + 13, 34))
+            width = painter.fontMetrics().horizontalAdvance(text)
+            painter.setPen(QColor(self._display.palette.muted))
+            painter.drawText(QRectF(x + 18, 24, width + 2, 20), Qt.AlignmentFlag.AlignVCenter, text)
+            x += width + 30
 
 
 def _y_of(plot: QRectF, velocity_mps: float, v_max_mps: float) -> float:
