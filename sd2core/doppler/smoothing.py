@@ -9,7 +9,7 @@ _REACH = 4.0
 """Where the Gaussian on time is cut, in sigmas."""
 
 _SLACK_S = 1e-9
-"""Frames that lie on the cut are looked up generously and judged once, by distance."""
+"""A frame that lies on the cut is inside on both sides, whatever the last digit says."""
 
 
 def velocity_kernel(bins: int, sigma_bins: float) -> NDArray[np.float64]:
@@ -28,7 +28,7 @@ def frames_within_reach(
     """Half-open range of frames that smoothing frames ``start`` to ``stop`` looks at."""
     if sigma_s == 0:
         return start, stop
-    reach = _REACH * sigma_s + _SLACK_S
+    reach = _REACH * sigma_s + 2 * _SLACK_S
     first = int(np.searchsorted(times_s, times_s[start] - reach))
     last = int(np.searchsorted(times_s, times_s[stop - 1] + reach, side="right"))
     return first, last
@@ -62,7 +62,7 @@ def smooth_time(
         return values[:, frames - first]
     last = first + values.shape[1]
     centres = times_s[frames]
-    reach = _REACH * sigma_s
+    reach = _REACH * sigma_s + _SLACK_S
     slack = reach + _SLACK_S
     before = int((frames - np.searchsorted(times_s, centres - slack)).max())
     after = int((np.searchsorted(times_s, centres + slack, side="right") - frames).max())

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 _REACH = 4.0
 """Where the Gaussian is cut, in sigmas (its value there: 3e-4 of the peak)."""
 
+_SLACK_S = 1e-9
+"""A frame that lies on the cut is inside on both sides, whatever the last digit says."""
+
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
@@ -61,7 +64,7 @@ class Trajectory:
         first = first_knot // self.oversampling
         last = -((1 - last_knot) // self.oversampling) + 1
         if self.smoothing_s > 0:
-            reach = _REACH * self.smoothing_s
+            reach = _REACH * self.smoothing_s + 2 * _SLACK_S
             times = self.knot_times_s
             first = int(np.searchsorted(self.frame_times_s, times[first_knot] - reach))
             last = int(
@@ -128,8 +131,9 @@ def line_weights(
         First frame and its and the following frames' weights; None when fewer
         than two frames lie under the Gaussian.
     """
-    first = int(np.searchsorted(times_s, time_s - _REACH * sigma_s))
-    last = int(np.searchsorted(times_s, time_s + _REACH * sigma_s, side="right"))
+    reach = _REACH * sigma_s + _SLACK_S
+    first = int(np.searchsorted(times_s, time_s - reach))
+    last = int(np.searchsorted(times_s, time_s + reach, side="right"))
     if last - first < 2:
         return None
     distance = (times_s[first:last] - time_s) / sigma_s

@@ -1,0 +1,8 @@
+import pytest
+
+from sd2core.compiled import warm_up
+
+
+@pytest.fixture(scope="session", autouse=True)
+def kernels() -> None:
+    warm_up()

@@ -1,0 +1,74 @@
+"""Normals, facing test, areas and the range law."""
+
+from __future__ import annotations
+
+import numpy as np
+from scattering_scenes import columns, plate, sphere, together
+
+from sd2core.scattering.amplitude import (
+    NEAREST_RANGE_M,
+    range_weight,
+    vertex_areas,
+    vertex_areas_kernel,
+)
+from sd2core.scattering.visibility import facing_mask, vertex_normals, vertex_normals_kernel
+
+
+def test_normals_of_a_sphere_point_outwards() -> None:
+    vertices, faces = sphere(2.0)
+    normals = vertex_normals(columns(vertices), faces)[0].T / 127
+    cosine = (normals * vertices / 2.0).sum(axis=1) / np.linalg.norm(normals, axis=1)
+    assert np.degrees(np.arccos(np.minimum(cosine, 1))).max() < 1.0
+
+
+def test_compiled_normals_and_areas_are_the_plain_ones() -> None:
+    vertices, faces = together(sphere(0.5), plate(1.0))
+    points = np.concatenate([columns(vertices), columns(vertices * [1.0, 0.7, 1.3])])
+    normals = np.empty(points.shape, np.int8)
+    vertex_normals_kernel(points, faces, 0, 2, normals)
+    np.testing.assert_array_equal(normals, vertex_normals(points, faces))
+    areas = np.empty((2, points.shape[2]), np.float32)
+    vertex_areas_kernel(points, faces, 0, 2, areas)
+    np.testing.assert_allclose(areas, vertex_areas(points, faces), rtol=1e-5)
+
+
+def test_facing_divides_a_sphere_at_its_horizon() -> None:
+    vertices, faces = sphere()
+    points = columns(vertices)
+    facing = facing_mask(points, vertex_normals(points, faces), np.array([0.0, 0.0, -4.0]))[0]
+    height = -vertices[:, 2] - 0.25
+    assert facing[height > 0.03].all()
+    assert not facing[height < -0.03].any()
+
+
+def test_reversed_faces_face_away() -> None:
+    vertices, faces = plate(depth_m=2.0)
+    points, sensor = columns(vertices), np.zeros(3)
+    assert facing_mask(points, vertex_normals(points, faces), sensor).all()
+    reversed_faces = faces[:, ::-1].copy()
+    assert not facing_mask(points, vertex_normals(points, reversed_faces), sensor).any()
+
+
+def test_what_has_no_surface_faces_everyone() -> None:
+    points = columns(np.array([[0.0, 0, 1], [1, 0, 1], [2, 0, 1], [5, 5, 5]]))
+    faces = np.array([[0, 1, 2]], np.int32)  # three points on a line
+    normals = vertex_normals(points, faces)
+    assert not normals.any()
+    assert facing_mask(points, normals, np.zeros(3)).all()
+
+
+def test_areas_add_up_to_the_surface() -> None:
+    vertices, faces = plate(1.5)
+    areas = vertex_areas(columns(vertices), faces)
+    np.testing.assert_allclose(areas.sum(), 1.5**2, rtol=1e-5)
+    assert areas.min() > 0
+
+
+def test_range_law() -> None:
+    ranges = np.array([2.2, 4.4, 1.1, 1e6])
+    np.testing.assert_allclose(
+        range_weight(ranges, 4.0, 2.2), [1, 1 / 16, 16, (2.2e-6) ** 4], rtol=1e-6
+    )
+    np.testing.assert_array_equal(range_weight(ranges, 0.0, 2.2), 1)
+    nearest = (2.2 / NEAREST_RANGE_M) ** 4
+    np.testing.assert_allclose(range_weight(np.array([0.0, 0.05]), 4.0, 2.2), nearest, rtol=1e-6)
