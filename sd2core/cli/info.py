@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from dataclasses import dataclass, field
 from pathlib import Path
+from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.options import add_command, add_json, add_mesh_reading
@@ -125,7 +126,7 @@ def describe_recording(recording: Recording, parts: list[Description]) -> Descri
     facts = {
         "title": recording.title + (" (simulated)" if recording.simulated else ""),
         "sensor": f"at x {x:g}, y {y:g}, z {z:g} m",
-        "radar offset": f"{recording.radar_offset_s:+g} s" if recording.radar else "",
+        "radar offset": f"{recording.radar_offset_s:g} s" if recording.radar else "",
         "spans": _labels(recording),
     }
     notes = tuple(f"the {role} is not at {path}" for role, path in missing.items())
@@ -228,9 +229,24 @@ def describe_map(path: Path, doppler: DopplerMap) -> Description:
         "unit": doppler.unit,
         "nulled bins": ", ".join(map(str, doppler.null_bins)),
         "unseen bins": ", ".join(map(str, doppler.unseen_bins)),
+        **_synthesis_facts(doppler.meta),
     }
     notes = tuple(doppler.meta.get("notes", ()))
     return Description(f"Doppler map {path}", data, facts, notes)
+
+
+def _synthesis_facts(provenance: dict[str, Any]) -> dict[str, str]:
+    if "visible_share" not in provenance:
+        return {}
+    x, y, z = provenance["sensor"]["position_m"]
+    visible, beyond = provenance["visible_share"], provenance["beyond_share"]
+    worst = max(range(len(beyond)), key=beyond.__getitem__)
+    return {
+        "sensor": f"at x {x:g}, y {y:g}, z {z:g} m",
+        "visibility": f"{provenance['visibility']}: {fmean(visible):.1%} visible on average",
+        "beyond axis": f"{fmean(beyond):.1%} of what is visible on average"
+        + (f", {beyond[worst]:.1%} in frame {worst}" if beyond[worst] > 0 else ""),
+    }
 
 
 def limit_facts(config: RadarConfig) -> dict[str, str]:

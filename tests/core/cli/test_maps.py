@@ -82,7 +82,14 @@ def test_an_approaching_plate(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
     assert doppler.kind == "synthetic"
     assert doppler.peak_velocity_mps() == pytest.approx(1.3, abs=doppler.axis.bin_width_mps / 2)
     assert "32 bins of 0.125 m/s over ±2 m/s, approaching is positive" in outcome.out
-    assert "nulled bins" in outcome.out
+    assert "nulled bins  14, 15, 16" in outcome.out
+    assert "exact: 100.0% visible on average" in outcome.out
+
+
+def test_the_share_beyond_the_axis_is_said(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
+    outcome = sd2("synth", plate, "--out", tmp_path / "map.npz", "--v-max", "1")
+    assert "100.0% of what is visible on average" in outcome.out
+    assert outcome.out == sd2("info", tmp_path / "map.npz").out
 
 
 def test_from_behind_it_recedes(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
