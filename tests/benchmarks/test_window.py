@@ -109,9 +109,11 @@ def sample_window(qtbot):
 
 def play(window, qtbot, every_tick=lambda: None):
     from sd2app.views.heatmap import HeatmapView
+    from sd2app.views.scene3d.image_backend import ImageBackend
     from sd2app.views.video import VideoView
 
-    counter = PaintCounter([window.findChild(VideoView), *window.findChildren(HeatmapView)])
+    views = [window.findChild(VideoView), *window.findChildren(HeatmapView)]
+    counter = PaintCounter([*views, *window.findChildren(ImageBackend)])
     context = window.context
     shown = {"pictures": 0, "maps": 0}
     context.video.frame_changed.connect(lambda: shown.update(pictures=shown["pictures"] + 1))
