@@ -3,7 +3,6 @@
 # The Python to make .venv from, e.g. `make setup PYTHON=python3.12`; found by itself otherwise.
 PYTHON ?=
 BIN := .venv/bin
-PYTEST := $(BIN)/python -m pytest
 export PYTHON
 
 .NOTPARALLEL:
@@ -63,14 +62,14 @@ format: $(INSTALLED)
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-bench: setup
-	QT_QPA_PLATFORM=offscreen $(PYTEST) tests/benchmarks --benchmark-only --timeout=0
+bench: system-packages-for-tests setup
+	scripts/on_display.sh $(BIN)/python -m pytest tests/benchmarks --benchmark-only --timeout=0
 
 wheel: $(INSTALLED)
 	$(BIN)/python -m build --wheel --no-isolation
 
 screenshots: system-packages-for-tests setup
-	$(BIN)/python docs/screenshots.py
+	scripts/on_display.sh $(BIN)/python docs/screenshots.py
 
 clean:
 	rm -rf .venv build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks \

@@ -14,12 +14,7 @@ offscreen=$?
 if [ $offscreen -eq $NO_TESTS_COLLECTED ]; then offscreen=0; fi
 
 echo "== Tests on a display"
-if [ "$(uname -s)" = Linux ]; then
-    QT_QPA_PLATFORM=xcb xvfb-run -a -s "-screen 0 1600x1000x24 -noreset" \
-        $pytest -m "($expression) and gl" < /dev/null
-else
-    $pytest -m "($expression) and gl" < /dev/null
-fi
+scripts/on_display.sh $pytest -m "($expression) and gl" < /dev/null
 display=$?
 if [ $display -eq $NO_TESTS_COLLECTED ]; then display=0; fi
 
