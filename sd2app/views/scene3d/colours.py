@@ -38,7 +38,7 @@ _SEQUENTIAL = (
     (0.625, "#26828e"),
     (0.750, "#31688e"),
     (0.875, "#3e4989"),
-    (1.000, "#482878"),
+    (1.000, "#443a83"),
 )
 
 
@@ -88,7 +88,6 @@ class SceneColours:
     camera: str
     text: str
     muted: str
-    chip: str
 
     @classmethod
     def of(cls, palette: Palette, dark: bool) -> SceneColours:
@@ -106,7 +105,6 @@ class SceneColours:
             camera=palette.muted,
             text=palette.text,
             muted=palette.muted,
-            chip=palette.panel,
         )
 
 

@@ -50,6 +50,7 @@ class Shape:
         lit: bool = False,
     ) -> None:
         self._renderer = renderer
+        self.points = np.zeros((0, 3), np.float32)
         self._points = vtkPoints()
         self.data = vtkPolyData()
         self.data.SetPoints(self._points)
@@ -179,7 +180,7 @@ class Body(Shape):
         self._dots = dots
         look = self.actor.GetProperty()
         if self.drawn_as_dots:
-            if self.data.GetNumberOfVerts() == 0 and len(getattr(self, "points", ())):
+            if self.data.GetNumberOfVerts() == 0 and len(self.points):
                 self.data.SetVerts(_cells(np.arange(len(self.points))[:, None]))
             self.mapper.SetInputData(self.data)
             look.SetLighting(False)

@@ -150,7 +150,7 @@ def ground(floor_m: float, x0: float, z0: float, x1: float, z1: float, step: flo
 
 
 def _ticks(low: float, high: float, step: float) -> NDArray[np.float64]:
-    return low + step * np.arange(round((high - low) / step) + 1)
+    return np.linspace(low, high, round((high - low) / step) + 1)
 
 
 def _is_major(value: float) -> bool:

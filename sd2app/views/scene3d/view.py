@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, get_args
 
@@ -32,6 +32,12 @@ _BUTTONS: dict[Qt.MouseButton, Button] = {
     Qt.MouseButton.MiddleButton: "middle",
     Qt.MouseButton.RightButton: "right",
 }
+_MOUSE = (
+    QEvent.Type.MouseMove,
+    QEvent.Type.MouseButtonPress,
+    QEvent.Type.MouseButtonRelease,
+    QEvent.Type.MouseButtonDblClick,
+)
 _NOTCH = 120.0
 """Qt's measure of one notch of a wheel."""
 
@@ -82,16 +88,20 @@ class SceneView(QWidget):
         )
         self.overlay = Overlay(self.scene, self.navigator, self)
         self._preset: Preset | None = "overview"
-        self._framed: tuple[Preset, tuple[float, float]] | None = None
+        self._framed: tuple[object, ...] | None = None
         self._frame: int | None = None
         self._stale_scattering = True
         self._backend.widget.installEventFilter(self)
-        document.opened.connect(self._take_over)
-        playback.time_changed.connect(self._follow_clock)
-        sensor.changed.connect(self._follow_sensor)
-        display.mesh_changed.connect(self._follow_colour)
-        display.theme_changed.connect(self._follow_theme)
-        synthesis.frame_changed.connect(self._follow_scattering)
+        self._followed = (
+            (document.opened, self._take_over),
+            (playback.time_changed, self._follow_clock),
+            (sensor.changed, self._follow_sensor),
+            (display.mesh_changed, self._follow_colour),
+            (display.theme_changed, self._follow_theme),
+            (synthesis.frame_changed, self._follow_scattering),
+        )
+        for signal, slot in self._followed:
+            signal.connect(slot)
         self._follow_theme()
         self._follow_colour()
         self._take_over()
@@ -139,45 +149,54 @@ class SceneView(QWidget):
         if self._backend is None:
             return False
         kind = event.type()
-        if kind == QEvent.Type.MouseMove:
-            self.navigator.move(*_place(event), *_modifiers(event))
-        elif kind == QEvent.Type.MouseButtonPress:
-            if event.button() in _BUTTONS:
-                self.navigator.press(*_place(event), _BUTTONS[event.button()], *_modifiers(event))
-        elif kind == QEvent.Type.MouseButtonRelease:
-            if event.button() in _BUTTONS:
-                self.navigator.release(*_place(event), _BUTTONS[event.button()])
-        elif kind == QEvent.Type.MouseButtonDblClick:
-            if not self.navigator.sensor_at(*_place(event)):
-                self.reset_view()
-        elif kind == QEvent.Type.Wheel:
+        if isinstance(event, QMouseEvent) and kind in _MOUSE:
+            self._handle_mouse(event)
+        elif isinstance(event, QWheelEvent):
             self.navigator.wheel(*_place(event), event.angleDelta().y() / _NOTCH)
         elif kind == QEvent.Type.Leave:
             self.navigator.leave()
-        elif kind == QEvent.Type.Hide:
-            self.navigator.let_go()
-            return False
         elif kind in (QEvent.Type.KeyPress, QEvent.Type.KeyRelease):
             # QtInteractor would take them; they belong to the window.
             event.ignore()
             return True
         else:
+            if kind == QEvent.Type.Hide:
+                self.navigator.let_go()
             return False
         self._choose_cursor()
         return True
+
+    def _handle_mouse(self, event: QMouseEvent) -> None:
+        kind, place = event.type(), _place(event)
+        if kind == QEvent.Type.MouseMove:
+            self.navigator.move(*place, *_modifiers(event))
+            return
+        button = _BUTTONS.get(event.button())
+        if button is None:
+            return
+        if kind == QEvent.Type.MouseButtonRelease:
+            self.navigator.release(*place, button)
+        elif kind == QEvent.Type.MouseButtonDblClick and not self.navigator.sensor_at(*place):
+            self.reset_view()
+        else:
+            # Also the second press of a double click: a hurried hand takes the sensor.
+            self.navigator.press(*place, button, *_modifiers(event))
 
     # What changed
 
     def _take_over(self) -> None:
         self._preset, self._framed = "overview", None
         self._frame = None
+        self.scene.clear_mesh()
+        self.overlay.message = ""
         mesh = self._document.mesh
         if mesh is None:
-            self.scene.clear_mesh()
+            self.overlay.message = "No mesh in this recording"
         else:
-            self._frame = mesh.timebase.frame_at(self._playback.time_s)
-            self.scene.set_mesh(mesh, self._frame)
-        self.overlay.message = "" if mesh is not None else "No mesh in this recording"
+            frame = mesh.timebase.frame_at(self._playback.time_s)
+            with self._explaining():
+                self.scene.set_mesh(mesh, frame)
+                self._frame = frame
         self._follow_sensor()
 
     def _follow_clock(self) -> None:
@@ -215,15 +234,14 @@ class SceneView(QWidget):
         """Fetch what changed since the last picture, right before the next."""
         mesh = self._document.mesh
         if mesh is not None and self.scene.has_mesh:
-            try:
+            with self._explaining():
                 self._fetch(mesh)
-            except (Sd2Error, OSError) as error:
-                # A mesh that is read from disk frame by frame can go away.
-                self.overlay.message = f"The mesh cannot be read: {error}"
-        # A ready-made view is kept when the widget is resized, but not while the
-        # sensor moves: it would slip from under the pointer.
-        if self._preset is not None and self._framed != (self._preset, size_px):
-            self._framed = (self._preset, size_px)
+        # A ready-made view is kept when the widget is resized. While the sensor moves
+        # the view stands still, or the sensor would slip from under the pointer;
+        # only the view from the sensor goes with it.
+        framed = (self._preset, size_px, self.scene.sensor if self._preset == "sensor" else None)
+        if self._preset is not None and self._framed != framed:
+            self._framed = framed
             self.scene.margins = replace(self.scene.margins, right=self.overlay.legend_room_px)
             self.scene.pose = self.scene.preset_pose(self._preset, size_px)
         self.scene.prepare(size_px, pixel_scale)
@@ -246,6 +264,14 @@ class SceneView(QWidget):
             self.scene.set_scattering(None, None)
         else:
             self.scene.set_scattering(scattering.velocity_mps, scattering.visible)
+
+    @contextmanager
+    def _explaining(self) -> Iterator[None]:
+        # A mesh that is read from disk frame by frame can go away.
+        try:
+            yield
+        except (Sd2Error, OSError) as error:
+            self.overlay.message = f"The mesh cannot be read: {error}"
 
     def _size_px(self) -> tuple[float, float]:
         return (max(self.width(), 1), max(self.height(), 1))
@@ -277,6 +303,8 @@ class SceneView(QWidget):
         if self._backend is None:
             return
         backend, self._backend = self._backend, None
+        for signal, slot in self._followed:
+            signal.disconnect(slot)
         backend.widget.removeEventFilter(self)
         backend.shut_down()
 

@@ -297,6 +297,14 @@ def test_resizing_keeps_a_ready_made_view_framed(stage: Stage) -> None:
     assert ((x > 0) & (x < 320) & (y > 0) & (y < 400)).all()
 
 
+def test_the_view_from_the_sensor_goes_with_it(stage: Stage) -> None:
+    stage.view.set_view("sensor")
+    stage.sensor.set_sensor(VirtualSensor((0.3, -0.2, -0.5), azimuth_deg=20.0))
+    stage.view.grab()
+    np.testing.assert_allclose(stage.view.scene.pose.position, (0.3, -0.2, -0.5), atol=1e-9)
+    assert stage.view.scene.pose.azimuth_deg == 20.0
+
+
 def test_dragging_the_sensor_does_not_move_the_view(stage: Stage) -> None:
     stage.view.set_view("overview")
     stage.view.grab()
