@@ -6,6 +6,8 @@ Plain VTK, because importing pyvista's plotter costs a second (matplotlib).
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 import vtkmodules.vtkRenderingOpenGL2 as opengl
@@ -153,21 +155,29 @@ def _off_screen_window() -> vtkRenderWindow:
         When no driver answers: rendering would end the program.
     """
     uses_egl = sys.platform.startswith("linux") and hasattr(opengl, "vtkEGLRenderWindow")
-    # Left to itself VTK tries the X server first and complains when there is none.
-    window = opengl.vtkEGLRenderWindow() if uses_egl else vtkRenderWindow()
-    window.SetOffScreenRendering(True)
-    window.SetMultiSamples(0)
-    window.SetSize(64, 48)
-    if not _answers(window):
-        raise NoOpenGL(GL_BROKEN)
-    return window
+    with _quiet_vtk():
+        # Left to itself VTK tries the X server first and complains when there is none.
+        window = opengl.vtkEGLRenderWindow() if uses_egl else vtkRenderWindow()
+        window.SetOffScreenRendering(True)
+        window.SetMultiSamples(0)
+        window.SetSize(64, 48)
+        if _answers(window):
+            return window
+        del window  # here, where it complains unheard
+    raise NoOpenGL(GL_BROKEN)
 
 
 def _answers(window: vtkRenderWindow) -> bool:
-    """Whether OpenGL works; VTK's own words on it are not for the user."""
+    """Whether OpenGL works."""
+    return bool(window.SupportsOpenGL())
+
+
+@contextmanager
+def _quiet_vtk() -> Iterator[None]:
+    # What VTK prints about a missing driver helps no user; the view says it in words.
     warned = vtkObject.GetGlobalWarningDisplay()
     vtkObject.GlobalWarningDisplayOff()
     try:
-        return bool(window.SupportsOpenGL())
+        yield
     finally:
         vtkObject.SetGlobalWarningDisplay(warned)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -435,6 +437,37 @@ def test_a_view_that_nobody_closed_does_not_crash_at_exit() -> None:
     )
     assert run.returncode == 0, run.stderr
     assert run.stdout.strip() == "drawn"
+    assert run.stderr == ""
+
+
+_WITHOUT_DRIVER = """
+from PySide6.QtWidgets import QApplication
+from sd2app.views.scene3d.backend import NoOpenGL
+from sd2app.views.scene3d.image_backend import ImageBackend
+application = QApplication([])
+try:
+    ImageBackend()
+except NoOpenGL as problem:
+    print(problem)
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="libglvnd is on Linux")
+def test_a_machine_without_a_driver_gets_a_sentence_and_no_crash(tmp_path: Path) -> None:
+    run = subprocess.run(
+        [sys.executable, "-c", _WITHOUT_DRIVER],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+        env={
+            **os.environ,
+            "QT_QPA_PLATFORM": "offscreen",
+            "__EGL_VENDOR_LIBRARY_DIRS": str(tmp_path),
+        },
+    )
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.strip() == choose.GL_BROKEN
     assert run.stderr == ""
 
 
