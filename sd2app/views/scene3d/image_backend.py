@@ -15,7 +15,7 @@ from PySide6.QtCore import QSize, Qt, QTimer
 from PySide6.QtGui import QImage, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QWidget
 from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonCore import vtkObject, vtkUnsignedCharArray
+from vtkmodules.vtkCommonCore import vtkLogger, vtkObject, vtkUnsignedCharArray
 from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow
 
 from sd2app.views.scene3d.backend import NoOpenGL, Prepare
@@ -175,9 +175,11 @@ def _answers(window: vtkRenderWindow) -> bool:
 @contextmanager
 def _quiet_vtk() -> Iterator[None]:
     # What VTK prints about a missing driver helps no user; the view says it in words.
-    warned = vtkObject.GetGlobalWarningDisplay()
+    heard, warned = vtkLogger.GetCurrentVerbosityCutoff(), vtkObject.GetGlobalWarningDisplay()
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
     vtkObject.GlobalWarningDisplayOff()
     try:
         yield
     finally:
         vtkObject.SetGlobalWarningDisplay(warned)
+        vtkLogger.SetStderrVerbosity(heard)
