@@ -20,7 +20,7 @@ from sd2app.settings import Settings
 from sd2app.theme import apply_theme
 from sd2app.views.window import MainWindow
 from sd2core.resources import resource_path
-from sd2core.sensor import VirtualSensor
+from sd2core.sensor import VirtualSensor, aimed_at
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 IMAGES = REPOSITORY / "docs" / "images"
@@ -37,8 +37,10 @@ def far_in_the_dark(window: MainWindow) -> None:
     """The sensor moved aside to 6 m, range colours, dark theme."""
     context = window.context
     window.set_dark(True)
-    context.playback.seek(6.1)
-    context.edits.place_sensor(VirtualSensor(position_m=(2.6, -0.6, -2.8)))
+    context.playback.seek(2.0)
+    sensor = VirtualSensor(position_m=(2.6, -0.6, -2.8))
+    context.edits.place_sensor(aimed_at(sensor, context.synthesis.torso_m))
+    window.set_scene_view("overview")
     context.display.set_mesh_colour("range")
 
 

@@ -61,6 +61,7 @@ def _style_sheet(c: Palette) -> str:
     QToolButton {{ border: 1px solid transparent; border-radius: 4px; padding: 4px; }}
     QToolButton:hover {{ background: {c.well}; }}
     QToolButton:checked {{ background: {c.well}; border-color: {c.border}; }}
+    QToolButton#outlined {{ border-color: {c.border}; padding: 2px 8px; }}
     QToolButton:focus {{ border-color: {c.accent}; }}
     QScrollArea {{ border: none; background: transparent; }}
     QScrollArea > QWidget > QWidget#page {{ background: transparent; }}

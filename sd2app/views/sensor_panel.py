@@ -12,8 +12,9 @@ from PySide6.QtWidgets import (
     QFormLayout,
     QFrame,
     QGridLayout,
+    QHBoxLayout,
     QLabel,
-    QPushButton,
+    QToolButton,
     QVBoxLayout,
     QWidget,
 )
@@ -42,6 +43,7 @@ class SensorPanel(QWidget):
         synthesis: SynthesisModel,
         edits: Edits,
         to_camera: QAction,
+        aim: QAction,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
@@ -51,14 +53,20 @@ class SensorPanel(QWidget):
         self._synthesis = synthesis
         self._edits = edits
         layout = QVBoxLayout(self)
-        layout.setContentsMargins(8, 8, 8, 8)
-        layout.setSpacing(8)
-        layout.addWidget(_title("Sensor"))
+        layout.setContentsMargins(8, 6, 8, 6)
+        layout.setSpacing(7)
+        head = QHBoxLayout()
+        head.addWidget(_title("Sensor"))
+        head.addStretch(1)
+        for action, text in ((aim, "Aim at body"), (to_camera, "To camera")):
+            button = QToolButton(self)
+            button.setObjectName("outlined")
+            button.setText(text)
+            button.setToolTip(action.toolTip())
+            button.clicked.connect(action.trigger)
+            head.addWidget(button)
+        layout.addLayout(head)
         layout.addLayout(self._placement_form())
-        button = QPushButton("At the camera", self)
-        button.setToolTip(to_camera.toolTip())
-        button.clicked.connect(to_camera.trigger)
-        layout.addWidget(button)
         layout.addWidget(_rule())
         layout.addWidget(_title("What it sees"))
         layout.addLayout(self._readout_form())
@@ -160,9 +168,16 @@ class SensorPanel(QWidget):
                 ("R max", "Largest unambiguous range"),
             )
         }
-        for name, label in self._limits.items():
-            form.addRow(name, label)
         layout.addLayout(form)
+        limits = QGridLayout()
+        limits.setHorizontalSpacing(12)
+        limits.setVerticalSpacing(4)
+        for place, (name, label) in enumerate(self._limits.items()):
+            row, column = divmod(place, 2)
+            limits.addWidget(QLabel(name, self), row, 2 * column)
+            limits.addWidget(label, row, 2 * column + 1)
+            limits.setColumnStretch(2 * column + 1, 1)
+        layout.addLayout(limits)
         self._warning = QLabel(part)
         self._warning.setObjectName("warning")
         self._warning.setWordWrap(True)

@@ -89,7 +89,7 @@ class MainWindow(QMainWindow):
             [self._panels["tracks"], self._panels["spectrum"]],
             (992, 272),
         )
-        self._rows = _splitter(Qt.Orientation.Vertical, [self._top, self._bottom], (360, 380))
+        self._rows = _splitter(Qt.Orientation.Vertical, [self._top, self._bottom], (376, 320))
         self._column = QVBoxLayout()
         self._column.setContentsMargins(8, 0, 8, 0)
         self._column.setSpacing(4)
@@ -140,8 +140,8 @@ class MainWindow(QMainWindow):
 
         c = self.context
         _fill(self._panels["video"], VideoView(c.video, c.document, c.playback, c.display))
-        to_camera = self._actions["sensor_to_camera"]
-        panel = SensorPanel(c.sensor, c.document, c.synthesis, c.edits, to_camera)
+        to_camera, aim = self._actions["sensor_to_camera"], self._actions["aim_sensor"]
+        panel = SensorPanel(c.sensor, c.document, c.synthesis, c.edits, to_camera, aim)
         _fill(self._panels["sensor"], _scrolled(panel))
         self._synthetic_view = HeatmapView(c.synthetic, c.span, c.playback, c.display, c.pointer)
         self._real_view = HeatmapView(
