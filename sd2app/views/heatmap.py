@@ -115,7 +115,10 @@ class HeatmapView(QWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Header, map, marked bins, axis, cursor."""
-        painter = QPainter(self)
+        with QPainter(self) as painter:
+            self._paint(painter)
+
+    def _paint(self, painter: QPainter) -> None:
         colours = self._display.palette
         painter.fillRect(self.rect(), QColor(colours.panel))
         if self._track.map is None:

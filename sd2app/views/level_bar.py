@@ -30,9 +30,12 @@ class _ColourStrip(QWidget):
         return QSize(200, 12)
 
     def paintEvent(self, event: QPaintEvent) -> None:
+        with QPainter(self) as painter:
+            self._paint(painter)
+
+    def _paint(self, painter: QPainter) -> None:
         table = lookup_table(self._display.levels.colour_map)
         image = QImage(table.tobytes(), 256, 1, 1024, QImage.Format.Format_RGB32)
-        painter = QPainter(self)
         painter.drawImage(QRectF(self.rect()), image)
         painter.setPen(QColor(self._display.palette.border))
         painter.drawRect(self.rect().adjusted(0, 0, -1, -1))

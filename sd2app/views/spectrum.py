@@ -61,7 +61,10 @@ class SpectrumView(QWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Axes, marked bins and curves."""
-        painter = QPainter(self)
+        with QPainter(self) as painter:
+            self._paint(painter)
+
+    def _paint(self, painter: QPainter) -> None:
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         colours = self._display.palette
         painter.fillRect(self.rect(), QColor(colours.panel))

@@ -45,7 +45,10 @@ class TimeRuler(QWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Ticks with times, and the cursor."""
-        painter = QPainter(self)
+        with QPainter(self) as painter:
+            self._paint(painter)
+
+    def _paint(self, painter: QPainter) -> None:
         colours, scale = self._display.palette, self.scale
         painter.fillRect(self.rect(), QColor(colours.panel))
         most = max(int(scale.plot_width_px / 80), 1)
@@ -134,7 +137,10 @@ class Overview(QWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Small map, spans, frame of the stretch in view, cursor."""
-        painter = QPainter(self)
+        with QPainter(self) as painter:
+            self._paint(painter)
+
+    def _paint(self, painter: QPainter) -> None:
         colours, scale, plot = self._display.palette, self.scale, self._plot_rect()
         painter.fillRect(self.rect(), QColor(colours.panel))
         painter.setPen(QColor(colours.muted))

@@ -43,7 +43,10 @@ class VideoView(QWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """The picture, or a word on why there is none."""
-        painter = QPainter(self)
+        with QPainter(self) as painter:
+            self._paint(painter)
+
+    def _paint(self, painter: QPainter) -> None:
         colours = self._display.palette
         painter.fillRect(self.rect(), QColor(colours.well))
         picture = self._video.picture
