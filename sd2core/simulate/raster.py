@@ -133,3 +133,14 @@ def lit_share(
             if outside or nearness[n] + bias >= buffer[r, c]:
                 lit += 1
         share[n] = np.float32(lit) / np.float32(offsets.shape[0])
+
+
+def compile_kernels() -> None:
+    """Call every kernel of this module once."""
+    points, nearness = np.zeros((3, 2), np.float32), np.ones(3, np.float32)
+    faces = np.array([[0, 1, 2]], np.int32)
+    buffer, owner = np.zeros((2, 2), np.float32), np.zeros((2, 2), np.int32)
+    pixel, value = np.zeros(1, np.intp), np.zeros((1, 3), np.float32)
+    rasterise(points, nearness, faces, buffer, owner)
+    interpolate(points, nearness, faces, pixel, pixel, owner, np.zeros((3, 3), np.float32), value)
+    lit_share(points, nearness, buffer, points, 0.0, np.zeros(3, np.float32))
