@@ -189,4 +189,4 @@ class KeysDialog(QDialog):
         layout = QVBoxLayout(self)
         layout.addWidget(scroll)
         layout.addWidget(buttons)
-        self.resize(480, 640)
+        self.resize(640, 640)

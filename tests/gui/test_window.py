@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
+from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QTimer, QUrl
 from PySide6.QtGui import QDragEnterEvent, QDropEvent, QWheelEvent
 from PySide6.QtWidgets import QApplication, QMessageBox
 
@@ -221,6 +221,38 @@ def test_a_drag_shows_a_preview_and_becomes_exact(window, qtbot):
     assert seen[0] == "preview: visibility of the last exact placement"
 
 
+def test_dragging_the_sensor_in_3d_follows_the_mouse_in_one_step(window, qtbot):
+    from sd2app.views.scene3d import SceneView
+    from sd2app.views.scene3d.image_backend import ImageBackend
+
+    c = window.context
+    view = window.findChild(SceneView)
+    canvas = window.findChild(ImageBackend)
+    view.grab()
+
+    def pixel() -> QPoint:
+        size = (canvas.width(), canvas.height())
+        x, y, _ = view.scene.pose.project(c.sensor.sensor.position_m, size)[0]
+        return QPoint(round(x), round(y))
+
+    start = pixel()
+    before = c.synthetic.map.values.copy()
+    qtbot.mousePress(canvas, Qt.MouseButton.LeftButton, pos=start)
+    for step in (8, 16, 24):
+        qtbot.mouseMove(canvas, start + QPoint(step, step // 2))
+    assert c.sensor.dragging
+    end = start + QPoint(24, 12)
+    assert (pixel() - end).manhattanLength() <= 1
+    qtbot.waitUntil(lambda: not np.array_equal(before, c.synthetic.map.values), timeout=5_000)
+    assert c.synthetic.status.startswith("preview")
+    qtbot.mouseRelease(canvas, Qt.MouseButton.LeftButton, pos=end)
+    assert not c.sensor.dragging
+    assert c.document.undo_stack.count() == 1
+    qtbot.waitUntil(lambda: c.synthesis.complete, timeout=10_000)
+    qtbot.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert c.sensor.sensor == VirtualSensor()
+
+
 def test_a_farther_sensor_shows_weaker_levels(window, qtbot):
     c = window.context
     strongest, reference = float(c.synthetic.map.values.max()), c.synthetic.reference
@@ -354,6 +386,19 @@ def test_every_key_is_in_the_list_and_used_once(window, qtbot):
     for action in ACTIONS:
         if action.keys:
             assert action.tip in texts
+
+
+def test_the_question_mark_shows_all_keys(window, qtbot):
+    shown = []
+
+    def look():
+        dialog = QApplication.activeModalWidget()
+        shown.append(dialog)
+        dialog.reject()
+
+    QTimer.singleShot(200, look)
+    qtbot.keyClick(window, Qt.Key.Key_Question)
+    assert isinstance(shown[0], KeysDialog)
 
 
 def test_both_themes_repaint_everything(window, qtbot):
