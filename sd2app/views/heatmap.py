@@ -6,12 +6,10 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import (
     QBrush,
     QColor,
-    QImage,
     QMouseEvent,
     QPainter,
     QPaintEvent,
     QPen,
-    QResizeEvent,
     QWheelEvent,
 )
 from PySide6.QtWidgets import QSizePolicy, QWidget
@@ -21,14 +19,14 @@ from sd2app.models.display import DisplayModel
 from sd2app.models.playback import PlaybackModel
 from sd2app.models.tracks import PointerModel, TrackModel
 from sd2app.models.visible_span import VisibleSpanModel
-from sd2app.views.heatmap_image import heatmap_image
-from sd2app.views.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, ticks
+from sd2app.views.map_widget import MapWidget, paint_cursor
+from sd2app.views.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, signed_text, ticks
 
 _HEADER_PX = 24
 _ZOOM_PER_NOTCH = 0.8
 
 
-class HeatmapView(QWidget):
+class HeatmapView(MapWidget):
     """Shows one track; click or drag seeks, wheel zooms, Shift+wheel pans.
 
     ``offset_dragged`` and ``offset_released`` are emitted while the user drags
@@ -50,21 +48,16 @@ class HeatmapView(QWidget):
         alignable: bool = False,
         parent: QWidget | None = None,
     ) -> None:
-        super().__init__(parent)
-        self._track = track
+        super().__init__(track, display, parent)
         self._span = span
         self._playback = playback
-        self._display = display
         self._pointer = pointer
         self._alignable = alignable
-        self._image: QImage | None = None
         self._grab: tuple[str, float] | None = None
         self._hint = ""
-        self.setMouseTracking(True)
         self.setMinimumHeight(96)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        for signal in (track.changed, span.changed, display.levels_changed, display.theme_changed):
-            signal.connect(self._invalidate)
+        span.changed.connect(self.invalidate)
         for signal in (track.status_changed, playback.frame_changed, pointer.changed):
             signal.connect(self.update)
 
@@ -103,14 +96,6 @@ class HeatmapView(QWidget):
         plot, v_max = self.plot_rect(), self._track.map.axis.v_max_mps
         return v_max - 2.0 * v_max * (y_px - plot.top()) / plot.height()
 
-    def _invalidate(self) -> None:
-        self._image = None
-        self.update()
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        """Draw the map anew for the new number of columns."""
-        self._invalidate()
-
     # --- painting -------------------------------------------------------------------------
 
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -127,16 +112,7 @@ class HeatmapView(QWidget):
             return
         self._paint_header(painter)
         plot = self.plot_rect()
-        if self._image is None:
-            self._image = heatmap_image(
-                self._track,
-                self._display.levels,
-                self._span.start_s,
-                self._span.end_s,
-                max(round(plot.width() * self.devicePixelRatioF()), 1),
-                QColor(colours.well).rgb(),
-            )
-        painter.drawImage(plot, self._image)
+        self.paint_map(painter, plot, self._span.start_s, self._span.end_s)
         self._paint_marked_bins(painter, plot)
         self._paint_axis(painter, plot)
         self._paint_cursors(painter, plot)
@@ -197,12 +173,11 @@ class HeatmapView(QWidget):
             y = self.y_of(velocity)
             painter.setPen(QPen(QColor(colours.muted), 1))
             painter.drawLine(QPointF(plot.left() - 4, y), QPointF(plot.left(), y))
-            text = f"{velocity:+g}".replace("-", "−") if abs(velocity) > 1e-9 else "0"
             y_text = min(max(y, plot.top() + line_px / 2 - 2), plot.bottom() - line_px / 2 + 2)
             painter.drawText(
                 QRectF(0, y_text - line_px / 2, GUTTER_PX - 8, line_px),
                 Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter,
-                text,
+                signed_text(velocity),
             )
 
     def _paint_cursors(self, painter: QPainter, plot: QRectF) -> None:
@@ -216,11 +191,7 @@ class HeatmapView(QWidget):
             if self._pointer.velocity_mps is not None:
                 y = self.y_of(self._pointer.velocity_mps)
                 painter.drawLine(QPointF(plot.left(), y), QPointF(plot.right(), y))
-        x = scale.x_of(self._playback.time_s)
-        painter.setPen(QPen(QColor(0, 0, 0, 140), 3))
-        painter.drawLine(QPointF(x, plot.top()), QPointF(x, plot.bottom()))
-        painter.setPen(QPen(QColor(255, 255, 255), 1))
-        painter.drawLine(QPointF(x, plot.top()), QPointF(x, plot.bottom()))
+        paint_cursor(painter, plot, scale.x_of(self._playback.time_s))
         painter.restore()
 
     # --- mouse ----------------------------------------------------------------------------

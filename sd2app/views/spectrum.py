@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QWidget
 from sd2app.models.display import DisplayModel
 from sd2app.models.playback import PlaybackModel
 from sd2app.models.tracks import PointerModel, TrackModel
-from sd2app.views.time_axis import ticks
+from sd2app.views.time_axis import signed_text, ticks
 
 _LEFT_PX, _TOP_PX, _RIGHT_PX, _BOTTOM_PX = 48, 50, 12, 40
 
@@ -111,11 +111,10 @@ class SpectrumView(QWidget):
             painter.setPen(QPen(QColor(colours.border), 1))
             painter.drawLine(QPointF(plot.left(), y), QPointF(plot.right(), y))
             painter.setPen(QColor(colours.muted))
-            text = f"{velocity:+g}".replace("-", "−") if abs(velocity) > 1e-9 else "0"
             painter.drawText(
                 QRectF(0, y - line_px / 2, _LEFT_PX - 6, line_px),
                 Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter,
-                text,
+                signed_text(velocity),
             )
         if levels.scale == "dB":
             low, high, unit = levels.low_db, levels.high_db, "dB"

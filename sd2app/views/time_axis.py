@@ -54,6 +54,11 @@ def ticks(low: float, high: float, most: int) -> list[float]:
     return [index * step for index in range(first, last + 1)]
 
 
+def signed_text(value: float) -> str:
+    """A tick with its sign, and nought without."""
+    return f"{value:+g}".replace("-", "−") if abs(value) > 1e-9 else "0"
+
+
 def clock_text(time_s: float, decimals: int = 3) -> str:
     """``mm:ss.mmm``, with hours when there are any."""
     sign = "-" if time_s < 0 else ""

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPaintEvent, QPen, QResizeEvent
+from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QWidget
 
 from sd2app.models.display import DisplayModel
 from sd2app.models.playback import PlaybackModel
 from sd2app.models.tracks import TrackModel
 from sd2app.models.visible_span import VisibleSpanModel
-from sd2app.views.heatmap_image import heatmap_image
+from sd2app.views.map_widget import MapWidget, paint_cursor
 from sd2app.views.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, clock_text, tick_step, ticks
 from sd2core.recording import Span
 
@@ -75,7 +75,7 @@ class TimeRuler(QWidget):
         self._playback.seek(self.scale.time_of(event.position().x()))
 
 
-class Overview(QWidget):
+class Overview(MapWidget):
     """The whole recording; drag the frame to pan, its edges to zoom."""
 
     def __init__(
@@ -86,18 +86,12 @@ class Overview(QWidget):
         display: DisplayModel,
         parent: QWidget | None = None,
     ) -> None:
-        super().__init__(parent)
-        self._track = track
+        super().__init__(track, display, parent)
         self._span = span
         self._playback = playback
-        self._display = display
         self._labels: Sequence[Span] = ()
-        self._image: QImage | None = None
         self._grab: tuple[str, float] | None = None
-        self.setMouseTracking(True)
         self.setFixedHeight(56)
-        for signal in (track.changed, display.levels_changed, display.theme_changed):
-            signal.connect(self._invalidate)
         for signal in (span.changed, playback.frame_changed):
             signal.connect(self.update)
 
@@ -108,10 +102,10 @@ class Overview(QWidget):
 
     def set_track(self, track: TrackModel) -> None:
         """Show another track."""
-        self._track.changed.disconnect(self._invalidate)
+        self._track.changed.disconnect(self.invalidate)
         self._track = track
-        track.changed.connect(self._invalidate)
-        self._invalidate()
+        track.changed.connect(self.invalidate)
+        self.invalidate()
 
     @property
     def scale(self) -> TimeScale:
@@ -126,14 +120,6 @@ class Overview(QWidget):
             max(self.width() - GUTTER_PX - MARGIN_PX, 1),
             max(self.height() - top - 4, 1),
         )
-
-    def _invalidate(self) -> None:
-        self._image = None
-        self.update()
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        """Draw the map anew."""
-        self._invalidate()
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Small map, spans, frame of the stretch in view, cursor."""
@@ -150,15 +136,7 @@ class Overview(QWidget):
             "All",
         )
         if self._track.map is not None:
-            if self._image is None:
-                self._image = heatmap_image(
-                    self._track,
-                    self._display.levels,
-                    *self._span.extent_s,
-                    max(round(plot.width() * self.devicePixelRatioF()), 1),
-                    QColor(colours.well).rgb(),
-                )
-            painter.drawImage(plot, self._image)
+            self.paint_map(painter, plot, *self._span.extent_s)
         self._paint_labels(painter, scale)
         left, right = scale.x_of(self._span.start_s), scale.x_of(self._span.end_s)
         veil = QColor(colours.panel)
@@ -169,11 +147,7 @@ class Overview(QWidget):
         painter.drawRoundedRect(
             QRectF(left, plot.top(), right - left, plot.height()).adjusted(0, 1, 0, -1), 2, 2
         )
-        x = scale.x_of(self._playback.time_s)
-        painter.setPen(QPen(QColor(0, 0, 0, 140), 3))
-        painter.drawLine(QPointF(x, plot.top()), QPointF(x, plot.bottom()))
-        painter.setPen(QPen(QColor(255, 255, 255), 1))
-        painter.drawLine(QPointF(x, plot.top()), QPointF(x, plot.bottom()))
+        paint_cursor(painter, plot, scale.x_of(self._playback.time_s))
 
     def _paint_labels(self, painter: QPainter, scale: TimeScale) -> None:
         colours = self._display.palette
