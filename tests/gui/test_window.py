@@ -288,6 +288,20 @@ def test_dropped_files_are_opened_and_added(empty_window, small_recording, qtbot
     assert empty_window.findChild(VideoView).isVisible()
 
 
+def test_a_point_cloud_counts_every_point(empty_window, tmp_path, qtbot):
+    rng = np.random.default_rng(0)
+    points = np.repeat(rng.normal(size=(1, 25, 3)), 20, axis=0)
+    points[:, :, 2] += 3.0 - np.arange(20)[:, None] / 30.0  # approaches at 1 m/s
+    np.savez(tmp_path / "cloud.npz", vertices=points, times_s=np.arange(20) / 30.0)
+    c = empty_window.context
+    with qtbot.waitSignal(c.document.opened, timeout=10_000):
+        empty_window.open_paths([tmp_path / "cloud.npz"])
+    qtbot.waitUntil(lambda: c.synthesis.complete, timeout=10_000)
+    assert c.synthetic.status == "all vertices of the point cloud"
+    assert c.synthesis.readout().visible_share == 1.0
+    assert np.nanmean(c.synthetic.map.mean_velocity_mps()) == pytest.approx(0.9, abs=0.15)
+
+
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [
