@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from PySide6.QtCore import QSignalBlocker, Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QToolButton, QWidget
 
+from sd2app.action_set import ActionSet
 from sd2app.models.display import DisplayModel
 
 _COLOURS = (
@@ -31,7 +30,7 @@ class SceneBar(QWidget):
     def __init__(
         self,
         display: DisplayModel,
-        actions: Mapping[str, QAction],
+        actions: ActionSet,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from PySide6.QtCore import QSignalBlocker, Qt
-from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSlider, QToolButton, QWidget
 
+from sd2app.action_set import ActionSet
 from sd2app.models.playback import PlaybackModel
 from sd2app.views.time_axis import clock_text
 
@@ -20,7 +18,7 @@ class TransportBar(QWidget):
     def __init__(
         self,
         playback: PlaybackModel,
-        actions: Mapping[str, QAction],
+        actions: ActionSet,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)

@@ -8,18 +8,15 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import (
-    QAction,
     QCloseEvent,
     QDragEnterEvent,
     QDropEvent,
-    QKeySequence,
     QPaintEvent,
 )
 from PySide6.QtWidgets import (
     QApplication,
     QFrame,
     QMainWindow,
-    QMenu,
     QScrollArea,
     QSplitter,
     QVBoxLayout,
@@ -102,6 +99,7 @@ class MainWindow(QMainWindow):
         """Load what takes time to import, and fill the skeleton."""
         # Imported here so that the skeleton is on screen before NumPy, PyAV,
         # numba and VTK are loaded.
+        from sd2app.action_set import ActionSet
         from sd2app.context import build_context
         from sd2app.dialogs.dialogs import Dialogs
         from sd2app.views.message_bar import MessageBar
@@ -113,14 +111,16 @@ class MainWindow(QMainWindow):
         context.display.set_dark(is_dark(self._settings))
         self.messages = MessageBar(self)
         self.dialogs = Dialogs(self, context, self.messages.warn)
-        self._actions = self._build_actions()
-        self._build_menus()
+        self._actions = ActionSet(self)
+        self._recent_menu = self._actions.fill_menu_bar()
+        self._recent_menu.aboutToShow.connect(self._list_recent)
         self._fill_panels()
         self._column.insertWidget(0, self.messages)
         self._column.addWidget(TransportBar(context.playback, self._actions, self))
         self._column.addWidget(StatusLine(context.pointer, context.jobs, self))
         self._connect()
         self._restyle()
+        self._refresh()
         for name in ("top", "bottom", "rows"):
             if (state := self._settings.layout(name)) is not None:
                 getattr(self, f"_{name}").restoreState(state)
@@ -189,39 +189,6 @@ class MainWindow(QMainWindow):
         layout.addWidget(self._scene, 1)
         _fill_layout(self._panels["scene"], layout)
 
-    def _build_actions(self) -> dict[str, QAction]:
-        from sd2app.actions import ACTIONS
-
-        actions = {}
-        for row in ACTIONS:
-            action = QAction(row.text, self)
-            action.setShortcuts([QKeySequence(key) for key in row.keys])
-            keys = ", ".join(row.keys)
-            action.setToolTip(f"{row.tip} ({keys})" if keys else row.tip)
-            action.setCheckable(row.checked is not None)
-            action.triggered.connect(lambda _=False, run=row.run: run(self))
-            actions[row.id] = action
-        return actions
-
-    def _build_menus(self) -> None:
-        from sd2app.actions import ACTIONS
-
-        menus: dict[str, QMenu] = {}
-        for name in ("File", "Edit", "View", "Play", "Help"):
-            menus[name] = self.menuBar().addMenu(name)
-        stack = self.context.document.undo_stack
-        undo, redo = stack.createUndoAction(self, "Undo"), stack.createRedoAction(self, "Redo")
-        undo.setShortcut(QKeySequence("Ctrl+Z"))
-        redo.setShortcut(QKeySequence("Ctrl+Shift+Z"))
-        menus["Edit"].addActions([undo, redo])
-        for row in ACTIONS:
-            if row.separator_before:
-                menus[row.menu].addSeparator()
-            menus[row.menu].addAction(self._actions[row.id])
-            if row.id == "open_folder":
-                self._recent_menu = menus["File"].addMenu("Open recent")
-                self._recent_menu.aboutToShow.connect(self._list_recent)
-
     def _connect(self) -> None:
         c = self.context
         c.document.opened.connect(self._show_document)
@@ -239,6 +206,7 @@ class MainWindow(QMainWindow):
         ):
             signal.connect(self._refresh)
         c.display.theme_changed.connect(self._restyle)
+        c.display.theme_changed.connect(self._refresh)
         for track in (c.synthetic, c.real):
             track.changed.connect(self._show_tracks)
         self._show_tracks()
@@ -265,38 +233,18 @@ class MainWindow(QMainWindow):
         )
 
     def _refresh(self) -> None:
-        from sd2app.actions import ACTIONS
-
         document = self.context.document
-        for row in ACTIONS:
-            action = self._actions[row.id]
-            action.setEnabled(row.enabled(self.context))
-            if row.checked is not None:
-                action.setChecked(row.checked(self.context))
-        playing = self.context.playback.playing
-        if playing != (self._actions["play"].text() == "Pause"):
-            self._actions["play"].setText("Pause" if playing else "Play")
-            self._set_icon("play", "pause" if playing else "play")
+        self._actions.refresh()
         mark = " *" if document.modified else ""
         kind = " (simulated)" if document.simulated else ""
         name = f"{document.title}{mark}{kind} – " if document.title else ""
         self.setWindowTitle(f"{name}SD² Studio")
 
     def _restyle(self) -> None:
-        from sd2app.actions import ACTIONS
-
         application = QApplication.instance()
         assert isinstance(application, QApplication)
         apply_theme(application, self.context.display.dark)
-        for row in ACTIONS:
-            if row.icon:
-                self._set_icon(row.id, row.icon)
-        self._refresh()
-
-    def _set_icon(self, action: str, icon: str) -> None:
-        from sd2app.icons import transport_icon
-
-        self._actions[action].setIcon(transport_icon(icon, self.context.display.palette.text))
+        self._actions.restyle()
 
     # --- what actions call ----------------------------------------------------------------
 

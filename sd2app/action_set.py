@@ -1,0 +1,79 @@
+"""The table of actions as Qt actions of one window, with its menus."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from PySide6.QtGui import QAction, QKeySequence
+from PySide6.QtWidgets import QMenu
+
+from sd2app.actions import ACTIONS
+from sd2app.icons import transport_icon
+
+if TYPE_CHECKING:
+    from sd2app.views.window import MainWindow
+
+_MENUS = ("File", "Edit", "View", "Play", "Help")
+
+
+class ActionSet:
+    """Makes the actions, keeps them enabled and checked as the models say."""
+
+    def __init__(self, window: MainWindow) -> None:
+        self._window = window
+        self._context = window.context
+        self._actions: dict[str, QAction] = {}
+        for row in ACTIONS:
+            action = QAction(row.text, window)
+            action.setShortcuts([QKeySequence(key) for key in row.keys])
+            keys = ", ".join(row.keys)
+            action.setToolTip(f"{row.tip} ({keys})" if keys else row.tip)
+            action.setCheckable(row.checked is not None)
+            action.triggered.connect(lambda _=False, run=row.run: run(window))
+            self._actions[row.id] = action
+
+    def __getitem__(self, name: str) -> QAction:
+        return self._actions[name]
+
+    def fill_menu_bar(self) -> QMenu:
+        """Make the menus; returns the one for recent files, which the window fills."""
+        bar = self._window.menuBar()
+        menus = {name: bar.addMenu(name) for name in _MENUS}
+        stack = self._context.document.undo_stack
+        for action, key in (
+            (stack.createUndoAction(self._window, "Undo"), "Ctrl+Z"),
+            (stack.createRedoAction(self._window, "Redo"), "Ctrl+Shift+Z"),
+        ):
+            action.setShortcut(QKeySequence(key))
+            menus["Edit"].addAction(action)
+        recent = QMenu("Open recent", menus["File"])
+        for row in ACTIONS:
+            if row.separator_before:
+                menus[row.menu].addSeparator()
+            menus[row.menu].addAction(self._actions[row.id])
+            if row.id == "open_folder":
+                menus["File"].addMenu(recent)
+        return recent
+
+    def refresh(self) -> None:
+        """Follow the models."""
+        for row in ACTIONS:
+            action = self._actions[row.id]
+            action.setEnabled(row.enabled(self._context))
+            if row.checked is not None:
+                action.setChecked(row.checked(self._context))
+        playing = self._context.playback.playing
+        if playing != (self._actions["play"].text() == "Pause"):
+            self._actions["play"].setText("Pause" if playing else "Play")
+            self._set_icon("play", "pause" if playing else "play")
+
+    def restyle(self) -> None:
+        """Draw the icons in the colour of the theme."""
+        for row in ACTIONS:
+            if row.icon:
+                self._set_icon(row.id, row.icon)
+        if self._context.playback.playing:
+            self._set_icon("play", "pause")
+
+    def _set_icon(self, name: str, icon: str) -> None:
+        self._actions[name].setIcon(transport_icon(icon, self._context.display.palette.text))
