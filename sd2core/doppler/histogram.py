@@ -1,7 +1,7 @@
 """Counting vertices per velocity bin, frame by frame.
 
 The compiled form goes through each frame in runs of vertices that stay in the
-first-level cache. Each step of a run is a loop of its own with few streams, which
+second-level cache. Each step of a run is a loop of its own with few streams, which
 the compiler turns into vector instructions.
 """
 
@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 
 from sd2core.compiled import compiled
 from sd2core.scattering.amplitude import NEAREST_RANGE_M, range_weight
-from sd2core.scattering.velocity import radial_velocity
 from sd2core.scattering.visibility import facing_kernel, facing_mask
 
-_RUN = 4096
+_RUN = 16384
 _TABLES = 8
 
 ALL, FACING, MASK = 0, 1, 2
@@ -116,17 +115,49 @@ class Counts:
         return Counts(self.histogram[rows], self.visible[rows], self.beyond[rows])
 
 
+def relative_range(
+    positions: NDArray[np.float32], sensor: NDArray[np.float64]
+) -> NDArray[np.float32]:
+    """Range of each vertex less the sensor's distance from the clip's origin.
+
+    |p − s| − |s| = p·(p − 2s) / (|p − s| + |s|). What differs from vertex to vertex
+    and from knot to knot is kept at the body's own scale, so the difference of two
+    is the exact change of range of :func:`radial_velocity` however far the sensor
+    is (1e-5 m/s in single precision), with one range per vertex and knot.
+
+    Parameters
+    ----------
+    positions : float32 array, shape (3, V)
+        Relative to the clip's origin.
+    sensor : float64 array, shape (3,)
+
+    Returns
+    -------
+    float32 array, shape (V,)
+    """
+    x, y, z = positions
+    sx, sy, sz = sensor.astype(np.float32)
+    two = np.float32(2)
+    away = np.sqrt((x - sx) ** 2 + (y - sy) ** 2 + (z - sz) ** 2)
+    difference = x * (x - two * sx) + y * (y - two * sy) + z * (z - two * sz)
+    ranges: NDArray[np.float32] = difference / np.maximum(
+        away + _distance(sensor), np.float32(1e-30)
+    )
+    return ranges
+
+
+def _distance(sensor: NDArray[np.float64]) -> np.float32:
+    return np.float32(np.linalg.norm(sensor.astype(np.float32).astype(np.float64)))
+
+
 def bins_plain(
     frames: Frames, t: int, sample: int, sensor: NDArray[np.float64], counting: Counting
 ) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
     """Bin of every vertex (``bins`` where dropped), and whether it lies beyond the axis."""
-    place = sensor.astype(np.float32)
-    per_bin = radial_velocity(
-        frames.positions[frames.before[t, sample]],
-        frames.positions[frames.after[t, sample]],
-        place,
-        1.0,
-    ) * counting.scale(frames.duration_s[t, sample : sample + 1])
+    closer = relative_range(frames.positions[frames.before[t, sample]], sensor) - relative_range(
+        frames.positions[frames.after[t, sample]], sensor
+    )
+    per_bin = closer * counting.scale(frames.duration_s[t, sample : sample + 1])
     return place_in_bins(per_bin + np.float32(0.5 * counting.bins), counting)
 
 
@@ -170,7 +201,7 @@ def count_plain(
         if areas is not None:
             weight = areas[t].astype(np.float64)
         if counting.range_exponent:
-            distance = np.linalg.norm(points - sensor.astype(np.float32)[:, None], axis=0)
+            distance = relative_range(points, sensor) + _distance(sensor)
             weight = weight * range_weight(
                 distance, counting.range_exponent, counting.reference_range_m
             )
@@ -230,20 +261,38 @@ def count(
 _NO_NORMALS = np.empty((0, 3, 0), np.int8)
 _NO_MASK = np.empty((0, 0), np.uint8)
 _NO_AREAS = np.empty((0, 0), np.float32)
-_NEAREST_SQUARED = np.float32(NEAREST_RANGE_M**2)
+_NEAREST = np.float32(NEAREST_RANGE_M)
 
 
 @compiled
-def _axis_positions(ax, ay, az, bx, by, bz, sx, sy, sz, scale, offset, f):  # type: ignore[no-untyped-def]
-    """Position on the velocity axis, in bins; see :func:`radial_velocity`."""
+def _relative_ranges(x, y, z, sx, sy, sz, distance, ranges):  # type: ignore[no-untyped-def]
+    """Compiled form of :func:`relative_range` for one knot."""
+    two = np.float32(2)
+    for v in range(ranges.shape[0]):
+        px, py, pz = x[v], y[v], z[v]
+        qx, qy, qz = px - sx, py - sy, pz - sz
+        away = np.sqrt(qx * qx + qy * qy + qz * qz)
+        difference = px * (px - two * sx) + py * (py - two * sy) + pz * (pz - two * sz)
+        ranges[v] = difference / max(away + distance, np.float32(1e-30))
+
+
+@compiled
+def _extend(positions, sensor, distance, known, upto, ring):  # type: ignore[no-untyped-def]
+    """Work out the knots from ``known`` to ``upto``; the ring keeps the newest few."""
+    for knot in range(known, upto + 1):
+        points = positions[knot]
+        _relative_ranges(
+            points[0], points[1], points[2],
+            sensor[0], sensor[1], sensor[2], distance, ring[knot % ring.shape[0]],
+        )  # fmt: skip
+    return max(known, upto + 1)
+
+
+@compiled
+def _axis_positions(before, after, scale, offset, f):  # type: ignore[no-untyped-def]
+    """Position on the velocity axis, in bins."""
     for v in range(f.shape[0]):
-        px, py, pz = ax[v] - sx, ay[v] - sy, az[v] - sz
-        qx, qy, qz = bx[v] - sx, by[v] - sy, bz[v] - sz
-        ranges = np.sqrt(px * px + py * py + pz * pz) + np.sqrt(qx * qx + qy * qy + qz * qz)
-        change = (
-            (bx[v] - ax[v]) * (px + qx) + (by[v] - ay[v]) * (py + qy) + (bz[v] - az[v]) * (pz + qz)
-        )
-        f[v] = offset - scale * change / max(ranges, np.float32(1e-30))
+        f[v] = offset + scale * (before[v] - after[v])
 
 
 @compiled
@@ -287,12 +336,11 @@ def _slots(f, seen, bins, beyond, slot):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _squared_ratios(x, y, z, sx, sy, sz, reference, weight):  # type: ignore[no-untyped-def]
+def _squared_ratios(ranges, distance, reference, weight):  # type: ignore[no-untyped-def]
     """(R_ref / R)² of a run of vertices."""
-    square = reference * reference
     for v in range(weight.shape[0]):
-        px, py, pz = x[v] - sx, y[v] - sy, z[v] - sz
-        weight[v] = square / max(px * px + py * py + pz * pz, _NEAREST_SQUARED)
+        ratio = reference / max(ranges[v] + distance, _NEAREST)
+        weight[v] = ratio * ratio
 
 
 @compiled
@@ -361,7 +409,11 @@ def _count_kernel(  # type: ignore[no-untyped-def]
     counts = np.zeros((_TABLES, 256), np.int32)
     sums = np.zeros((_TABLES, 256), np.float64)
     weights = weighted or exponent != 0
+    distance = np.float32(np.sqrt(np.float64(sx) ** 2 + np.float64(sy) ** 2 + np.float64(sz) ** 2))
+    ring = np.empty((samples + 2, vertices), np.float32)
+    known = before[0, 0]
     for t in range(centre.shape[0]):
+        known = _extend(positions, sensor, distance, known, after[t, samples - 1], ring)
         counts[:, : bins + 2] = 0
         sums[:, : bins + 2] = 0
         seen_count = np.int64(0)
@@ -376,19 +428,21 @@ def _count_kernel(  # type: ignore[no-untyped-def]
         for v0 in range(0, vertices, _RUN):
             v1 = min(v0 + _RUN, vertices)
             n = v1 - v0
+            sight = seen[:n]
             if which == FACING:
                 nx, ny, nz = normals[t, 0], normals[t, 1], normals[t, 2]
                 facing_kernel(
                     x[v0:v1], y[v0:v1], z[v0:v1], nx[v0:v1], ny[v0:v1], nz[v0:v1],
-                    sx, sy, sz, seen[:n],
+                    sx, sy, sz, sight,
                 )  # fmt: skip
             elif which == MASK:
                 marks = mask[t]
-                seen[:n] = marks[v0:v1]
+                sight = marks[v0:v1]
             for v in range(n):
-                seen_count += np.int64(seen[v])
+                seen_count += np.int64(sight[v])
             if exponent != 0:
-                _squared_ratios(x[v0:v1], y[v0:v1], z[v0:v1], sx, sy, sz, reference, weight[:n])
+                here = ring[centre[t] % ring.shape[0]]
+                _squared_ratios(here[v0:v1], distance, reference, weight[:n])
                 _raise_to(weight[:n], exponent, spare[:n])
                 if weighted:
                     area = areas[t, v0:v1]
@@ -399,14 +453,10 @@ def _count_kernel(  # type: ignore[no-untyped-def]
             for sample in range(samples):
                 if scale[t, sample] <= 0:
                     continue
-                a, b = positions[before[t, sample]], positions[after[t, sample]]
-                ax, ay, az = a[0], a[1], a[2]
-                bx, by, bz = b[0], b[1], b[2]
-                _axis_positions(
-                    ax[v0:v1], ay[v0:v1], az[v0:v1], bx[v0:v1], by[v0:v1], bz[v0:v1],
-                    sx, sy, sz, scale[t, sample], offset, f[:n],
-                )  # fmt: skip
-                outside_count += _slots(f[:n], seen[:n], bins, beyond, slot[:n])
+                a = ring[before[t, sample] % ring.shape[0]]
+                b = ring[after[t, sample] % ring.shape[0]]
+                _axis_positions(a[v0:v1], b[v0:v1], scale[t, sample], offset, f[:n])
+                outside_count += _slots(f[:n], sight, bins, beyond, slot[:n])
                 if weights:
                     _tally_weights(slot[:n], weight[:n], sums)
                 else:
@@ -472,20 +522,20 @@ def _needed_kernel(  # type: ignore[no-untyped-def]
     f = np.empty(_RUN, np.float32)
     seen = np.ones(_RUN, np.uint8)
     slot = np.empty(_RUN, np.uint8)
+    distance = np.float32(np.sqrt(np.float64(sx) ** 2 + np.float64(sy) ** 2 + np.float64(sz) ** 2))
+    ring = np.empty((before.shape[1] + 2, vertices), np.float32)
+    known = before[0, 0]
     for t in range(needed.shape[0]):
+        known = _extend(positions, sensor, distance, known, after[t, -1], ring)
         for sample in range(before.shape[1]):
             if scale[t, sample] <= 0:
                 continue
-            a, b = positions[before[t, sample]], positions[after[t, sample]]
-            ax, ay, az = a[0], a[1], a[2]
-            bx, by, bz = b[0], b[1], b[2]
+            a = ring[before[t, sample] % ring.shape[0]]
+            b = ring[after[t, sample] % ring.shape[0]]
             for v0 in range(0, vertices, _RUN):
                 v1 = min(v0 + _RUN, vertices)
                 n = v1 - v0
-                _axis_positions(
-                    ax[v0:v1], ay[v0:v1], az[v0:v1], bx[v0:v1], by[v0:v1], bz[v0:v1],
-                    sx, sy, sz, scale[t, sample], offset, f[:n],
-                )  # fmt: skip
+                _axis_positions(a[v0:v1], b[v0:v1], scale[t, sample], offset, f[:n])
                 _slots(f[:n], seen[:n], bins, beyond, slot[:n])
                 for v in range(n):
                     needed[t, v0 + v] |= live[slot[v]]

@@ -9,10 +9,18 @@ import numpy as np
 import pytest
 from doppler_scenes import CAMERA, RAW, moving, options, plate, sensor_at, wobbling
 
-from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer, prepared, synthesizer
+from sd2core.doppler import (
+    PRESETS,
+    SynthesisOptions,
+    Synthesizer,
+    histogram,
+    prepared,
+    synthesizer,
+)
 from sd2core.errors import Sd2Error
 from sd2core.mesh import MeshSequence
 from sd2core.scattering.amplitude import range_weight, vertex_areas
+from sd2core.scattering.velocity import radial_velocity
 from sd2core.sensor import VelocityAxis, VirtualSensor
 
 SENSOR = sensor_at(0.3, -0.2, 0.1)
@@ -211,3 +219,19 @@ def test_a_point_cloud_takes_visibility_none_only(preset: str) -> None:
             maker.map(SENSOR, visibility=visibility)  # type: ignore[arg-type]
     with pytest.raises(Sd2Error, match="Area weighting"):
         Synthesizer(cloud, replace(PRESETS[preset], weight="area"))
+
+
+@pytest.mark.parametrize("distance_m", [0.0, 0.3, 2.2, 300.0, 1e6])
+def test_the_change_of_range_keeps_its_digits(distance_m: float) -> None:
+    random = np.random.default_rng(4)
+    before = random.uniform(-1, 1, (3, 5000)).astype(np.float32)
+    after = (before + random.normal(scale=0.03, size=before.shape)).astype(np.float32)
+    sensor = np.float32(distance_m) * np.array([0.48, 0.6, -0.64])
+    sensor = sensor.astype(np.float32).astype(np.float64)
+    truth = radial_velocity(before.astype(float), after.astype(float), sensor, 1 / 15)
+    closer = histogram.relative_range(before, sensor) - histogram.relative_range(after, sensor)
+    assert closer.dtype == np.float32
+    error = np.abs(closer * 15 - truth)
+    assert error.max() <= 1e-5
+    still = histogram.relative_range(before, sensor) - histogram.relative_range(before, sensor)
+    assert not still.any()
