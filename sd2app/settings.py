@@ -2,12 +2,33 @@
 
 from __future__ import annotations
 
-import tempfile
 from pathlib import Path
+from typing import Any, Protocol
 
 from PySide6.QtCore import QByteArray, QSettings
 
 _RECENT = 10
+
+
+class Store(Protocol):
+    """What settings need: QSettings, or a substitute that forgets."""
+
+    def value(self, key: str, default: Any = None, /) -> Any:
+        """What was stored under a key."""
+
+    def setValue(self, key: str, value: Any, /) -> None:
+        """Store a value."""
+
+
+class _Memory:
+    def __init__(self) -> None:
+        self._values: dict[str, Any] = {}
+
+    def value(self, key: str, default: Any = None, /) -> Any:
+        return self._values.get(key, default)
+
+    def setValue(self, key: str, value: Any, /) -> None:
+        self._values[key] = value
 
 
 class Settings:
@@ -16,15 +37,10 @@ class Settings:
     @classmethod
     def forgetful(cls) -> Settings:
         """Settings that start empty and are not kept."""
-        folder = tempfile.TemporaryDirectory(prefix="sd2-settings-")
-        store = QSettings(str(Path(folder.name) / "settings.ini"), QSettings.Format.IniFormat)
-        settings = cls(store)
-        settings._folder = folder
-        return settings
+        return cls(_Memory())
 
-    def __init__(self, store: QSettings | None = None) -> None:
+    def __init__(self, store: Store | None = None) -> None:
         self._store = store if store is not None else QSettings("SD2 Studio", "SD2 Studio")
-        self._folder: tempfile.TemporaryDirectory[str] | None = None
 
     @property
     def recent(self) -> list[Path]:

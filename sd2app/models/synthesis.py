@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -29,7 +30,7 @@ from sd2core.spectrum import DopplerMap
 _AT_ONCE = 12_000_000
 """Vertices times frames that are swept in one go (about 30 ms) while dragging."""
 _EXACT_PARTS = 16
-_KERNELS_POLL_MS = 500
+_COMPILER_POLL_MS = 500
 
 _WORDS = {
     RANK["facing"]: "preview: vertices facing the sensor",
@@ -102,9 +103,10 @@ class SynthesisModel(QObject):
         self._runner.partial.connect(self._receive)
         self._runner.finished.connect(self._finish)
         self._runner.failed.connect(self._fail)
-        self._kernels = QTimer(self)
-        self._kernels.setInterval(_KERNELS_POLL_MS)
-        self._kernels.timeout.connect(self._poll_kernels)
+        self._compiler: subprocess.Popen[bytes] | None = None
+        self._compiler_poll = QTimer(self)
+        self._compiler_poll.setInterval(_COMPILER_POLL_MS)
+        self._compiler_poll.timeout.connect(self._watch_compiler)
         sensor.changed.connect(self._follow)
         sensor.dragging_changed.connect(lambda _: self._follow())
         span.changed.connect(self._reorder)
@@ -120,7 +122,7 @@ class SynthesisModel(QObject):
     @property
     def busy(self) -> bool:
         """Whether a better map is on its way."""
-        return self._runner.busy or self._kernels.isActive()
+        return self._runner.busy or self._compiling
 
     @property
     def complete(self) -> bool:
@@ -185,8 +187,9 @@ class SynthesisModel(QObject):
             self.failed.emit(str(error))
             return
         self._canvas = Canvas.blank(options.axis.bins, mesh.frame_count)
-        if compile_in_background() is not None:
-            self._kernels.start()
+        self._compiler = compile_in_background()
+        if self._compiling:
+            self._compiler_poll.start()
         self._announce()
         self._follow()
 
@@ -203,7 +206,7 @@ class SynthesisModel(QObject):
 
     def close(self) -> None:
         """Stop computing."""
-        self._kernels.stop()
+        self._compiler_poll.stop()
         self._runner.close()
         self._end_job()
 
@@ -270,7 +273,8 @@ class SynthesisModel(QObject):
         rough_size = max(_AT_ONCE // synthesizer.mesh.vertex_count, 64)
         exact_size = min(max(len(rank) // _EXACT_PARTS, 8), max(rough_size // 16, 8))
         total = int((rank < FINAL).sum())
-        if kernels_ready() or final == "none":
+        refining = final != "exact" or not self._compiling
+        if refining:
             self._job = self._jobs.start("Exact visibility", self._cancel)
 
         def work(emit: Emit) -> None:
@@ -293,7 +297,7 @@ class SynthesisModel(QObject):
             for part in (view, (view[1], len(rank)), (0, view[0])):
                 if rough != final:
                     run(RANK["facing"], part, rough_size, rough)
-                if kernels_ready() or final != "exact":
+                if refining:
                     run(FINAL, part, exact_size, final)
 
         self._runner.submit(work)
@@ -302,6 +306,7 @@ class SynthesisModel(QObject):
         start, stop = self._frames_in_view()
         if self._synthesizer is None or self._sensor.dragging or stop <= start:
             return
+        self._say_quality()
         if self._canvas.rank[start:stop].min() < FINAL and self._canvas.frames > stop - start:
             self._settle()
 
@@ -310,9 +315,14 @@ class SynthesisModel(QObject):
         self._end_job()
         self._say_quality()
 
-    def _poll_kernels(self) -> None:
-        if kernels_ready():
-            self._kernels.stop()
+    @property
+    def _compiling(self) -> bool:
+        """Whether machine code is on its way; without it exact visibility takes too long."""
+        return not kernels_ready() and self._compiler is not None and self._compiler.poll() is None
+
+    def _watch_compiler(self) -> None:
+        if not self._compiling:
+            self._compiler_poll.stop()
             self._follow()
 
     # --- results --------------------------------------------------------------------------
@@ -367,8 +377,8 @@ class SynthesisModel(QObject):
         words = _WORDS.get(lowest) or _FINAL_WORDS[self._synthesizer.options.visibility]
         if 0 < final < 1 and lowest < FINAL:
             words = f"{words}, {100 * final:.0f} % exact"
-        if not kernels_ready():
-            words += " · preparing fast kernels"
+        if self._compiling:
+            words += " · compiling, exact follows"
         self._track.set_status(words)
 
     def _fail(self, error: Exception) -> None:
