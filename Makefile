@@ -63,7 +63,7 @@ format: $(INSTALLED)
 	$(BIN)/ruff format .
 
 bench: system-packages-for-tests setup
-	scripts/on_display.sh $(BIN)/python -m pytest tests/benchmarks --benchmark-only --timeout=0
+	scripts/on_display.sh $(BIN)/python -m pytest tests/benchmarks --benchmark-only --timeout=0 --capture=no
 
 wheel: $(INSTALLED)
 	$(BIN)/python -m build --wheel --no-isolation
