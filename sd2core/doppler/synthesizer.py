@@ -25,7 +25,7 @@ from sd2core.scattering import exact_plain
 from sd2core.scattering.amplitude import range_weight
 from sd2core.scattering.exact import exact_visibility_kernel
 from sd2core.scattering.velocity import radial_velocity
-from sd2core.scattering.visibility import facing_mask
+from sd2core.scattering.visibility import facing_kernel, facing_mask
 from sd2core.sensor import VirtualSensor
 from sd2core.spectrum import DopplerMap
 from sd2core.timebase import Timebase
@@ -439,7 +439,7 @@ class Synthesizer:
         needed = self._needed(block, rows, place)
         points = block.frames.positions[block.frames.centre[rows]].astype(np.float32, copy=False)
         normals = self.prepared.normals(block)[rows]
-        visible = facing_mask(points, normals, place)
+        visible = _facing(points, normals, place)
         self._test(points, place, needed, visible)
         mask.visible[rows] = visible
         mask.done[rows] = True
@@ -492,7 +492,7 @@ class Synthesizer:
         if kept is not None and kept.done[local]:
             return kept.visible[local] > 0, "frozen"
         normals = self.prepared.normals(block)[rows]
-        return facing_mask(points, normals, place)[0] > 0, "facing"
+        return _facing(points, normals, place)[0] > 0, "facing"
 
     # Blocks and threads.
 
@@ -512,6 +512,18 @@ class Synthesizer:
     def _rows(self, index: int, start: int, stop: int) -> slice:
         base = index * self.prepared.block_frames
         return slice(start - base, stop - base)
+
+
+def _facing(
+    points: NDArray[np.float32], normals: NDArray[np.int8], place: NDArray[np.float64]
+) -> NDArray[np.uint8]:
+    if not kernels_ready():
+        return facing_mask(points, normals, place)
+    sx, sy, sz = place.astype(np.float32)
+    visible = np.empty((len(points), points.shape[2]), np.uint8)
+    for (x, y, z), (nx, ny, nz), row in zip(points, normals, visible, strict=True):
+        facing_kernel(x, y, z, nx, ny, nz, sx, sy, sz, row)
+    return visible
 
 
 def _no_surface(mesh: MeshSequence, wanted: str) -> Sd2Error:
