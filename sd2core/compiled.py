@@ -161,7 +161,8 @@ def compile_in_background() -> subprocess.Popen[bytes] | None:
     Returns
     -------
     subprocess.Popen or None
-        The process, or None when the kernels are ready or cannot be kept.
+        The process, or None when the kernels are ready, cannot be kept, or no
+        process can be started.
     """
     global _background
     with _lock:
@@ -175,13 +176,16 @@ def compile_in_background() -> subprocess.Popen[bytes] | None:
                 "NUMBA_CACHE_DIR": str(directory.parent),
                 "PYTHONPATH": os.pathsep.join(filter(None, paths)),
             }
-            _background = subprocess.Popen(
-                [sys.executable, "-m", "sd2core.compiled", "--quiet"],
-                env=environment,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-            )
+            try:
+                _background = subprocess.Popen(
+                    [sys.executable, "-m", "sd2core.compiled", "--quiet"],
+                    env=environment,
+                    stdin=subprocess.DEVNULL,
+                    stdout=subprocess.DEVNULL,
+                    stderr=subprocess.DEVNULL,
+                )
+            except OSError:
+                return None
             atexit.register(_stop_background)
         return _background
 

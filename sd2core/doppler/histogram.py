@@ -123,7 +123,9 @@ def relative_range(
     |p − s| − |s| = p·(p − 2s) / (|p − s| + |s|). What differs from vertex to vertex
     and from knot to knot is kept at the body's own scale, so the difference of two
     is the exact change of range of :func:`radial_velocity` however far the sensor
-    is (1e-5 m/s in single precision), with one range per vertex and knot.
+    is, with one range per vertex and knot. In single precision its error is below
+    1e-5 m/s at 30 frames/s within a metre of the clip's origin and grows with the
+    distance from there, as does the rounding of the positions themselves.
 
     Parameters
     ----------

@@ -17,6 +17,10 @@ VelocityRule = Literal["central", "vid2doppler"]
 MOST_BINS = 254
 """Bin numbers are bytes, and two values say "beyond the axis" and "hidden"."""
 
+STEEPEST_RANGE_LAW = 8
+FARTHEST_REFERENCE_M = 1000
+"""Within these, the range law stays within single precision at any range."""
+
 
 @dataclass(frozen=True)
 class SynthesisOptions:
@@ -96,9 +100,14 @@ class SynthesisOptions:
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0):
                 raise Sd2Error(f"{name} is {value}", "0 or more")
-        if not (math.isfinite(self.reference_range_m) and self.reference_range_m > 0):
+        if self.range_exponent > STEEPEST_RANGE_LAW:
             raise Sd2Error(
-                f"The reference range is {self.reference_range_m} m", "a positive distance"
+                f"range_exponent is {self.range_exponent}", f"up to {STEEPEST_RANGE_LAW}"
+            )
+        if not 0 < self.reference_range_m <= FARTHEST_REFERENCE_M:
+            raise Sd2Error(
+                f"The reference range is {self.reference_range_m} m",
+                f"more than 0 and up to {FARTHEST_REFERENCE_M} m",
             )
         if self.oversampling < 1 or self.oversampling % 2 == 0:
             raise Sd2Error(f"The oversampling is {self.oversampling}", "an odd number: 1, 3, 5 …")

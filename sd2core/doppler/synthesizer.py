@@ -38,6 +38,7 @@ Quality = Literal["none", "facing", "exact", "frozen"]
 _MEMORY_BUDGET_BYTES = 512 << 20
 _FAST_FRAMES = 64
 _EXACT_FRAMES = 4
+_PLACES_KEPT = 4
 
 Position = tuple[float, float, float]
 
@@ -137,7 +138,7 @@ class Synthesizer:
         live[-1] = 0
         self._live = live
         self._smooth_velocity = velocity_kernel(options.axis.bins, options.velocity_sigma_bins)
-        self._frozen_at: dict[int, Position] = {}
+        self._exact_at: dict[int, tuple[Position, ...]] = {}
 
     def prepare(self, progress: Progress = silent) -> None:
         """Read and prepare as many blocks as the budget holds, before they are asked for."""
@@ -372,8 +373,8 @@ class Synthesizer:
         if visibility == "exact":
             mask = self._exact(block, rows, position_m).visible[rows]
         elif visibility == "frozen":
-            kept = self._frozen(block.index)
-            if kept is not None and kept.done[rows].all():
+            kept = self._frozen(block.index, rows)
+            if kept is not None:
                 mask = kept.visible[rows]
             else:
                 quality = "facing"
@@ -432,7 +433,8 @@ class Synthesizer:
     def _exact(self, block: Block, rows: slice, position_m: Position) -> BlockMask:
         """The block's exact mask with these rows worked out."""
         mask = self.prepared.mask(block, position_m)
-        self._frozen_at[block.index] = position_m
+        others = [place for place in self._exact_at.get(block.index, ()) if place != position_m]
+        self._exact_at[block.index] = (position_m, *others[: _PLACES_KEPT - 1])
         if mask.done[rows].all():
             return mask
         place = self.prepared.sensor(position_m)
@@ -471,10 +473,16 @@ class Synthesizer:
             seen = exact_plain.exact_visibility(points[t], faces, place, wanted)
             visible[t][wanted] = seen[wanted]
 
-    def _frozen(self, index: int) -> BlockMask | None:
-        """The exact mask that was last worked out for a block, if it is still kept."""
-        position_m = self._frozen_at.get(index)
-        return None if position_m is None else self.prepared.kept_mask(index, position_m)
+    def _frozen(self, index: int, rows: slice) -> BlockMask | None:
+        """The newest exact mask of a block in which these rows are complete.
+
+        Not simply the newest: a drag that goes on cancels what its pause began.
+        """
+        for position_m in self._exact_at.get(index, ()):
+            mask = self.prepared.kept_mask(index, position_m)
+            if mask is not None and mask.done[rows].all():
+                return mask
+        return None
 
     def _visible_in_frame(
         self, block: Block, local: int, position_m: Position, visibility: Visibility
@@ -488,8 +496,8 @@ class Synthesizer:
             visible = np.empty((1, self.mesh.vertex_count), np.uint8)
             self._test(points, place, np.ones_like(visible), visible)
             return visible[0] > 0, "exact"
-        kept = self._frozen(block.index) if visibility == "frozen" else None
-        if kept is not None and kept.done[local]:
+        kept = self._frozen(block.index, rows) if visibility == "frozen" else None
+        if kept is not None:
             return kept.visible[local] > 0, "frozen"
         normals = self.prepared.normals(block)[rows]
         return _facing(points, normals, place)[0] > 0, "facing"

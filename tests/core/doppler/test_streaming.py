@@ -158,6 +158,14 @@ def test_frozen_for_a_part_only_is_labelled_by_its_weakest() -> None:
     assert maker.stretch(NEXT, 0, 40, "frozen").quality == "facing"
 
 
+def test_a_refinement_cut_short_does_not_spoil_what_is_frozen() -> None:
+    maker = Synthesizer(wobbling(60), options())
+    maker.stretch(NEAR, 0, 60)
+    maker.stretch(NEXT, 0, 7)  # the hand moved on before more was done
+    assert maker.stretch(CAMERA, 0, 60, "frozen").quality == "frozen"
+    assert maker.frame(CAMERA, 40, "frozen").quality == "frozen"
+
+
 def test_exact_visibility_is_kept_per_sensor_position(monkeypatch: pytest.MonkeyPatch) -> None:
     maker = Synthesizer(wobbling(12), options())
     first = maker.map(NEAR).values
