@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from sd2core import __version__
 from sd2core.compiled import compile_in_background, kernels_ready
 from sd2core.doppler import histogram, vid2doppler
-from sd2core.doppler.histogram import ALL, FACING, MASK, Counting, Counts
+from sd2core.doppler.histogram import Counting, Counts
+from sd2core.doppler.kernels import ALL, CLIP, DROP, FACING, MASK, WRAP
 from sd2core.doppler.options import PRESETS, SynthesisOptions
 from sd2core.doppler.parallel import Ticket, run_jobs
 from sd2core.doppler.prepared import Block, BlockMask, ByteBudget, PreparedMesh
@@ -127,9 +128,7 @@ class Synthesizer:
         self._counting = Counting(
             options.axis.bins,
             options.axis.v_max_mps,
-            {"drop": histogram.DROP, "wrap": histogram.WRAP, "clip": histogram.CLIP}[
-                options.beyond
-            ],
+            {"drop": DROP, "wrap": WRAP, "clip": CLIP}[options.beyond],
             options.range_exponent,
             options.reference_range_m,
         )

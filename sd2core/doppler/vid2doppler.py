@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.doppler.histogram import CLIP, DROP, WRAP, Counting
+from sd2core.doppler.histogram import Counting
+from sd2core.doppler.kernels import CLIP, DROP, WRAP
 
 TAPS = 5
 """Frames in its mean over time."""

@@ -132,7 +132,7 @@ def test_warm_up_leaves_nothing_to_compile() -> None:
 import numpy as np
 from sd2core import compiled
 assert compiled.kernels_ready()
-from sd2core.doppler import Synthesizer, SynthesisOptions, histogram, prepared
+from sd2core.doppler import Synthesizer, SynthesisOptions, kernels
 from sd2core.mesh import MeshSequence
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
@@ -150,7 +150,7 @@ for dtype in ("f4", "f8"):
     Synthesizer(mesh, "vid2doppler").map(VirtualSensor())
 misses = [
     (kernel.__name__, sum(kernel.stats.cache_misses.values()))
-    for module in (amplitude, exact, visibility, histogram)
+    for module in (amplitude, exact, visibility, kernels)
     for kernel in vars(module).values()
     if hasattr(kernel, "stats")
 ]

@@ -1,0 +1,275 @@
+"""The compiled inner loops of counting.
+
+Each frame is gone through in runs of vertices that stay in the second-level
+cache. Each step of a run is a loop of its own with few streams, which the compiler
+turns into vector instructions. :mod:`sd2core.doppler.histogram` says what the
+numbers mean.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sd2core.compiled import compiled
+from sd2core.scattering.amplitude import NEAREST_RANGE_M
+from sd2core.scattering.visibility import facing_kernel
+
+_RUN = 16384
+_TABLES = 8
+_NEAREST = np.float32(NEAREST_RANGE_M)
+
+ALL, FACING, MASK = 0, 1, 2
+"""Which vertices count: all, those facing the sensor, those marked in a mask."""
+
+DROP, WRAP, CLIP = 0, 1, 2
+"""What happens beyond the axis."""
+
+
+@compiled
+def _relative_ranges(x, y, z, sx, sy, sz, distance, ranges):  # type: ignore[no-untyped-def]
+    """Compiled form of :func:`sd2core.doppler.histogram.relative_range` for one knot."""
+    two = np.float32(2)
+    for v in range(ranges.shape[0]):
+        px, py, pz = x[v], y[v], z[v]
+        qx, qy, qz = px - sx, py - sy, pz - sz
+        away = np.sqrt(qx * qx + qy * qy + qz * qz)
+        difference = px * (px - two * sx) + py * (py - two * sy) + pz * (pz - two * sz)
+        ranges[v] = difference / max(away + distance, np.float32(1e-30))
+
+
+@compiled
+def _extend(positions, sensor, distance, known, upto, ring):  # type: ignore[no-untyped-def]
+    """Work out the knots from ``known`` to ``upto``; the ring keeps the newest few."""
+    for knot in range(known, upto + 1):
+        points = positions[knot]
+        _relative_ranges(
+            points[0], points[1], points[2],
+            sensor[0], sensor[1], sensor[2], distance, ring[knot % ring.shape[0]],
+        )  # fmt: skip
+    return max(known, upto + 1)
+
+
+@compiled
+def _axis_positions(before, after, scale, offset, f):  # type: ignore[no-untyped-def]
+    """Position on the velocity axis, in bins."""
+    for v in range(f.shape[0]):
+        f[v] = offset + scale * (before[v] - after[v])
+
+
+@compiled
+def _slots(f, seen, bins, beyond, slot):  # type: ignore[no-untyped-def]
+    """Slot per vertex: its bin, ``bins`` when beyond the axis, ``bins + 1`` when hidden.
+
+    Returns how many seen vertices lie beyond the axis.
+    """
+    end = np.float32(bins)
+    inner = end - np.float32(1e-3)
+    zero, off, dark = np.float32(0), np.float32(bins), np.float32(bins + 1)
+    if beyond == WRAP:
+        for v in range(f.shape[0]):
+            x = f[v]
+            y = x - end * np.floor(x / end)
+            f[v] = x if (x >= zero) & (x <= end) else y + np.float32(2 * bins)
+    outside = np.int32(0)
+    if beyond == DROP:
+        for v in range(f.shape[0]):
+            x = f[v]
+            inside = (x >= zero) & (x <= end)
+            y = min(x, inner) if inside else off
+            slot[v] = np.uint8(np.int32(y if seen[v] != 0 else dark))
+            outside += np.int32((not inside) & (seen[v] != 0))
+    elif beyond == CLIP:
+        for v in range(f.shape[0]):
+            x = f[v]
+            inside = (x >= zero) & (x <= end)
+            y = max(min(x, inner), zero)
+            slot[v] = np.uint8(np.int32(y if seen[v] != 0 else dark))
+            outside += np.int32((not inside) & (seen[v] != 0))
+    else:
+        for v in range(f.shape[0]):
+            x = f[v]
+            inside = x <= end
+            y = x if inside else x - np.float32(2 * bins)
+            y = max(min(y, inner), zero)
+            slot[v] = np.uint8(np.int32(y if seen[v] != 0 else dark))
+            outside += np.int32((not inside) & (seen[v] != 0))
+    return outside
+
+
+@compiled
+def _squared_ratios(ranges, distance, reference, weight):  # type: ignore[no-untyped-def]
+    """(R_ref / R)² of a run of vertices."""
+    for v in range(weight.shape[0]):
+        ratio = reference / max(ranges[v] + distance, _NEAREST)
+        weight[v] = ratio * ratio
+
+
+@compiled
+def _raise_to(weight, exponent, spare):  # type: ignore[no-untyped-def]
+    """Squared ratios to ratios to the power of ``exponent``, in place."""
+    if exponent != np.floor(exponent):
+        power = np.float32(exponent * 0.5)
+        for v in range(weight.shape[0]):
+            weight[v] = weight[v] ** power
+        return
+    whole, odd = int(exponent) // 2, int(exponent) % 2
+    while odd == 0 and whole > 1 and whole % 2 == 0:
+        for v in range(weight.shape[0]):
+            weight[v] *= weight[v]
+        whole //= 2
+    if odd == 0 and whole == 1:
+        return
+    for v in range(weight.shape[0]):
+        spare[v] = weight[v]
+        weight[v] = np.sqrt(weight[v]) if odd == 1 else np.float32(1)
+    while whole > 0:
+        if whole % 2 == 1:
+            for v in range(weight.shape[0]):
+                weight[v] *= spare[v]
+        whole //= 2
+        if whole > 0:
+            for v in range(weight.shape[0]):
+                spare[v] *= spare[v]
+
+
+@compiled
+def _tally(slot, counts):  # type: ignore[no-untyped-def]
+    """Add 1 per vertex; several tables in turn, so that equal slots do not wait."""
+    whole = slot.shape[0] // _TABLES * _TABLES
+    for v in range(0, whole, _TABLES):
+        for table in range(_TABLES):
+            counts[table, slot[v + table]] += np.int32(1)
+    for v in range(whole, slot.shape[0]):
+        counts[0, slot[v]] += np.int32(1)
+
+
+@compiled
+def _tally_weights(slot, weight, sums):  # type: ignore[no-untyped-def]
+    whole = slot.shape[0] // _TABLES * _TABLES
+    for v in range(0, whole, _TABLES):
+        for table in range(_TABLES):
+            sums[table, slot[v + table]] += np.float64(weight[v + table])
+    for v in range(whole, slot.shape[0]):
+        sums[0, slot[v]] += np.float64(weight[v])
+
+
+@compiled
+def count_kernel(  # type: ignore[no-untyped-def]
+    positions, centre, before, after, scale, normals, mask, areas, sensor,
+    which, weighted, bins, beyond, exponent, reference, histogram, visible, outside,
+):  # fmt: skip
+    """See :func:`sd2core.doppler.histogram.count`; the last three are written."""
+    vertices = positions.shape[2]
+    samples = before.shape[1]
+    sx, sy, sz = sensor[0], sensor[1], sensor[2]
+    offset = np.float32(0.5 * bins)
+    f = np.empty(_RUN, np.float32)
+    weight = np.empty(_RUN, np.float32)
+    spare = np.empty(_RUN, np.float32)
+    seen = np.ones(_RUN, np.uint8)
+    slot = np.empty(_RUN, np.uint8)
+    counts = np.zeros((_TABLES, 256), np.int32)
+    sums = np.zeros((_TABLES, 256), np.float64)
+    weights = weighted or exponent != 0
+    distance = np.float32(np.sqrt(np.float64(sx) ** 2 + np.float64(sy) ** 2 + np.float64(sz) ** 2))
+    ring = np.empty((samples + 2, vertices), np.float32)
+    known = before[0, 0]
+    for t in range(centre.shape[0]):
+        known = _extend(positions, sensor, distance, known, after[t, samples - 1], ring)
+        counts[:, : bins + 2] = 0
+        sums[:, : bins + 2] = 0
+        seen_count = np.int64(0)
+        outside_count = 0
+        measured = 0
+        for sample in range(samples):
+            if scale[t, sample] > 0:
+                measured += 1
+        measured = max(measured, 1)
+        middle = positions[centre[t]]
+        x, y, z = middle[0], middle[1], middle[2]
+        for v0 in range(0, vertices, _RUN):
+            v1 = min(v0 + _RUN, vertices)
+            n = v1 - v0
+            sight = seen[:n]
+            if which == FACING:
+                nx, ny, nz = normals[t, 0], normals[t, 1], normals[t, 2]
+                facing_kernel(
+                    x[v0:v1], y[v0:v1], z[v0:v1], nx[v0:v1], ny[v0:v1], nz[v0:v1],
+                    sx, sy, sz, sight,
+                )  # fmt: skip
+            elif which == MASK:
+                marks = mask[t]
+                sight = marks[v0:v1]
+            for v in range(n):
+                seen_count += np.int64(sight[v])
+            if exponent != 0:
+                here = ring[centre[t] % ring.shape[0]]
+                _squared_ratios(here[v0:v1], distance, reference, weight[:n])
+                _raise_to(weight[:n], exponent, spare[:n])
+                if weighted:
+                    area = areas[t, v0:v1]
+                    for v in range(n):
+                        weight[v] *= area[v]
+            elif weighted:
+                weight[:n] = areas[t, v0:v1]
+            for sample in range(samples):
+                if scale[t, sample] <= 0:
+                    continue
+                a = ring[before[t, sample] % ring.shape[0]]
+                b = ring[after[t, sample] % ring.shape[0]]
+                _axis_positions(a[v0:v1], b[v0:v1], scale[t, sample], offset, f[:n])
+                outside_count += _slots(f[:n], sight, bins, beyond, slot[:n])
+                if weights:
+                    _tally_weights(slot[:n], weight[:n], sums)
+                else:
+                    _tally(slot[:n], counts)
+        for bin_number in range(bins):
+            total = 0.0
+            for table in range(_TABLES):
+                total += sums[table, bin_number] if weights else counts[table, bin_number]
+            histogram[t, bin_number] = total / measured
+        visible[t] = seen_count
+        outside[t] = outside_count / measured
+
+
+@compiled
+def needed_kernel(  # type: ignore[no-untyped-def]
+    positions, before, after, scale, sensor, bins, beyond, live, needed
+) -> None:
+    """See :func:`sd2core.doppler.histogram.mark_needed`; ``needed`` starts as zeros."""
+    vertices = positions.shape[2]
+    sx, sy, sz = sensor[0], sensor[1], sensor[2]
+    offset = np.float32(0.5 * bins)
+    f = np.empty(_RUN, np.float32)
+    seen = np.ones(_RUN, np.uint8)
+    slot = np.empty(_RUN, np.uint8)
+    distance = np.float32(np.sqrt(np.float64(sx) ** 2 + np.float64(sy) ** 2 + np.float64(sz) ** 2))
+    ring = np.empty((before.shape[1] + 2, vertices), np.float32)
+    known = before[0, 0]
+    for t in range(needed.shape[0]):
+        known = _extend(positions, sensor, distance, known, after[t, -1], ring)
+        for sample in range(before.shape[1]):
+            if scale[t, sample] <= 0:
+                continue
+            a = ring[before[t, sample] % ring.shape[0]]
+            b = ring[after[t, sample] % ring.shape[0]]
+            for v0 in range(0, vertices, _RUN):
+                v1 = min(v0 + _RUN, vertices)
+                n = v1 - v0
+                _axis_positions(a[v0:v1], b[v0:v1], scale[t, sample], offset, f[:n])
+                _slots(f[:n], seen[:n], bins, beyond, slot[:n])
+                for v in range(n):
+                    needed[t, v0 + v] |= live[slot[v]]
+
+
+def compile_kernels() -> None:
+    """Call every kernel of this module once."""
+    positions, sensor = np.ones((1, 3, 4), np.float32), np.zeros(3, np.float32)
+    knots, scale = np.zeros((1, 1), np.int64), np.ones((1, 1), np.float32)
+    normals, marks = np.zeros((1, 3, 4), np.int8), np.zeros((1, 4), np.uint8)
+    count_kernel(
+        positions, knots[0], knots, knots, scale, normals, marks, np.ones((1, 4), np.float32),
+        sensor, ALL, False, 32, DROP, 4.0, np.float32(2.2), np.zeros((1, 32)), np.zeros(1),
+        np.zeros(1),
+    )  # fmt: skip
+    needed_kernel(positions, knots, knots, scale, sensor, 32, DROP, np.ones(33, np.uint8), marks)
