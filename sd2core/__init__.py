@@ -6,7 +6,7 @@ library costs nothing::
     import sd2core as sd2
 
     mesh = sd2.load_mesh("walk.npz")
-    maps = sd2.Synthesizer(mesh, "paper")
+    maps = sd2.Synthesizer(mesh, preset="paper")
     synthetic = maps.map(sd2.VirtualSensor(position_m=(0, 0, 0)), visibility="exact")
     real = sd2.doppler_map(sd2.load_capture("recording/"), v_max_mps=2.0, bins=32)
 """

@@ -363,7 +363,7 @@ class SynthesisModel(QObject):
             axis=options.axis,
             timebase=mesh.timebase,
             kind="synthetic",
-            unit="share of vertices",
+            unit=self._synthesizer.unit,
             null_bins=options.null_bins,
         )
 

@@ -98,8 +98,8 @@ class Synthesizer:
     Parameters
     ----------
     mesh : MeshSequence
-    options : SynthesisOptions or str
-        Or the name of a preset.
+    preset : str or SynthesisOptions
+        Name of a preset, or options of one's own.
     memory_budget_bytes : int
         For prepared blocks and visibility.
 
@@ -112,14 +112,13 @@ class Synthesizer:
     def __init__(
         self,
         mesh: MeshSequence,
-        options: SynthesisOptions | str = "paper",
+        preset: str | SynthesisOptions = "paper",
         *,
         memory_budget_bytes: int = _MEMORY_BUDGET_BYTES,
     ) -> None:
-        if isinstance(options, str):
-            if options not in PRESETS:
-                raise Sd2Error(f"The preset is {options!r}", f"one of {', '.join(PRESETS)}")
-            options = PRESETS[options]
+        if isinstance(preset, str) and preset not in PRESETS:
+            raise Sd2Error(f"The preset is {preset!r}", f"one of {', '.join(PRESETS)}")
+        options = PRESETS[preset] if isinstance(preset, str) else preset
         if mesh.faces is None and options.weight == "area":
             raise _no_surface(mesh, "Area weighting")
         self.mesh = mesh
@@ -138,6 +137,13 @@ class Synthesizer:
         self._live = live
         self._smooth_velocity = velocity_kernel(options.axis.bins, options.velocity_sigma_bins)
         self._exact_at: dict[int, tuple[Position, ...]] = {}
+
+    @property
+    def unit(self) -> str:
+        """What a value of 1 in a map means."""
+        options = self.options
+        share = {"count": "share of vertices", "area": "share of the surface"}[options.weight]
+        return f"{share} at {options.reference_range_m:g} m" if options.range_exponent else share
 
     def prepare(self, progress: Progress = silent) -> None:
         """Read and prepare as many blocks as the budget holds, before they are asked for."""
@@ -187,13 +193,12 @@ class Synthesizer:
         start, stop = frames or (0, self.mesh.frame_count)
         stretch = self.stretch(sensor, start, stop, visibility, progress)
         options = self.options
-        per = {"count": "share of vertices", "area": "share of the surface"}[options.weight]
         return DopplerMap(
             values=stretch.values,
             axis=options.axis,
             timebase=Timebase(self.mesh.times_s[start:stop]),
             kind="synthetic",
-            unit=f"{per} at {options.reference_range_m:g} m" if options.range_exponent else per,
+            unit=self.unit,
             null_bins=options.null_bins,
             meta={
                 "sensor": asdict(sensor),
