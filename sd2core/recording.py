@@ -263,11 +263,11 @@ class Recording:
         text = json.dumps(document.model_dump(mode="json"), indent=2, ensure_ascii=False)
         atomic_write_text(self.folder / FILE_NAME, text + "\n")
 
-    def open_video(self) -> VideoReader:
+    def open_video(self, progress: Progress = silent) -> VideoReader:
         """Open the video."""
         from sd2core.io.video import open_video
 
-        return open_video(self._present("video"))
+        return open_video(self._present("video"), progress)
 
     def load_mesh(self, progress: Progress = silent) -> MeshSequence:
         """Load the mesh as :attr:`mesh_reading` says, placed by the video where that helps."""

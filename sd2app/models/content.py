@@ -109,20 +109,20 @@ def load_content(recording: Recording, clutter: Clutter, progress: Progress) -> 
             problems.append(error)
             return None
 
-    progress(0, 4)
-    video = attempt(recording.video, recording.open_video)
-    progress(1, 4)
-    mesh = attempt(recording.mesh, recording.load_mesh)
-    progress(2, 4)
+    def step(number: int) -> Progress:
+        """Progress of one of four parts; it is also where cancelling takes effect."""
+        return lambda done, total: progress(
+            100 * number + (100 * min(done, total) // total if total else 0), 400
+        )
+
+    video = attempt(recording.video, lambda: recording.open_video(step(0)))
+    mesh = attempt(recording.mesh, lambda: recording.load_mesh(step(1)))
     capture = attempt(recording.radar, recording.load_capture)
-    progress(3, 4)
     radar_map = attempt(
         capture,
-        lambda: doppler_map(
-            capture, axis=VelocityAxis(), clutter=clutter, progress=lambda *_: progress(3, 4)
-        ),
+        lambda: doppler_map(capture, axis=VelocityAxis(), clutter=clutter, progress=step(3)),
     )
-    progress(4, 4)
+    progress(400, 400)
     parts = [part for part in (video, mesh, capture) if part is not None]
     if not parts:
         raise (
