@@ -39,13 +39,6 @@ class ActionSet:
         """Make the menus; returns the one for recent files, which the window fills."""
         bar = self._window.menuBar()
         menus = {name: bar.addMenu(name) for name in _MENUS}
-        stack = self._context.document.undo_stack
-        for action, key in (
-            (stack.createUndoAction(self._window, "Undo"), "Ctrl+Z"),
-            (stack.createRedoAction(self._window, "Redo"), "Ctrl+Shift+Z"),
-        ):
-            action.setShortcut(QKeySequence(key))
-            menus["Edit"].addAction(action)
         recent = QMenu("Open recent", menus["File"])
         for row in ACTIONS:
             if row.separator_before:
@@ -62,6 +55,9 @@ class ActionSet:
             action.setEnabled(row.enabled(self._context))
             if row.checked is not None:
                 action.setChecked(row.checked(self._context))
+        stack = self._context.document.undo_stack
+        self._actions["undo"].setText(f"Undo {stack.undoText().lower()}".rstrip())
+        self._actions["redo"].setText(f"Redo {stack.redoText().lower()}".rstrip())
         playing = self._context.playback.playing
         if playing != (self._actions["play"].text() == "Pause"):
             self._actions["play"].setText("Pause" if playing else "Play")

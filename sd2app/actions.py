@@ -92,6 +92,16 @@ ACTIONS: tuple[Action, ...] = (
         separator_before=True,
     ),
     Action(
+        "undo", "Edit", "Undo", ("Ctrl+Z",), "Take back the last edit of this recording",
+        lambda w: w.context.document.undo_stack.undo(),
+        lambda c: c.document.undo_stack.canUndo(),
+    ),
+    Action(
+        "redo", "Edit", "Redo", ("Ctrl+Shift+Z",), "Do again what was taken back",
+        lambda w: w.context.document.undo_stack.redo(),
+        lambda c: c.document.undo_stack.canRedo(),
+    ),
+    Action(
         "sensor_to_camera", "Edit", "Sensor at the camera", ("Home",),
         "Put the sensor at the camera, looking along its axis",
         lambda w: w.context.edits.sensor_to_camera(), separator_before=True,

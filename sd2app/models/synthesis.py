@@ -31,6 +31,8 @@ _AT_ONCE = 12_000_000
 """Vertices times frames that are swept in one go (about 30 ms) while dragging."""
 _EXACT_PARTS = 16
 _COMPILER_POLL_MS = 500
+_REST_MS = 300
+"""A hand that holds the sensor still for so long is at rest."""
 
 _WORDS = {
     RANK["facing"]: "preview: vertices facing the sensor",
@@ -107,6 +109,10 @@ class SynthesisModel(QObject):
         self._compiler_poll = QTimer(self)
         self._compiler_poll.setInterval(_COMPILER_POLL_MS)
         self._compiler_poll.timeout.connect(self._watch_compiler)
+        self._rest = QTimer(self)
+        self._rest.setSingleShot(True)
+        self._rest.setInterval(_REST_MS)
+        self._rest.timeout.connect(self._settle)
         sensor.changed.connect(self._follow)
         sensor.dragging_changed.connect(lambda _: self._follow())
         span.changed.connect(self._reorder)
@@ -169,6 +175,7 @@ class SynthesisModel(QObject):
 
     def take_over(self) -> None:
         """Start on the mesh of the document that is open now."""
+        self._rest.stop()
         self._runner.cancel()
         self._end_job()
         self._synthesizer = None
@@ -206,6 +213,7 @@ class SynthesisModel(QObject):
 
     def close(self) -> None:
         """Stop computing."""
+        self._rest.stop()
         self._compiler_poll.stop()
         self._runner.close()
         self._end_job()
@@ -235,6 +243,7 @@ class SynthesisModel(QObject):
         self.frame_changed.emit()
         self.readout_changed.emit()
         if self._sensor.dragging:
+            self._rest.start()
             if self._sweeping and self._runner.busy:
                 self._again = True
             else:
@@ -261,7 +270,9 @@ class SynthesisModel(QObject):
 
     def _settle(self) -> None:
         """Rough where nothing is known yet, then exact; the stretch in view first."""
-        assert self._synthesizer is not None
+        if self._synthesizer is None:
+            return
+        self._rest.stop()
         self._end_job()
         self._again = self._sweeping = False
         synthesizer, sensor = self._synthesizer, self._sensor.sensor

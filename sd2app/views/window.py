@@ -197,6 +197,7 @@ class MainWindow(QMainWindow):
         c.document.noted.connect(self.messages.note)
         c.synthesis.failed.connect(self.messages.warn)
         c.video.failed.connect(self.messages.warn)
+        c.document.undo_stack.indexChanged.connect(self._refresh)
         c.document.undo_stack.cleanChanged.connect(self._refresh)
         for signal in (
             c.playback.playing_changed,

@@ -85,6 +85,19 @@ def test_every_sweep_of_a_fast_hand_is_for_one_placement(context, qtbot, ball):
     assert context.document.undo_stack.count() == 1
 
 
+def test_a_hand_that_holds_still_gets_the_exact_map(context, qtbot, ball):
+    open_ball(context, qtbot, ball)
+    qtbot.waitUntil(lambda: context.synthesis.complete, timeout=10_000)
+    context.edits.begin_sensor_drag()
+    context.edits.drag_sensor((0.2, 0.0, 0.0))
+    qtbot.waitUntil(lambda: context.synthetic.status.startswith("preview"), timeout=5_000)
+    qtbot.waitUntil(lambda: context.synthesis.complete, timeout=10_000)
+    assert context.sensor.dragging
+    context.edits.drag_sensor((0.3, 0.0, 0.0))
+    qtbot.waitUntil(lambda: context.synthetic.status.startswith("preview"), timeout=5_000)
+    context.edits.end_sensor_drag()
+
+
 def test_another_recording_replaces_work_under_way(context, qtbot, ball, tmp_path):
     still = tmp_path / "still.npz"
     with np.load(ball) as data:
