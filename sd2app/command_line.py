@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -88,7 +89,12 @@ def _show(paths: Sequence[Path], screenshot: Path | None) -> int:
         )
     from sd2app.main import run as run_window
 
-    return run_window(paths, screenshot=screenshot)
+    # Qt's event loop gives Python no turn to raise KeyboardInterrupt.
+    previous = signal.signal(signal.SIGINT, signal.SIG_DFL)
+    try:
+        return run_window(paths, screenshot=screenshot)
+    finally:
+        signal.signal(signal.SIGINT, previous)
 
 
 def has_display(platform: str, environment: Mapping[str, str]) -> bool:

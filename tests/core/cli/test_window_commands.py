@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -97,6 +98,23 @@ def test_a_screenshot_that_cannot_be_written(
     outcome = sd2("open", plate, "--screenshot", tmp_path / name)
     assert (outcome.code, window) == (1, [])
     assert says in " ".join(outcome.err.split())
+
+
+def test_ctrl_c_ends_the_window(
+    sd2: Sd2, window: list, plate: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    handlers = []
+
+    def run(paths: list[Path], *, screenshot: Path | None = None) -> int:
+        handlers.append(signal.getsignal(signal.SIGINT))
+        return 0
+
+    before = signal.getsignal(signal.SIGINT)
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.setattr(sys.modules["sd2app.main"], "run", run)
+    assert sd2("open", plate).code == 0
+    assert handlers == [signal.SIG_DFL]
+    assert signal.getsignal(signal.SIGINT) is before
 
 
 def test_opening_nothing(sd2: Sd2, window: list, tmp_path: Path) -> None:
