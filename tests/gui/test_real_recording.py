@@ -1,0 +1,64 @@
+"""A real video with a fitted mesh, and a real radar capture, in the whole window."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sd2app.views.mesh_overlay import covered_pixels, project
+
+
+@pytest.fixture
+def walk(empty_window, shared_data, qtbot):
+    document = empty_window.context.document
+    with qtbot.waitSignal(document.opened, timeout=30_000):
+        empty_window.open_paths(
+            [shared_data / "video" / "walk.mkv", shared_data / "mesh" / "walk.npz"]
+        )
+    qtbot.waitUntil(lambda: empty_window.settled, timeout=60_000)
+    qtbot.waitUntil(lambda: empty_window.context.synthesis.complete, timeout=60_000)
+    return empty_window
+
+
+def test_the_mesh_lies_on_the_person(walk, qtbot):
+    c = walk.context
+    for frame in (20, 44, 70):
+        c.playback.seek_frame(frame)
+        qtbot.waitUntil(lambda frame=frame: c.video.shown_frame == frame, timeout=10_000)
+        red, green, blue = (c.video.picture[:, :, k].astype(int) for k in range(3))
+        pullover = (red - blue > 90) & (red - green > 20)
+        height, width = pullover.shape
+        pixels = project(c.document.mesh.frame(frame), c.document.focal_px, width, height)
+        body = covered_pixels(pixels, c.document.mesh.faces, width, height)
+        # She wears the only thing of that orange. A pullover is wider than the body in it.
+        assert (pullover & body).sum() > 0.7 * pullover.sum()
+        assert body.sum() < 4 * pullover.sum()
+
+
+def test_the_sensor_drag_is_followed(walk, qtbot):
+    c = walk.context
+    before = c.synthetic.map.values.copy()
+    c.edits.begin_sensor_drag()
+    for step in range(10):
+        c.edits.drag_sensor((0.08 * step, 0.0, 0.0))
+        qtbot.wait(5)
+    qtbot.waitUntil(lambda: not np.array_equal(before, c.synthetic.map.values), timeout=5_000)
+    c.edits.end_sensor_drag()
+    qtbot.waitUntil(lambda: c.synthesis.complete, timeout=60_000)
+    assert c.document.undo_stack.count() == 1
+    assert walk.messages.text == ""
+
+
+def test_a_real_capture_shows_a_person_receding(empty_window, shared_data, qtbot):
+    c = empty_window.context
+    with qtbot.waitSignal(c.document.opened, timeout=30_000):
+        empty_window.open_paths([shared_data / "radar" / "infineon_people"])
+    assert c.real.title == "Real"
+    assert c.real.map.kind == "real"
+    assert c.synthetic.map is None
+    values, times_s = c.real.map.values, c.real.map.times_s
+    receding, approaching = values[:14].sum(axis=0), values[18:].sum(axis=0)
+    late = times_s > 1.8
+    assert (receding[late] > approaching[late]).mean() > 0.9
+    # Before it somebody stands there: nothing moves away faster than 0.25 m/s.
+    assert receding[times_s < 1.25].max() < 0.02 * receding[late].mean()
