@@ -68,7 +68,7 @@ def test_a_drag_back_to_the_start_is_no_step(document):
     assert document.undo_stack.count() == 0
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(moves=st.lists(st.one_of(positions, st.floats(-3, 3)), max_size=30))
 def test_undo_restores_every_former_state(moves, qapp, tmp_path_factory):
     document = DocumentModel(JobsModel())

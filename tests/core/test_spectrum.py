@@ -26,7 +26,7 @@ def map_of(values, **changes) -> DopplerMap:
     return DopplerMap(values=values, **given)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     hnp.arrays(np.float32, st.tuples(st.integers(2, 40), st.integers(1, 30)),
                elements=st.floats(0, 100, width=32))

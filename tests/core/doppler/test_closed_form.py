@@ -81,7 +81,7 @@ def test_time_reversal_flips_the_sign() -> None:
     assert np.abs(forward - reverse[::-1, ::-1]).max() <= 2 / mesh.vertex_count
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(
     shift=st.tuples(*[st.floats(-50, 50)] * 3),
     turn=st.floats(-3, 3),

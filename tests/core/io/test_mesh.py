@@ -56,7 +56,7 @@ def one_note(mesh: MeshSequence, text: str) -> None:
     chunk_bytes=st.sampled_from([1, 500, 2**21]),
     seed=st.integers(0, 99),
 )
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 def test_every_format_gives_back_what_was_saved(
     tmp_path_factory: pytest.TempPathFactory,
     frames: int,

@@ -109,7 +109,7 @@ def test_pickles_of_python_2_are_read(tmp_path: Path) -> None:
     protocol=st.sampled_from(list(PROTOCOLS)),
     fortran=st.booleans(),
 )
-@settings(deadline=None, max_examples=80)
+@settings(max_examples=80)
 def test_arrays_of_any_shape_survive(
     tmp_path_factory: pytest.TempPathFactory,
     array: tuple[str, list[int]],
@@ -317,7 +317,7 @@ def test_a_file_cut_short_is_named(tmp_path: Path, compression: Any) -> None:
 
 
 @given(st.binary(max_size=200), st.integers(0, 400))
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 def test_damage_gives_a_sentence_or_data(
     tmp_path_factory: pytest.TempPathFactory, noise: bytes, place: int
 ) -> None:
@@ -339,7 +339,7 @@ def test_damage_gives_a_sentence_or_data(
     ids=["zlib", "gzip", "bz2", "xz", "none"],
 )
 @given(content=st.binary(min_size=1, max_size=3000))
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 def test_compressions_are_recognised(compress: Callable[[bytes], bytes], content: bytes) -> None:
     content = b"\x80\x04" + content
     assert decompressed(io.BytesIO(compress(content))).read(10_000) == content
