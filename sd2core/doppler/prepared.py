@@ -95,18 +95,6 @@ class Block:
 
 
 @dataclass(eq=False)
-class BlockMask:
-    """Exact visibility of one block's frames from one place.
-
-    ``visible`` (n, V) holds the facing test where visibility cannot change the
-    map; ``done`` (n,) says which frames have been worked out.
-    """
-
-    visible: NDArray[np.uint8]
-    done: NDArray[np.bool_]
-
-
-@dataclass(eq=False)
 class PreparedMesh:
     """A mesh as the kernels take it, block by block.
 
@@ -200,31 +188,15 @@ class PreparedMesh:
         areas: NDArray[np.float32] = self.budget.get_or_make(("areas", block.index), make)
         return areas
 
-    def mask(self, block: Block, position_m: tuple[float, float, float]) -> BlockMask:
-        """Exact visibility from a place, as far as it has been worked out."""
-
-        def make() -> tuple[BlockMask, int]:
-            frames = block.stop - block.start
-            visible = np.zeros((frames, self.mesh.vertex_count), np.uint8)
-            return BlockMask(visible, np.zeros(frames, bool)), visible.nbytes
-
-        mask: BlockMask = self.budget.get_or_make(("mask", block.index, position_m), make)
-        return mask
-
-    def kept_mask(self, index: int, position_m: tuple[float, float, float]) -> BlockMask | None:
-        """Exact visibility from a place, if it is in memory."""
-        mask: BlockMask | None = self.budget.get(("mask", index, position_m))
-        return mask
-
     def velocities_vid2doppler(
-        self, block: Block, start: int, stop: int, sensor: NDArray[np.float64]
+        self, block: Block, rows: slice, sensor: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Vid2Doppler's velocities of the clip's frames ``start`` to ``stop``, (n, V)."""
+        """Vid2Doppler's velocities of some of a block's frames, (n, V)."""
         return vid2doppler.velocities(
             block.frames.positions,
             block.first_knot,
-            start,
-            stop,
+            block.start + rows.start,
+            block.start + rows.stop,
             self.mesh.frame_count,
             sensor,
             self.mesh.timebase.frames_per_s,

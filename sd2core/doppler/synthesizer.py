@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from itertools import pairwise
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,33 +14,22 @@ from sd2core.compiled import compile_in_background, kernels_ready
 from sd2core.doppler import histogram, vid2doppler
 from sd2core.doppler.histogram import Counting, Counts
 from sd2core.doppler.kernels import ALL, CLIP, DROP, FACING, MASK, WRAP
+from sd2core.doppler.masks import Position, Quality, Visibility, VisibilityMasks
 from sd2core.doppler.options import PRESETS, SynthesisOptions
 from sd2core.doppler.parallel import Ticket, run_jobs
-from sd2core.doppler.prepared import Block, BlockMask, ByteBudget, PreparedMesh
+from sd2core.doppler.prepared import Block, ByteBudget, PreparedMesh
 from sd2core.doppler.smoothing import frames_within_reach, smooth_time, velocity_kernel
 from sd2core.errors import Sd2Error
 from sd2core.mesh import MeshSequence
 from sd2core.progress import Progress, silent
-from sd2core.scattering import exact_plain
-from sd2core.scattering.amplitude import range_weight
-from sd2core.scattering.exact import exact_visibility_kernel
 from sd2core.scattering.velocity import radial_velocity
-from sd2core.scattering.visibility import facing_kernel, facing_mask
 from sd2core.sensor import VirtualSensor
 from sd2core.spectrum import DopplerMap
 from sd2core.timebase import Timebase
 
-Visibility = Literal["none", "facing", "exact", "frozen"]
-"""``frozen``: the last exact visibility, kept while the sensor is dragged."""
-
-Quality = Literal["none", "facing", "exact", "frozen"]
-
 _MEMORY_BUDGET_BYTES = 512 << 20
 _FAST_FRAMES = 64
 _EXACT_FRAMES = 4
-_PLACES_KEPT = 4
-
-Position = tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,12 +119,8 @@ class Synthesizer:
             options.range_exponent,
             options.reference_range_m,
         )
-        live = np.ones(options.axis.bins + 1, np.uint8)
-        live[list(options.null_bins)] = 0
-        live[-1] = 0
-        self._live = live
+        self._masks = VisibilityMasks(self.prepared, self._counting)
         self._smooth_velocity = velocity_kernel(options.axis.bins, options.velocity_sigma_bins)
-        self._exact_at: dict[int, tuple[Position, ...]] = {}
 
     @property
     def unit(self) -> str:
@@ -263,7 +247,8 @@ class Synthesizer:
         points = frames.positions[frames.centre[local]]
         ray = points.astype(np.float64) - place[:, None]
         if self.options.velocity == "vid2doppler":
-            velocity = self.prepared.velocities_vid2doppler(block, index, index + 1, place)[0]
+            rows = slice(local, local + 1)
+            velocity = self.prepared.velocities_vid2doppler(block, rows, place)[0]
         else:
             middle = frames.before.shape[1] // 2
             velocity = radial_velocity(
@@ -272,7 +257,7 @@ class Synthesizer:
                 place,
                 frames.duration_s[local, middle],
             )
-        visible, quality = self._visible_in_frame(block, local, sensor.position_m, chosen)
+        visible, quality = self._masks.for_frame(block, local, sensor.position_m, chosen)
         return FrameScattering(
             velocity.astype(np.float32),
             np.sqrt((ray * ray).sum(axis=0)).astype(np.float32),
@@ -293,11 +278,11 @@ class Synthesizer:
         stop = self.mesh.frame_count if stop is None else stop
         parts = []
         for index, low, high in self._blocks_between(start, stop):
-            mask = self.prepared.kept_mask(index, sensor.position_m)
-            rows = self._rows(index, low, high)
-            if mask is None or not mask.done[rows].all():
+            base = index * self.prepared.block_frames
+            mask = self._masks.kept(index, slice(low - base, high - base), sensor.position_m)
+            if mask is None:
                 return None
-            parts.append(mask.visible[rows])
+            parts.append(mask)
         return np.concatenate(parts)
 
     # How frames become counts.
@@ -372,141 +357,23 @@ class Synthesizer:
             areas = self.prepared.areas(block)[rows]
             totals[:] = areas.sum(axis=1, dtype=np.float64)
 
-        mask: NDArray[np.uint8] | None = None
-        quality: Quality = visibility
-        if visibility == "exact":
-            mask = self._exact(block, rows, position_m).visible[rows]
-        elif visibility == "frozen":
-            kept = self._frozen(block.index, rows)
-            if kept is not None:
-                mask = kept.visible[rows]
-            else:
-                quality = "facing"
+        mask, quality = self._masks.for_rows(block, rows, position_m, visibility)
         which = MASK if mask is not None else FACING if quality == "facing" else ALL
         normals = self.prepared.normals(block)[rows] if which == FACING else None
 
+        frames = block.frames.rows(rows)
         if self.options.velocity == "vid2doppler":
-            self._count_vid2doppler(block, rows, place, which, normals, mask, areas, into)
+            velocity = self.prepared.velocities_vid2doppler(block, rows, place)
+            edges_mps = self.options.axis.edges_mps
+            vid2doppler.count(
+                frames, velocity, edges_mps, place, self._counting, normals, mask, areas, into
+            )
         else:
             count = histogram.count if kernels_ready() else histogram.count_plain
-            frames = block.frames.rows(rows)
             count(frames, place, self._counting, which, normals, mask, areas, into)
         return quality
 
-    def _count_vid2doppler(
-        self,
-        block: Block,
-        rows: slice,
-        place: NDArray[np.float64],
-        which: int,
-        normals: NDArray[np.int8] | None,
-        mask: NDArray[np.uint8] | None,
-        areas: NDArray[np.float32] | None,
-        into: Counts,
-    ) -> None:
-        bins, options = self.options.axis.bins, self.options
-        numbers, beyond = self._bins_vid2doppler(block, rows, place)
-        for row, knot in enumerate(block.frames.centre[rows]):
-            points = block.frames.positions[knot]
-            seen = np.ones(points.shape[1], bool)
-            if mask is not None:
-                seen = mask[row] > 0
-            elif normals is not None:
-                seen = facing_mask(points[None], normals[row : row + 1], place)[0] > 0
-            weight = np.ones(points.shape[1]) if areas is None else areas[row].astype(float)
-            if options.range_exponent:
-                distance = np.linalg.norm(points - place[:, None], axis=0)
-                weight *= range_weight(distance, options.range_exponent, options.reference_range_m)
-            into.visible[row] = seen.sum()
-            # With one frame there is no velocity, not a velocity of zero.
-            if self.mesh.frame_count > 1:
-                total = np.bincount(numbers[row][seen], weight[seen], bins + 1)
-                into.histogram[row] = total[:bins]
-                into.beyond[row] = (beyond[row] & seen).sum()
-
-    def _bins_vid2doppler(
-        self, block: Block, rows: slice, place: NDArray[np.float64]
-    ) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-        velocity = self.prepared.velocities_vid2doppler(
-            block, block.start + rows.start, block.start + rows.stop, place
-        )
-        return vid2doppler.place_in_bins(velocity, self.options.axis.edges_mps, self._counting)
-
-    # Visibility.
-
-    def _exact(self, block: Block, rows: slice, position_m: Position) -> BlockMask:
-        """The block's exact mask with these rows worked out."""
-        mask = self.prepared.mask(block, position_m)
-        others = [place for place in self._exact_at.get(block.index, ()) if place != position_m]
-        self._exact_at[block.index] = (position_m, *others[: _PLACES_KEPT - 1])
-        if mask.done[rows].all():
-            return mask
-        place = self.prepared.sensor(position_m)
-        needed = self._needed(block, rows, place)
-        points = block.frames.positions[block.frames.centre[rows]].astype(np.float32, copy=False)
-        normals = self.prepared.normals(block)[rows]
-        visible = _facing(points, normals, place)
-        self._test(points, place, needed, visible)
-        mask.visible[rows] = visible
-        mask.done[rows] = True
-        return mask
-
-    def _needed(self, block: Block, rows: slice, place: NDArray[np.float64]) -> NDArray[np.uint8]:
-        """Which vertices' visibility can change the map, uint8 (n, V)."""
-        if self.options.velocity == "vid2doppler":
-            return self._live[self._bins_vid2doppler(block, rows, place)[0]]
-        mark = histogram.mark_needed if kernels_ready() else histogram.mark_needed_plain
-        return mark(block.frames.rows(rows), place, self._counting, self._live)
-
-    def _test(
-        self,
-        points: NDArray[np.float32],
-        place: NDArray[np.float64],
-        needed: NDArray[np.uint8],
-        visible: NDArray[np.uint8],
-    ) -> None:
-        """Write the exact visibility of the needed vertices into ``visible``."""
-        faces = self.prepared.faces
-        if faces is None:
-            raise _no_surface(self.mesh, "Exact visibility")
-        if kernels_ready():
-            exact_visibility_kernel(points, faces, place, needed, 0, len(points), visible)
-            return
-        for t in np.flatnonzero(needed.any(axis=1)):
-            wanted = needed[t] > 0
-            seen = exact_plain.exact_visibility(points[t], faces, place, wanted)
-            visible[t][wanted] = seen[wanted]
-
-    def _frozen(self, index: int, rows: slice) -> BlockMask | None:
-        """The newest exact mask of a block in which these rows are complete.
-
-        Not simply the newest: a drag that goes on cancels what its pause began.
-        """
-        for position_m in self._exact_at.get(index, ()):
-            mask = self.prepared.kept_mask(index, position_m)
-            if mask is not None and mask.done[rows].all():
-                return mask
-        return None
-
-    def _visible_in_frame(
-        self, block: Block, local: int, position_m: Position, visibility: Visibility
-    ) -> tuple[NDArray[np.bool_], Quality]:
-        rows = slice(local, local + 1)
-        points = block.frames.positions[block.frames.centre[rows]].astype(np.float32, copy=False)
-        place = self.prepared.sensor(position_m)
-        if visibility == "none":
-            return np.ones(self.mesh.vertex_count, bool), "none"
-        if visibility == "exact":
-            visible = np.empty((1, self.mesh.vertex_count), np.uint8)
-            self._test(points, place, np.ones_like(visible), visible)
-            return visible[0] > 0, "exact"
-        kept = self._frozen(block.index, rows) if visibility == "frozen" else None
-        if kept is not None:
-            return kept.visible[local] > 0, "frozen"
-        normals = self.prepared.normals(block)[rows]
-        return _facing(points, normals, place)[0] > 0, "facing"
-
-    # Blocks and threads.
+    # Blocks.
 
     def _block_of(self, frame: int) -> Block:
         if not 0 <= frame < self.mesh.frame_count:
@@ -520,22 +387,6 @@ class Synthesizer:
             (index, max(start, index * size), min(stop, (index + 1) * size))
             for index in range(start // size, (stop - 1) // size + 1)
         ]
-
-    def _rows(self, index: int, start: int, stop: int) -> slice:
-        base = index * self.prepared.block_frames
-        return slice(start - base, stop - base)
-
-
-def _facing(
-    points: NDArray[np.float32], normals: NDArray[np.int8], place: NDArray[np.float64]
-) -> NDArray[np.uint8]:
-    if not kernels_ready():
-        return facing_mask(points, normals, place)
-    sx, sy, sz = place.astype(np.float32)
-    visible = np.empty((len(points), points.shape[2]), np.uint8)
-    for (x, y, z), (nx, ny, nz), row in zip(points, normals, visible, strict=True):
-        facing_kernel(x, y, z, nx, ny, nz, sx, sy, sz, row)
-    return visible
 
 
 def _no_surface(mesh: MeshSequence, wanted: str) -> Sd2Error:

@@ -14,9 +14,11 @@ from sd2core.doppler import (
     SynthesisOptions,
     Synthesizer,
     histogram,
+    masks,
     prepared,
     synthesizer,
 )
+from sd2core.doppler.masks import VisibilityMasks
 from sd2core.errors import Sd2Error
 from sd2core.mesh import MeshSequence
 from sd2core.scattering.amplitude import range_weight, vertex_areas
@@ -95,7 +97,7 @@ def test_plain_form_gives_the_same(
     mesh = wobbling(10)
     chosen = options(visibility=visibility, **changes)
     compiled = Synthesizer(mesh, chosen).stretch(SENSOR, 0, 10)
-    for module in (synthesizer, prepared):
+    for module in (synthesizer, prepared, masks):
         monkeypatch.setattr(module, "kernels_ready", lambda: False)
     asked: list[bool] = []
     monkeypatch.setattr(synthesizer, "compile_in_background", lambda: asked.append(True))
@@ -119,18 +121,20 @@ def test_testing_only_what_matters_changes_nothing(
     chosen = replace(PRESETS[preset], beyond=beyond, axis=VelocityAxis(32, 0.8))
     sparing = Synthesizer(mesh, chosen)
     tested: list[float] = []
-    original = Synthesizer._needed
+    original = VisibilityMasks._needed
 
-    def spy(self: Synthesizer, *arguments: Any) -> Any:
+    def spy(self: VisibilityMasks, *arguments: Any) -> Any:
         needed = original(self, *arguments)
         tested.append(needed.mean())
         return needed
 
-    monkeypatch.setattr(Synthesizer, "_needed", spy)
+    monkeypatch.setattr(VisibilityMasks, "_needed", spy)
     values = sparing.map(SENSOR).values
     assert 0 < np.mean(tested) < 0.99
     monkeypatch.setattr(
-        Synthesizer, "_needed", lambda self, *arguments: np.ones_like(original(self, *arguments))
+        VisibilityMasks,
+        "_needed",
+        lambda self, *arguments: np.ones_like(original(self, *arguments)),
     )
     np.testing.assert_array_equal(Synthesizer(mesh, chosen).map(SENSOR).values, values)
 
@@ -139,14 +143,14 @@ def test_a_still_frame_needs_no_test(monkeypatch: pytest.MonkeyPatch) -> None:
     vertices, faces = plate()
     mesh = moving(vertices, faces, np.tile([0.0, 0.0, 2.0], (5, 1)), np.arange(5) / 30)
     needed: list[int] = []
-    original = Synthesizer._needed
+    original = VisibilityMasks._needed
 
-    def spy(self: Synthesizer, *arguments: Any) -> Any:
+    def spy(self: VisibilityMasks, *arguments: Any) -> Any:
         marks = original(self, *arguments)
         needed.append(int(marks.sum()))
         return marks
 
-    monkeypatch.setattr(Synthesizer, "_needed", spy)
+    monkeypatch.setattr(VisibilityMasks, "_needed", spy)
     assert not Synthesizer(mesh).map(CAMERA).values.any()
     assert needed
     assert not any(needed)

@@ -13,6 +13,7 @@ import zarr
 from doppler_scenes import CAMERA, options, sensor_at, wobbling
 
 from sd2core.doppler import PRESETS, Synthesizer
+from sd2core.doppler.masks import VisibilityMasks
 from sd2core.doppler.parallel import run_jobs
 from sd2core.doppler.prepared import ByteBudget
 from sd2core.mesh import MeshSequence
@@ -174,7 +175,7 @@ def test_exact_visibility_is_kept_per_sensor_position(monkeypatch: pytest.Monkey
     def never(*arguments: Any) -> None:
         raise AssertionError("worked out again")
 
-    monkeypatch.setattr(Synthesizer, "_test", never)
+    monkeypatch.setattr(VisibilityMasks, "_test", never)
     np.testing.assert_array_equal(maker.map(NEAR).values, first)
 
 
