@@ -14,7 +14,7 @@ from sd2core.io.video import VideoReader
 
 
 class VideoModel(QObject):
-    """Follows the clock; a frame that is overtaken by a newer one is never shown."""
+    """Follows the clock: one picture at a time is decoded, then the newest wanted one."""
 
     frame_changed = Signal()
     failed = Signal(str)
@@ -72,9 +72,9 @@ class VideoModel(QObject):
         if frame == self._wanted:
             return
         self._wanted = frame
-        if self._runner.busy and self._playback.playing:
-            return
-        self._request(frame)
+        # One picture at a time: cancelling would show none while scrubbing fast.
+        if not self._runner.busy:
+            self._request(frame)
 
     def _request(self, frame: int) -> None:
         reader = self._reader
