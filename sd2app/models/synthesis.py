@@ -10,26 +10,24 @@ from typing import Any
 import numpy as np
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from sd2app.jobs.latest import Emit, LatestRunner
-from sd2app.models.canvas import FINAL, RANK, Canvas, View, pieces
+from sd2app.jobs.latest import LatestRunner
+from sd2app.models.canvas import FINAL, RANK, Canvas, View
 from sd2app.models.content import reference_of
 from sd2app.models.document import DocumentModel
 from sd2app.models.jobs import Job, JobsModel
 from sd2app.models.playback import PlaybackModel
+from sd2app.models.refine import Part, refine, sweep
 from sd2app.models.sensor import SensorModel
 from sd2app.models.tracks import TrackModel
 from sd2app.models.visible_span import VisibleSpanModel
 from sd2core.compiled import compile_in_background, kernels_ready
 from sd2core.doppler.options import PRESETS
-from sd2core.doppler.synthesizer import FrameScattering, Stretch, Synthesizer, Visibility
+from sd2core.doppler.synthesizer import FrameScattering, Synthesizer, Visibility
 from sd2core.errors import Sd2Error
 from sd2core.progress import Cancelled
-from sd2core.sensor import Vector, VirtualSensor
+from sd2core.sensor import Vector
 from sd2core.spectrum import DopplerMap
 
-_AT_ONCE = 12_000_000
-"""Vertices times frames that are swept in one go (about 30 ms) while dragging."""
-_EXACT_PARTS = 16
 _COMPILER_POLL_MS = 500
 _REST_MS = 300
 """A hand that holds the sensor still for so long is at rest."""
@@ -52,16 +50,6 @@ class Readout:
     torso_range_m: float
     visible_share: float
     beyond_share: float
-
-
-@dataclass(frozen=True, eq=False)
-class _Part:
-    """A computed stretch on its way to the window."""
-
-    sensor: VirtualSensor
-    start: int
-    stretch: Stretch
-    synthesizer: Synthesizer
 
 
 class SynthesisModel(QObject):
@@ -257,16 +245,8 @@ class SynthesisModel(QObject):
         self._end_job()
         self._again, self._sweeping = False, True
         synthesizer, sensor = self._synthesizer, self._sensor.sensor
-        start, stop = self._frames_in_view()
-        if synthesizer.mesh.vertex_count * self._canvas.frames <= _AT_ONCE:
-            start, stop = 0, self._canvas.frames
-        rough = self._rough()
-
-        def work(emit: Emit) -> _Part:
-            stretch = synthesizer.stretch(sensor, start, stop, rough)
-            return _Part(sensor, start, stretch, synthesizer)
-
-        self._runner.submit(work)
+        view, rough = self._frames_in_view(), self._rough()
+        self._runner.submit(lambda emit: sweep(synthesizer, sensor, view, rough))
 
     def _settle(self) -> None:
         """Rough where nothing is known yet, then exact; the stretch in view first."""
@@ -280,38 +260,14 @@ class SynthesisModel(QObject):
         if rank.min() >= FINAL:
             return
         view, rough = self._frames_in_view(), self._rough()
-        final = synthesizer.options.visibility
-        rough_size = max(_AT_ONCE // synthesizer.mesh.vertex_count, 64)
-        exact_size = min(max(len(rank) // _EXACT_PARTS, 8), max(rough_size // 16, 8))
-        total = int((rank < FINAL).sum())
-        refining = final != "exact" or not self._compiling
-        if refining:
+        to_the_end = synthesizer.options.visibility != "exact" or not self._compiling
+        if to_the_end:
             self._job = self._jobs.start("Exact visibility", self._cancel)
-
-        def work(emit: Emit) -> None:
-            def check(*_: int) -> None:
-                emit(None)
-
-            done = 0
-
-            def run(below: int, view: View, size: int, visibility: Visibility) -> None:
-                nonlocal done
-                for start, stop in pieces(rank, below, *view, size):
-                    stretch = synthesizer.stretch(sensor, start, stop, visibility, check)
-                    rank[start:stop] = RANK[stretch.quality]
-                    emit(_Part(sensor, start, stretch, synthesizer))
-                    if visibility == final:
-                        done += stop - start
-                        emit((done, total))
-
-            # What is on screen first, at once and then exactly; then what follows it.
-            for part in (view, (view[1], len(rank)), (0, view[0])):
-                if rough != final:
-                    run(RANK["facing"], part, rough_size, rough)
-                if refining:
-                    run(FINAL, part, exact_size, final)
-
-        self._runner.submit(work)
+        self._runner.submit(
+            lambda emit: refine(
+                synthesizer, sensor, rank, view, rough, to_the_end=to_the_end, emit=emit
+            )
+        )
 
     def _reorder(self) -> None:
         start, stop = self._frames_in_view()
@@ -339,13 +295,13 @@ class SynthesisModel(QObject):
     # --- results --------------------------------------------------------------------------
 
     def _receive(self, result: Any) -> None:
-        if isinstance(result, _Part):
+        if isinstance(result, Part):
             self._take(result)
         elif self._job is not None:
             self._jobs.report(self._job, *result)
 
     def _finish(self, result: Any) -> None:
-        if isinstance(result, _Part):
+        if isinstance(result, Part):
             self._take(result)
         self._sweeping = False
         self._end_job()
@@ -354,7 +310,7 @@ class SynthesisModel(QObject):
         elif self.complete:
             self.completed.emit()
 
-    def _take(self, part: _Part) -> None:
+    def _take(self, part: Part) -> None:
         if part.synthesizer is not self._synthesizer:
             return
         self._canvas.paint(part.sensor, part.start, part.stretch)

@@ -30,7 +30,7 @@ def failing(error: BaseException) -> argparse.ArgumentParser:
     [
         (Sd2Error("a.npz is empty", "a mesh", "Fit it"), 1, "a.npz is empty. Expected: a mesh."),
         (KeyboardInterrupt(), 130, "interrupted"),
-        (PermissionError(13, "Permission denied", "/root/a.npz"), 1, "/root/a.npz: Permission"),
+        (PermissionError(13, "Permission denied", "/data/a.npz"), 1, "/data/a.npz: Permission"),
         (MemoryError("Unable to allocate 9 TiB"), 1, "not enough memory"),
         (ZeroDivisionError("division by zero"), 1, "Please report it"),
     ],
