@@ -26,8 +26,6 @@ class Canvas:
     Parameters
     ----------
     values : float32 array, shape (bins, T)
-    visible, beyond : float32 arrays, shape (T,)
-        Shares per frame.
     rank : uint8 array, shape (T,)
         See :data:`RANK`.
     sensor : VirtualSensor or None
@@ -35,8 +33,6 @@ class Canvas:
     """
 
     values: NDArray[np.float32]
-    visible: NDArray[np.float32]
-    beyond: NDArray[np.float32]
     rank: NDArray[np.uint8]
     sensor: VirtualSensor | None = None
 
@@ -45,8 +41,6 @@ class Canvas:
         """Nothing known."""
         return cls(
             np.zeros((bins, frames), np.float32),
-            np.zeros(frames, np.float32),
-            np.zeros(frames, np.float32),
             np.zeros(frames, np.uint8),
         )
 
@@ -72,8 +66,6 @@ class Canvas:
             self.rank[:] = 0
         inside = slice(start, start + stretch.values.shape[1])
         self.values[:, inside] = stretch.values
-        self.visible[inside] = stretch.visible_share
-        self.beyond[inside] = stretch.beyond_share
         self.rank[inside] = RANK[stretch.quality]
 
     def ranks_for(self, sensor: VirtualSensor) -> NDArray[np.uint8]:

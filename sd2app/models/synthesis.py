@@ -148,15 +148,15 @@ class SynthesisModel(QObject):
 
     def readout(self) -> Readout | None:
         """Numbers beside the sensor, None without a mesh on screen."""
-        index, torso = self._mesh_frame(), self.torso_m
-        canvas = self._canvas
-        if index is None or torso is None or not (canvas.frames and canvas.rank[index]):
+        frame, torso = self.frame, self.torso_m
+        if frame is None or torso is None:
             return None
         offset = np.subtract(self._sensor.sensor.position_m, torso)
+        seen = np.abs(frame.velocity_mps[frame.visible])
         return Readout(
             torso_range_m=float(np.linalg.norm(offset)),
-            visible_share=float(canvas.visible[index]),
-            beyond_share=float(canvas.beyond[index]),
+            visible_share=float(frame.visible.mean()),
+            beyond_share=float((seen > self.v_max_mps).mean()) if seen.size else 0.0,
         )
 
     # --- requests -------------------------------------------------------------------------
