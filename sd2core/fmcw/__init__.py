@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from sd2core.fmcw.chain import ProcessingOptions
+from sd2core.fmcw.options import Mirror, WaveOptions
 from sd2core.fmcw.processing import RangeDoppler, doppler_map, limits, range_doppler
 from sd2core.fmcw.signal import Reflector, SignalOptions, capture_scene, simulate_capture
+from sd2core.fmcw.simulation import simulate_radar
 
 __all__ = [
+    "Mirror",
     "ProcessingOptions",
     "RangeDoppler",
     "Reflector",
     "SignalOptions",
+    "WaveOptions",
     "capture_scene",
     "doppler_map",
     "limits",
     "range_doppler",
     "simulate_capture",
+    "simulate_radar",
 ]

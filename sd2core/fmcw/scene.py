@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -143,6 +145,7 @@ class MeshScene:
         self._faces = mesh.faces
         self._first = 0
         self._block = np.empty((0, mesh.vertex_count, 3))
+        self._reading = threading.Lock()
 
     def frame_times_s(self) -> NDArray[np.float64]:
         """Times of the radar frames that fit into the mesh, from its first frame on."""
@@ -154,6 +157,12 @@ class MeshScene:
 
     def at(self, time_s: float) -> Scatterers:
         """Facets at an instant, moving with the central difference over two mesh frames."""
+        position, velocity = self.moving(time_s)
+        visible = self.visible(time_s)
+        return facet_scatterers(position, velocity, self._faces, self.sensor, self.config, visible)
+
+    def moving(self, time_s: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Vertices at an instant and their velocity, (V, 3) each; from any thread."""
         half_s = self.mesh.timebase.frame_duration_s
         first, last = float(self.mesh.times_s[0]), float(self.mesh.times_s[-1])
         before, after = max(time_s - half_s, first), min(time_s + half_s, last)
@@ -161,10 +170,45 @@ class MeshScene:
         velocity = np.zeros_like(position)
         if after > before:
             velocity = (self._vertices(after) - self._vertices(before)) / (after - before)
-        visible = None
-        if self.visibility is not None:
-            visible = np.asarray(self.visibility[self.mesh.timebase.nearest_frame(time_s)])
-        return facet_scatterers(position, velocity, self._faces, self.sensor, self.config, visible)
+        return position, velocity
+
+    def visible(self, time_s: float) -> NDArray[np.bool_] | None:
+        """Facets that nothing hides, (F,); None when that was not looked at."""
+        if self.visibility is None:
+            return None
+        return np.asarray(self.visibility[self.mesh.timebase.nearest_frame(time_s)])
+
+    def between(self, times_s: NDArray[np.float64]) -> Iterator[tuple[NDArray[np.float64], ...]]:
+        """Vertices and velocity at every time on a smooth path through the mesh's frames.
+
+        Cubic Hermite with the central differences of the frames (Catmull-Rom);
+        still before the first and after the last frame.
+        """
+        times = self.mesh.times_s
+        if len(times) == 1:
+            still = self._frame(0)
+            yield from ((still, np.zeros_like(still)) for _ in times_s)
+            return
+        for time_s in np.clip(times_s, times[0], times[-1]):
+            left = int(np.clip(np.searchsorted(times, time_s) - 1, 0, len(times) - 2))
+            step_s = times[left + 1] - times[left]
+            u = (time_s - times[left]) / step_s
+            a, b = self._frame(left), self._frame(left + 1)
+            slope_a, slope_b = step_s * self._slope(left), step_s * self._slope(left + 1)
+            change = b - a
+            bend = slope_a + slope_b - 2.0 * change
+            turn = change - slope_a - bend
+            position = a + u * (slope_a + u * (turn + u * bend))
+            yield position, (slope_a + u * (2.0 * turn + 3.0 * u * bend)) / step_s
+
+    def _slope(self, index: int) -> NDArray[np.float64]:
+        """Central difference of the frames around one, one-sided at the ends."""
+        low, high = max(index - 1, 0), min(index + 1, self.mesh.frame_count - 1)
+        times = self.mesh.times_s
+        slope: NDArray[np.float64] = (self._frame(high) - self._frame(low)) / (
+            times[high] - times[low]
+        )
+        return slope
 
     def _vertices(self, time_s: float) -> NDArray[np.float64]:
         times = self.mesh.times_s
@@ -180,10 +224,23 @@ class MeshScene:
         return (1.0 - share) * self._frame(right - 1) + share * self._frame(right)
 
     def _frame(self, index: int) -> NDArray[np.float64]:
-        if not self._first <= index < self._first + len(self._block):
-            # A few frames back, because a velocity reaches back.
-            self._first = max(index - 4, 0)
-            stop = min(self._first + _BLOCK_FRAMES, self.mesh.frame_count)
-            self._block = self.mesh.read(self._first, stop).astype(np.float64)
-        frame: NDArray[np.float64] = self._block[index - self._first]
-        return frame
+        with self._reading:
+            if not self._first <= index < self._first + len(self._block):
+                # A few frames back, because a velocity reaches back.
+                first = max(index - 4, 0)
+                stop = min(first + _BLOCK_FRAMES, self.mesh.frame_count)
+                block = self.mesh.read(first, stop).astype(np.float64)
+                self._refuse_missing(block, first)
+                self._first, self._block = first, block
+            frame: NDArray[np.float64] = self._block[index - self._first]
+            return frame
+
+    def _refuse_missing(self, block: NDArray[np.float64], first: int) -> None:
+        bad = ~np.isfinite(block)
+        if bad.any():
+            frame, vertex, _ = np.argwhere(bad)[0]
+            raise Sd2Error(
+                f"{self.mesh.source or 'The mesh'}: vertex {vertex} of frame {first + frame} is"
+                f" at {block[frame, vertex]}",
+                "finite coordinates",
+            )

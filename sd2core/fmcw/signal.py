@@ -152,8 +152,7 @@ def capture_scene(
     Other parameters and the result are those of :func:`simulate_capture`.
     """
     sensor, options = sensor or VirtualSensor(), options or SignalOptions()
-    if config.adc_bits > 16:
-        raise Sd2Error(f"The converter has {config.adc_bits} bits", "16 or fewer")
+    check_converter(config)
     frames = len(times_s)
     shape = (config.receivers, config.chirps_per_frame, config.samples_per_chirp)
     signal = np.empty((frames, *shape))
@@ -162,7 +161,7 @@ def capture_scene(
         signal[frame] = echo(scatterers_at(float(time_s)), config, sensor)
     power = float(np.mean(signal**2))
     signal += _static(options, config, sensor)
-    samples, levels = _digitise(signal, power, config, options)
+    samples, levels = digitise(signal, power, config, options)
     progress(frames, frames)
     return RadarCapture(
         samples=samples,
@@ -176,7 +175,7 @@ def capture_scene(
                 # The name only: the folder says nothing on another machine.
                 "source": Path(source).name,
                 "sensor": asdict(sensor),
-                "options": asdict(options) | {"snr_db": _finite(options.snr_db)},
+                "options": asdict(options) | {"snr_db": finite_or_none(options.snr_db)},
                 "first_frame_s": float(times_s[0]),
                 "frame_time": "middle of the burst of chirps",
                 **levels,
@@ -265,7 +264,7 @@ def _static(
     return echo(point_scatterers(positions, (0.0, 0.0, 0.0), areas, sensor), config, sensor)
 
 
-def _digitise(
+def digitise(
     signal: NDArray[np.float64], power: float, config: RadarConfig, options: SignalOptions
 ) -> tuple[NDArray[np.uint16], dict[str, float]]:
     """Gain, thermal noise and rounding to converter counts around mid-scale."""
@@ -293,6 +292,12 @@ def _digitise(
     }
 
 
-def _finite(value: float) -> float | None:
+def check_converter(config: RadarConfig) -> None:
+    """Refuse what does not fit into uint16."""
+    if config.adc_bits > 16:
+        raise Sd2Error(f"The converter has {config.adc_bits} bits", "16 or fewer")
+
+
+def finite_or_none(value: float) -> float | None:
     """JSON has no infinity."""
     return value if math.isfinite(value) else None

@@ -1,0 +1,194 @@
+"""What of the physics a simulated FMCW signal contains."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+from sd2core.sensor import RadarConfig, Vector, VirtualSensor
+
+Model = Literal["nufft", "direct"]
+Motion = Literal["constant", "interpolated"]
+
+CONCRETE = -0.39
+"""Reflection at normal incidence, (1 - sqrt e) / (1 + sqrt e) with e = 5.24 for concrete
+(Recommendation ITU-R P.2040, valid from 1 to 100 GHz)."""
+
+
+@dataclass(frozen=True)
+class Mirror:
+    """A plane that reflects the wave: floor or wall, as an image of the sensor.
+
+    Parameters
+    ----------
+    point_m : tuple of 3 floats
+        Any point of the plane, camera frame.
+    normal : tuple of 3 floats
+        Across the plane; length and side do not matter.
+    reflection : float
+        Amplitude coefficient, from -1 to 1; the same for every angle.
+    """
+
+    point_m: Vector
+    normal: Vector
+    reflection: float = CONCRETE
+
+    def __post_init__(self) -> None:
+        values = (*self.point_m, *self.normal)
+        if len(values) != 6 or not all(map(math.isfinite, values)) or not any(self.normal):
+            raise Sd2Error(
+                f"The plane is given by the point {self.point_m} and the normal {self.normal}",
+                "three finite numbers each, and a normal that is not zero",
+            )
+        if not -1 <= self.reflection <= 1:
+            raise Sd2Error(f"The reflection coefficient is {self.reflection}", "-1 to 1")
+
+    @classmethod
+    def ground(cls, y_m: float, reflection: float = CONCRETE) -> Mirror:
+        """A floor ``y_m`` below the camera."""
+        return cls((0.0, y_m, 0.0), (0.0, 1.0, 0.0), reflection)
+
+    @classmethod
+    def wall(cls, z_m: float, reflection: float = CONCRETE) -> Mirror:
+        """A wall across the optical axis, ``z_m`` in front of the camera."""
+        return cls((0.0, 0.0, z_m), (0.0, 0.0, 1.0), reflection)
+
+
+@dataclass(frozen=True)
+class WaveOptions:
+    """How echoes are summed, and what they pass through.
+
+    Parameters
+    ----------
+    model : {"nufft", "direct"}
+        ``direct`` sums every facet at every sample in complex128 (the
+        reference); ``nufft`` is the same sum by a non-uniform FFT (Barnett,
+        Magland, af Klinteberg, SIAM J. Sci. Comput. 41, 2019) with a relative
+        error of 1e-9, once per block.
+    blocks : int
+        The ``nufft`` holds every facet's beat frequency over a block of chirps.
+        More blocks follow the change of range within a frame (range migration:
+        Richards, *Fundamentals of Radar Signal Processing*); with one block per
+        chirp nothing is left out.
+    coherent : bool
+        True: a smooth surface. Physical optics with linear phase on every
+        facet: amplitude A cos(theta) / R^2 times the closed-form mean phasor.
+        False: a rough one. Every facet has a random phase that stays with it,
+        and the constant-gamma power gamma A cos(theta) / R^4 (Skolnik, *Radar
+        Handbook*, ground echo), so that power does not depend on how finely the
+        surface is cut; gamma is set so that a facet of lambda^2 / 4 seen square
+        on echoes as it would smooth and small.
+    motion : {"constant", "interpolated"}
+        Within a frame: constant velocity, or vertices interpolated at every
+        chirp (cubic Hermite over the mesh's frames; the reference, one sum per
+        chirp).
+    receiver_offsets_m : tuple of positions
+        Receivers relative to the transmitter, which is at the sensor, in the
+        sensor's frame: x to its right, y down, z along the boresight. Empty:
+        half a wavelength apart, to its left and right.
+    beam_width_deg : float or None
+        Full width at half power of every antenna's cos^n power pattern about
+        the boresight, n = ln(1/2) / ln(cos(width / 2)); nothing behind it
+        (Balanis, *Antenna Theory*). None: isotropic.
+    mirror : Mirror or None
+        Two-ray propagation: out and back each directly or by the image
+        (Skolnik, *Introduction to Radar Systems*, propagation over a plane).
+        What is hidden from the sensor counts as hidden from its image.
+    """
+
+    model: Model = "nufft"
+    blocks: int = 1
+    coherent: bool = True
+    motion: Motion = "constant"
+    receiver_offsets_m: tuple[Vector, ...] = ()
+    beam_width_deg: float | None = None
+    mirror: Mirror | None = None
+
+    def __post_init__(self) -> None:
+        for name, choices in (("model", get_args(Model)), ("motion", get_args(Motion))):
+            if getattr(self, name) not in choices:
+                raise Sd2Error(f"{name} is {getattr(self, name)!r}", f"one of {', '.join(choices)}")
+        if self.blocks < 1:
+            raise Sd2Error(f"blocks is {self.blocks}", "1 or more")
+        for offset in self.receiver_offsets_m:
+            if len(offset) != 3 or not all(map(math.isfinite, offset)):
+                raise Sd2Error(f"A receiver is at {offset}", "three finite numbers in metres")
+        if self.beam_width_deg is not None and not 0 < self.beam_width_deg < 180:
+            raise Sd2Error(
+                f"The beam is {self.beam_width_deg} degrees wide", "between 0 and 180 degrees"
+            )
+
+    @property
+    def pattern_exponent(self) -> float:
+        """N of the power pattern cos^n; 0 is isotropic."""
+        if self.beam_width_deg is None:
+            return 0.0
+        return math.log(0.5) / math.log(math.cos(math.radians(0.5 * self.beam_width_deg)))
+
+
+@dataclass(frozen=True, eq=False)
+class Antenna:
+    """Where a wave leaves or arrives, (3,) each, and how much of it; maybe an image."""
+
+    position_m: NDArray[np.float64]
+    boresight: NDArray[np.float64]
+    gain: float = 1.0
+    image: bool = False
+
+    def mirrored(self, mirror: Mirror) -> Antenna:
+        """The image behind a plane."""
+        normal = np.asarray(mirror.normal, dtype=np.float64)
+        normal = normal / np.linalg.norm(normal)
+        above_m = (self.position_m - np.asarray(mirror.point_m)) @ normal
+        return Antenna(
+            self.position_m - 2.0 * above_m * normal,
+            self.boresight - 2.0 * (self.boresight @ normal) * normal,
+            self.gain * mirror.reflection,
+            image=True,
+        )
+
+
+def paths(
+    sensor: VirtualSensor, config: RadarConfig, options: WaveOptions
+) -> list[list[tuple[Antenna, Antenna]]]:
+    """For every receiver the pairs (transmitter, receiver) between which waves travel.
+
+    Raises
+    ------
+    Sd2Error
+        When receivers are placed, but not as many as the radar has.
+    """
+    offsets = np.array(options.receiver_offsets_m, dtype=np.float64).reshape(-1, 3)
+    if not options.receiver_offsets_m:
+        steps = np.arange(config.receivers) - 0.5 * (config.receivers - 1)
+        offsets = steps[:, None] * np.array([0.5 * config.wavelength_m, 0.0, 0.0])
+    if len(offsets) != config.receivers:
+        raise Sd2Error(
+            f"{len(offsets)} receivers are placed, and the radar has {config.receivers}",
+            "one offset per receiver",
+        )
+    boresight = np.asarray(sensor.boresight)
+    centre = np.asarray(sensor.position_m)
+    transmitters = _with_image(Antenna(centre, boresight), options.mirror)
+    found = []
+    for place in centre + offsets @ sensor_axes(sensor):
+        receivers = _with_image(Antenna(place, boresight), options.mirror)
+        found.append([(out, back) for out in transmitters for back in receivers])
+    return found
+
+
+def sensor_axes(sensor: VirtualSensor) -> NDArray[np.float64]:
+    """Rows: right of, below and along the boresight, in the camera frame, (3, 3)."""
+    azimuth = math.radians(sensor.azimuth_deg)
+    right = np.array([math.cos(azimuth), 0.0, -math.sin(azimuth)])
+    forward = np.asarray(sensor.boresight)
+    return np.stack([right, np.cross(forward, right), forward])
+
+
+def _with_image(antenna: Antenna, mirror: Mirror | None) -> list[Antenna]:
+    return [antenna] if mirror is None else [antenna, antenna.mirrored(mirror)]

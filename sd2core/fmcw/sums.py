@@ -1,0 +1,162 @@
+"""Summing many echoes to one frame of an FMCW signal: directly, or by a non-uniform FFT.
+
+An echo at range R that grows at rate r has, at time t_m of chirp m and t_n of
+sample n from the middles of frame and chirp, the phase
+2 pi (2 / c) (f_c (R + r (t_m + t_n)) + S (R + r t_m) t_n) after M. A. Richards,
+*Fundamentals of Radar Signal Processing*. It is bilinear in m and n. Without the
+product m n, the migration through range, it is a two-dimensional Fourier sum.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.fmcw.kernels import direct_sum
+from sd2core.sensor import SPEED_OF_LIGHT_MPS, RadarConfig
+
+NUFFT_TOLERANCE = 1e-9
+"""Relative to the norm of the amplitudes; 1e-6 would save a tenth of the time."""
+
+_TERMS_PER_STEP = 1_000_000
+"""Some 30 ms, after which a direct sum asks whether it is still wanted."""
+
+
+@dataclass(frozen=True, eq=False)
+class Echoes:
+    """What comes back to one receiver, (n,) each.
+
+    Parameters
+    ----------
+    range_m : float64 array
+        Half the path at the frame's middle.
+    rate_mps : float64 array
+        How fast that grows.
+    amplitude : complex128 array
+    """
+
+    range_m: NDArray[np.float64]
+    rate_mps: NDArray[np.float64]
+    amplitude: NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False)
+class _Turns:
+    """Phase in turns: start + m chirp + n sample + m n migration, (k,) each."""
+
+    start: NDArray[np.float64]
+    chirp: NDArray[np.float64]
+    sample: NDArray[np.float64]
+    migration: NDArray[np.float64]
+
+
+def direct(
+    echoes: Echoes,
+    config: RadarConfig,
+    chirps: int | None = None,
+    go_on: Callable[[], None] | None = None,
+) -> NDArray[np.complex128]:
+    """Sum of every echo at every sample, (chirps, samples): the reference.
+
+    Parameters
+    ----------
+    chirps : int or None
+        How many around the middle; the radar's own.
+    go_on : callable or None
+        Called every few ten milliseconds; may raise to stop.
+    """
+    turns = _turns(echoes, config)
+    shape = (chirps or config.chirps_per_frame, config.samples_per_chirp)
+    total = np.zeros(shape, np.complex128)
+    count = len(echoes.amplitude)
+    step = max(1, _TERMS_PER_STEP // total.size)
+    for start in range(0, count, step):
+        if go_on is not None:
+            go_on()
+        direct_sum(
+            turns.start,
+            turns.chirp,
+            turns.sample,
+            turns.migration,
+            echoes.amplitude,
+            start,
+            min(start + step, count),
+            -0.5 * (shape[0] - 1),
+            -0.5 * shape[1],
+            total,
+        )
+    return total
+
+
+def nufft(
+    echoes: Echoes,
+    config: RadarConfig,
+    blocks: int = 1,
+    chirps: int | None = None,
+    tolerance: float = NUFFT_TOLERANCE,
+) -> NDArray[np.complex128]:
+    """The same sum by type-1 non-uniform FFTs on one thread, (chirps, samples).
+
+    Parameters
+    ----------
+    blocks : int
+        Stretches of chirps with a beat frequency of their own; no more than
+        there are chirps. What one block leaves out of the phase at its ends is
+        2 pi (2 / c) S r t_m t_n.
+    chirps : int or None
+        How many around the middle; the radar's own.
+    tolerance : float
+        Relative error of the sums.
+    """
+    import finufft
+
+    turns = _turns(echoes, config)
+    chirps = chirps or config.chirps_per_frame
+    samples = config.samples_per_chirp
+    total = np.zeros((chirps, samples), np.complex128)
+    if not len(echoes.amplitude):
+        return total
+    along_chirps = _angle(turns.chirp)
+    edges = np.linspace(0, chirps, min(blocks, chirps) + 1).round().astype(int)
+    for first, last in itertools.pairwise(edges):
+        length = int(last - first)
+        middle = 0.5 * (first + last - 1) - 0.5 * (chirps - 1)
+        sample = turns.sample + middle * turns.migration
+        # Modes count from -(length // 2); chirps from -(length - 1) / 2, samples from
+        # -samples / 2.
+        start = turns.start + (middle + length // 2 - 0.5 * (length - 1)) * turns.chirp
+        start += (samples // 2 - 0.5 * samples) * sample
+        total[first:last] = finufft.nufft2d1(
+            along_chirps,
+            _angle(sample),
+            echoes.amplitude * np.exp(1j * _angle(start)),
+            (length, samples),
+            eps=tolerance,
+            isign=1,
+            nthreads=1,
+        )
+    return total
+
+
+def _turns(echoes: Echoes, config: RadarConfig) -> _Turns:
+    per_metre = 2.0 / SPEED_OF_LIGHT_MPS
+    carrier = 2.0 / config.wavelength_m
+    per_sample_s = 1.0 / config.sample_rate_hz
+    slope = per_metre * config.slope_hz_per_s * per_sample_s
+    start = carrier * echoes.range_m
+    return _Turns(
+        start - np.floor(start),
+        carrier * config.chirp_repetition_s * echoes.rate_mps,
+        slope * echoes.range_m + carrier * per_sample_s * echoes.rate_mps,
+        slope * config.chirp_repetition_s * echoes.rate_mps,
+    )
+
+
+def _angle(turns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Radians within half a turn of 0."""
+    angle: NDArray[np.float64] = 2.0 * np.pi * (turns - np.rint(turns))
+    return angle

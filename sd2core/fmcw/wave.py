@@ -1,0 +1,199 @@
+"""What the waves of one radar do with a moving mesh: echoes on every path, summed up."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+from sd2core.fmcw.kernels import facet_echoes
+from sd2core.fmcw.options import Antenna, WaveOptions, paths
+from sd2core.fmcw.scene import NEAREST_M, MeshScene
+from sd2core.fmcw.signal import Reflector
+from sd2core.fmcw.sums import Echoes, direct, nufft
+from sd2core.mesh import MeshSequence
+from sd2core.sensor import RadarConfig, VirtualSensor
+
+GoOn = Callable[[], None]
+"""Called every few ten milliseconds; raises when the result is no longer wanted."""
+
+_NO_PLANE = np.array([0.0, 0.0, 0.0, 1.0])
+
+
+class WaveScene:
+    """A moving mesh, one radar, and everything waves do between them.
+
+    Parameters
+    ----------
+    mesh : MeshSequence
+        Must have faces.
+    config : RadarConfig
+    sensor : VirtualSensor
+        Transmitter and boresight.
+    visibility : bool array, shape (T, F), or "facing"
+        Per mesh frame, the facets that nothing hides from the sensor.
+    wave : WaveOptions
+    seed : int
+        Of the random phases of a rough surface.
+    """
+
+    def __init__(
+        self,
+        mesh: MeshSequence,
+        config: RadarConfig,
+        sensor: VirtualSensor,
+        visibility: NDArray[np.bool_] | Literal["facing"] = "facing",
+        wave: WaveOptions | None = None,
+        seed: int = 0,
+    ) -> None:
+        self.scene = MeshScene(mesh, config, sensor, visibility)
+        self.config = config
+        self.wave = wave or WaveOptions()
+        self.paths = paths(sensor, config, self.wave)
+        faces = mesh.faces
+        assert faces is not None  # MeshScene refuses a mesh without
+        self.faces = faces
+        self._all = np.ones(len(faces), np.bool_)
+        self._plane = self._oriented_plane(sensor)
+        self._random: NDArray[np.complex128] | None = None
+        if not self.wave.coherent:
+            # Three words, so that no frame's noise has the same stream.
+            turns = np.random.default_rng([seed, 0, 1]).random(len(faces))
+            self._random = np.exp(2j * np.pi * turns)
+
+    def frame(self, time_s: float, go_on: GoOn | None = None) -> NDArray[np.float64]:
+        """Beat signal of the frame around a time, (receivers, chirps, samples)."""
+        visible = self.scene.visible(time_s)
+        chirps = self.config.chirps_per_frame
+        if self.wave.motion == "constant":
+            return self._signal(*self.scene.moving(time_s), visible, chirps, go_on)
+        places = np.arange(chirps, dtype=np.float64) - 0.5 * (chirps - 1)
+        rows = [
+            self._signal(position, velocity, visible, 1, go_on)
+            for position, velocity in self.scene.between(
+                time_s + places * self.config.chirp_repetition_s
+            )
+        ]
+        return np.concatenate(rows, axis=1)
+
+    def echoes(
+        self,
+        position_m: NDArray[np.float64],
+        velocity_mps: NDArray[np.float64],
+        visible: NDArray[np.bool_] | None,
+        receiver: int = 0,
+    ) -> Echoes:
+        """What one receiver gets back from every facet on every path."""
+        parts = [
+            self._facets(position_m, velocity_mps, visible, out, back)
+            for out, back in self.paths[receiver]
+        ]
+        return parts[0] if len(parts) == 1 else _joined(parts)
+
+    def static(self, reflectors: tuple[Reflector, ...]) -> NDArray[np.float64]:
+        """Beat signal of points that stand still, (receivers, chirps, samples)."""
+        config = self.config
+        found = np.zeros((config.receivers, config.chirps_per_frame, config.samples_per_chirp))
+        if reflectors:
+            for receiver, pairs in enumerate(self.paths):
+                parts = [self._points(reflectors, out, back) for out, back in pairs]
+                found[receiver] = direct(_joined(parts), self.config).real
+        return found
+
+    def _signal(
+        self,
+        position_m: NDArray[np.float64],
+        velocity_mps: NDArray[np.float64],
+        visible: NDArray[np.bool_] | None,
+        chirps: int,
+        go_on: GoOn | None,
+    ) -> NDArray[np.float64]:
+        signal = np.empty((len(self.paths), chirps, self.config.samples_per_chirp))
+        for receiver in range(len(self.paths)):
+            if go_on is not None:
+                go_on()
+            echoes = self.echoes(position_m, velocity_mps, visible, receiver)
+            if self.wave.model == "direct":
+                total = direct(echoes, self.config, chirps, go_on)
+            else:
+                total = nufft(echoes, self.config, self.wave.blocks, chirps)
+            signal[receiver] = total.real
+        return signal
+
+    def _facets(
+        self,
+        position_m: NDArray[np.float64],
+        velocity_mps: NDArray[np.float64],
+        visible: NDArray[np.bool_] | None,
+        out: Antenna,
+        back: Antenna,
+    ) -> Echoes:
+        count = len(self.faces)
+        index = np.empty(count, np.int32)
+        range_m, rate_mps = np.empty(count), np.empty(count)
+        amplitude = np.empty(count, np.complex128)
+        found = facet_echoes(
+            position_m,
+            velocity_mps,
+            self.faces,
+            self._all if visible is None else visible,
+            np.concatenate([out.position_m, out.boresight]),
+            np.concatenate([back.position_m, back.boresight]),
+            self._plane if out.image or back.image else _NO_PLANE,
+            4.0 * np.pi / self.config.wavelength_m,
+            self.wave.pattern_exponent,
+            self.wave.coherent,
+            index,
+            range_m,
+            rate_mps,
+            amplitude,
+        )
+        strength = amplitude[:found] * (out.gain * back.gain)
+        if self._random is not None:
+            strength *= self._random[index[:found]]
+        return Echoes(range_m[:found], rate_mps[:found], strength)
+
+    def _points(self, reflectors: tuple[Reflector, ...], out: Antenna, back: Antenna) -> Echoes:
+        position = np.array([reflector.position_m for reflector in reflectors])
+        area = np.array([reflector.area_m2 for reflector in reflectors])
+        strength = area * (out.gain * back.gain)
+        range_m = np.zeros(len(area))
+        for antenna in (out, back):
+            away = position - antenna.position_m
+            distance_m = np.linalg.norm(away, axis=1)
+            range_m += 0.5 * distance_m
+            near_m = np.maximum(distance_m, NEAREST_M)
+            strength /= near_m
+            if self.wave.pattern_exponent > 0:
+                cosine = np.maximum(away @ antenna.boresight / near_m, 0.0)
+                strength *= cosine ** (0.5 * self.wave.pattern_exponent)
+        if out.image or back.image:
+            strength *= position @ self._plane[:3] + self._plane[3] > 0
+        return Echoes(range_m, np.zeros(len(area)), strength.astype(np.complex128))
+
+    def _oriented_plane(self, sensor: VirtualSensor) -> NDArray[np.float64]:
+        """The mirror as normal and offset, positive on the sensor's side."""
+        mirror = self.wave.mirror
+        if mirror is None:
+            return _NO_PLANE
+        normal = np.asarray(mirror.normal, dtype=np.float64)
+        normal = normal / np.linalg.norm(normal)
+        offset = -float(normal @ np.asarray(mirror.point_m))
+        side = float(normal @ np.asarray(sensor.position_m)) + offset
+        if side == 0.0:
+            raise Sd2Error(
+                f"The sensor at {sensor.position_m} lies in the reflecting plane",
+                "a sensor on one side of it",
+            )
+        return np.sign(side) * np.array([*normal, offset])
+
+
+def _joined(parts: list[Echoes]) -> Echoes:
+    return Echoes(
+        np.concatenate([part.range_m for part in parts]),
+        np.concatenate([part.rate_mps for part in parts]),
+        np.concatenate([part.amplitude for part in parts]),
+    )
