@@ -38,7 +38,7 @@ class ActionSet:
     def fill_menu_bar(self) -> QMenu:
         """Make the menus; returns the one for recent files, which the window fills."""
         bar = self._window.menuBar()
-        menus = {name: bar.addMenu(name) for name in _MENUS}
+        menus = {name: bar.addMenu(f"&{name}") for name in _MENUS}
         recent = QMenu("Open recent", menus["File"])
         for row in ACTIONS:
             if row.separator_before:

@@ -45,6 +45,19 @@ class Action:
     icon: str = ""
 
 
+MOUSE = (
+    ("Click or drag in a heatmap or the ruler", "Go to that time"),
+    ("Wheel over a heatmap", "Zoom in on time, about the pointer"),
+    ("Shift+wheel, middle drag", "Pan in time"),
+    ("Double click in a heatmap", "Show the whole recording"),
+    ("Drag the title of the radar's heatmap", "Align the capture in time"),
+    ("Drag the frame or its edges in the overview", "Pan or zoom in time"),
+    ("Drag the sensor in the scene", "Move it in the plane of the screen"),
+    ("Shift+drag, Ctrl+drag the sensor", "Move it vertically, or along the line to the body"),
+    ("Drag elsewhere, middle drag, wheel in the scene", "Turn, shift, zoom; double click resets"),
+)
+"""What the mouse does, for the list of keys."""
+
 ACTIONS: tuple[Action, ...] = (
     Action(
         "open", "File", "Open…", ("Ctrl+O",),
@@ -179,10 +192,9 @@ ACTIONS: tuple[Action, ...] = (
         lambda w: w.context.span.fit(), _has_content,
     ),
     Action(
-        "reset_reference", "View", "Set 0 dB to this placement", ("R",),
-        "Make the strongest bin of the synthetic map 0 dB",
-        lambda w: w.context.synthesis.reset_reference(),
-        lambda c: c.synthesis.complete,
+        "reset_reference", "View", "Set 0 dB to what is shown", ("R",),
+        "Make the strongest bin of each map 0 dB",
+        lambda w: w.context.reset_references(), _has_content,
     ),
     Action(
         "dark", "View", "Dark theme", ("Ctrl+D",), "Dark or light",

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from PySide6.QtGui import QUndoCommand
 
 from sd2app.models.document import DocumentModel
 from sd2app.models.sensor import SensorModel
 from sd2core.sensor import Vector, VirtualSensor, aimed_at
+
+if TYPE_CHECKING:
+    from sd2core.fmcw.processing import Clutter
 
 
 class _Assign(QUndoCommand):
@@ -102,6 +105,14 @@ class Edits:
                 self._before,
                 recording.radar_offset_s,
             )
+
+    # --- processing of the capture --------------------------------------------------------
+
+    def set_clutter(self, clutter: Clutter) -> None:
+        """Remove static echoes another way."""
+        before = self._document.clutter
+        self._document.set_clutter(clutter)
+        self._push("Choose clutter removal", self._document.set_clutter, before, clutter)
 
     def _push(
         self, text: str, assign: Callable[[Any], None], before: object, after: object

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from PySide6.QtCore import QObject
 
 from sd2app.commands import Edits
+from sd2app.models.content import reference_of
 from sd2app.models.display import DisplayModel
 from sd2app.models.document import DocumentModel
 from sd2app.models.jobs import JobsModel
@@ -36,6 +37,12 @@ class Context:
     real: TrackModel
     synthesis: SynthesisModel
     edits: Edits
+
+    def reset_references(self) -> None:
+        """Make the strongest bin of each map 0 dB."""
+        for track in (self.synthetic, self.real):
+            if track.map is not None:
+                track.set_reference(reference_of(track.map.values, track.map.null_bins))
 
     def close(self) -> None:
         """Stop every thread and let go of the files."""
@@ -91,8 +98,6 @@ def _take_over(context: Context) -> None:
 
 
 def _follow_capture(context: Context, new: bool = False) -> None:
-    from sd2app.models.content import reference_of
-
     document, real = context.document, context.real
     radar_map, recording = document.radar_map, document.recording
     if recording is not None:
@@ -100,6 +105,7 @@ def _follow_capture(context: Context, new: bool = False) -> None:
     if radar_map is real.map and not new:
         return
     real.title = "Radar (simulated)" if radar_map and radar_map.kind == "simulated" else "Real"
-    if radar_map is not None:
+    # Another way of removing clutter is compared against the same 0 dB.
+    if radar_map is not None and new:
         real.set_reference(reference_of(radar_map.values, radar_map.null_bins))
     real.set_map(radar_map)

@@ -37,7 +37,7 @@ LIGHT = Palette(
     real="#b4520b",
     hatch="#9aa1ab",
     warning="#a33a00",
-    overlay="#38a9ff",
+    overlay="#2fc6a8",
 )
 DARK = Palette(
     window="#17191d",
@@ -52,7 +52,7 @@ DARK = Palette(
     real="#f5a45a",
     hatch="#5a616c",
     warning="#ffb07a",
-    overlay="#38a9ff",
+    overlay="#2fc6a8",
 )
 
 

@@ -7,6 +7,12 @@ from pathlib import Path
 from sd2core.errors import Sd2Error
 
 _PACKAGE = Path(__file__).resolve().parent
+_FOLDERS = (_PACKAGE / "resources", _PACKAGE.parent / "resources")
+
+
+def is_bundled(path: Path) -> bool:
+    """Whether a path belongs to the program and must not be written to."""
+    return any(Path(path).resolve().is_relative_to(folder) for folder in _FOLDERS)
 
 
 def resource_path(name: str) -> Path:
@@ -15,12 +21,11 @@ def resource_path(name: str) -> Path:
     A wheel carries the resources inside the package; a checkout keeps them
     beside it.
     """
-    folders = (_PACKAGE / "resources", _PACKAGE.parent / "resources")
-    for folder in folders:
+    for folder in _FOLDERS:
         if (folder / name).exists():
             return folder / name
     raise Sd2Error(
-        f"The bundled file {name} is in neither {folders[0]} nor {folders[1]}",
+        f"The bundled file {name} is in neither {_FOLDERS[0]} nor {_FOLDERS[1]}",
         "an installation with its resources",
         "Install SD² Studio again",
     )

@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 )
 
 import sd2core
-from sd2app.actions import ACTIONS
+from sd2app.actions import ACTIONS, MOUSE
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
@@ -163,23 +163,15 @@ class KeysDialog(QDialog):
         grid.setHorizontalSpacing(24)
         grid.setVerticalSpacing(4)
         row = 0
-        menu = ""
-        for action in ACTIONS:
-            if not action.keys:
-                continue
-            if action.menu != menu:
-                menu = action.menu
-                title = QLabel(menu, inside)
-                title.setObjectName("title")
-                grid.addWidget(title, row, 0, 1, 2, Qt.AlignmentFlag.AlignBottom)
-                grid.setRowMinimumHeight(row, 28)
+        for title, lines in self._sections():
+            heading = QLabel(title, inside)
+            heading.setObjectName("title")
+            grid.addWidget(heading, row, 0, 1, 2, Qt.AlignmentFlag.AlignBottom)
+            grid.setRowMinimumHeight(row, 28)
+            for keys, meaning in lines:
                 row += 1
-            keys = ", ".join(
-                QKeySequence(key).toString(QKeySequence.SequenceFormat.NativeText)
-                for key in action.keys
-            )
-            grid.addWidget(QLabel(keys, inside), row, 0)
-            grid.addWidget(QLabel(action.tip, inside), row, 1)
+                grid.addWidget(QLabel(keys, inside), row, 0)
+                grid.addWidget(QLabel(meaning, inside), row, 1)
             row += 1
         scroll = QScrollArea(self)
         scroll.setWidget(inside)
@@ -189,4 +181,16 @@ class KeysDialog(QDialog):
         layout = QVBoxLayout(self)
         layout.addWidget(scroll)
         layout.addWidget(buttons)
-        self.resize(640, 640)
+        self.resize(800, 640)
+
+    @staticmethod
+    def _sections() -> list[tuple[str, list[tuple[str, str]]]]:
+        sections: dict[str, list[tuple[str, str]]] = {}
+        for action in ACTIONS:
+            if action.keys:
+                keys = ", ".join(
+                    QKeySequence(key).toString(QKeySequence.SequenceFormat.NativeText)
+                    for key in action.keys
+                )
+                sections.setdefault(action.menu, []).append((keys, action.tip))
+        return [*sections.items(), ("Mouse", list(MOUSE))]

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from sd2core.doppler.synthesizer import Quality, Stretch
 from sd2core.sensor import VirtualSensor
 
-RANK: dict[Quality, int] = {"facing": 1, "frozen": 2, "none": 3, "exact": 3}
-"""How good a frame is; 0 is not computed. ``none`` is final for a point cloud."""
+RANK: dict[Quality, int] = {"facing": 1, "frozen": 2, "none": 3, "depth": 3, "exact": 3}
+"""How good a frame is; 0 is not computed. ``none`` is final for a point cloud.
+
+``depth`` too is only ever asked for where the synthesizer's own options say so."""
 
 FINAL = 3
 

@@ -14,6 +14,7 @@ from sd2core.io.kinds import Kind, kind_of
 from sd2core.mesh import MeshSequence
 from sd2core.progress import Progress
 from sd2core.recording import Recording, open_recording
+from sd2core.resources import is_bundled
 from sd2core.sensor import VelocityAxis
 from sd2core.spectrum import DopplerMap
 from sd2core.timebase import Timebase
@@ -44,8 +45,8 @@ class Content:
 
     @property
     def saved(self) -> bool:
-        """Whether the recording has a folder on disk."""
-        return self.recording.folder != UNTITLED
+        """Whether the recording has a folder of its own that may be written to."""
+        return self.recording.folder != UNTITLED and not is_bundled(self.recording.folder)
 
     def close(self) -> None:
         """Release the video file."""
@@ -100,8 +101,17 @@ def load_content(recording: Recording, clutter: Clutter, progress: Progress) -> 
 
     problems: list[Sd2Error] = []
 
+    missing = recording.missing()
+    for role, path in missing.items():
+        problems.append(
+            Sd2Error(
+                f"The {role} is not at {path}",
+                remedy="File → Find missing files… looks for it in another folder",
+            )
+        )
+
     def attempt(present: object, read: Callable[[], Any]) -> Any:
-        if present is None:
+        if present is None or present in missing.values():
             return None
         try:
             return read()
@@ -135,12 +145,12 @@ def load_content(recording: Recording, clutter: Clutter, progress: Progress) -> 
     notes = [*recording.notes] if recording.folder != UNTITLED else []
     for part in parts:
         notes.extend(part.notes)
-    timebase = parts[0].timebase
-    if parts[0] is capture:
-        timebase = timebase.shifted(recording.radar_offset_s)
+    clocks = [part.timebase for part in (video, mesh) if part is not None]
+    if capture is not None:
+        clocks.append(capture.timebase.shifted(recording.radar_offset_s))
     return Content(
         recording=recording,
-        timebase=timebase,
+        timebase=common_clock(clocks),
         video=video,
         mesh=mesh,
         capture=capture,
@@ -148,6 +158,26 @@ def load_content(recording: Recording, clutter: Clutter, progress: Progress) -> 
         notes=tuple(notes),
         problems=tuple(str(problem) for problem in problems),
     )
+
+
+def common_clock(clocks: Sequence[Timebase]) -> Timebase:
+    """Frames of the first clock, and of the others where they reach beyond it.
+
+    A clock that does not touch the ones before it is left out: nobody wants to
+    play through the gap.
+    """
+    times_s = clocks[0].times_s
+    start_s, end_s = clocks[0].start_s, clocks[0].end_s
+    for clock in clocks[1:]:
+        if clock.end_s < start_s or clock.start_s > end_s:
+            continue
+        # Less than half a frame beyond the end is rounding, not another frame.
+        slack_s = 0.5 * clock.frame_duration_s
+        before = clock.times_s[clock.times_s < start_s - slack_s]
+        after = clock.times_s[clock.times_s > end_s - slack_s]
+        times_s = np.concatenate([before, times_s, after])
+        start_s, end_s = min(start_s, clock.start_s), max(end_s, clock.end_s)
+    return Timebase(times_s)
 
 
 def reference_of(values: np.ndarray, bins: Iterable[int] = ()) -> float:

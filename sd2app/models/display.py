@@ -79,7 +79,11 @@ class DisplayModel(QObject):
         """Change some of the levels."""
         levels = replace(self._levels, **changes)  # type: ignore[arg-type]
         if levels.high_db - levels.low_db < 1.0:
-            return
+            # The end that was moved pushes the other along.
+            if "low_db" in changes:
+                levels = replace(levels, high_db=levels.low_db + 1.0)
+            else:
+                levels = replace(levels, low_db=levels.high_db - 1.0)
         if levels != self._levels:
             self._levels = levels
             self.levels_changed.emit()

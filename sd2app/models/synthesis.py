@@ -39,6 +39,7 @@ _WORDS = {
 _FINAL_WORDS = {
     "none": "all vertices of the point cloud",
     "facing": "vertices facing the sensor",
+    "depth": "visibility by depth buffer",
     "exact": "exact visibility",
 }
 
@@ -187,11 +188,6 @@ class SynthesisModel(QObject):
             self._compiler_poll.start()
         self._announce()
         self._follow()
-
-    def reset_reference(self) -> None:
-        """Make the strongest bin of the map 0 dB."""
-        if self._track.map is not None:
-            self._track.set_reference(reference_of(self._canvas.values))
 
     def export(self, path: Path) -> None:
         """Write the exact map with its provenance."""

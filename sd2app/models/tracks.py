@@ -43,6 +43,7 @@ class TrackModel(QObject):
         self._offset_s = 0.0
         self._reference = 1.0
         self._status = ""
+        self._strongest: float | None = None
 
     @property
     def map(self) -> DopplerMap | None:
@@ -69,12 +70,20 @@ class TrackModel(QObject):
         """A few words on what the map is worth, e.g. ``exact``."""
         return self._status
 
+    @property
+    def strongest_db(self) -> float:
+        """Level of the strongest bin of the map, minus infinity for an empty one."""
+        if self._strongest is None:
+            self._strongest = float(self._map.values.max()) if self._map is not None else 0.0
+        return float(self.levels_db(np.array(self._strongest, np.float32)))
+
     def set_map(
         self, doppler_map: DopplerMap | None, covered: NDArray[np.bool_] | None = None
     ) -> None:
         """Show another map, or none."""
         self._map = doppler_map
         self._covered = covered
+        self._strongest = None
         self.changed.emit()
 
     def set_offset(self, offset_s: float) -> None:

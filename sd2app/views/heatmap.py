@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import (
     QBrush,
@@ -133,7 +135,7 @@ class HeatmapView(MapWidget):
         right = "approaching +  /  receding −   m/s"
         room = self.width() - 16 - left - painter.fontMetrics().horizontalAdvance(right)
         status = painter.fontMetrics().elidedText(
-            self._track.status, Qt.TextElideMode.ElideRight, int(max(room - 16, 40))
+            self._status(), Qt.TextElideMode.ElideRight, int(max(room - 16, 40))
         )
         painter.drawText(
             QRectF(left, 0, self.width(), _HEADER_PX), centred | Qt.AlignmentFlag.AlignLeft, status
@@ -141,10 +143,22 @@ class HeatmapView(MapWidget):
         if room > 60:
             painter.drawText(box, centred | Qt.AlignmentFlag.AlignRight, right)
 
+    def _status(self) -> str:
+        """What the map is worth, and why nothing shows where nothing shows."""
+        strongest_db, lowest_db = self._track.strongest_db, self._display.levels.low_db
+        if self._track.covered is not None or not -math.inf < strongest_db < lowest_db:
+            return self._track.status
+        hint = f"strongest bin {strongest_db:.0f} dB, below the scale: R sets 0 dB here"
+        return f"{self._track.status} · {hint}".replace("-", "−")
+
     def _paint_marked_bins(self, painter: QPainter, plot: QRectF) -> None:
         doppler_map = self._track.map
         assert doppler_map is not None
         edges = doppler_map.axis.edges_mps
+        left, right = (
+            self.scale.x_of(time_s + self._track.offset_s)
+            for time_s in (doppler_map.timebase.start_s, doppler_map.timebase.end_s)
+        )
         nothing = QColor.fromRgb(int(lookup_table(self._display.levels.colour_map)[0]))
         hatch = QColor(255, 255, 255, 80)
         painter.save()
@@ -156,7 +170,7 @@ class HeatmapView(MapWidget):
         ):
             for index in bins:
                 top, bottom = self.y_of(edges[index + 1]), self.y_of(edges[index])
-                band = QRectF(plot.left(), top, plot.width(), bottom - top)
+                band = QRectF(left, top, right - left, bottom - top)
                 painter.fillRect(band, nothing)
                 painter.fillRect(band, QBrush(hatch, pattern))
         painter.restore()

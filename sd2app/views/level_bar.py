@@ -5,8 +5,6 @@ from __future__ import annotations
 from PySide6.QtCore import QRectF, QSignalBlocker, QSize
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
 from PySide6.QtWidgets import (
-    QComboBox,
-    QDoubleSpinBox,
     QGridLayout,
     QHBoxLayout,
     QLabel,
@@ -17,6 +15,7 @@ from PySide6.QtWidgets import (
 from sd2app.colour_maps import lookup_table
 from sd2app.models.display import COLOUR_MAPS, DisplayModel
 from sd2app.models.tracks import TrackModel
+from sd2app.views.inputs import Choice, NumberBox
 
 
 class _ColourStrip(QWidget):
@@ -53,17 +52,17 @@ class LevelBar(QWidget):
         super().__init__(parent)
         self._display = display
         self._tracks = tracks
-        self._low = self._level_box("Level shown as the first colour")
-        self._high = self._level_box("Level shown as the last colour")
+        self._low, self._high = (
+            NumberBox(-90.0, 20.0, " dB", tip, decimals=0, step=3.0)
+            for tip in ("Level shown as the first colour", "Level shown as the last colour")
+        )
         self._low.valueChanged.connect(lambda value: display.set_levels(low_db=value))
         self._high.valueChanged.connect(lambda value: display.set_levels(high_db=value))
-        self._scale = QComboBox(self)
+        self._scale = Choice("Logarithmic or linear levels, for all heatmaps", self)
         self._scale.addItems(["dB", "linear"])
-        self._scale.setToolTip("Logarithmic or linear levels, for all heatmaps")
         self._scale.currentTextChanged.connect(lambda text: display.set_levels(scale=text))
-        self._colours = QComboBox(self)
+        self._colours = Choice("Colour map of all heatmaps", self)
         self._colours.addItems(list(COLOUR_MAPS))
-        self._colours.setToolTip("Colour map of all heatmaps")
         self._colours.currentTextChanged.connect(lambda text: display.set_levels(colour_map=text))
         self._reference = QLabel(self)
         self._reference.setObjectName("muted")
@@ -87,20 +86,10 @@ class LevelBar(QWidget):
             track.changed.connect(self._refresh)
         self._refresh()
 
-    def _level_box(self, tip: str) -> QDoubleSpinBox:
-        box = QDoubleSpinBox(self)
-        box.setRange(-90.0, 20.0)
-        box.setSingleStep(3.0)
-        box.setDecimals(0)
-        box.setSuffix(" dB")
-        box.setToolTip(tip)
-        return box
-
     def _refresh(self) -> None:
         levels = self._display.levels
-        for widget, value in ((self._low, levels.low_db), (self._high, levels.high_db)):
-            with QSignalBlocker(widget):
-                widget.setValue(value)
+        self._low.show_value(levels.low_db)
+        self._high.show_value(levels.high_db)
         self._low.setEnabled(levels.scale == "dB")
         for combo, text in ((self._scale, levels.scale), (self._colours, levels.colour_map)):
             with QSignalBlocker(combo):

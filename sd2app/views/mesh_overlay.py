@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from sd2core.compiled import kernels_ready
 from sd2core.simulate.raster import rasterise
 
-_OPACITY = 0.4
+_OPACITY = 0.35
 
 
 def project(

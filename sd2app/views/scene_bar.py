@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from PySide6.QtCore import QSignalBlocker, Qt
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QToolButton, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QToolButton, QWidget
 
 from sd2app.action_set import ActionSet
 from sd2app.models.display import DisplayModel
+from sd2app.views.inputs import Choice
 
 _COLOURS = (
     ("velocity", "radial velocity"),
@@ -15,13 +16,7 @@ _COLOURS = (
     ("visibility", "visibility"),
     ("plain", "plain"),
 )
-_VIEWS = (
-    ("view_three_quarter", "Overview"),
-    ("view_camera", "Camera"),
-    ("view_sensor", "Sensor"),
-    ("view_side", "Side"),
-    ("view_top", "Top"),
-)
+_VIEWS = ("view_three_quarter", "view_camera", "view_sensor", "view_side", "view_top")
 
 
 class SceneBar(QWidget):
@@ -35,9 +30,7 @@ class SceneBar(QWidget):
     ) -> None:
         super().__init__(parent)
         self._display = display
-        self._colour = QComboBox(self)
-        self._colour.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self._colour.setToolTip("What the colour of the mesh means (1 to 4)")
+        self._colour = Choice("What the colour of the mesh means (1 to 4)", self)
         for value, text in _COLOURS:
             self._colour.addItem(text, value)
         self._colour.currentIndexChanged.connect(
@@ -54,14 +47,26 @@ class SceneBar(QWidget):
         layout.addWidget(self._colour)
         layout.addWidget(_button(actions["dots"], "Dots"))
         layout.addStretch(1)
-        for name, text in _VIEWS:
-            layout.addWidget(_button(actions[name], text))
+        layout.addWidget(_view_menu(actions))
         display.mesh_changed.connect(self._refresh)
         self._refresh()
 
     def _refresh(self) -> None:
         with QSignalBlocker(self._colour):
             self._colour.setCurrentIndex(self._colour.findData(self._display.mesh_colour))
+
+
+def _view_menu(actions: ActionSet) -> QToolButton:
+    button = QToolButton()
+    button.setText("Look from")
+    button.setToolTip("Where to look at the scene from (Ctrl+1 to Ctrl+5)")
+    button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+    button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+    menu = QMenu(button)
+    for name in _VIEWS:
+        menu.addAction(actions[name])
+    button.setMenu(menu)
+    return button
 
 
 def _button(action: QAction, text: str) -> QToolButton:

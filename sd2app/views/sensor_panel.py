@@ -8,7 +8,6 @@ from PySide6.QtCore import QSignalBlocker, Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
     QComboBox,
-    QDoubleSpinBox,
     QFormLayout,
     QFrame,
     QGridLayout,
@@ -24,6 +23,7 @@ from sd2app.models.content import CLUTTER_CHOICES
 from sd2app.models.document import DocumentModel
 from sd2app.models.sensor import SensorModel
 from sd2app.models.synthesis import SynthesisModel
+from sd2app.views.inputs import Choice, NumberBox
 from sd2core.sensor import aimed_at, position_from_spherical, spherical_from_position
 
 _CLUTTER_TEXT = {
@@ -64,6 +64,9 @@ class SensorPanel(QWidget):
             button.setText(text)
             button.setToolTip(action.toolTip())
             button.clicked.connect(action.trigger)
+            button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+            button.setEnabled(action.isEnabled())
+            action.enabledChanged.connect(button.setEnabled)
             head.addWidget(button)
         layout.addLayout(head)
         layout.addLayout(self._placement_form())
@@ -88,17 +91,19 @@ class SensorPanel(QWidget):
         grid.setHorizontalSpacing(6)
         grid.setVerticalSpacing(4)
         self._xyz = [
-            _number(self, -100.0, 100.0, " m", f"Sensor position, {axis}: {meaning}")
+            NumberBox(-100.0, 100.0, " m", f"Sensor position, {axis}: {meaning}")
             for axis, meaning in (("x", "to the right"), ("y", "down"), ("z", "forward"))
         ]
         self._spherical = [
-            _number(self, 0.05, 100.0, " m", "Range: distance from the body's centre"),
-            _number(
-                self, -180.0, 180.0, "°",
-                "Azimuth: 0° is between body and camera, positive to the right", 1,
+            NumberBox(0.05, 100.0, " m", "Range: distance from the body's centre"),
+            NumberBox(
+                -180.0, 180.0, "°",
+                "Azimuth: 0° is between body and camera, positive to the right",
+                decimals=1, step=1.0,
             ),
-            _number(
-                self, -90.0, 90.0, "°", "Elevation: positive is above the body's centre", 1
+            NumberBox(
+                -90.0, 90.0, "°", "Elevation: positive is above the body's centre",
+                decimals=1, step=1.0,
             ),
         ]  # fmt: skip
         names = (("x", "range"), ("y", "azim."), ("z", "elev."))
@@ -109,7 +114,6 @@ class SensorPanel(QWidget):
                 label = QLabel(name, self)
                 label.setObjectName("muted")
                 label.setToolTip(box.toolTip())
-                box.setAccessibleName(box.toolTip())
                 grid.addWidget(label, row, 2 * column)
                 grid.addWidget(box, row, 2 * column + 1)
                 grid.setColumnStretch(2 * column + 1, 1)
@@ -126,11 +130,13 @@ class SensorPanel(QWidget):
         self._beyond = _value(
             self, "Share of what the sensor sees in this frame that is faster than the axis"
         )
-        self._v_max = _value(self, "Edge of the velocity axis")
         form.addRow("Range to torso", self._torso)
         form.addRow("Visible", self._visible)
-        form.addRow("Axis ends at", self._v_max)
-        form.addRow("Beyond it", self._beyond)
+        self._beyond_name = QLabel(self)
+        form.addRow(self._beyond_name, self._beyond)
+        field = _value(self, "The cone is drawn for orientation; every direction counts alike")
+        field.setText("drawn, not applied")
+        form.addRow("Field of view", field)
         return form
 
     def _capture_part(self) -> QWidget:
@@ -142,12 +148,12 @@ class SensorPanel(QWidget):
         self._capture_title = _title("Radar capture")
         layout.addWidget(self._capture_title)
         form = _form()
-        self._offset = _number(self, -1e5, 1e5, " s", "Time of the first radar frame here", 3)
-        self._offset.setSingleStep(0.01)
+        self._offset = NumberBox(
+            -1e5, 1e5, " s", "Time of the first radar frame here", decimals=3, step=0.01
+        )
         self._offset.valueChanged.connect(self._edits.set_radar_offset)
         form.addRow("Offset", self._offset)
-        self._clutter = QComboBox(self)
-        self._clutter.setToolTip("How echoes that do not move are removed")
+        self._clutter = Choice("How echoes that do not move are removed", self)
         for choice in CLUTTER_CHOICES:
             self._clutter.addItem(_CLUTTER_TEXT[choice], choice)
         self._clutter.setMinimumContentsLength(8)
@@ -155,7 +161,7 @@ class SensorPanel(QWidget):
             QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
         )
         self._clutter.currentIndexChanged.connect(
-            lambda _: self._document.set_clutter(self._clutter.currentData())
+            lambda _: self._edits.set_clutter(self._clutter.currentData())
         )
         form.addRow("Clutter", self._clutter)
         self._limits = {
@@ -218,17 +224,16 @@ class SensorPanel(QWidget):
             spherical = spherical_from_position(target, position)
             shown += [*zip(self._spherical, spherical, strict=True)]
         for box, value in shown:
-            with QSignalBlocker(box):
-                box.setValue(value)
+            box.show_value(value)
         self._refresh_readout()
 
     def _refresh_readout(self) -> None:
         readout = self._synthesis.readout()
+        self._beyond_name.setText(f"Beyond ±{self._synthesis.v_max_mps:g} m/s")
         for label, text in (
             (self._torso, f"{readout.torso_range_m:.2f} m" if readout else "–"),
             (self._visible, _percent(readout.visible_share) if readout else "–"),
             (self._beyond, _percent(readout.beyond_share) if readout else "–"),
-            (self._v_max, f"±{self._synthesis.v_max_mps:g} m/s"),
         ):
             label.setText(text)
 
@@ -240,8 +245,7 @@ class SensorPanel(QWidget):
         kind = "Simulated radar" if capture.simulated else "Real radar"
         self._capture_title.setText(kind)
         self._capture_title.setToolTip(capture.config.name)
-        with QSignalBlocker(self._offset):
-            self._offset.setValue(recording.radar_offset_s)
+        self._offset.show_value(recording.radar_offset_s)
         with QSignalBlocker(self._clutter):
             self._clutter.setCurrentIndex(CLUTTER_CHOICES.index(self._document.clutter))
         config = capture.config
@@ -291,17 +295,3 @@ def _value(parent: QWidget, tip: str) -> QLabel:
     label.setToolTip(tip)
     label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
     return label
-
-
-def _number(
-    parent: QWidget, low: float, high: float, suffix: str, tip: str, decimals: int = 2
-) -> QDoubleSpinBox:
-    box = QDoubleSpinBox(parent)
-    box.setRange(low, high)
-    box.setDecimals(decimals)
-    box.setSingleStep(0.1 if decimals > 1 else 1.0)
-    box.setSuffix(suffix)
-    box.setToolTip(tip)
-    box.setKeyboardTracking(False)
-    box.setMinimumWidth(72)
-    return box

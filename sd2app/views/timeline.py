@@ -75,6 +75,53 @@ class TimeRuler(QWidget):
         self._playback.seek(self.scale.time_of(event.position().x()))
 
 
+class SpanStrip(QWidget):
+    """Gesture spans on the time axis of the tracks."""
+
+    def __init__(
+        self, span: VisibleSpanModel, display: DisplayModel, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._span = span
+        self._display = display
+        self._labels: Sequence[Span] = ()
+        self.setFixedHeight(_SPANS_PX)
+        self.hide()
+        for signal in (span.changed, display.theme_changed):
+            signal.connect(self.update)
+
+    def set_labels(self, labels: Sequence[Span]) -> None:
+        """Show these spans; nothing is drawn where there are none."""
+        self._labels = labels
+        self.setVisible(bool(labels))
+        self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Each span as a box with its label."""
+        with QPainter(self) as painter:
+            self._paint(painter)
+
+    def _paint(self, painter: QPainter) -> None:
+        colours = self._display.palette
+        scale = TimeScale(self._span.start_s, self._span.end_s, self.width())
+        painter.fillRect(self.rect(), QColor(colours.panel))
+        painter.setClipRect(
+            QRectF(GUTTER_PX, 0, self.width() - GUTTER_PX - MARGIN_PX, self.height())
+        )
+        for label in self._labels:
+            left, right = scale.x_of(label.start_s), scale.x_of(label.end_s)
+            box = QRectF(left, 2, max(right - left, 2), _SPANS_PX - 4)
+            tint = QColor(colours.accent)
+            tint.setAlpha(48)
+            painter.fillRect(box, tint)
+            painter.fillRect(QRectF(left, 2, 2, _SPANS_PX - 4), QColor(colours.accent))
+            text = painter.fontMetrics().elidedText(
+                label.label, Qt.TextElideMode.ElideRight, int(box.width()) - 8
+            )
+            painter.setPen(QColor(colours.text))
+            painter.drawText(box.adjusted(6, 0, -2, 0), Qt.AlignmentFlag.AlignVCenter, text)
+
+
 class Overview(MapWidget):
     """The whole recording; drag the frame to pan, its edges to zoom."""
 
@@ -91,12 +138,12 @@ class Overview(MapWidget):
         self._playback = playback
         self._labels: Sequence[Span] = ()
         self._grab: tuple[str, float] | None = None
-        self.setFixedHeight(56)
+        self.setFixedHeight(40)
         for signal in (span.changed, playback.frame_changed):
             signal.connect(self.update)
 
     def set_labels(self, labels: Sequence[Span]) -> None:
-        """Gesture spans to write above the overview."""
+        """Gesture spans to mark in the overview."""
         self._labels = labels
         self.update()
 
@@ -113,12 +160,11 @@ class Overview(MapWidget):
         return TimeScale(*self._span.extent_s, self.width())
 
     def _plot_rect(self) -> QRectF:
-        top = _SPANS_PX if self._labels else 2
         return QRectF(
             GUTTER_PX,
-            top,
+            2,
             max(self.width() - GUTTER_PX - MARGIN_PX, 1),
-            max(self.height() - top - 4, 1),
+            max(self.height() - 6, 1),
         )
 
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -137,7 +183,7 @@ class Overview(MapWidget):
         )
         if self._track.map is not None:
             self.paint_map(painter, plot, *self._span.extent_s)
-        self._paint_labels(painter, scale)
+        self._paint_labels(painter, plot, scale)
         left, right = scale.x_of(self._span.start_s), scale.x_of(self._span.end_s)
         veil = QColor(colours.panel)
         veil.setAlpha(150)
@@ -149,20 +195,13 @@ class Overview(MapWidget):
         )
         paint_cursor(painter, plot, scale.x_of(self._playback.time_s))
 
-    def _paint_labels(self, painter: QPainter, scale: TimeScale) -> None:
-        colours = self._display.palette
+    def _paint_labels(self, painter: QPainter, plot: QRectF, scale: TimeScale) -> None:
         for label in self._labels:
             left, right = scale.x_of(label.start_s), scale.x_of(label.end_s)
-            box = QRectF(left, 2, max(right - left, 2), _SPANS_PX - 4)
-            tint = QColor(colours.accent)
-            tint.setAlpha(48)
-            painter.fillRect(box, tint)
-            painter.fillRect(QRectF(left, 2, 2, _SPANS_PX - 4), QColor(colours.accent))
-            text = painter.fontMetrics().elidedText(
-                label.label, Qt.TextElideMode.ElideRight, int(box.width()) - 8
+            painter.fillRect(
+                QRectF(left, plot.top(), max(right - left, 2), 3),
+                QColor(self._display.palette.accent),
             )
-            painter.setPen(QColor(colours.text))
-            painter.drawText(box.adjusted(6, 0, -2, 0), Qt.AlignmentFlag.AlignVCenter, text)
 
     def _handle_at(self, x: float) -> str:
         scale = self.scale

@@ -52,9 +52,7 @@ class VideoView(QWidget):
         picture = self._video.picture
         if picture is None:
             painter.setPen(QColor(colours.muted))
-            has_video = self._video.reader is not None
-            text = "" if has_video else "No video in this recording"
-            painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, text)
+            painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, self._absence())
             return
         if self._display.overlay:
             picture = self._with_mesh(picture)
@@ -66,6 +64,14 @@ class VideoView(QWidget):
         box.moveCenter(QRectF(self.rect()).center())
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
         painter.drawImage(box, image)
+
+    def _absence(self) -> str:
+        recording = self._document.recording
+        if recording is None or self._video.reader is not None:
+            return ""
+        if recording.video is None:
+            return "No video in this recording"
+        return "The video cannot be shown"
 
     def _with_mesh(self, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
         mesh, reader = self._document.mesh, self._video.reader

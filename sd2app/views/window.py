@@ -135,7 +135,7 @@ class MainWindow(QMainWindow):
         from sd2app.views.level_bar import LevelBar
         from sd2app.views.sensor_panel import SensorPanel
         from sd2app.views.spectrum import Curve, SpectrumView
-        from sd2app.views.timeline import Overview, TimeRuler
+        from sd2app.views.timeline import Overview, SpanStrip, TimeRuler
         from sd2app.views.video import VideoView
 
         c = self.context
@@ -151,11 +151,13 @@ class MainWindow(QMainWindow):
         self._real_view.offset_grabbed.connect(c.edits.begin_offset_drag)
         self._real_view.offset_dragged.connect(c.edits.drag_offset)
         self._real_view.offset_released.connect(c.edits.end_offset_drag)
+        self._spans = SpanStrip(c.span, c.display)
         self._overview = Overview(c.synthetic, c.span, c.playback, c.display)
         tracks = QVBoxLayout()
         for view, stretch in (
             (self._synthetic_view, 1),
             (self._real_view, 1),
+            (self._spans, 0),
             (TimeRuler(c.span, c.playback, c.display), 0),
             (self._overview, 0),
         ):
@@ -216,7 +218,8 @@ class MainWindow(QMainWindow):
 
     def _show_document(self) -> None:
         self.messages.hide()
-        self._overview.set_labels(self.context.document.spans)
+        for view in (self._spans, self._overview):
+            view.set_labels(self.context.document.spans)
         self._show_tracks()
         self._refresh()
 
@@ -345,6 +348,8 @@ def _panel(name: str) -> QFrame:
     panel = QFrame()
     panel.setObjectName("panel")
     panel.setAccessibleName(name.capitalize())
+    # A click anywhere in it takes the keyboard back from a number box.
+    panel.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
     return panel
 
 

@@ -141,5 +141,5 @@ def test_levels_keep_their_reference_until_asked(context, qtbot, ball):
     context.edits.end_sensor_drag()
     qtbot.waitUntil(lambda: context.synthesis.complete, timeout=10_000)
     assert context.synthetic.reference == reference
-    context.synthesis.reset_reference()
+    context.reset_references()
     assert context.synthetic.reference < reference

@@ -207,6 +207,136 @@ def test_typing_a_range_moves_the_sensor_along_its_direction(window, qtbot):
     assert c.document.undo_stack.undoText() == "Sensor to camera"
 
 
+def number_boxes(window):
+    from sd2app.views.sensor_panel import SensorPanel
+
+    panel = window.findChild(SensorPanel)
+    return panel._xyz, panel._spherical
+
+
+def type_into(box, text, qtbot):
+    qtbot.mouseClick(box.lineEdit(), Qt.MouseButton.LeftButton)
+    box.lineEdit().selectAll()
+    qtbot.keyClicks(box.lineEdit(), text)
+
+
+def test_typing_is_not_disturbed_by_playing(window, qtbot):
+    c = window.context
+    box = number_boxes(window)[1][0]
+    c.playback.set_loop(True)
+    c.playback.play()
+    for text in ("3", ".", "5"):
+        if text == "3":
+            type_into(box, text, qtbot)
+        else:
+            qtbot.keyClicks(box.lineEdit(), text)
+        frame = c.playback.frame
+        qtbot.waitUntil(lambda frame=frame: c.playback.frame != frame)
+    qtbot.keyClick(box, Qt.Key.Key_Return)
+    c.playback.pause()
+    assert c.document.undo_stack.count() == 1
+    distance = np.linalg.norm(np.subtract(c.sensor.sensor.position_m, c.synthesis.torso_m))
+    assert distance == pytest.approx(3.5, abs=0.45)  # the ball went on swinging by 0.2 m
+
+
+def test_a_number_box_gives_the_keyboard_back(window, qtbot):
+    c = window.context
+    x = number_boxes(window)[0][0]
+    type_into(x, "0.5", qtbot)
+    qtbot.keyClick(x, Qt.Key.Key_Return)
+    assert c.sensor.sensor.position_m[0] == 0.5
+    assert not x.hasFocus()
+    qtbot.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert c.sensor.sensor.position_m[0] == 0.0
+    assert x.value() == 0.0
+    type_into(x, "7", qtbot)
+    qtbot.keyClick(x, Qt.Key.Key_Escape)
+    assert x.value() == 0.0
+    assert c.sensor.sensor.position_m[0] == 0.0
+    type_into(x, "2", qtbot)
+    synthetic, _ = heatmaps(window)
+    qtbot.mouseClick(synthetic, Qt.MouseButton.LeftButton, pos=at(synthetic, 0.5, 1.0))
+    assert not x.hasFocus()
+
+
+def test_the_wheel_over_a_box_changes_nothing(window, qtbot):
+    from sd2app.views.inputs import Choice, NumberBox
+
+    c = window.context
+    before = (c.sensor.sensor, c.display.levels, c.document.clutter)
+    for widget in [*window.findChildren(NumberBox), *window.findChildren(Choice)]:
+        wheel(widget, QPoint(5, 5), 1)
+    assert (c.sensor.sensor, c.display.levels, c.document.clutter) == before
+
+
+def test_levels_push_each_other_along(window, qtbot):
+    from sd2app.views.level_bar import LevelBar
+
+    bar, levels = window.findChild(LevelBar), lambda: window.context.display.levels
+    type_into(bar._low, "15", qtbot)
+    qtbot.keyClick(bar._low, Qt.Key.Key_Return)
+    assert (levels().low_db, levels().high_db) == (15, 16)
+    type_into(bar._high, "-40", qtbot)
+    qtbot.keyClick(bar._high, Qt.Key.Key_Return)
+    assert (levels().low_db, levels().high_db) == (-41, -40)
+    assert (bar._low.value(), bar._high.value()) == (-41, -40)
+
+
+def test_clutter_removal_can_be_undone(window, qtbot):
+    c = window.context
+    before, reference = c.real.map.values.copy(), c.real.reference
+    c.edits.set_clutter("none")
+    qtbot.waitUntil(lambda: not np.array_equal(c.real.map.values, before), timeout=10_000)
+    assert c.real.reference == reference
+    qtbot.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    qtbot.waitUntil(lambda: np.array_equal(c.real.map.values, before), timeout=10_000)
+
+
+def test_the_bundled_sample_is_never_written_to(empty_window, qtbot, monkeypatch):
+    from PySide6.QtWidgets import QFileDialog
+
+    from sd2core.resources import resource_path
+
+    c = empty_window.context
+    file = resource_path("swipes.sd2") / "recording.json"
+    before = file.read_bytes()
+    with qtbot.waitSignal(c.document.opened, timeout=20_000):
+        empty_window.open_sample()
+    c.edits.place_sensor(VirtualSensor(position_m=(0.5, 0.0, 0.0)))
+    asked = []
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (asked.append(1), ("", ""))[1])
+    qtbot.keyClick(empty_window, Qt.Key.Key_S, Qt.KeyboardModifier.ControlModifier)
+    assert asked
+    assert file.read_bytes() == before
+
+
+def test_a_mesh_longer_than_its_video_is_played_to_its_end(
+    empty_window, small_recording, tmp_path, qtbot
+):
+    from sd2app.views.scene3d import SceneView
+
+    with np.load(small_recording / "mesh.npz") as data:
+        vertices, faces = data["vertices"], data["faces"]
+    c = empty_window.context
+    for count, end_s in ((90, 3.0), (30, 2.0)):
+        mesh = tmp_path / f"{count}.npz"
+        frames = np.arange(count) % len(vertices)
+        np.savez(mesh, vertices=vertices[frames], faces=faces, times_s=np.arange(count) / 30)
+        with qtbot.waitSignal(c.document.opened, timeout=10_000):
+            empty_window.open_paths([small_recording / "video.mp4", mesh])
+        assert c.span.extent_s == pytest.approx((0.0, end_s), abs=0.01)
+    # The second mesh ends in the middle of the video: no stale body after that.
+    qtbot.waitUntil(lambda: empty_window.settled, timeout=20_000)
+    view = empty_window.findChild(SceneView)
+    c.playback.seek(0.5)
+    view.grab()
+    assert view.overlay.message == ""
+    c.playback.seek(1.5)
+    view.grab()
+    assert view.overlay.message == "No mesh at this time"
+    assert c.synthesis.readout() is None
+
+
 def test_a_drag_shows_a_preview_and_becomes_exact(window, qtbot):
     c = window.context
     seen = []

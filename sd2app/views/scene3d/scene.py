@@ -112,6 +112,10 @@ class Scene:
         self._set_floor()
         self.set_sensor(self.sensor)
 
+    def show_mesh(self, shown: bool) -> None:
+        """Draw the mesh, or leave it out at a time that it does not cover."""
+        self.body.show(shown and self.has_mesh)
+
     def set_vertices(self, vertices: NDArray[np.floating]) -> None:
         """Move the mesh to another frame."""
         self.body.set_vertices(vertices)

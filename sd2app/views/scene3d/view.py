@@ -200,8 +200,7 @@ class SceneView(QWidget):
         self._follow_sensor()
 
     def _follow_clock(self) -> None:
-        mesh = self._document.mesh
-        if mesh is not None and mesh.timebase.frame_at(self._playback.time_s) != self._frame:
+        if self._document.mesh is not None:
             self._stale_scattering = True
             self.request_render()
 
@@ -247,7 +246,11 @@ class SceneView(QWidget):
         self.scene.prepare(size_px, pixel_scale)
 
     def _fetch(self, mesh: MeshSequence) -> None:
-        frame = mesh.timebase.frame_at(self._playback.time_s)
+        time_s = self._playback.time_s
+        there = mesh.timebase.covers(time_s)
+        self.scene.show_mesh(there)
+        self.overlay.message = "" if there else "No mesh at this time"
+        frame = mesh.timebase.frame_at(time_s)
         if frame != self._frame:
             self._frame = frame
             self.scene.set_vertices(mesh.frame(frame))

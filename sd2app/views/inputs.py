@@ -1,0 +1,89 @@
+"""Number boxes and choices that leave the keyboard and the wheel to the window."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QSignalBlocker, Qt
+from PySide6.QtGui import QKeyEvent, QWheelEvent
+from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QWidget
+
+
+class NumberBox(QDoubleSpinBox):
+    """A number with its unit.
+
+    Return takes what was typed, Escape takes it back; either gives the keyboard
+    back to the window, so that Space and Ctrl+Z mean what they mean everywhere.
+    The wheel changes it only while it has the keyboard.
+    """
+
+    def __init__(
+        self,
+        low: float,
+        high: float,
+        suffix: str,
+        tip: str,
+        *,
+        decimals: int = 2,
+        step: float = 0.1,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self.setRange(low, high)
+        self.setDecimals(decimals)
+        self.setSingleStep(step)
+        self.setSuffix(suffix)
+        self.setToolTip(tip)
+        self.setAccessibleName(tip)
+        self.setKeyboardTracking(False)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setMinimumWidth(72)
+        self._typing = False
+        self.lineEdit().textEdited.connect(self._begin_typing)
+        self.editingFinished.connect(self._end_typing)
+
+    def show_value(self, value: float) -> None:
+        """Follow a model, unless somebody is typing; emits nothing."""
+        if self._typing:
+            return
+        if abs(value - self.value()) >= 0.5 * 10.0 ** -self.decimals():
+            with QSignalBlocker(self):
+                self.setValue(value)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Return and Escape end the editing."""
+        if event.key() == Qt.Key.Key_Escape:
+            self._end_typing()
+            self.lineEdit().setText(
+                self.prefix() + self.textFromValue(self.value()) + self.suffix()
+            )
+            self.clearFocus()
+            return
+        super().keyPressEvent(event)
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            self.clearFocus()
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Scroll what is behind it unless it has the keyboard."""
+        if self.hasFocus():
+            super().wheelEvent(event)
+        else:
+            event.ignore()
+
+    def _begin_typing(self, text: str) -> None:
+        self._typing = True
+
+    def _end_typing(self) -> None:
+        self._typing = False
+
+
+class Choice(QComboBox):
+    """A list to choose from; the wheel and the keyboard belong to the window."""
+
+    def __init__(self, tip: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setToolTip(tip)
+        self.setAccessibleName(tip)
+        self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Scroll what is behind it."""
+        event.ignore()
