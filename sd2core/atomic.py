@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import tempfile
 from collections.abc import Iterator
@@ -9,33 +10,68 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
+_DISK_FULL = frozenset({errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)})
+
 
 @contextmanager
 def atomic_write(path: Path) -> Iterator[IO[bytes]]:
     """Open a binary file that replaces ``path`` when the block succeeds.
 
     The bytes go to a temporary file in the same folder, which is flushed to
-    disk and renamed; when the block raises, ``path`` is untouched.
+    disk and renamed; when the block raises, ``path`` is untouched. Where
+    ``path`` is a link, the file that it leads to is replaced.
+
+    Raises
+    ------
+    OSError
+        When ``path`` cannot be written; it is the error's ``filename``.
     """
     path = Path(path)
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".tmp", dir=path.parent)
-    temporary = Path(name)
+    target = _target(path)
+    handle, temporary = _temporary(path, target)
     try:
         with os.fdopen(handle, "wb") as stream:
             yield stream
             stream.flush()
             os.fsync(stream.fileno())
         temporary.chmod(0o666 & ~_umask())
-        temporary.replace(path)
-    except BaseException:
+        temporary.replace(target)
+    except BaseException as error:
         temporary.unlink(missing_ok=True)
+        # A write to an open file fails without saying which file it is.
+        if isinstance(error, OSError) and error.errno in _DISK_FULL and not error.filename:
+            raise OSError(error.errno, error.strerror, str(path)) from error
         raise
+
+
+def check_writable(path: Path) -> None:
+    """Raise what :func:`atomic_write` would raise where ``path`` cannot be written."""
+    path = Path(path)
+    handle, temporary = _temporary(path, _target(path))
+    os.close(handle)
+    temporary.unlink()
 
 
 def atomic_write_text(path: Path, text: str) -> None:
     """Replace ``path`` by ``text`` (UTF-8) in one step."""
     with atomic_write(path) as stream:
         stream.write(text.encode("utf-8"))
+
+
+def _target(path: Path) -> Path:
+    target = path.resolve() if path.is_symlink() else path
+    if target.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+    return target
+
+
+def _temporary(path: Path, target: Path) -> tuple[int, Path]:
+    # Not named after the file, whose name may be as long as a name can be.
+    try:
+        handle, name = tempfile.mkstemp(prefix=".sd2-", suffix=".tmp", dir=target.parent)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error
+    return handle, Path(name)
 
 
 def _umask() -> int:
