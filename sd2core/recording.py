@@ -28,6 +28,7 @@ from sd2core.recording_document import (
 )
 from sd2core.relative_paths import (
     common_suffix_length,
+    free_path,
     is_absolute,
     is_pattern,
     is_there,
@@ -162,7 +163,7 @@ class Recording:
         folder = _new_folder(Path(folder))
         files: dict[Role, Path] = {}
         for role, path in self._files().items():
-            if not is_there(Path(path)):
+            if not _exists(role, Path(path)):
                 raise Sd2Error(f"The {role} {path} does not exist", "a file or folder")
             files[role] = plain_path(Path(path))
         if not files.keys() - {"faces"}:
@@ -201,7 +202,7 @@ class Recording:
 
     def missing(self) -> dict[Role, Path]:
         """Files that are not where the recording says."""
-        return {role: path for role, path in self._files().items() if not is_there(path)}
+        return {role: path for role, path in self._files().items() if not _exists(role, path)}
 
     def relink(self, folder: Path, progress: Progress = silent) -> Relinked:
         """Find all missing files by name under one folder, and save.
@@ -220,15 +221,17 @@ class Recording:
         if not folder.is_dir():
             raise Sd2Error(f"{folder} is not a folder", "the folder to search for missing files")
         missing = self.missing()
-        # Files of a pattern are found by their folder.
-        sought = {role: path.parent if is_pattern(path) else path for role, path in missing.items()}
-        candidates = paths_named({path.name for path in sought.values()}, folder, progress)
+        folders = {path.parent.name for role, path in missing.items() if _is_pattern(role, path)}
+        names = {path.name for path in missing.values()}
+        candidates = paths_named(names | folders, folder, progress)
         found: dict[Role, Path] = {}
         ambiguous: dict[Role, tuple[Path, ...]] = {}
         for role, path in missing.items():
-            old = sought[role]
+            # Files of a pattern are found by their folder, unless it is one file's own name.
+            by_folder = _is_pattern(role, path) and path.name not in candidates
+            old = path.parent if by_folder else path
             rest = path.relative_to(old)
-            same_name = [p for p in candidates.get(old.name, []) if is_there(p / rest)]
+            same_name = [p for p in candidates.get(old.name, []) if _exists(role, p / rest)]
             agreement = [common_suffix_length(path, old) for path in same_name]
             best = [
                 path
@@ -298,7 +301,7 @@ class Recording:
         if path is None:
             has = ", ".join(self._files()) or "nothing"
             raise Sd2Error(f"{self.folder} holds no {role}", f"a {role}; it has {has}")
-        if not is_there(path):
+        if not _exists(role, path):
             raise Sd2Error(
                 f"The {role} of {self.folder} is not at {path}",
                 "the file where the recording says",
@@ -326,7 +329,6 @@ def open_recording(path: Path) -> Recording:
     path = Path(path)
     folder = plain_path(path.parent if path.name == FILE_NAME else path)
     document = read_document(folder / FILE_NAME)
-    sensor = document.sensor
     return Recording(
         folder,
         video=located_path(document.video, folder),
@@ -335,17 +337,34 @@ def open_recording(path: Path) -> Recording:
         radar=located_path(document.radar, folder),
         mesh_reading=document.mesh_reading,
         radar_offset_s=document.radar_offset_s,
-        sensor=VirtualSensor(
-            position_m=sensor.position_m,
-            azimuth_deg=sensor.azimuth_deg,
-            elevation_deg=sensor.elevation_deg,
-            field_of_view_deg=sensor.field_of_view_deg,
-        ),
+        sensor=_sensor(document, folder / FILE_NAME),
         spans=document.spans,
         title=document.title or folder.stem,
         simulated=document.simulated,
         _read=document,
     )
+
+
+def _sensor(document: Document, file: Path) -> VirtualSensor:
+    entry = document.sensor
+    try:
+        return VirtualSensor(
+            position_m=entry.position_m,
+            azimuth_deg=entry.azimuth_deg,
+            elevation_deg=entry.elevation_deg,
+            field_of_view_deg=entry.field_of_view_deg,
+        )
+    except Sd2Error as error:
+        raise Sd2Error(f"{file}: {error.found}", error.expected, error.remedy) from error
+
+
+def _is_pattern(role: Role, path: Path) -> bool:
+    # Only a mesh is made of many files.
+    return role == "mesh" and is_pattern(path)
+
+
+def _exists(role: Role, path: Path) -> bool:
+    return is_there(path) if role == "mesh" else path.exists()
 
 
 def _new_folder(folder: Path) -> Path:
@@ -376,16 +395,14 @@ def _copied(
     inside: dict[Role, Path] = {}
     for done, (role, source) in enumerate(files.items()):
         progress(done, len(files))
-        if is_pattern(source):
+        if _is_pattern(role, source):
             raise Sd2Error(
                 f"{source} stands for several files", "a folder, for copying", "Give their folder"
             )
         if source.is_relative_to(folder):
             inside[role] = source
             continue
-        target = folder / source.name
-        if target.exists() or target.name == FILE_NAME:
-            target = folder / f"{role}-{source.name}"
+        target = free_path(folder, source.name, role, reserved=FILE_NAME)
         temporary = Path(tempfile.mkdtemp(prefix=".copy-", dir=folder))
         made.append(temporary)
         if source.is_dir():

@@ -4,15 +4,28 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, FiniteFloat, ValidationError, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    PositiveInt,
+    StringConstraints,
+    ValidationError,
+    model_validator,
+)
 
 from sd2core.errors import Sd2Error
 
 FILE_NAME = "recording.json"
 FORMAT: Literal["sd2-recording"] = "sd2-recording"
 VERSION = 1
+
+PositiveFinite = Annotated[FiniteFloat, Field(gt=0)]
+StoredPath = Annotated[str, StringConstraints(pattern=r"\S")]
+"""A path that names something: nothing at all would be the recording's own folder."""
 
 
 class Span(BaseModel):
@@ -47,11 +60,11 @@ class MeshReading(BaseModel):
 
     model_config = ConfigDict(extra="allow", frozen=True)
 
-    frames_per_s: FiniteFloat | None = None
-    scale: FiniteFloat | None = None
+    frames_per_s: PositiveFinite | None = None
+    scale: PositiveFinite | None = None
     person: int | str | None = None
-    image_size: tuple[int, int] | None = None
-    focal_px: FiniteFloat | None = None
+    image_size: tuple[PositiveInt, PositiveInt] | None = None
+    focal_px: PositiveFinite | None = None
     distance_m: FiniteFloat | None = None
 
     def options(self) -> dict[str, Any]:
@@ -69,11 +82,11 @@ class Document(BaseModel):
     version: int = VERSION
     title: str = ""
     simulated: bool = False
-    video: str | None = None
-    mesh: str | None = None
+    video: StoredPath | None = None
+    mesh: StoredPath | None = None
     mesh_reading: MeshReading = MeshReading()
-    faces: str | None = None
-    radar: str | None = None
+    faces: StoredPath | None = None
+    radar: StoredPath | None = None
     radar_offset_s: FiniteFloat = 0.0
     sensor: SensorEntry = SensorEntry()
     spans: tuple[Span, ...] = ()

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import glob
 import os
 import shutil
+from itertools import chain, count
 from pathlib import Path, PurePath, PurePosixPath, PureWindowsPath
 
 from sd2core.progress import Progress
@@ -31,13 +33,18 @@ def located_path(stored: str | None, folder: Path) -> Path | None:
 
 
 def is_pattern(path: Path) -> bool:
-    """Whether a name such as ``*.obj`` stands for several files."""
-    return any(character in path.name for character in "*?[") and not path.exists()
+    """Whether a name such as ``*.obj`` stands for several files, and is not one file's own."""
+    return glob.has_magic(path.name) and not path.exists()
+
+
+def files_of_pattern(path: Path) -> list[Path]:
+    """Files that a pattern stands for, which is in the name alone: ``[`` in a folder is a ``[``."""
+    return [path.parent / name for name in glob.glob(path.name, root_dir=path.parent)]
 
 
 def is_there(path: Path) -> bool:
     """Whether a file, a folder, or any file of a pattern exists."""
-    return any(path.parent.glob(path.name)) if is_pattern(path) else path.exists()
+    return bool(files_of_pattern(path)) if is_pattern(path) else path.exists()
 
 
 def is_absolute(stored: str) -> bool:
@@ -68,6 +75,17 @@ def common_suffix_length(a: Path, b: Path) -> int:
             break
         count += 1
     return count
+
+
+def free_path(folder: Path, name: str, prefix: str, *, reserved: str) -> Path:
+    """Where ``name`` can be put, with a prefix and a number if need be, replacing nothing."""
+    names = chain((name, f"{prefix}-{name}"), (f"{prefix}-{n}-{name}" for n in count(2)))
+    return next(
+        folder / free
+        for free in names
+        # A link that leads nowhere does not "exist" but would be replaced.
+        if free != reserved and not os.path.lexists(folder / free)
+    )
 
 
 def remove(path: Path) -> None:

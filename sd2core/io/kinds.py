@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from sd2core.errors import Sd2Error
+from sd2core.relative_paths import is_pattern
 
 Kind = Literal["recording", "video", "mesh", "radar", "map"]
 
@@ -23,7 +24,7 @@ def kind_of(path: Path) -> Kind:
         When the path does not exist or is none of these.
     """
     path = Path(path)
-    if any(character in path.name for character in "*?["):
+    if is_pattern(path):
         return "mesh"
     if not path.exists():
         raise Sd2Error(f"{path} does not exist", "a file or folder", "Check the path")

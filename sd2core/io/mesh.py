@@ -18,10 +18,11 @@ from sd2core.io.mesh_arrays import (
     write_zarr,
 )
 from sd2core.io.mesh_checks import check_mesh, drop_empty_frames
-from sd2core.io.mesh_files import SURFACE_SUFFIXES, is_pattern, read_faces, read_mesh_files
+from sd2core.io.mesh_files import SURFACE_SUFFIXES, read_faces, read_mesh_files
 from sd2core.io.mesh_models import read_model_output
 from sd2core.mesh import MeshSequence
 from sd2core.progress import Progress, silent
+from sd2core.relative_paths import is_pattern
 from sd2core.timebase import Timebase
 
 _PICKLES = {".pkl", ".pickle", ".joblib"}

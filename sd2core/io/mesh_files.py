@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import glob
 import re
 from pathlib import Path
 from typing import Any
@@ -13,13 +12,9 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.io.mesh_arrays import FACE_NAMES, RawMesh
 from sd2core.progress import Progress, silent
+from sd2core.relative_paths import files_of_pattern
 
 SURFACE_SUFFIXES = (".obj", ".ply", ".glb")
-
-
-def is_pattern(path: Path) -> bool:
-    """Whether a path is a pattern such as ``frames/*.obj`` and names no file itself."""
-    return glob.has_magic(str(path)) and not path.exists()
 
 
 def natural_key(name: str) -> tuple[Any, ...]:
@@ -127,7 +122,7 @@ def _files(path: Path) -> list[Path]:
                 f"Name those that are meant, for example '{path.name}/*{kinds[0]}'",
             )
     else:
-        found = [Path(name) for name in glob.glob(str(path))]
+        found = files_of_pattern(path)
         found = [file for file in found if file.suffix.lower() in SURFACE_SUFFIXES]
     if not found:
         raise Sd2Error(

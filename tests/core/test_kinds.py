@@ -5,6 +5,7 @@ import pytest
 
 from sd2core.errors import Sd2Error
 from sd2core.io.kinds import kind_of
+from sd2core.io.mesh import load_mesh
 from sd2core.sensor import VelocityAxis
 from sd2core.spectrum import DopplerMap
 from sd2core.timebase import Timebase
@@ -58,3 +59,32 @@ def test_what_is_nothing_known_is_explained(tmp_path):
             kind_of(tmp_path / name)
         assert words in str(caught.value)
         assert name in str(caught.value)
+
+
+@pytest.mark.parametrize("folder", ["data", "data [1]"])
+def test_a_name_with_brackets_is_a_file_and_not_a_pattern(tmp_path, folder):
+    path = tmp_path / folder / "walk [1].mkv"
+    path.parent.mkdir()
+    for name, kind in (("walk [1].mkv", "video"), ("a?b*.npy", "radar"), ("[a].sd2", "recording")):
+        if kind == "recording":
+            (path.parent / name).mkdir()
+            (path.parent / name / "recording.json").touch()
+        else:
+            (path.parent / name).touch()
+        assert kind_of(path.parent / name) == kind
+    (path.parent / "1.obj").touch()
+    assert kind_of(path.parent / "*.obj") == "mesh"
+    with pytest.raises(Sd2Error, match="does not exist"):
+        kind_of(path.parent / "walk.mkv")
+
+
+def test_a_pattern_below_a_folder_with_brackets_finds_its_frames(tmp_path):
+    folder = tmp_path / "data [1]"
+    folder.mkdir()
+    for number in range(3):
+        (folder / f"{number}.obj").write_text(
+            f"v 0 0 {number + 1}\nv 1 0 2\nv 0 1 2\nf 1 2 3\n", encoding="utf-8"
+        )
+    assert load_mesh(folder / "*.obj", frames_per_s=30, scale=1).frame_count == 3
+    with pytest.raises(Sd2Error, match="does not exist"):
+        load_mesh(folder / "walk.npz")

@@ -201,6 +201,12 @@ def test_a_failed_save_leaves_the_old_recording(
         ({"sensor": {"position_m": [0, 0]}}, "sensor.position_m"),
         ({"spans": [{"start_s": 2, "end_s": 1, "label": "x"}]}, "ends at 1.0 s"),
         ({"video": 3}, "video is 3"),
+        ({"video": ""}, "recording.json: video is ''"),
+        ({"mesh": " "}, "recording.json: mesh is ' '"),
+        ({"sensor": {"field_of_view_deg": 500}}, "recording.json.*field of view is 500"),
+        ({"mesh_reading": {"scale": -1}}, "recording.json: mesh_reading.scale is -1"),
+        ({"mesh_reading": {"frames_per_s": 0}}, "recording.json: mesh_reading.frames_per_s is 0"),
+        ({"mesh_reading": {"image_size": [0, 480]}}, "recording.json: mesh_reading.image_size.0"),
     ],
 )
 def test_what_is_wrong_is_said(files: Path, change: dict, says: str) -> None:
@@ -410,3 +416,34 @@ def test_a_missing_file_is_explained_when_it_is_opened(files: Path) -> None:
     made.mesh = None
     with pytest.raises(Sd2Error, match="holds no mesh"):
         made.load_mesh()
+
+
+def test_a_file_with_brackets_in_its_name_moves_like_any_other(files: Path, tmp_path: Path) -> None:
+    video = files / "walk [1].mkv"
+    video.write_text("video")
+    made = Recording.create(files.parent / "b.sd2", video=video)
+    assert not made.missing()
+    (tmp_path / "disk").mkdir()
+    # What the name would stand for as a pattern, beside what it is.
+    (tmp_path / "disk" / "walk 1.mkv").write_text("another")
+    video.rename(tmp_path / "disk" / video.name)
+    assert made.missing() == {"video": video}
+    assert made.relink(tmp_path / "disk").found == {"video": tmp_path / "disk" / video.name}
+    copied = made.save_as(tmp_path / "copy", copy=True)
+    assert content(copied)["video"] == video.name
+
+
+def test_a_copy_replaces_no_file_that_is_there(files: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "all.sd2"
+    folder.mkdir()
+    for name in ("walk.mkv", "video-walk.mkv"):
+        (folder / name).write_text("precious")
+    (folder / "video-2-walk.mkv").symlink_to("nowhere")
+    made = Recording.create(folder, video=files / "walk.mkv", copy=True)
+    assert [(folder / name).read_text() for name in ("walk.mkv", "video-walk.mkv")] == [
+        "precious",
+        "precious",
+    ]
+    assert (folder / "video-2-walk.mkv").is_symlink()
+    assert content(made)["video"] == "video-3-walk.mkv"
+    assert (folder / "video-3-walk.mkv").read_text() == "walk.mkv"
