@@ -123,6 +123,9 @@ def _fingerprint() -> str:
     for module in (*KERNEL_MODULES, "sd2core.compiled"):
         digest.update(_PACKAGE.parent.joinpath(*module.split(".")).with_suffix(".py").read_bytes())
     for fact in (
+        # Numba keeps code by the place of its source: another installation that
+        # shares this cache cannot use it.
+        str(_PACKAGE),
         platform.python_version(),
         importlib.metadata.version("numba"),
         llvmlite.binding.get_host_cpu_name(),
