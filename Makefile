@@ -9,7 +9,8 @@ export PYTHON
 
 INSTALLED := .venv/.installed
 COMPILED := .venv/.compiled
-KERNELS := $(wildcard sd2core/compiled.py sd2core/scattering/*.py sd2core/doppler/*.py)
+# Among them every module in KERNEL_MODULES of sd2core/compiled.py.
+KERNELS := $(wildcard sd2core/compiled.py sd2core/scattering/*.py sd2core/doppler/*.py sd2core/fmcw/*.py sd2core/simulate/*.py)
 
 .PHONY: help setup demo test test-slow lint format bench wheel screenshots clean
 

@@ -26,7 +26,7 @@ def run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
     options = parser.parse_args(attach_negative_values(arguments))
     try:
         code = options.handler(options)
-        sys.stdout.flush()
+        _flush_output()
         return code or 0
     except Sd2Error as error:
         return _explain(str(error))
@@ -34,15 +34,19 @@ def run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
         print("sd2: interrupted", file=sys.stderr)
         return _INTERRUPTED
     except BrokenPipeError:
-        # Whoever read the output (`| head`) has seen enough; stop Python from
-        # complaining when it flushes at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        # Whoever read the output (`| head`) has seen enough.
+        _discard_output()
         return 0
     except Exception as error:
         if os.environ.get("SD2_TRACEBACK") == "1":
             raise
         if isinstance(error, OSError) and error.filename:
             return _explain(f"{error.filename}: {error.strerror}.")
+        if isinstance(error, OSError) and error.errno:
+            if _output_fails():
+                _discard_output()
+                return _explain(f"The output cannot be written ({error.strerror}).")
+            return _explain(f"{error.strerror}.")
         if isinstance(error, MemoryError):
             return _explain(f"There is not enough memory for this ({error}).")
         return _explain(
@@ -70,6 +74,25 @@ def attach_negative_values(arguments: Sequence[str]) -> list[str]:
         else:
             attached.append(argument)
     return attached
+
+
+def _flush_output() -> None:
+    if sys.stdout is not None:  # closed: `>&-`
+        sys.stdout.flush()
+
+
+def _output_fails() -> bool:
+    """Whether standard output is what could not be written: what it holds back still cannot."""
+    try:
+        _flush_output()
+    except OSError:
+        return True
+    return False
+
+
+def _discard_output() -> None:
+    """Keep Python from trying, and complaining, once more when it flushes at exit."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _explain(sentence: str) -> int:

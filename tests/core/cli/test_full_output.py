@@ -1,0 +1,41 @@
+"""Where the output of ``sd2`` goes may be full, or closed."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+FULL = Path("/dev/full")
+REPOSITORY = Path(__file__).resolve().parents[3]
+
+
+@pytest.mark.skipif(not FULL.exists(), reason="needs /dev/full")
+@pytest.mark.parametrize("buffered", [True, False])
+def test_a_full_disk_is_said_once(plate: Path, buffered: bool) -> None:
+    with FULL.open("w") as full:
+        done = subprocess.run(
+            [sys.executable, *([] if buffered else ["-u"]), "-m", "sd2app.command_line"]
+            + ["info", str(plate)],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+            cwd=REPOSITORY,
+        )
+    reason = os.strerror(28)
+    # Without a buffer nothing tells that it was the output.
+    said = f"The output cannot be written ({reason})" if buffered else reason
+    assert (done.returncode, done.stderr) == (1, f"sd2: {said}.\n")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="closes the output as a POSIX shell does")
+def test_a_closed_output_is_no_error(plate: Path) -> None:
+    command = f'"{sys.executable}" -m sd2app.command_line info "{plate}" >&-'
+    done = subprocess.run(
+        ["sh", "-c", command], stderr=subprocess.PIPE, text=True, check=False, cwd=REPOSITORY
+    )
+    assert (done.returncode, done.stderr) == (0, "")
