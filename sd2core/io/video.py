@@ -210,9 +210,9 @@ class VideoReader:
             self._next = number + 1
             if number == frame:
                 return picture
-            if number > frame:
+            if number > frame + self._index.late:
                 return None
-            self._gave_earlier = True
+            self._gave_earlier |= number < frame
         self._frames = None
         return None
 

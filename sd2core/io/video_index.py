@@ -31,6 +31,18 @@ _HEAD_PACKETS = 64
 _TAIL_FRAMES = 8
 _MISSING_IN_TAIL = 4
 
+_DISORDER = 0.1
+"""Up to this share of frames without a time, or out of turn, is damage; more is wrong times."""
+
+_TICKS_PER_FRAME = 4
+"""On a finer grid than this any times lie near a place, and a gap proves nothing."""
+
+_FIRST_FRAME_S = 0.1
+"""A video that starts this soon has lost its first frame; a later start was meant so."""
+
+_LONG_STEP = 10
+"""Steps of an uneven video that are this many times the typical one are noted."""
+
 
 @dataclass(frozen=True, eq=False)
 class FrameIndex:
@@ -47,6 +59,8 @@ class FrameIndex:
         Frames at which decoding can begin, by their keys; also the time to seek to.
     counted : bool
         Frames can only be found by counting from the start.
+    late : int
+        Frames that the decoder may show ahead of one: 0, unless the file is damaged.
     notes : tuple of str
         What differs from what the file says of itself.
     """
@@ -55,6 +69,7 @@ class FrameIndex:
     times_s: NDArray[np.float64]
     entry_keys: NDArray[np.int64]
     counted: bool
+    late: int
     notes: tuple[str, ...]
 
 
@@ -158,19 +173,24 @@ def build_index(path: Path, progress: Progress = silent) -> FrameIndex:
     if packets.usable and packets.count * megapixels > _WHOLE_MEGAPIXELS:
         keys = _keys_from_ends(path, packets, progress)
     entries = packets.entry_pts
-    counted = False
+    counted, late = False, 0
+    notes = []
     if keys is None:
         shown = _decode_all(path, packets.count, progress)
         if not shown:
             raise _nothing_decodes(path)
-        if packets.usable and None not in shown and (np.diff(np.array(shown)) > 0).all():
-            keys = np.array(shown, dtype=np.int64)
-        else:
+        keys, late = _keys_from_all(shown) if packets.usable else (None, 0)
+        if keys is None:
             keys = np.arange(len(shown), dtype=np.int64)
             entries = np.zeros(1, np.int64)
             counted = True
+        elif late or len(keys) < len(shown):
+            notes.append(
+                "The file is damaged: some frames come out of turn or have no time; the "
+                f"{len(keys):,} that have one are used, each at its own time."
+            )
 
-    notes = []
+    missing = 0
     if counted:
         stated = rates[0] if rates else 30.0
         times_s = keys / stated
@@ -179,16 +199,26 @@ def build_index(path: Path, progress: Progress = silent) -> FrameIndex:
             f"{stated:g} frames/s. Jumping back is slow; 'ffmpeg -i FILE copy.mp4' cures both."
         )
     else:
-        times_s = _unrounded((keys - keys[0]) * float(time_base), rates, float(time_base))
+        times_s = (keys - keys[0]) * float(time_base)
+        grid = _grid(times_s, rates, float(time_base))
         entries = entries[entries <= keys[-1]]
-    if claimed == 0 and len(times_s) > 1 and np.ptp(np.diff(times_s)) < 1e-6:
-        claimed = round(seconds * (len(times_s) - 1) / times_s[-1])
+        if grid is not None:
+            places, rate = grid
+            times_s = places / rate
+            # Where most frames lie further apart, that rate is not the video's.
+            if len(places) > 1 and np.median(np.diff(places)) == 1:
+                missing = int(places[-1]) + 1 - len(places)
+                claimed = claimed or round(seconds * rate)
+        notes += _notes_on_gaps(times_s, missing, even=grid is not None)
+        if grid is None:
+            notes += _note_on_end(times_s, seconds)
     if claimed > len(keys):
+        cut = claimed > len(keys) + missing
         notes.append(
-            f"The file claims {claimed:,} frames, {len(keys):,} decode; it is used up to its "
-            "last frame that decodes."
+            f"The file claims {claimed:,} frames, {len(keys):,} decode"
+            + ("; it is used up to its last frame that decodes." if cut else ".")
         )
-    return FrameIndex(keys, times_s, entries, counted, tuple(notes))
+    return FrameIndex(keys, times_s, entries, counted, late, tuple(notes))
 
 
 def _read_packets(container: Any, stream: Any, progress: Progress) -> _Packets:
@@ -257,6 +287,16 @@ def _keys_from_ends(path: Path, packets: _Packets, progress: Progress) -> NDArra
     return np.concatenate([keys[keys < begin], decoded])
 
 
+def _keys_from_all(shown: list[Any]) -> tuple[NDArray[np.int64] | None, int]:
+    """Times of all decoded frames and how late one may come; None when they make no sense."""
+    timed = np.array([time for time in shown if time is not None], np.int64)
+    disorder = len(shown) - len(timed) + int((np.diff(timed) <= 0).sum())
+    if not timed.size or disorder > _DISORDER * len(shown):
+        return None, 0
+    keys, places = np.unique(timed, return_inverse=True)
+    return keys, int((np.maximum.accumulate(places) - places).max())
+
+
 def _decode_all(path: Path, packets: int, progress: Progress) -> list[Any]:
     container, stream = open_stream(path)
     with container:
@@ -277,28 +317,60 @@ def _stated_seconds(container: Any, stream: Any) -> float:
     """How long the video lasts by what the file says; 0 when it does not say."""
     if stream.duration is not None:
         return float(stream.duration * stream.time_base)
+    # What Matroska states is when the video ends, not how long it lasts.
+    start_s = float((stream.start_time or 0) * stream.time_base)
+    if start_s < _FIRST_FRAME_S:
+        start_s = 0.0
     tag = re.fullmatch(r"(\d+):(\d+):([\d.]+)", stream.metadata.get("DURATION", ""))
     if tag:
         hours, minutes, seconds = (float(part) for part in tag.groups())
-        return 3600 * hours + 60 * minutes + seconds
+        return 3600 * hours + 60 * minutes + seconds - start_s
     if len(container.streams) > 1:
         return 0.0  # the container's duration may be that of the sound
-    return float(container.duration or 0) / 1e6
+    return float(container.duration or 0) / 1e6 - start_s
 
 
-def _unrounded(
+def _grid(
     times_s: NDArray[np.float64], rates: list[float], tick_s: float
-) -> NDArray[np.float64]:
-    """Undo the rounding of a regular clock to the container's ticks.
+) -> tuple[NDArray[np.int64], float] | None:
+    """Place of every frame on a regular clock, and its rate; None when there is none.
 
     Matroska keeps milliseconds, which turns steps of 1/30 s into 33 and 34 ms
-    and would put 3 % of jitter on every velocity.
+    and would put 3 % of jitter on every velocity. Where frames are missing the
+    others keep their places.
     """
     for rate in rates:
-        regular = np.arange(len(times_s)) / rate
-        if (np.abs(times_s - regular) < tick_s).all():
-            return regular
-    return times_s
+        places = np.rint(times_s * rate).astype(np.int64)
+        steps = np.diff(places)
+        if (np.abs(times_s - places / rate) >= tick_s).any() or (steps < 1).any():
+            continue
+        if (steps == 1).all() or rate * tick_s * _TICKS_PER_FRAME < 1:
+            return places, rate
+    return None
+
+
+def _notes_on_gaps(times_s: NDArray[np.float64], missing: int, *, even: bool) -> list[str]:
+    steps_s = np.diff(times_s)
+    if not steps_s.size or (even and not missing):
+        return []
+    if not even and steps_s.max() < _LONG_STEP * np.median(steps_s):
+        return []
+    longest = int(steps_s.argmax())
+    where = f"from {times_s[longest]:.2f} s to {times_s[longest + 1]:.2f} s"
+    why = "the file is damaged there, or they were never recorded."
+    if even:
+        plural = "s are" if missing > 1 else " is"
+        return [f"{missing:,} frame{plural} missing inside, the longest gap {where}: {why}"]
+    return [f"No frame is shown {where}: {why}"]
+
+
+def _note_on_end(times_s: NDArray[np.float64], claimed_s: float) -> list[str]:
+    if len(times_s) < 2 or claimed_s < times_s[-1] + _LONG_STEP * np.median(np.diff(times_s)):
+        return []
+    return [
+        f"The file claims to last {claimed_s:.1f} s; its last frame that decodes is at"
+        f" {times_s[-1]:.1f} s."
+    ]
 
 
 def _is_cover_art(stream: Any) -> bool:

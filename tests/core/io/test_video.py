@@ -136,6 +136,108 @@ def test_a_truncated_file_is_read_to_its_true_end(
         assert number_in(reader.read(3)) == 3
 
 
+@pytest.mark.parametrize("share", [0.4, 0.6, 0.8])
+def test_a_cut_regular_video_keeps_its_clock_and_says_what_is_missing(
+    tmp_path: Path, share: float, listing: str
+) -> None:
+    path = write_video(tmp_path / "v.mkv", 90, options={"bf": "3", "g": "600", "crf": "5"})
+    content = path.read_bytes()
+    path.write_bytes(content[: int(len(content) * share)])
+    with open_video(path) as reader:
+        places = reader.timebase.times_s * 30
+        np.testing.assert_allclose(places, np.rint(places), atol=1e-9)
+        claim = f"claims 90 frames, {len(reader)} decode; it is used up to its last frame"
+        assert any(claim in note for note in reader.notes)
+        missing = round(places[-1]) + 1 - len(reader)
+        assert any(f"{missing} frame" in note for note in reader.notes) == (missing > 0)
+
+
+def test_a_frame_missing_inside_leaves_a_hole_in_a_regular_clock(
+    tmp_path: Path, listing: str
+) -> None:
+    whole = write_video(tmp_path / "whole.mkv", 60, codec="mjpeg", pixels="yuvj420p")
+    cut = tmp_path / "cut.mkv"
+    with av.open(str(whole)) as source, av.open(str(cut), "w") as target:
+        stream = source.streams.video[0]
+        copy = target.add_stream_from_template(stream)
+        for number, packet in enumerate(source.demux(stream)):
+            if packet.size and number not in (10, 20, 21):
+                packet.stream = copy
+                target.mux(packet)
+    kept = [k for k in range(60) if k not in (10, 20, 21)]
+    with open_video(cut) as reader:
+        assert [number_in(image) for image in reader.frames()] == kept
+        np.testing.assert_allclose(reader.timebase.times_s, np.array(kept) / 30, atol=1e-12)
+        assert "3 frames are missing inside, the longest gap from 0.63 s to 0.73 s" in str(
+            reader.notes
+        )
+
+
+def test_every_second_frame_of_a_clock_is_no_damage(tmp_path: Path) -> None:
+    times_ms = [round(2000 * k / 30) for k in range(30)]
+    path = write_video(tmp_path / "v.mkv", 30, rate=30, times_ms=times_ms)
+    with open_video(path) as reader:
+        np.testing.assert_allclose(reader.timebase.times_s, np.arange(30) / 15, atol=1e-12)
+        assert reader.notes == ()
+
+
+def test_a_cut_uneven_video_says_how_long_it_should_last(tmp_path: Path) -> None:
+    path = write_video(tmp_path / "v.mkv", 60, times_ms=UNEVEN_MS, options={"crf": "5"})
+    with open_video(path) as reader:
+        assert reader.notes == ()
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) // 2])
+    with open_video(path) as reader:
+        last_s = reader.timebase.times_s[-1]
+        lasts_s = UNEVEN_MS[-1] / 1000
+        assert reader.notes == (
+            f"The file claims to last {lasts_s:.1f} s; its last frame that decodes is at "
+            f"{last_s:.1f} s.",
+        )
+
+
+def test_a_late_start_is_no_claim_of_more_frames(tmp_path: Path) -> None:
+    path = write_video(tmp_path / "v.mkv", 30, times_ms=[500 + round(k / 0.03) for k in range(30)])
+    with open_video(path) as reader:
+        assert len(reader) == 30
+        assert reader.notes == ()
+
+
+@pytest.mark.parametrize(("name", "b_frames", "where"), [("v.mp4", 3, 0.6), ("v.mkv", 2, 0.4)])
+def test_damage_inside_leaves_the_other_frames_at_their_times(
+    tmp_path: Path, name: str, b_frames: int, where: float
+) -> None:
+    steps_ms = random.Random(3).choices([11, 33, 34, 70, 240], k=149)
+    times_ms = np.cumsum([0, *steps_ms]) if name == "v.mkv" else np.arange(150) / 0.03
+    options = {"bf": str(b_frames), "g": "30", "crf": "1"}
+    how = {"times_ms": times_ms.tolist()} if name == "v.mkv" else {}
+    path = write_video(tmp_path / name, 150, options=options, **how)
+    content = bytearray(path.read_bytes())
+    place = int(len(content) * where)
+    content[place : place + 200] = bytes(200)
+    path.write_bytes(content)
+    with av.open(str(path)) as container:
+        stream = container.streams.video[0]
+        shown = [frame.pts for frame in video_index.decoded_frames(container, stream)]
+        assert shown != sorted(shown)  # the decoder shows frames out of turn
+        tick_s = float(stream.time_base)
+    with open_video(path) as reader:
+        np.testing.assert_allclose(
+            reader.timebase.times_s, np.array(sorted(shown)) * tick_s, atol=1e-3
+        )
+        assert "The file is damaged: some frames come out of turn" in reader.notes[0]
+        assert "from " in reader.notes[1]
+        images = [number_in(image) for image in reader.frames()]
+        # Some pictures right after the damage are wrong themselves; the others are in place.
+        off_ms = np.abs(times_ms[images] - 1e3 * reader.timebase.times_s)
+        right = (off_ms < 2).tolist()
+        assert all(right[:40])
+        assert all(right[-60:-20])
+        assert sum(right) >= len(reader) - 10
+        shuffled = random.Random(6).sample(range(len(reader)), len(reader))
+        assert [number_in(reader.read(k)) for k in shuffled] == [images[k] for k in shuffled]
+
+
 def test_frames_before_the_first_key_frame_are_not_listed(tmp_path: Path, listing: str) -> None:
     options = {"bf": "0", "g": "20", "sc_threshold": "0"}
     whole = write_video(tmp_path / "whole.mkv", 60, options=options)
