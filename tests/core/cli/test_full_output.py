@@ -18,8 +18,8 @@ REPOSITORY = Path(__file__).resolve().parents[3]
 def test_a_full_disk_is_said_once(plate: Path, buffered: bool) -> None:
     with FULL.open("w") as full:
         done = subprocess.run(
-            [sys.executable, *([] if buffered else ["-u"]), "-m", "sd2app.command_line"]
-            + ["info", str(plate)],
+            [sys.executable, "-m", "sd2app.command_line", "info", str(plate)],
+            env=os.environ | {"PYTHONUNBUFFERED": "" if buffered else "1"},
             stdout=full,
             stderr=subprocess.PIPE,
             text=True,
