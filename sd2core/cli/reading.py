@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ from sd2core.errors import Sd2Error
 if TYPE_CHECKING:
     from sd2core.mesh import MeshSequence
     from sd2core.recording import MeshReading
+    from sd2core.sensor import VirtualSensor
 
 
 def mesh_reading(options: argparse.Namespace) -> MeshReading:
@@ -36,6 +38,24 @@ def load_mesh_as_told(path: Path, options: argparse.Namespace) -> MeshSequence:
         return load_mesh(
             path, faces=options.faces, progress=progress, **mesh_reading(options).options()
         )
+
+
+def mesh_and_sensor(options: argparse.Namespace) -> tuple[MeshSequence, VirtualSensor]:
+    """The mesh, and the sensor of the recording or the camera with ``--sensor`` in its place."""
+    from sd2core.recording import is_recording, open_recording
+    from sd2core.sensor import VirtualSensor
+
+    sensor = VirtualSensor()
+    if is_recording(options.mesh):
+        recording = open_recording(options.mesh)
+        sensor = recording.sensor
+        with progress_bar("Reading the mesh") as progress:
+            mesh = recording.load_mesh(progress)
+    else:
+        mesh = load_mesh_as_told(options.mesh, options)
+    if options.sensor is not None:
+        sensor = replace(sensor, position_m=options.sensor)
+    return mesh, sensor
 
 
 def check_output(path: Path, suffix: str) -> None:

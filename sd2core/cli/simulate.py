@@ -1,4 +1,4 @@
-"""``sd2 simulate``: recordings made from nothing, with known truth."""
+"""``sd2 simulate``: recordings and radar signals with known truth."""
 
 from __future__ import annotations
 
@@ -7,15 +7,16 @@ from pathlib import Path
 
 from sd2core.cli.options import add_command
 from sd2core.cli.output import progress_bar
+from sd2core.cli.simulate_radar import add_radar
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``simulate sample`` and ``simulate export-body``."""
+    """Add ``simulate sample``, ``simulate radar`` and ``simulate export-body``."""
     parser = add_command(
         commands,
         "simulate",
-        "make recordings of a simulated body",
-        examples="  sd2 simulate sample swipes.sd2",
+        "make recordings of a simulated body, or a radar's samples of any mesh",
+        examples="  sd2 simulate sample swipes.sd2\n  sd2 simulate radar walk.npz walk-radar",
     )
     kinds = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     sample = add_command(
@@ -30,6 +31,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         ),
     )
     sample.add_argument("out", type=Path, metavar="OUT", help="the recording to make (NAME.sd2)")
+    add_radar(kinds)
     body = add_command(
         kinds,
         "export-body",

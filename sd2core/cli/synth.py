@@ -19,11 +19,26 @@ from sd2core.cli.options import (
     positive_int,
 )
 from sd2core.cli.output import progress_bar
+from sd2core.cli.simulate_radar import add_radar_choice, chosen_radar, simulated
+from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
     from sd2core.doppler import SynthesisOptions
     from sd2core.mesh import MeshSequence
     from sd2core.sensor import VelocityAxis, VirtualSensor
+    from sd2core.spectrum import DopplerMap
+
+_COUNTING_ONLY = (
+    "weight",
+    "null_bins",
+    "beyond",
+    "range_exponent",
+    "reference_range_m",
+    "trajectory_smoothing_s",
+    "oversampling",
+    "velocity_sigma_bins",
+    "time_sigma_s",
+)
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
@@ -37,14 +52,16 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "Counts the mesh's vertices by their velocity towards the sensor, frame by frame.\n"
             "The camera is at 0,0,0 and looks along z; x is to its right and y down, in\n"
             "metres. Positive velocity is approaching. Options that are not given come from\n"
-            "the preset."
+            "the preset. With --model fmcw the echoes of all triangles are summed to the signal\n"
+            "of a radar, and that is processed like a capture (more: sd2 simulate radar)."
         ),
         examples=(
             "  sd2 synth walk.npz --out map.npz\n"
             "  sd2 synth walk.npz --out left.npz --sensor -1,0,2\n"
             "  sd2 synth walk.sd2 --out map.npz    (mesh and sensor of a recording)\n"
             "  sd2 synth points.npz --out map.npz --visibility none --null-bins none\n"
-            "  sd2 synth walk.npz --out map.npz --preset vid2doppler"
+            "  sd2 synth walk.npz --out map.npz --preset vid2doppler\n"
+            "  sd2 synth walk.npz --out map.npz --model fmcw"
         ),
     )
     parser.add_argument("mesh", type=Path, metavar="MESH", help="a mesh, or a recording")
@@ -63,6 +80,13 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         default="paper",
         help="the paper's chain, or Vid2Doppler's arithmetic to the last digit (default: paper)",
     )
+    parser.add_argument(
+        "--model",
+        choices=("histogram", "fmcw"),
+        default="histogram",
+        help="count vertices, or simulate the radar's signal (default: histogram)",
+    )
+    add_radar_choice(parser)
     parser.add_argument(
         "--visibility",
         choices=("none", "facing", "exact"),
@@ -129,20 +153,56 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 def _synth(options: argparse.Namespace) -> None:
     from sd2core.cli.info import describe_map, show
-    from sd2core.cli.reading import check_output
+    from sd2core.cli.reading import check_output, mesh_and_sensor
     from sd2core.doppler import Synthesizer
 
     check_output(options.out, ".npz")
-    mesh, sensor = _mesh_and_sensor(options)
-    chosen = synthesis_options(options)
-    synthesizer = Synthesizer(mesh, chosen)
-    with progress_bar("Synthesising") as progress:
-        doppler = synthesizer.map(sensor, progress=progress)
+    if options.model == "fmcw":
+        _check_fmcw(options)
+    elif options.radar != "paper":
+        raise Sd2Error("--radar is given", "it together with --model fmcw only")
+    mesh, sensor = mesh_and_sensor(options)
+    if options.model == "fmcw":
+        doppler = _by_fmcw(options, mesh, sensor)
+    else:
+        synthesizer = Synthesizer(mesh, synthesis_options(options))
+        with progress_bar("Synthesising") as progress:
+            doppler = synthesizer.map(sensor, progress=progress)
     doppler.save(options.out)
     description = describe_map(options.out, doppler)
     description.notes = mesh.notes + description.notes
     description.data["notes"] = list(description.notes)
     show(description, as_json=options.json)
+
+
+def _check_fmcw(options: argparse.Namespace) -> None:
+    given = [name for name in _COUNTING_ONLY if getattr(options, name) is not None]
+    if options.preset != "paper":
+        given.append("preset")
+    if given:
+        raise Sd2Error(
+            f"--{given[0].replace('_', '-')} is given with --model fmcw",
+            "options of the histogram with the histogram only",
+        )
+    if options.visibility not in (None, "facing", "exact"):
+        raise Sd2Error(
+            f"--visibility {options.visibility} is given with --model fmcw", "facing or exact"
+        )
+
+
+def _by_fmcw(options: argparse.Namespace, mesh: MeshSequence, sensor: VirtualSensor) -> DopplerMap:
+    from sd2core.fmcw import doppler_map
+    from sd2core.sensor import VelocityAxis
+
+    config = chosen_radar(options.radar)
+    capture = simulated(mesh, sensor, config, options.visibility or "exact")
+    default = VelocityAxis()
+    axis = VelocityAxis(options.bins or default.bins, options.v_max or default.v_max_mps)
+    with progress_bar("Processing") as progress:
+        doppler = doppler_map(capture, axis=axis, progress=progress)
+    provenance = doppler.meta | {"simulation": capture.meta["simulation"]}
+    # The capture's clock starts with its first frame, the map's is the mesh's.
+    return replace(doppler, meta=provenance).shifted(mesh.timebase.start_s)
 
 
 def synthesis_options(options: argparse.Namespace) -> SynthesisOptions:
@@ -151,18 +211,7 @@ def synthesis_options(options: argparse.Namespace) -> SynthesisOptions:
     from sd2core.sensor import VelocityAxis
 
     preset = PRESETS[options.preset]
-    names = (
-        "visibility",
-        "weight",
-        "null_bins",
-        "beyond",
-        "range_exponent",
-        "reference_range_m",
-        "trajectory_smoothing_s",
-        "oversampling",
-        "velocity_sigma_bins",
-        "time_sigma_s",
-    )
+    names = ("visibility", *_COUNTING_ONLY)
     given: dict[str, Any] = {
         name: getattr(options, name) for name in names if getattr(options, name) is not None
     }
@@ -181,21 +230,3 @@ def same_velocities(
         for number, centre_mps in enumerate(other.centres_mps)
         if axis.bin_of(float(centre_mps)) in bins
     )
-
-
-def _mesh_and_sensor(options: argparse.Namespace) -> tuple[MeshSequence, VirtualSensor]:
-    from sd2core.cli.reading import load_mesh_as_told
-    from sd2core.recording import is_recording, open_recording
-    from sd2core.sensor import VirtualSensor
-
-    sensor = VirtualSensor()
-    if is_recording(options.mesh):
-        recording = open_recording(options.mesh)
-        sensor = recording.sensor
-        with progress_bar("Reading the mesh") as progress:
-            mesh = recording.load_mesh(progress)
-    else:
-        mesh = load_mesh_as_told(options.mesh, options)
-    if options.sensor is not None:
-        sensor = replace(sensor, position_m=options.sensor)
-    return mesh, sensor

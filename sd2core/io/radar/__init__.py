@@ -6,9 +6,22 @@ from pathlib import Path
 
 from sd2core.errors import Sd2Error
 from sd2core.io.radar.capture import RadarCapture
-from sd2core.io.radar.infineon import find_recording, load_infineon, write_capture
+from sd2core.io.radar.infineon import (
+    check_replaceable,
+    find_recording,
+    load_infineon,
+    read_radar_config,
+    write_capture,
+)
 
-__all__ = ["SUPPORTED", "RadarCapture", "load_capture", "write_capture"]
+__all__ = [
+    "SUPPORTED",
+    "RadarCapture",
+    "check_replaceable",
+    "load_capture",
+    "read_radar_config",
+    "write_capture",
+]
 
 SUPPORTED = (
     "an Infineon recording: the folder with radar.npy, config.json and radar_timestamp.csv"

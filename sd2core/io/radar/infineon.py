@@ -116,6 +116,19 @@ def load_infineon(folder: Path) -> RadarCapture:
     )
 
 
+def read_radar_config(path: Path) -> RadarConfig:
+    """Radar of a config.json; the meta.json beside it is heeded where there is one.
+
+    Raises
+    ------
+    Sd2Error
+        When the file is missing, damaged or describes no possible radar.
+    """
+    if not path.is_file():
+        raise Sd2Error(f"There is no file {path}", "the config.json of a radar recording")
+    return _read_config(path, _read_meta(path.parent / _META))
+
+
 def write_capture(
     folder: Path | str,
     samples: ArrayLike,
@@ -145,17 +158,12 @@ def write_capture(
         Further entries of ``meta.json``, e.g. how it was simulated and the truth.
     """
     folder = Path(folder)
+    check_replaceable(folder)
     timebase = Timebase(times_s)
     cube = np.asarray(samples)
     check_cube(cube, config, f"The recording for {folder}")
     if len(timebase) != len(cube):
         raise Sd2Error(f"{len(cube)} radar frames but {len(timebase)} times", "one time per frame")
-    if folder.exists() and not (folder.is_dir() and _replaceable(folder)):
-        raise Sd2Error(
-            f"{folder} exists and is not a radar recording",
-            "a new folder, or a radar recording to replace",
-            "Choose another name",
-        )
     shape = {
         "rx_antennas": list(range(1, config.receivers + 1)),
         "tx_antennas": [1],
@@ -188,6 +196,16 @@ def write_capture(
     finally:
         shutil.rmtree(new, ignore_errors=True)
     return folder
+
+
+def check_replaceable(folder: Path) -> None:
+    """Refuse a folder that holds something else than a radar recording."""
+    if folder.exists() and not (folder.is_dir() and _replaceable(folder)):
+        raise Sd2Error(
+            f"{folder} exists and is not a radar recording",
+            "a new folder, or a radar recording to replace",
+            "Choose another name",
+        )
 
 
 def _swap(new: Path, folder: Path) -> None:
