@@ -17,6 +17,9 @@ from sd2core.errors import Sd2Error
 
 SPEED_OF_LIGHT_MPS = 299_792_458.0
 
+_LOWEST_HZ, _HIGHEST_HZ = 1e8, 1e12
+"""No radar that sees a body works outside; figures outside are in MHz or GHz."""
+
 Vector = tuple[float, float, float]
 
 
@@ -194,6 +197,7 @@ class RadarConfig:
     def __post_init__(self) -> None:
         for key in (
             "start_frequency_hz",
+            "end_frequency_hz",
             "chirp_repetition_s",
             "frame_repetition_s",
             "sample_rate_hz",
@@ -206,6 +210,13 @@ class RadarConfig:
                 f"The chirp ends at {self.end_frequency_hz:g} Hz"
                 f" and starts at {self.start_frequency_hz:g} Hz",
                 "an end frequency above the start frequency",
+            )
+        if self.start_frequency_hz < _LOWEST_HZ or self.end_frequency_hz > _HIGHEST_HZ:
+            raise Sd2Error(
+                f"The radar sweeps from {self.start_frequency_hz:g} Hz"
+                f" to {self.end_frequency_hz:g} Hz",
+                "radar frequencies, between 100 MHz and 1 THz",
+                "State them in Hz: 60 GHz is 60e9",
             )
         for key, least in (
             ("samples_per_chirp", 2),

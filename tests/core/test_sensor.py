@@ -70,6 +70,13 @@ def test_limits_follow_from_the_configuration():
     ("change", "words"),
     [
         ({"end_frequency_hz": 1e9}, "ends at 1e+09 Hz"),
+        ({"end_frequency_hz": math.inf}, "end_frequency_hz is inf"),
+        (
+            {"start_frequency_hz": 60.0, "end_frequency_hz": 61.0},
+            "sweeps from 60 Hz to 61 Hz. Expected: radar frequencies, between 100 MHz and 1 THz."
+            " State them in Hz",
+        ),
+        ({"end_frequency_hz": 60e12}, "to 6e+13 Hz"),
         ({"chirps_per_frame": 1}, "chirps_per_frame is 1"),
         ({"frame_repetition_s": 1e-3}, "do not fit"),
         ({"sample_rate_hz": math.nan}, "sample_rate_hz is nan"),
