@@ -68,11 +68,26 @@ class RadarCapture:
         -------
         float32 array, shape (n, receivers, chirps, samples)
             Mid-scale is 0, the ends of the converter's range are -1 and (nearly) 1.
+
+        Raises
+        ------
+        Sd2Error
+            When a count is larger than the converter can give.
         """
         if not 0 <= start < stop <= self.frame_count:
             raise IndexError(f"frames {start} to {stop} of {self.frame_count}")
         half = np.float32(2.0 ** (self.config.adc_bits - 1))
-        counts = np.asarray(self.samples[start:stop]).astype(np.float32)
+        raw = np.asarray(self.samples[start:stop])
+        top = int(raw.max())
+        bits = self.config.adc_bits
+        if top >= 2**bits:
+            raise Sd2Error(
+                f"{self.source or 'The radar cube'} holds a count of {top}, but the converter is"
+                f" said to have {bits} bits",
+                f"counts from 0 to {2**bits - 1}, or {top.bit_length()} or more bits",
+                "Correct adc_resolution in meta.json (12 when it is not stated)",
+            )
+        counts = raw.astype(np.float32)
         counts -= half
         counts /= half
         return counts

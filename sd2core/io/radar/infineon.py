@@ -11,7 +11,6 @@ A recording is a folder, usually called ``RadarIfxAvian_00``::
 from __future__ import annotations
 
 import json
-import math
 import shutil
 import tempfile
 from pathlib import Path
@@ -33,6 +32,10 @@ ADC_BITS = 12
 _DATA, _CONFIG, _TIMES, _META = "radar.npy", "config.json", "radar_timestamp.csv", "meta.json"
 _FIRST_PLAUSIBLE_UNIX_S = 1e8
 """Smaller start times are seconds since the start, not a date."""
+_LAST_PLAUSIBLE_UNIX_S = 1e11
+"""Larger ones are not in seconds."""
+_FAR_TOO_SLOW = 100
+"""Typical steps of this many frame repetition times are no pauses: the unit is another."""
 
 
 class _Shape(BaseModel):
@@ -41,6 +44,8 @@ class _Shape(BaseModel):
     model_config = ConfigDict(extra="ignore")
 
     rx_antennas: list[int] = Field(min_length=1)
+    tx_antennas: list[int] = Field(default=[1])
+    mimo_mode: str | None = "off"
     start_frequency_Hz: float = Field(gt=0)
     end_frequency_Hz: float = Field(gt=0)
     num_chirps_per_frame: int = Field(ge=2)
@@ -104,7 +109,7 @@ def load_infineon(folder: Path) -> RadarCapture:
     samples = _open_samples(folder / _DATA)
     check_cube(samples, config, str(folder / _DATA))
     timebase, start_unix_s, notes = _read_times(folder / _TIMES, len(samples), config)
-    return RadarCapture(
+    capture = RadarCapture(
         samples=samples,
         config=config,
         timebase=timebase,
@@ -114,6 +119,8 @@ def load_infineon(folder: Path) -> RadarCapture:
         notes=notes,
         meta=meta.model_dump(),
     )
+    capture.read(0, 1)  # refuses counts beyond the converter
+    return capture
 
 
 def read_radar_config(path: Path) -> RadarConfig:
@@ -272,6 +279,14 @@ def _read_config(path: Path, meta: _Meta) -> RadarConfig:
         shape = _Config.model_validate(_read_json(path)).device_config.fmcw_single_shape
     except ValidationError as error:
         raise _explain(path, error) from error
+    mode = (shape.mimo_mode or "off").lower()
+    if mode != "off" or len(shape.tx_antennas) > 1:
+        raise Sd2Error(
+            f"{path}: mimo_mode is {mode!r} with {len(shape.tx_antennas)} transmitters. Chirps of"
+            " several transmitters take turns, so that velocities would come out wrong",
+            "a recording with one transmitter, mimo_mode 'off'",
+            "Record again with one transmitter, or keep the chirps of one and its repetition time",
+        )
     try:
         return RadarConfig(
             start_frequency_hz=shape.start_frequency_Hz,
@@ -317,7 +332,7 @@ def _read_times(
     if not path.exists():
         return regular, None, (f"{path.name} is missing: {fallback}.",)
     times = _parse_times(path)
-    plausible = times.size > 0 and math.isfinite(times[0]) and times[0] > _FIRST_PLAUSIBLE_UNIX_S
+    plausible = times.size > 0 and _FIRST_PLAUSIBLE_UNIX_S < times[0] < _LAST_PLAUSIBLE_UNIX_S
     start_unix_s = float(times[0]) if plausible else None
     if len(times) != frames:
         which = "fewer" if len(times) < frames else "more"
@@ -328,6 +343,12 @@ def _read_times(
         bad = int(np.flatnonzero(~(steps > 0))[0])
         note = f"{path.name} does not increase from frame {bad} to {bad + 1}"
         return regular, start_unix_s, (f"{note}: {fallback}.",)
+    if steps.size and np.median(steps) > _FAR_TOO_SLOW * nominal_s:
+        note = (
+            f"{path.name} has steps of {np.median(steps):g} s, which looks like milliseconds; it"
+            " should hold seconds"
+        )
+        return regular, None, (f"{note}: {fallback}.",)
     # No frame can follow sooner than the radar sends one; the host read several at once.
     if steps.size and steps.min() < 0.5 * nominal_s:
         note = (

@@ -181,6 +181,27 @@ DAMAGE: dict[str, tuple[Callable[[Path], object], str]] = {
         lambda f: edit_config(f, lambda shape: shape.update(chirp_repetition_time_s=-1)),
         r"chirp_repetition_time_s is -1 .*greater than 0",
     ),
+    "endless sweep": (
+        lambda f: edit_config(f, lambda shape: shape.update(end_frequency_Hz=np.inf)),
+        r"config\.json: The radar's end_frequency_hz is inf",
+    ),
+    "gigahertz for hertz": (
+        lambda f: edit_config(f, lambda s: s.update(start_frequency_Hz=60, end_frequency_Hz=61)),
+        r"config\.json: The radar sweeps from 60 Hz to 61 Hz.*60 GHz is 60e9",
+    ),
+    "transmitters in turn": (
+        lambda f: edit_config(f, lambda s: s.update(mimo_mode="tdm", tx_antennas=[1, 2])),
+        r"config\.json: mimo_mode is 'tdm' with 2 transmitters",
+    ),
+    "two transmitters": (
+        lambda f: edit_config(f, lambda shape: shape.update(tx_antennas=[1, 2])),
+        r"config\.json: mimo_mode is 'off' with 2 transmitters",
+    ),
+    "counts beyond the converter": (
+        lambda f: (f / "meta.json").write_text('{"adc_resolution": 8}'),
+        r"radar\.npy holds a count of 40\d\d, but the converter is said to have 8 bits\."
+        r" Expected: counts from 0 to 255",
+    ),
     "sweep backwards": (
         lambda f: edit_config(f, lambda shape: shape.update(end_frequency_Hz=1e9)),
         r"config\.json: The chirp ends at 1e\+09 Hz",
@@ -243,6 +264,28 @@ def test_odd_times_are_noted(folder: Path, case: str) -> None:
     expected_s = times_s if used else STEADY_S
     np.testing.assert_allclose(capture.timebase.times_s, expected_s, atol=1e-6)
     assert capture.start_unix_s == START_UNIX_S
+
+
+@pytest.mark.parametrize("first_ms", [0.0, 1e3 * START_UNIX_S])
+def test_times_in_milliseconds_are_suspected(folder: Path, first_ms: float) -> None:
+    lines = [f"{time!r}\n" for time in (first_ms + 1e3 * STEADY_S).tolist()]
+    (folder / "radar_timestamp.csv").write_text("".join(lines))
+    capture = load_capture(folder)
+    assert len(capture.notes) == 1
+    assert "has steps of 33.3" in capture.notes[0]
+    assert "looks like milliseconds" in capture.notes[0]
+    np.testing.assert_allclose(capture.timebase.times_s, STEADY_S)
+    assert capture.start_unix_s is None
+
+
+def test_counts_beyond_the_converter_are_refused_in_later_frames_too(
+    folder: Path, cube: np.ndarray
+) -> None:
+    cube[5, 0, 0, 0] = 5000
+    np.save(folder / "radar.npy", cube)
+    capture = load_capture(folder)
+    with pytest.raises(Sd2Error, match=r"radar\.npy holds a count of 5000.*12 bits.*13 or more"):
+        capture.read(4, 7)
 
 
 def test_missing_times_are_noted(folder: Path) -> None:
