@@ -65,9 +65,9 @@ class ProcessingOptions:
         for name, choices in (("clutter", get_args(Clutter)), ("window", get_args(Window))):
             if getattr(self, name) not in choices:
                 raise Sd2Error(f"{name} is {getattr(self, name)!r}", f"one of {', '.join(choices)}")
-        if not self.clutter_window_s > 0:
+        if not 0 < self.clutter_window_s < np.inf:
             raise Sd2Error(f"clutter_window_s is {self.clutter_window_s}", "a positive time")
-        if self.range_m is not None and not 0 <= self.range_m[0] < self.range_m[1]:
+        if self.range_m is not None and not 0 <= self.range_m[0] < self.range_m[1] < np.inf:
             raise Sd2Error(f"range_m is {self.range_m}", "two ranges in metres, the nearer first")
 
 
@@ -121,7 +121,8 @@ class Chain:
         if self.options.clutter != "moving":
             return 0
         frame_s = self.capture.config.frame_repetition_s
-        return min(round(0.5 * self.options.clutter_window_s / frame_s), self.capture.frame_count)
+        frames = min(self.options.clutter_window_s / frame_s, 2.0 * self.capture.frame_count)
+        return round(0.5 * frames)
 
     def blocks(self) -> Iterator[tuple[int, int]]:
         """Half-open stretches of frames that fit into a few megabytes."""
@@ -196,8 +197,8 @@ def _gates(config: RadarConfig, options: ProcessingOptions) -> slice:
     if options.range_m is not None:
         # Gate k is the cell from (k - 1/2) to (k + 1/2) times the resolution.
         low, high = options.range_m
-        first = max(first, int(np.floor(low / step_m + 0.5)))
-        end = min(end, int(np.ceil(high / step_m + 0.5)))
+        first = max(first, int(np.floor(min(low / step_m, end) + 0.5)))
+        end = int(min(end, np.ceil(high / step_m + 0.5)))
     if first >= end:
         wanted = "" if options.range_m is None else f" from {low:g} m to {high:g} m"
         raise Sd2Error(

@@ -322,6 +322,9 @@ def test_the_axis_is_the_radars_own_unless_asked_for() -> None:
         ({"clutter": "median"}, "clutter is 'median'"),
         ({"window": "kaiser"}, "window is 'kaiser'"),
         ({"range_m": (3.0, 1.0)}, "range_m is"),
+        ({"range_m": (0.5, np.inf)}, "range_m is"),
+        ({"range_m": (1e300, 1e308)}, "No range gate is left from 1e.300 m"),
+        ({"clutter": "moving", "clutter_window_s": np.inf}, "clutter_window_s is inf"),
         ({"range_m": (20.0, 30.0)}, "No range gate is left from 20 m to 30 m"),
         ({"range_m": (0.0, 0.2)}, "No range gate is left"),
         ({"clutter_window_s": 0.0}, "clutter_window_s is 0.0"),
@@ -330,6 +333,13 @@ def test_the_axis_is_the_radars_own_unless_asked_for() -> None:
 def test_options_that_do_not_fit_are_explained(options: dict, sentence: str) -> None:
     with pytest.raises(Sd2Error, match=sentence):
         doppler_map(noise_capture(FINE, 1), **options)
+
+
+def test_a_stretch_or_a_window_longer_than_everything_is_everything() -> None:
+    capture = noise_capture(FINE, 3)
+    far = doppler_map(capture, range_m=(0.0, 1e308), clutter="moving", clutter_window_s=1e308)
+    near = doppler_map(capture, range_m=(0.0, 100.0), clutter="moving", clutter_window_s=100.0)
+    np.testing.assert_array_equal(far.values, near.values)
 
 
 def test_real_person_recedes_from_one_and_a_half_seconds(shared_data: Path) -> None:
