@@ -241,9 +241,12 @@ def _synthesis_facts(provenance: dict[str, Any]) -> dict[str, str]:
     x, y, z = provenance["sensor"]["position_m"]
     visible, beyond = provenance["visible_share"], provenance["beyond_share"]
     worst = max(range(len(beyond)), key=beyond.__getitem__)
+    stride = provenance.get("mask_stride", 1)
+    shared = "" if stride == 1 else f", worked out for one frame in {stride}"
     return {
         "sensor": f"at x {x:g}, y {y:g}, z {z:g} m",
-        "visibility": f"{provenance['visibility']}: {fmean(visible):.1%} visible on average",
+        "visibility": f"{provenance['visibility']}: {fmean(visible):.1%} visible on average"
+        + shared,
         "beyond axis": f"{fmean(beyond):.1%} of what is visible on average"
         + (f", {beyond[worst]:.1%} in frame {worst}" if beyond[worst] > 0 else ""),
     }

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from sd2core.spectrum import DopplerMap
 
 _COUNTING_ONLY = (
+    "depth_resolution",
+    "mask_stride",
     "weight",
     "null_bins",
     "beyond",
@@ -89,8 +91,22 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     add_radar_choice(parser)
     parser.add_argument(
         "--visibility",
-        choices=("none", "facing", "exact"),
-        help="which vertices count: all, those that face the sensor, or those that nothing hides",
+        choices=("none", "facing", "depth", "exact"),
+        help="which vertices count: all, those that face the sensor, or those that nothing hides:"
+        " by a depth buffer (fast, approximate) or exactly",
+    )
+    parser.add_argument(
+        "--depth-resolution",
+        type=int,
+        choices=(128, 256),
+        help="pixels along each side of the depth buffer (default: 256)",
+    )
+    parser.add_argument(
+        "--mask-stride",
+        type=positive_int,
+        metavar="N",
+        help="work depth or exact visibility out for every N-th frame only, and use it for the"
+        " frames nearest to each (default: 1)",
     )
     parser.add_argument(
         "--weight",

@@ -12,14 +12,18 @@ from sd2core.compiled import kernels_ready
 from sd2core.doppler import histogram, vid2doppler
 from sd2core.doppler.histogram import Counting
 from sd2core.doppler.prepared import Block, PreparedMesh
-from sd2core.scattering import exact_plain
+from sd2core.scattering import depth_plain, exact_plain
+from sd2core.scattering.depth import depth_visibility_kernel
 from sd2core.scattering.exact import exact_visibility_kernel
 from sd2core.scattering.visibility import facing_kernel, facing_mask
 
-Visibility = Literal["none", "facing", "exact", "frozen"]
-"""``frozen``: the last exact visibility, kept while the sensor is dragged."""
+Visibility = Literal["none", "facing", "depth", "exact", "frozen"]
+"""``frozen``: the last depth or exact visibility, kept while the sensor is dragged."""
 
-Quality = Literal["none", "facing", "exact", "frozen"]
+Quality = Literal["none", "facing", "depth", "exact", "frozen"]
+
+Occlusion = Literal["depth", "exact"]
+"""Visibility that takes what stands in between into account; its masks are kept."""
 
 Position = tuple[float, float, float]
 
@@ -28,10 +32,11 @@ _PLACES_KEPT = 4
 
 @dataclass(eq=False)
 class _BlockMask:
-    """Exact visibility of one block's frames from one place.
+    """Depth or exact visibility of one block's frames from one place.
 
     ``visible`` (n, V) holds the facing test where visibility cannot change the
-    map; ``done`` (n,) says which frames have been worked out.
+    map; ``done`` (n,) says which frames have been worked out. With a stride only
+    the frames that serve their neighbours ever are.
     """
 
     visible: NDArray[np.uint8]
@@ -39,9 +44,9 @@ class _BlockMask:
 
 
 class VisibilityMasks:
-    """Visibility of a mesh from any place; what is exact is kept in the mesh's byte budget.
+    """Visibility of a mesh from any place; masks are kept in the mesh's byte budget.
 
-    Calls may come from several threads. Facing and exact visibility need faces.
+    Calls may come from several threads. All visibility but none needs faces.
 
     Parameters
     ----------
@@ -57,8 +62,9 @@ class VisibilityMasks:
         live[list(prepared.options.null_bins)] = 0
         live[-1] = 0
         self._live = live
+        self._stride = prepared.options.mask_stride
         # Newest first, per block.
-        self._exact_at: dict[int, tuple[Position, ...]] = {}
+        self._kept_at: dict[int, tuple[tuple[Occlusion, Position], ...]] = {}
 
     def for_rows(
         self, block: Block, rows: slice, position_m: Position, visibility: Visibility
@@ -69,13 +75,13 @@ class VisibilityMasks:
         -------
         mask : uint8 array, shape (n, V), or None
             None for ``none`` and ``facing``: counting judges those by itself.
-        quality : {"none", "facing", "frozen", "exact"}
+        quality : {"none", "facing", "depth", "frozen", "exact"}
             ``facing`` where ``frozen`` was asked for and nothing is kept.
         """
-        if visibility == "exact":
-            return self._exact(block, rows, position_m), "exact"
+        if visibility == "exact" or visibility == "depth":
+            return self._worked_out(block, rows, position_m, visibility), visibility
         if visibility == "frozen":
-            mask = self._frozen(block.index, rows)
+            mask = self._frozen(block, rows)
             return mask, "facing" if mask is None else "frozen"
         return None, visibility
 
@@ -84,14 +90,16 @@ class VisibilityMasks:
     ) -> tuple[NDArray[np.bool_], Quality]:
         """Visibility of every vertex of a block's frame, bool (V,), and how it was found.
 
-        Exact also where it cannot change the map.
+        Depth and exact also where they cannot change the map. With a stride, that of
+        the frame whose visibility serves this one.
         """
         rows = slice(local, local + 1)
         place = self._prepared.sensor(position_m)
-        if visibility == "exact":
+        if visibility == "exact" or visibility == "depth":
             visible = np.empty((1, self._prepared.mesh.vertex_count), np.uint8)
-            self._test(_points(block, rows), place, np.ones_like(visible), visible)
-            return visible[0] > 0, "exact"
+            points = self._points_of(int(self._serving(block.start + local)))
+            self._test(points, place, np.ones_like(visible), visible, visibility)
+            return visible[0] > 0, visibility
         mask, quality = self.for_rows(block, rows, position_m, visibility)
         if quality == "none":
             return np.ones(self._prepared.mesh.vertex_count, bool), quality
@@ -99,45 +107,113 @@ class VisibilityMasks:
             mask = _facing(_points(block, rows), self._prepared.normals(block)[rows], place)
         return mask[0] > 0, quality
 
-    def kept(self, index: int, rows: slice, position_m: Position) -> NDArray[np.uint8] | None:
-        """Exact mask of a block's frames from this place, uint8 (n, V), if all are in memory."""
-        mask: _BlockMask | None = self._prepared.budget.get(("mask", index, position_m))
-        return mask.visible[rows] if mask is not None and mask.done[rows].all() else None
+    def kept(
+        self, index: int, rows: slice, position_m: Position, occlusion: Occlusion
+    ) -> NDArray[np.uint8] | None:
+        """Mask of a block's frames from this place, uint8 (n, V), if all are in memory."""
+        if self._stride == 1:
+            mask: _BlockMask | None = self._prepared.budget.get(
+                ("mask", occlusion, index, position_m)
+            )
+            return mask.visible[rows] if mask is not None and mask.done[rows].all() else None
+        served = []
+        for frame in self._serving(self._frames(index, rows)).tolist():
+            home, local = divmod(frame, self._prepared.block_frames)
+            mask = self._prepared.budget.get(("mask", occlusion, home, position_m))
+            if mask is None or not mask.done[local]:
+                return None
+            served.append(mask.visible[local])
+        return np.stack(served)
 
-    def _frozen(self, index: int, rows: slice) -> NDArray[np.uint8] | None:
-        """The newest exact mask in which these rows are complete.
+    def _frames(self, index: int, rows: slice) -> NDArray[np.intp]:
+        """Numbers, in the clip, of some of a block's frames."""
+        return np.arange(rows.start, rows.stop) + self._prepared.span(index)[0]
+
+    def _serving(self, frames: NDArray[np.intp] | int) -> NDArray[np.intp]:
+        """The frames whose visibility serves these: every n-th of the clip, the nearest.
+
+        Midway the later one. The last one may have more than half a stride to serve.
+        """
+        every = self._stride
+        last = (self._prepared.mesh.frame_count - 1) // every * every
+        return np.minimum((np.asarray(frames) + every // 2) // every * every, last)
+
+    def _frozen(self, block: Block, rows: slice) -> NDArray[np.uint8] | None:
+        """The newest mask in which these rows are complete.
 
         Not simply the newest: a drag that goes on cancels what its pause began.
         """
-        for position_m in self._exact_at.get(index, ()):
-            mask = self.kept(index, rows, position_m)
+        for occlusion, position_m in self._kept_at.get(block.index, ()):
+            mask = self.kept(block.index, rows, position_m, occlusion)
             if mask is not None:
                 return mask
         return None
 
-    def _exact(self, block: Block, rows: slice, position_m: Position) -> NDArray[np.uint8]:
-        """Exact mask of these rows, kept or worked out now."""
-        mask = self._block_mask(block, position_m)
-        others = [place for place in self._exact_at.get(block.index, ()) if place != position_m]
-        self._exact_at[block.index] = (position_m, *others[: _PLACES_KEPT - 1])
+    def _worked_out(
+        self, block: Block, rows: slice, position_m: Position, occlusion: Occlusion
+    ) -> NDArray[np.uint8]:
+        """Mask of these rows, kept or worked out now."""
+        here = (occlusion, position_m)
+        others = [place for place in self._kept_at.get(block.index, ()) if place != here]
+        self._kept_at[block.index] = (here, *others[: _PLACES_KEPT - 1])
+        if self._stride > 1:
+            frames = self._serving(self._frames(block.index, rows))
+            serving, which = np.unique(frames, return_inverse=True)
+            masks = [self._serving_mask(frame, position_m, occlusion) for frame in serving.tolist()]
+            return np.stack(masks)[which]
+        mask = self._block_mask(block.index, position_m, occlusion)
         if not mask.done[rows].all():
             place, points = self._prepared.sensor(position_m), _points(block, rows)
             visible = _facing(points, self._prepared.normals(block)[rows], place)
-            self._test(points, place, self._needed(block, rows, place), visible)
+            self._test(points, place, self._needed(block, rows, place), visible, occlusion)
             mask.visible[rows] = visible
             mask.done[rows] = True
         return mask.visible[rows]
 
-    def _block_mask(self, block: Block, position_m: Position) -> _BlockMask:
-        """Exact visibility from a place, as far as it has been worked out."""
+    def _serving_mask(
+        self, frame: int, position_m: Position, occlusion: Occlusion
+    ) -> NDArray[np.uint8]:
+        """Mask of one frame that serves its neighbours, uint8 (V,).
+
+        Tested are the vertices that can change the map in any frame it serves, also
+        beyond the block's seams.
+        """
+        home, local = divmod(frame, self._prepared.block_frames)
+        mask = self._block_mask(home, position_m, occlusion)
+        if not mask.done[local]:
+            place = self._prepared.sensor(position_m)
+            first = max(frame - self._stride, 0)
+            around = np.arange(first, min(frame + self._stride, self._prepared.mesh.frame_count))
+            served = around[self._serving(around) == frame]
+            needed = np.zeros((1, self._prepared.mesh.vertex_count), np.uint8)
+            for index in np.unique(served // self._prepared.block_frames).tolist():
+                start, stop = self._prepared.span(index)
+                low, high = max(int(served[0]), start), min(int(served[-1]) + 1, stop)
+                rows = slice(low - start, high - start)
+                needed |= self._needed(self._prepared.block(index), rows, place).max(axis=0)
+            block, points = self._prepared.block(home), self._points_of(frame)
+            normals = self._prepared.normals(block)[local : local + 1]
+            visible = _facing(points, normals, place)
+            self._test(points, place, needed, visible, occlusion)
+            mask.visible[local] = visible[0]
+            mask.done[local] = True
+        return mask.visible[local]
+
+    def _points_of(self, frame: int) -> NDArray[np.float32]:
+        """Positions of one frame of the clip in single precision, (1, 3, V)."""
+        home, local = divmod(frame, self._prepared.block_frames)
+        return _points(self._prepared.block(home), slice(local, local + 1))
+
+    def _block_mask(self, index: int, position_m: Position, occlusion: Occlusion) -> _BlockMask:
+        """Visibility from a place, as far as it has been worked out."""
 
         def make() -> tuple[_BlockMask, int]:
-            frames = block.stop - block.start
-            visible = np.zeros((frames, self._prepared.mesh.vertex_count), np.uint8)
-            return _BlockMask(visible, np.zeros(frames, bool)), visible.nbytes
+            start, stop = self._prepared.span(index)
+            visible = np.zeros((stop - start, self._prepared.mesh.vertex_count), np.uint8)
+            return _BlockMask(visible, np.zeros(stop - start, bool)), visible.nbytes
 
         mask: _BlockMask = self._prepared.budget.get_or_make(
-            ("mask", block.index, position_m), make
+            ("mask", occlusion, index, position_m), make
         )
         return mask
 
@@ -157,16 +233,26 @@ class VisibilityMasks:
         place: NDArray[np.float64],
         needed: NDArray[np.uint8],
         visible: NDArray[np.uint8],
+        occlusion: Occlusion,
     ) -> None:
-        """Write the exact visibility of the needed vertices into ``visible``."""
+        """Write the visibility of the needed vertices into ``visible``."""
         faces = self._prepared.faces
         assert faces is not None  # the Synthesizer refuses to ask it of a point cloud
+        pixels = self._prepared.options.depth_resolution
         if kernels_ready():
-            exact_visibility_kernel(points, faces, place, needed, 0, len(points), visible)
+            if occlusion == "exact":
+                exact_visibility_kernel(points, faces, place, needed, 0, len(points), visible)
+            else:
+                depth_visibility_kernel(
+                    points, faces, place, pixels, needed, 0, len(points), visible
+                )
             return
         for t in np.flatnonzero(needed.any(axis=1)):
             wanted = needed[t] > 0
-            seen = exact_plain.exact_visibility(points[t], faces, place, wanted)
+            if occlusion == "exact":
+                seen = exact_plain.exact_visibility(points[t], faces, place, wanted)
+            else:
+                seen = depth_plain.depth_visibility(points[t], faces, place, pixels, wanted)
             visible[t][wanted] = seen[wanted]
 
 

@@ -9,7 +9,8 @@ from typing import Literal, get_args
 from sd2core.errors import Sd2Error
 from sd2core.sensor import VelocityAxis
 
-Visibility = Literal["none", "facing", "exact"]
+Visibility = Literal["none", "facing", "depth", "exact"]
+DepthResolution = Literal[128, 256]
 Weight = Literal["count", "area"]
 Beyond = Literal["drop", "wrap", "clip"]
 VelocityRule = Literal["central", "vid2doppler"]
@@ -28,9 +29,14 @@ class SynthesisOptions:
 
     Parameters
     ----------
-    visibility : {"none", "facing", "exact"}
+    visibility : {"none", "facing", "depth", "exact"}
         Which vertices count: all, those whose normal faces the sensor, or those
-        that nothing hides.
+        that nothing hides, by a depth buffer (fast, approximate) or exactly.
+    depth_resolution : {128, 256}
+        Pixels along each side of the depth buffer.
+    mask_stride : int
+        Depth or exact visibility is worked out for every so many frames, and
+        serves the frames nearest to each.
     weight : {"count", "area"}
         A vertex counts 1 (the map is a share of all vertices) or its area (a
         share of the surface).
@@ -62,6 +68,8 @@ class SynthesisOptions:
     """
 
     visibility: Visibility = "exact"
+    depth_resolution: DepthResolution = 256
+    mask_stride: int = 1
     weight: Weight = "count"
     axis: VelocityAxis = field(default_factory=VelocityAxis)
     null_bins: tuple[int, ...] = (14, 15, 16)
@@ -78,13 +86,16 @@ class SynthesisOptions:
     def __post_init__(self) -> None:
         for name, allowed in (
             ("visibility", Visibility),
+            ("depth_resolution", DepthResolution),
             ("weight", Weight),
             ("beyond", Beyond),
             ("velocity", VelocityRule),
         ):
             value = getattr(self, name)
             if value not in get_args(allowed):
-                raise Sd2Error(f"{name} is {value!r}", f"one of {', '.join(get_args(allowed))}")
+                raise Sd2Error(
+                    f"{name} is {value!r}", f"one of {', '.join(map(str, get_args(allowed)))}"
+                )
         if self.axis.bins > MOST_BINS:
             raise Sd2Error(f"The velocity axis has {self.axis.bins} bins", f"up to {MOST_BINS}")
         nulled = tuple(sorted({int(number) for number in self.null_bins}))
@@ -109,6 +120,8 @@ class SynthesisOptions:
                 f"The reference range is {self.reference_range_m} m",
                 f"more than 0 and up to {FARTHEST_REFERENCE_M} m",
             )
+        if self.mask_stride < 1:
+            raise Sd2Error(f"mask_stride is {self.mask_stride}", "1 or more frames")
         if self.oversampling < 1 or self.oversampling % 2 == 0:
             raise Sd2Error(f"The oversampling is {self.oversampling}", "an odd number: 1, 3, 5 …")
         if self.velocity == "vid2doppler" and self.oversampling > 1:

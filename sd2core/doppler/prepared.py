@@ -144,6 +144,11 @@ class PreparedMesh:
         """A sensor's place in the frame of the prepared positions."""
         return np.asarray(position_m, np.float64) - self.origin_m
 
+    def span(self, index: int) -> tuple[int, int]:
+        """First frame of a block and the one after its last."""
+        start = index * self.block_frames
+        return start, min(start + self.block_frames, self.mesh.frame_count)
+
     def has(self, index: int) -> bool:
         """Whether a block is in memory."""
         return self.budget.get(("block", index)) is not None
@@ -213,8 +218,7 @@ class PreparedMesh:
         return np.ascontiguousarray(points, np.float32)
 
     def _prepare(self, index: int) -> Block:
-        start = index * self.block_frames
-        stop = min(start + self.block_frames, self.mesh.frame_count)
+        start, stop = self.span(index)
         every = self.options.oversampling
         half = every // 2
         if self._compatible:

@@ -14,7 +14,7 @@ from sd2core.compiled import compile_in_background, kernels_ready
 from sd2core.doppler import histogram, vid2doppler
 from sd2core.doppler.histogram import Counting, Counts
 from sd2core.doppler.kernels import ALL, CLIP, DROP, FACING, MASK, WRAP
-from sd2core.doppler.masks import Position, Quality, Visibility, VisibilityMasks
+from sd2core.doppler.masks import Occlusion, Position, Quality, Visibility, VisibilityMasks
 from sd2core.doppler.options import PRESETS, SynthesisOptions
 from sd2core.doppler.parallel import Ticket, run_jobs
 from sd2core.doppler.prepared import Block, ByteBudget, PreparedMesh
@@ -44,9 +44,9 @@ class Stretch:
         the map (still, or off the axis) are judged by the facing test.
     beyond_share : float32 array, shape (n,)
         Share of those whose velocity lies beyond the axis.
-    quality : {"none", "facing", "frozen", "exact"}
+    quality : {"none", "facing", "depth", "frozen", "exact"}
         The weakest visibility that was used: ``frozen`` falls back to facing
-        where no exact visibility is kept.
+        where no depth or exact visibility is kept.
     """
 
     values: NDArray[np.float32]
@@ -66,7 +66,7 @@ class FrameScattering:
     range_m : float32 array, shape (V,)
         Distance from the sensor.
     visible : bool array, shape (V,)
-    quality : {"none", "facing", "frozen", "exact"}
+    quality : {"none", "facing", "depth", "frozen", "exact"}
         How ``visible`` was found.
     """
 
@@ -161,7 +161,7 @@ class Synthesizer:
         Parameters
         ----------
         sensor : VirtualSensor
-        visibility : {"none", "facing", "exact", "frozen"}, optional
+        visibility : {"none", "facing", "depth", "exact", "frozen"}, optional
             Otherwise that of the options.
         frames : tuple of int, optional
         progress : Progress
@@ -171,12 +171,13 @@ class Synthesizer:
         -------
         DopplerMap
             Of kind ``synthetic``. Its meta names sensor, options, source and
-            version, the quality of the visibility, and per frame
-            ``visible_share`` and ``beyond_share``.
+            version, the quality of the visibility, how many frames share a mask,
+            and per frame ``visible_share`` and ``beyond_share``.
         """
         start, stop = frames or (0, self.mesh.frame_count)
         stretch = self.stretch(sensor, start, stop, visibility, progress)
         options = self.options
+        unshared = stretch.quality in ("none", "facing")
         return DopplerMap(
             values=stretch.values,
             axis=options.axis,
@@ -188,6 +189,7 @@ class Synthesizer:
                 "sensor": asdict(sensor),
                 "options": asdict(options),
                 "visibility": stretch.quality,
+                "mask_stride": 1 if unshared else options.mask_stride,
                 "source": self.mesh.source,
                 "version": __version__,
                 "visible_share": _rounded(stretch.visible_share),
@@ -266,9 +268,13 @@ class Synthesizer:
         )
 
     def cached_mask(
-        self, sensor: VirtualSensor, start: int = 0, stop: int | None = None
+        self,
+        sensor: VirtualSensor,
+        start: int = 0,
+        stop: int | None = None,
+        visibility: Occlusion = "exact",
     ) -> NDArray[np.uint8] | None:
-        """Exact visibility of frames ``start`` to ``stop`` from this place, if it is kept.
+        """Exact or depth visibility of frames ``start`` to ``stop`` from this place, if kept.
 
         Returns
         -------
@@ -279,7 +285,8 @@ class Synthesizer:
         parts = []
         for index, low, high in self._blocks_between(start, stop):
             base = index * self.prepared.block_frames
-            mask = self._masks.kept(index, slice(low - base, high - base), sensor.position_m)
+            rows = slice(low - base, high - base)
+            mask = self._masks.kept(index, rows, sensor.position_m, visibility)
             if mask is None:
                 return None
             parts.append(mask)
@@ -289,8 +296,8 @@ class Synthesizer:
 
     def _choose(self, visibility: Visibility | None) -> Visibility:
         chosen: Visibility = self.options.visibility if visibility is None else visibility
-        if chosen not in ("none", "facing", "exact", "frozen"):
-            raise Sd2Error(f"visibility is {chosen!r}", "none, facing, exact or frozen")
+        if chosen not in ("none", "facing", "depth", "exact", "frozen"):
+            raise Sd2Error(f"visibility is {chosen!r}", "none, facing, depth, exact or frozen")
         if self.mesh.faces is None and chosen != "none":
             raise _no_surface(self.mesh, f"Visibility {chosen}")
         return chosen
@@ -312,7 +319,7 @@ class Synthesizer:
 
         def job(index: int, low: int, high: int) -> Callable[[Ticket], None]:
             def work(ticket: Ticket) -> None:
-                small = visibility == "exact" or not kernels_ready()
+                small = visibility in ("depth", "exact") or not kernels_ready()
                 step = _EXACT_FRAMES if small else _FAST_FRAMES
                 ticket.advance(0)
                 block = self.prepared.block(index)

@@ -28,7 +28,7 @@ common edge cannot slip between two triangles."""
 _FLAT = 1e-13
 """Triangles seen more exactly edge-on than this, or without area, hide nothing."""
 
-_WIDEST = 2.0
+WIDEST = 2.0
 """Up to this tangent from the axis one image plane serves; beyond, six (a cube)."""
 
 _ROUNDING = np.float32(1e-6)
@@ -261,13 +261,13 @@ def exact_visibility_kernel(
 
         narrow = distance > 0
         if narrow:
-            _axes_along(away[0] / distance, away[1] / distance, away[2] / distance, axes)
+            axes_along(away[0] / distance, away[1] / distance, away[2] / distance, axes)
             for v in range(vertices):
                 gx, gy, gz = -g[0, v], -g[1, v], -g[2, v]
                 right = axes[0, 0] * gx + axes[0, 1] * gy + axes[0, 2] * gz
                 up = axes[1, 0] * gx + axes[1, 1] * gy + axes[1, 2] * gz
                 forward = axes[2, 0] * gx + axes[2, 1] * gy + axes[2, 2] * gz
-                if forward <= 0 or abs(right) + abs(up) > _WIDEST * forward:
+                if forward <= 0 or abs(right) + abs(up) > WIDEST * forward:
                     narrow = False
                     break
                 # Scaled to metres at the body, and depth counted from there:
@@ -316,7 +316,7 @@ def exact_visibility_kernel(
 
 
 @compiled
-def _axes_along(fx: float, fy: float, fz: float, axes: NDArray[np.float64]) -> None:
+def axes_along(fx: float, fy: float, fz: float, axes: NDArray[np.float64]) -> None:
     """Right, up and forward of a view along the unit vector f."""
     if abs(fz) < 0.9:
         rx, ry, rz = fy, -fx, 0.0

@@ -136,7 +136,7 @@ from sd2core.doppler import Synthesizer, SynthesisOptions, kernels
 from sd2core.mesh import MeshSequence
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
-from sd2core.scattering import amplitude, exact, visibility
+from sd2core.scattering import amplitude, depth, exact, visibility
 faces = np.array([[0, 1, 2]], np.int32)
 faces.flags.writeable = False
 vertices = np.random.default_rng(0).normal(size=(40, 3, 3))
@@ -144,13 +144,13 @@ for dtype in ("f4", "f8"):
     for weight in ("count", "area"):
         mesh = MeshSequence(vertices.astype(dtype), faces, Timebase.regular(40, 30), "x")
         maker = Synthesizer(mesh, SynthesisOptions(weight=weight))
-        for seen in ("none", "facing", "exact", "frozen"):
+        for seen in ("none", "facing", "depth", "exact", "frozen"):
             maker.map(VirtualSensor(), visibility=seen)
         maker.frame(VirtualSensor(), 3)
     Synthesizer(mesh, "vid2doppler").map(VirtualSensor())
 misses = [
     (kernel.__name__, sum(kernel.stats.cache_misses.values()))
-    for module in (amplitude, exact, visibility, kernels)
+    for module in (amplitude, depth, exact, visibility, kernels)
     for kernel in vars(module).values()
     if hasattr(kernel, "stats")
 ]

@@ -28,6 +28,7 @@ def test_without_options_it_is_the_preset() -> None:
 
 def test_every_option_arrives() -> None:
     chosen = options_of(
+        *("--depth-resolution", "128", "--mask-stride", "3"),
         *("--visibility", "facing", "--weight", "area", "--beyond", "wrap"),
         *("--bins", "64", "--v-max", "3", "--null-bins", "1,2"),
         *("--range-exponent", "2", "--reference-range-m", "1.5"),
@@ -37,6 +38,8 @@ def test_every_option_arrives() -> None:
     assert vars(chosen) == {
         **vars(PRESETS["paper"]),
         "visibility": "facing",
+        "depth_resolution": 128,
+        "mask_stride": 3,
         "weight": "area",
         "beyond": "wrap",
         "axis": VelocityAxis(64, 3.0),

@@ -15,6 +15,8 @@ from sd2core.sensor import VelocityAxis
     ("wrong", "words"),
     [
         ({"visibility": "some"}, "visibility is 'some'"),
+        ({"depth_resolution": 64}, "depth_resolution is 64"),
+        ({"mask_stride": 0}, "mask_stride is 0"),
         ({"weight": "mass"}, "weight is 'mass'"),
         ({"beyond": "keep"}, "beyond is 'keep'"),
         ({"velocity": "forward"}, "velocity is 'forward'"),

@@ -41,10 +41,11 @@ def recording(tmp_path: Path) -> tuple[MeshSequence, MeshSequence]:
         {"weight": "area"},
         {"oversampling": 3, "trajectory_smoothing_s": 0.05},
         {"time_sigma_s": 0.2},
+        {"mask_stride": 7},
     ],
     ids=str,
 )
-@pytest.mark.parametrize("visibility", ["exact", "facing"])
+@pytest.mark.parametrize("visibility", ["exact", "depth", "facing"])
 def test_a_long_recording_equals_the_one_in_memory(
     recording: tuple[MeshSequence, MeshSequence], changes: dict[str, Any], visibility: Any
 ) -> None:
@@ -179,7 +180,7 @@ def test_exact_visibility_is_kept_per_sensor_position(monkeypatch: pytest.Monkey
     np.testing.assert_array_equal(maker.map(NEAR).values, first)
 
 
-@pytest.mark.parametrize("visibility", ["exact", "facing"])
+@pytest.mark.parametrize("visibility", ["exact", "depth", "facing"])
 def test_progress_and_cancelling(visibility: Any) -> None:
     maker = Synthesizer(wobbling(60), options())
     reports: list[tuple[int, int]] = []

@@ -1,0 +1,112 @@
+"""The depth buffer in NumPy: serves while the kernels are being compiled.
+
+The same arithmetic as :mod:`sd2core.scattering.depth`; only a pixel centre on an
+edge, or a depth on the limit, to the last digit can come out differently.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.scattering.depth import ALMOST_ONE, BIAS_PIXELS, LOOSE, RIM_PIXELS, THINNEST
+from sd2core.scattering.exact import EDGE, WIDEST, axes_along
+from sd2core.scattering.exact_plain import exact_visibility
+
+_PAIRS_AT_ONCE = 1 << 20
+
+
+def depth_visibility(
+    points: NDArray[Any],
+    faces: NDArray[np.int32],
+    sensor: NDArray[np.float64],
+    resolution: int,
+    needed: NDArray[np.bool_],
+) -> NDArray[np.bool_]:
+    """Which of the needed vertices of one frame the depth buffer lets through.
+
+    Parameters
+    ----------
+    points : float array, shape (3, V)
+    faces : int32 array, shape (F, 3)
+    sensor : float64 array, shape (3,)
+    resolution : int
+        Pixels along each side of the buffer.
+    needed : bool array, shape (V,)
+
+    Returns
+    -------
+    bool array, shape (V,)
+        False where not needed.
+    """
+    place = np.asarray(points, np.float64)
+    centre = 0.5 * (place.min(axis=1) + place.max(axis=1))
+    towards = centre - sensor
+    distance = float(np.linalg.norm(towards))
+    if distance == 0:
+        return exact_visibility(points, faces, sensor, needed)
+    axes = np.empty((3, 3))
+    fx, fy, fz = (towards / distance).tolist()
+    # Not its compiled form: this serves while that is not there.
+    getattr(axes_along, "py_func", axes_along)(fx, fy, fz, axes)
+    right, up, behind = axes @ (place - centre[:, None])
+    ahead = distance + behind
+    if (ahead <= 0).any() or (np.abs(right) + np.abs(up) > WIDEST * ahead).any():
+        return exact_visibility(points, faces, sensor, needed)
+    scale = distance / ahead
+    image = np.stack([right * scale, up * scale])
+    low, high = image.min(axis=1), image.max(axis=1)
+    pixel = float((high - low).max()) / (resolution - 2)
+    image = (image - low[:, None]) * (1 / pixel if pixel > 0 else 0.0) + 0.5
+    depth = behind * scale
+    depths, facing = _draw(image, depth, faces, resolution)
+
+    column, row = image.astype(int)
+    u, w = image - np.stack([column, row])
+    around = np.stack([depths[row + r, column + c] for r in (0, 1) for c in (0, 1)])  # (4, V)
+    inside = np.isfinite(around).all(axis=0)
+    weights = np.stack([(1 - w) * (1 - u), (1 - w) * u, w * (1 - u), w * u])
+    smooth = (weights * np.where(inside, around, 0.0)).sum(axis=0)
+    farthest = np.where(np.isfinite(around), around, -np.inf).max(axis=0)
+    limit = np.where(inside, smooth, np.where(np.isfinite(farthest), farthest, np.inf))
+    bias = np.where(inside, BIAS_PIXELS, RIM_PIXELS) * pixel * scale
+    seen: NDArray[np.bool_] = needed & (facing != 0) & (depth <= limit + bias)
+    return seen
+
+
+def _draw(
+    image: NDArray[np.float64], depth: NDArray[np.float64], faces: NDArray[np.int32], size: int
+) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
+    """Nearest depth per pixel, and whether a triangle of each vertex faces the sensor."""
+    x, y = image[0][faces].T, image[1][faces].T  # (3, F) each
+    low = np.stack([x.min(axis=0), y.min(axis=0)])
+    high = np.stack([x.max(axis=0), y.max(axis=0)])
+    area = (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0])
+    solid = np.abs(area) > THINNEST * (high - low).sum(axis=0)
+    facing = np.full(image.shape[1], LOOSE, np.uint8)
+    facing[faces[solid]] = 0
+    facing[faces[solid & (area < 0)]] = 1
+
+    first, last = (low + ALMOST_ONE).astype(int), high.astype(int)
+    extent = np.maximum(last - first + 1, 0) * solid
+    pixels = extent[0] * extent[1]
+    depths = np.full(size * size, np.inf)
+    parts = np.cumsum(pixels) // _PAIRS_AT_ONCE
+    for part in range(int(parts[-1]) + 1 if len(parts) else 0):
+        chosen = np.flatnonzero((parts == part) & (pixels > 0))
+        f = np.repeat(chosen, pixels[chosen])
+        ends = np.cumsum(pixels[chosen])
+        within = np.arange(len(f)) - np.repeat(ends - pixels[chosen], pixels[chosen])
+        column = first[0, f] + within % extent[0, f]
+        row = first[1, f] + within // extent[0, f]
+        (x0, x1, x2), (y0, y1, y2), per_area = x[:, f], y[:, f], 1 / area[f]
+        w0 = ((x1 - column) * (y2 - row) - (x2 - column) * (y1 - row)) * per_area
+        w1 = ((x2 - column) * (y0 - row) - (x0 - column) * (y2 - row)) * per_area
+        w2 = 1 - w0 - w1
+        corner = depth[faces[f]].T
+        here = w0 * corner[0] + w1 * corner[1] + w2 * corner[2]
+        covered = np.minimum(np.minimum(w0, w1), w2) >= -EDGE
+        np.minimum.at(depths, (row * size + column)[covered], here[covered])
+    return depths.reshape(size, size), facing

@@ -1,0 +1,100 @@
+"""Masks that serve several frames, and masks by depth buffer, in the whole chain."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from doppler_scenes import RAW, options, sensor_at, wobbling
+
+from sd2core.doppler import PRESETS, Synthesizer, masks
+
+NEAR = sensor_at(0.3, -0.2, 0.1)
+NEXT = sensor_at(0.32, -0.2, 0.1)
+OCCLUSION = pytest.mark.parametrize("visibility", ["depth", "exact"])
+
+
+@OCCLUSION
+def test_every_frame_is_its_own_mask(visibility: Any) -> None:
+    mesh = wobbling(24)
+    plain = Synthesizer(mesh, options()).map(NEAR, visibility=visibility)
+    told = Synthesizer(mesh, options(mask_stride=1)).map(NEAR, visibility=visibility)
+    np.testing.assert_array_equal(told.values, plain.values)
+    assert told.meta["mask_stride"] == 1
+    assert told.meta["visibility"] == visibility
+
+
+@OCCLUSION
+@pytest.mark.parametrize("stride", [2, 5, 100])
+def test_the_nearest_frame_serves(visibility: Any, stride: int) -> None:
+    """Everything live, so that masks are complete and can be compared with single frames."""
+    frames = 23
+    mesh = wobbling(frames)
+    wide = options(mask_stride=stride, beyond="clip")
+    maker = Synthesizer(mesh, wide)
+    made = maker.map(NEAR, visibility=visibility)
+    mask = maker.cached_mask(NEAR, visibility=visibility)
+    assert mask is not None
+    every = Synthesizer(mesh, replace(wide, mask_stride=1))
+    serving = range(0, frames, stride)
+    single = {t: every.frame(NEAR, t, visibility).visible for t in serving}
+    for frame in range(frames):
+        nearest = min(serving, key=lambda t, frame=frame: (abs(t - frame), -t))
+        np.testing.assert_array_equal(mask[frame] > 0, single[nearest])
+        np.testing.assert_array_equal(maker.frame(NEAR, frame, visibility).visible, mask[frame] > 0)
+    assert made.meta["mask_stride"] == stride
+    assert made.meta["visibility"] == visibility
+    assert maker.map(NEAR, visibility="facing").meta["mask_stride"] == 1
+
+
+@OCCLUSION
+def test_a_serving_frame_tests_what_its_neighbours_need(visibility: Any) -> None:
+    """With nulled bins few vertices are tested; the map must not depend on which."""
+    mesh = wobbling(40)
+    some = Synthesizer(mesh, replace(RAW, null_bins=tuple(range(8, 24)), mask_stride=6))
+    all_of_it = Synthesizer(mesh, replace(RAW, mask_stride=6, beyond="clip"))
+    values = some.map(NEAR, visibility=visibility).values
+    live = [*range(1, 8), *range(24, 31)]  # clipping fills the outermost
+    np.testing.assert_array_equal(
+        values[live], all_of_it.map(NEAR, visibility=visibility).values[live]
+    )
+
+
+@OCCLUSION
+def test_frozen_reuses_shared_masks(visibility: Any) -> None:
+    maker = Synthesizer(wobbling(20), options(visibility=visibility, mask_stride=4))
+    made = maker.stretch(NEAR, 0, 20)
+    frozen = maker.stretch(NEAR, 0, 20, "frozen")
+    assert (made.quality, frozen.quality) == (visibility, "frozen")
+    np.testing.assert_array_equal(frozen.values, made.values)
+    assert maker.map(NEXT, visibility="frozen").meta["mask_stride"] == 4
+
+
+def test_depth_is_close_to_exact_and_finer_is_closer() -> None:
+    mesh = wobbling(30)
+    truth = Synthesizer(mesh, options()).map(NEAR).values
+
+    def error(resolution: Any) -> float:
+        chosen = options(visibility="depth", depth_resolution=resolution)
+        values = Synthesizer(mesh, chosen).map(NEAR).values
+        return float(np.abs(values - truth).sum() / truth.sum())
+
+    facing = Synthesizer(mesh, options()).map(NEAR, visibility="facing").values
+    assert error(256) <= error(128)
+    # Balls of few facets are mostly rim, which is where a depth buffer errs.
+    assert error(256) < 0.75 * float(np.abs(facing - truth).sum() / truth.sum())
+
+
+@OCCLUSION
+@pytest.mark.parametrize("preset", list(PRESETS))
+def test_the_same_while_kernels_are_not_ready(
+    monkeypatch: pytest.MonkeyPatch, visibility: Any, preset: str
+) -> None:
+    chosen = replace(PRESETS[preset], mask_stride=3)
+    mesh = wobbling(9, divisions=2)
+    compiled = Synthesizer(mesh, chosen).map(NEAR, visibility=visibility)
+    monkeypatch.setattr(masks, "kernels_ready", lambda: False)
+    plain = Synthesizer(mesh, chosen).map(NEAR, visibility=visibility)
+    np.testing.assert_allclose(plain.values, compiled.values, atol=1e-6)
