@@ -71,9 +71,11 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 def _import(options: argparse.Namespace) -> None:
     from sd2core.cli.info import describe_parts, describe_recording, show
-    from sd2core.cli.reading import mesh_reading
+    from sd2core.cli.reading import mesh_reading, refuse_in_vain
     from sd2core.recording import Recording
 
+    # The window lays any mesh over the video by its focal length.
+    refuse_in_vain(options, options.out, options.mesh, but=("focal_px",))
     recording = Recording(
         options.out,
         video=options.video,

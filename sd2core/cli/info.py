@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from sd2core.io.video import VideoReader
     from sd2core.mesh import MeshSequence
     from sd2core.recording import Recording
-    from sd2core.sensor import RadarConfig
+    from sd2core.sensor import RadarConfig, VelocityAxis
     from sd2core.spectrum import DopplerMap
     from sd2core.timebase import Timebase
 
@@ -65,23 +65,21 @@ def show(description: Description, *, as_json: bool) -> None:
 
 def describe(path: Path, options: argparse.Namespace) -> Description:
     """Open whatever ``path`` is and describe it."""
+    from sd2core.cli.reading import load_mesh_as_told, recording_as_told, refuse_in_vain
     from sd2core.io.kinds import kind_of
 
     kind = kind_of(path)
     if kind == "recording":
-        from sd2core.recording import open_recording
-
-        recording = open_recording(path)
+        recording = recording_as_told(path, options)
         return describe_recording(recording, describe_parts(recording))
+    if kind == "mesh":
+        return describe_mesh(path, load_mesh_as_told(path, options))
+    refuse_in_vain(options, path, None)
     if kind == "video":
         from sd2core.io.video import open_video
 
         with open_video(path) as video:
             return describe_video(path, video)
-    if kind == "mesh":
-        from sd2core.cli.reading import load_mesh_as_told
-
-        return describe_mesh(path, load_mesh_as_told(path, options))
     if kind == "radar":
         from sd2core.io.radar import load_capture
 
@@ -227,12 +225,24 @@ def describe_map(path: Path, doppler: DopplerMap) -> Description:
         f" ±{doppler.axis.v_max_mps:g} m/s, approaching is positive",
         "time": _clock(doppler.timebase),
         "unit": doppler.unit,
-        "nulled bins": ", ".join(map(str, doppler.null_bins)),
-        "unseen bins": ", ".join(map(str, doppler.unseen_bins)),
+        "nulled bins": _bins(doppler.axis, doppler.null_bins),
+        "unseen bins": _bins(doppler.axis, doppler.unseen_bins),
         **_synthesis_facts(doppler.meta),
     }
     notes = tuple(doppler.meta.get("notes", ()))
     return Description(f"Doppler map {path}", data, facts, notes)
+
+
+def _bins(axis: VelocityAxis, bins: tuple[int, ...]) -> str:
+    """Their numbers and the velocities that they cover."""
+    if not bins:
+        return ""
+    # Rounded: an edge at 0 may be computed as 1e-17.
+    edges_mps = [f"{round(edge, 9) + 0.0:g}" for edge in axis.edges_mps.tolist()]
+    firsts = [edges_mps[number] for number in bins if number - 1 not in bins]
+    ends = [edges_mps[number + 1] for number in bins if number + 1 not in bins]
+    spans = (f"{first} to {end}" for first, end in zip(firsts, ends, strict=True))
+    return f"{', '.join(map(str, bins))}: {', '.join(spans)} m/s"
 
 
 def _synthesis_facts(provenance: dict[str, Any]) -> dict[str, str]:

@@ -51,13 +51,13 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 def _radar(options: argparse.Namespace) -> None:
     from sd2core.cli.info import describe_map, limit_facts, show
-    from sd2core.cli.reading import check_output
+    from sd2core.cli.reading import check_map_output
     from sd2core.fmcw import doppler_map, limits
     from sd2core.io.radar import load_capture
     from sd2core.recording import is_recording, open_recording
     from sd2core.sensor import VelocityAxis
 
-    check_output(options.out, ".npz")
+    check_map_output(options.out)
     offset_s = 0.0
     if is_recording(options.capture):
         recording = open_recording(options.capture)

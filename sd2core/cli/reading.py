@@ -7,13 +7,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from sd2core.atomic import check_writable
 from sd2core.cli.output import progress_bar
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
     from sd2core.mesh import MeshSequence
-    from sd2core.recording import MeshReading
+    from sd2core.recording import MeshReading, Recording
     from sd2core.sensor import VirtualSensor
+
+
+_OF_THE_MESH = ("faces", "fps", "scale", "person", "distance_m", "image_size", "focal_px")
+_OF_BODY_MODELS = ("person", "image_size", "focal_px")
+_BODY_MODEL_SUFFIXES = {".pkl", ".pickle", ".joblib"}
 
 
 def mesh_reading(options: argparse.Namespace) -> MeshReading:
@@ -34,6 +40,7 @@ def load_mesh_as_told(path: Path, options: argparse.Namespace) -> MeshSequence:
     """Load a mesh with ``--faces`` and what else is given on the command line."""
     from sd2core.io.mesh import load_mesh
 
+    refuse_in_vain(options, path, path)
     with progress_bar("Reading the mesh") as progress:
         return load_mesh(
             path, faces=options.faces, progress=progress, **mesh_reading(options).options()
@@ -42,12 +49,12 @@ def load_mesh_as_told(path: Path, options: argparse.Namespace) -> MeshSequence:
 
 def mesh_and_sensor(options: argparse.Namespace) -> tuple[MeshSequence, VirtualSensor]:
     """The mesh, and the sensor of the recording or the camera with ``--sensor`` in its place."""
-    from sd2core.recording import is_recording, open_recording
+    from sd2core.recording import is_recording
     from sd2core.sensor import VirtualSensor
 
     sensor = VirtualSensor()
     if is_recording(options.mesh):
-        recording = open_recording(options.mesh)
+        recording = recording_as_told(options.mesh, options)
         sensor = recording.sensor
         with progress_bar("Reading the mesh") as progress:
             mesh = recording.load_mesh(progress)
@@ -58,12 +65,77 @@ def mesh_and_sensor(options: argparse.Namespace) -> tuple[MeshSequence, VirtualS
     return mesh, sensor
 
 
+def recording_as_told(path: Path, options: argparse.Namespace) -> Recording:
+    """Open a recording; of its mesh, what the command line says holds before what is stored."""
+    from sd2core.recording import open_recording
+
+    recording = open_recording(path)
+    refuse_in_vain(options, path, recording.mesh)
+    recording.mesh_reading = recording.mesh_reading.model_copy(
+        update=mesh_reading(options).options()
+    )
+    if options.faces is not None:
+        if not options.faces.exists():
+            raise Sd2Error(f"The faces file {options.faces} does not exist", "a file of triangles")
+        recording.faces = options.faces
+    return recording
+
+
+def refuse_in_vain(
+    options: argparse.Namespace, path: Path, mesh: Path | None, *, but: tuple[str, ...] = ()
+) -> None:
+    """Refuse options on how to read a mesh that would change nothing, ``but`` these."""
+    if mesh is None:
+        for name in _given(options, _OF_THE_MESH, but):
+            raise Sd2Error(f"{name} is given, and {path} holds no mesh", f"{name} for a mesh only")
+    elif mesh.suffix.lower() not in _BODY_MODEL_SUFFIXES:
+        for name in _given(options, _OF_BODY_MODELS, but):
+            raise Sd2Error(
+                f"{name} is given, and {mesh} is not the output of a body model",
+                f"{name} for {', '.join(sorted(_BODY_MODEL_SUFFIXES))} files only",
+            )
+
+
+def _given(options: argparse.Namespace, names: tuple[str, ...], but: tuple[str, ...]) -> list[str]:
+    return [
+        f"--{name.replace('_', '-')}"
+        for name in names
+        if name not in but and getattr(options, name) is not None
+    ]
+
+
 def check_output(path: Path, suffix: str) -> None:
     """Refuse an output file that cannot be written, before the work is done."""
     if path.suffix.lower() != suffix:
         raise Sd2Error(f"The output file is {path}", f"a name that ends in {suffix}")
+    if path.is_dir():
+        raise Sd2Error(f"The output file {path} is a folder", f"a file's name, ending in {suffix}")
     if not path.absolute().parent.is_dir():
         raise Sd2Error(
             f"The folder {path.absolute().parent} does not exist",
             "an existing folder for the output file",
         )
+    try:
+        check_writable(path)
+    except OSError as error:
+        raise Sd2Error(
+            f"The output file {path} cannot be written ({error.strerror})",
+            "a folder in which files may be made",
+            "Choose another place",
+        ) from error
+
+
+def check_map_output(path: Path) -> None:
+    """Refuse what :func:`check_output` does, and to replace anything but a Doppler map."""
+    from sd2core.io.kinds import kind_of
+
+    check_output(path, ".npz")
+    # `mktemp` leaves an empty file to be filled.
+    if path.exists() and path.stat().st_size:
+        kind = kind_of(path)
+        if kind != "map":
+            raise Sd2Error(
+                f"The output file {path} exists and is a {kind}",
+                "a new name, or a Doppler map to replace",
+                "Choose another name, or delete that file first",
+            )

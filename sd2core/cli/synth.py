@@ -119,7 +119,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         type=bin_list,
         metavar="BINS",
         help="bins to empty, as 14,15,16, or none (default: those from -0.25 to 0.125 m/s, which"
-        " the paper's radar cannot tell from a static room)",
+        " the paper's radar cannot tell from a static room; on any axis those at 0 m/s)",
     )
     parser.add_argument(
         "--beyond",
@@ -169,10 +169,10 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 def _synth(options: argparse.Namespace) -> None:
     from sd2core.cli.info import describe_map, show
-    from sd2core.cli.reading import check_output, mesh_and_sensor
+    from sd2core.cli.reading import check_map_output, mesh_and_sensor
     from sd2core.doppler import Synthesizer
 
-    check_output(options.out, ".npz")
+    check_map_output(options.out)
     if options.model == "fmcw":
         _check_fmcw(options)
     elif options.radar != "paper":
@@ -240,9 +240,18 @@ def synthesis_options(options: argparse.Namespace) -> SynthesisOptions:
 def same_velocities(
     bins: tuple[int, ...], axis: VelocityAxis, other: VelocityAxis
 ) -> tuple[int, ...]:
-    """Bins of ``other`` whose centre lies in one of the ``bins`` of ``axis``."""
+    """Bins of ``other`` whose centre lies in one of the ``bins`` of ``axis``.
+
+    Those at 0 m/s belong to them where they do on ``axis``, however wide they are.
+    """
+    at_zero = _bins_at_zero(other) if _bins_at_zero(axis).intersection(bins) else set()
     return tuple(
         number
         for number, centre_mps in enumerate(other.centres_mps)
-        if axis.bin_of(float(centre_mps)) in bins
+        if number in at_zero or axis.bin_of(float(centre_mps)) in bins
     )
+
+
+def _bins_at_zero(axis: VelocityAxis) -> set[int]:
+    # Of an even number of bins, two meet at 0.
+    return {(axis.bins - 1) // 2, axis.bins // 2}
