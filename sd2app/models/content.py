@@ -171,11 +171,11 @@ def common_clock(clocks: Sequence[Timebase]) -> Timebase:
     for clock in clocks[1:]:
         if clock.end_s < start_s or clock.start_s > end_s:
             continue
-        # Less than half a frame beyond the end is rounding, not another frame.
-        slack_s = 0.5 * clock.frame_duration_s
+        # Less than half a frame beyond an end is rounding, not another frame.
+        slack_s = 0.5 * min(clock.frame_duration_s, clocks[0].frame_duration_s)
         before = clock.times_s[clock.times_s < start_s - slack_s]
         after = clock.times_s[clock.times_s > end_s - slack_s]
-        times_s = np.concatenate([before, times_s, after])
+        times_s = np.concatenate([before[before < times_s[0]], times_s, after[after > times_s[-1]]])
         start_s, end_s = min(start_s, clock.start_s), max(end_s, clock.end_s)
     return Timebase(times_s)
 

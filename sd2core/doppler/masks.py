@@ -60,7 +60,8 @@ class VisibilityMasks:
         self._counting = counting
         live = np.ones(counting.bins + 1, np.uint8)
         live[list(prepared.options.null_bins)] = 0
-        live[-1] = 0
+        # The last entry, beyond the axis, stays live: dropped vertices change no bin,
+        # but the share that is reported of them is to be right.
         self._live = live
         self._stride = prepared.options.mask_stride
         # Newest first, per block.

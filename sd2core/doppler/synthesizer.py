@@ -41,7 +41,7 @@ class Stretch:
     values : float32 array, shape (bins, n)
     visible_share : float32 array, shape (n,)
         Share of all vertices that the sensor sees. Vertices that cannot change
-        the map (still, or off the axis) are judged by the facing test.
+        the map (in nulled bins) are judged by the facing test.
     beyond_share : float32 array, shape (n,)
         Share of those whose velocity lies beyond the axis.
     quality : {"none", "facing", "depth", "frozen", "exact"}
@@ -127,7 +127,10 @@ class Synthesizer:
         """What a value of 1 in a map means."""
         options = self.options
         share = {"count": "share of vertices", "area": "share of the surface"}[options.weight]
-        return f"{share} at {options.reference_range_m:g} m" if options.range_exponent else share
+        if not options.range_exponent:
+            return share
+        # Nearer than the reference a value may exceed 1.
+        return f"{share} × ({options.reference_range_m:g} m / R)^{options.range_exponent:g}"
 
     def prepare(self, progress: Progress = silent) -> None:
         """Read and prepare as many blocks as the budget holds, before they are asked for."""

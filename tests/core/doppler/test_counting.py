@@ -187,7 +187,7 @@ def test_meta_tells_where_a_map_comes_from() -> None:
     assert len(made.meta["visible_share"]) == len(made.meta["beyond_share"]) == 6
     assert 0.2 < np.mean(made.meta["visible_share"]) < 0.6
     assert made.null_bins == (14, 15, 16)
-    assert made.unit == "share of vertices at 2.2 m"
+    assert made.unit == "share of vertices × (2.2 m / R)^4"
 
 
 def test_part_of_the_frames() -> None:
