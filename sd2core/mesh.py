@@ -64,6 +64,8 @@ class MeshSequence:
                 f"{self.source or 'The mesh'}: {shape[0]} frames but {len(self.timebase)} times",
                 "one time per frame",
             )
+        if self.faces is not None and not np.size(self.faces):
+            object.__setattr__(self, "faces", None)
         if self.faces is None:
             return
         faces = np.ascontiguousarray(self.faces, dtype=np.int32)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import zipfile
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -124,7 +123,7 @@ class DopplerMap:
         try:
             with np.load(path, allow_pickle=False) as data:
                 arrays = {name: data[name] for name in data.files}
-        except (OSError, ValueError, zipfile.BadZipFile) as error:
+        except Exception as error:  # a damaged archive fails in many ways
             raise Sd2Error(
                 f"{path} cannot be read as a Doppler map ({error})",
                 "an .npz written by `sd2 synth`",
@@ -135,6 +134,8 @@ class DopplerMap:
                 f"{path} has no {', '.join(sorted(missing))}; it holds {', '.join(sorted(arrays))}",
                 "a Doppler map with values, velocity_mps, times_s and meta",
             )
+        if arrays["values"].dtype.kind != "f" or not np.isfinite(arrays["values"]).all():
+            raise Sd2Error(f"{path}: values hold NaN, infinity or no numbers", "finite numbers")
         try:
             meta = json.loads(str(arrays["meta"]))
             version = meta.get("version", 0)
@@ -157,7 +158,7 @@ class DopplerMap:
                 unseen_bins=tuple(meta["unseen_bins"]),
                 meta=meta["provenance"],
             )
-        except (KeyError, TypeError, json.JSONDecodeError) as error:
+        except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
             raise Sd2Error(
                 f"{path}: its description is damaged ({error!r})", "the meta written by `sd2 synth`"
             ) from error

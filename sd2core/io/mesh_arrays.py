@@ -5,7 +5,6 @@ from __future__ import annotations
 import shutil
 import tempfile
 import zipfile
-import zlib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -76,7 +75,7 @@ class StoredVertices:
         elif isinstance(key, slice) and key.step in (None, 1):
             part = self._stretch(*key.indices(self.shape[0])[:2])
         else:
-            part = np.asarray(self._array[key], dtype=self.dtype)
+            part = self._read(key)
         # A sum is finite only when its terms are, and costs next to nothing
         # beside the reading; a sum that overflowed is looked at again.
         with np.errstate(all="ignore"):
@@ -96,7 +95,7 @@ class StoredVertices:
     def _stretch(self, start: int, stop: int) -> NDArray[Any]:
         """Frames ``start`` to ``stop``, chunk by chunk: Zarr is slower on many at once."""
         if self.chunk_bytes > _LARGEST_CHUNK_BYTES or stop <= start:
-            return np.asarray(self._array[start:stop], dtype=self.dtype)
+            return self._read(slice(start, stop))
         part = np.empty((stop - start, *self.shape[1:]), self.dtype)
         step = self.frames_per_chunk
         for number in range(start // step, (stop - 1) // step + 1):
@@ -110,9 +109,19 @@ class StoredVertices:
         kept = self._last
         if kept is None or kept[0] != number:
             step = self.frames_per_chunk
-            kept = (number, np.asarray(self._array[number * step : (number + 1) * step]))
+            kept = (number, self._read(slice(number * step, (number + 1) * step)))
             self._last = kept
         return kept[1]
+
+    def _read(self, key: Any) -> NDArray[Any]:
+        try:
+            return np.asarray(self._array[key], dtype=self.dtype)
+        except Exception as error:  # a damaged chunk fails in the codec's own ways
+            raise Sd2Error(
+                f"{self._source}: {_where(key)} cannot be read ({type(error).__name__}: {error})",
+                "complete chunks",
+                "Copy the recording again from where it came",
+            ) from error
 
 
 def read_npz(path: Path) -> RawMesh:
@@ -122,7 +131,11 @@ def read_npz(path: Path) -> RawMesh:
             wanted = VERTEX_NAMES + FACE_NAMES + TIME_NAMES + RATE_NAMES
             arrays = {name: archive[name] for name in archive.files if name in wanted}
             names = list(archive.files)
-    except (OSError, ValueError, TypeError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+    except PermissionError as error:
+        raise Sd2Error(
+            f"{path} may not be read ({error.strerror})", "permission to read"
+        ) from error
+    except Exception as error:  # a damaged archive fails in many ways
         raise Sd2Error(
             f"{path} cannot be read as .npz ({error})",
             "a complete .npz file that holds plain numbers",
@@ -222,6 +235,8 @@ def write_zarr(mesh: MeshSequence, path: Path, progress: Progress = silent) -> N
             chunks=(step, mesh.vertex_count, 3),
             dtype=np.dtype(mesh.vertices.dtype).newbyteorder("<"),
             compressors=BloscCodec(cname="lz4", clevel=5, shuffle="shuffle"),
+            # A chunk that goes missing is then found, not read as zeros.
+            fill_value=float("nan"),
         )
         for start in range(0, mesh.frame_count, step):
             progress(start, mesh.frame_count)

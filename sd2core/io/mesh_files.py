@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 from pathlib import Path
 from typing import Any
@@ -57,7 +58,13 @@ def read_surface(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64] | N
     import trimesh
 
     try:
-        loaded = trimesh.load(str(path), process=False, maintain_order=True)
+        if path.suffix.lower() == ".obj":
+            source: Any = _geometry_of_obj(path)
+        else:
+            source = str(path)
+        loaded = trimesh.load(
+            source, file_type=path.suffix[1:].lower(), process=False, maintain_order=True
+        )
         if isinstance(loaded, trimesh.Scene):
             loaded = loaded.to_geometry() if len(loaded.geometry) else trimesh.Trimesh()
         vertices = np.asarray(loaded.vertices, dtype=np.float64)
@@ -71,6 +78,22 @@ def read_surface(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64] | N
         raise Sd2Error(f"{path} holds no vertices", "a mesh or a point cloud", "Export it again")
     faces = np.asarray(getattr(loaded, "faces", np.zeros((0, 3))), dtype=np.int64)
     return vertices, faces if len(faces) else None
+
+
+def _geometry_of_obj(path: Path) -> io.BytesIO:
+    """Only the vertices of an OBJ file and the vertex numbers of its faces.
+
+    Materials, groups and texture coordinates would split one surface into
+    several and double, reorder or drop its vertices.
+    """
+    lines = []
+    for line in path.read_bytes().replace(b"\\\r\n", b" ").replace(b"\\\n", b" ").splitlines():
+        words = line.split()
+        if words[:1] == [b"v"]:
+            lines.append(line)
+        elif words[:1] == [b"f"]:
+            lines.append(b" ".join(word.split(b"/")[0] for word in words))
+    return io.BytesIO(b"\n".join(lines) + b"\n")
 
 
 def read_faces(path: Path) -> NDArray[Any]:

@@ -106,3 +106,23 @@ def test_a_failed_write_leaves_the_old_file(tmp_path):
         map_of(np.ones((4, 3)), meta={"sensor": object()}).save(path)
     assert path.read_bytes() == before
     assert [entry.name for entry in tmp_path.iterdir()] == ["map.npz"]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"values": np.full((4, 3), np.nan, np.float32)},
+        {"times_s": np.array(["a", "b", "c"])},
+        {"meta": json.dumps([1])},
+        {"meta": '{"format": "sd2-doppler-map", "version": 1, "v_max_mps": "abc"}'},
+        {"meta": "[" * 100_000},
+    ],
+)
+def test_a_damaged_map_is_explained(tmp_path, changes):
+    path = tmp_path / "map.npz"
+    map_of(np.ones((4, 3))).save(path)
+    with np.load(path) as data:
+        arrays = dict(data) | changes
+    np.savez(path, **arrays)
+    with pytest.raises(Sd2Error, match=r"map\.npz"):
+        DopplerMap.load(path)

@@ -1,0 +1,112 @@
+"""What must not be read as something else: materials, missing chunks, forbidden files."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sd2core.errors import Sd2Error
+from sd2core.io.mesh import load_mesh, save_mesh
+from sd2core.io.mesh_files import read_surface
+from sd2core.mesh import MeshSequence
+from sd2core.timebase import Timebase
+
+OBJ = """mtllib person.mtl
+o person
+v 0 0 2
+v 1 0 2
+v 0 1 2
+v 1 1 2
+v 5 5 5
+vt 0 0
+vt 1 0
+vt 0 1
+g upper
+usemtl skin
+f 1/1 2/2 3/3
+g lower
+usemtl cloth
+f 2/2 4/3 3/1
+"""
+
+
+def long_mesh(frames: int = 3000) -> MeshSequence:
+    rng = np.random.default_rng(3)
+    vertices = rng.normal(size=(frames, 120, 3)).astype(np.float32) * 0.3
+    vertices[:, :, 2] += 3.0
+    faces = rng.permuted(np.tile(np.arange(120), (50, 1)), axis=1)[:, :3].astype(np.int32)
+    return MeshSequence(vertices, faces, Timebase.regular(frames, 30.0))
+
+
+def test_materials_and_textures_leave_the_vertices_alone(tmp_path):
+    path = tmp_path / "person.obj"
+    path.write_text(OBJ)
+    vertices, faces = read_surface(path)
+    assert vertices.tolist() == [[0, 0, 2], [1, 0, 2], [0, 1, 2], [1, 1, 2], [5, 5, 5]]
+    assert faces is not None
+    assert sorted(map(sorted, faces.tolist())) == [[0, 1, 2], [1, 2, 3]]
+
+
+def test_relative_numbers_polygons_and_continued_lines_are_read(tmp_path):
+    path = tmp_path / "quad.obj"
+    path.write_text("v 0 0 2\nv 1 0 2\nv 1 1 2\nv 0 1 2\nf -4//1 -3//1 \\\n-2//1 -1//1\n")
+    vertices, faces = read_surface(path)
+    assert len(vertices) == 4
+    assert faces is not None
+    assert set(faces.ravel().tolist()) == {0, 1, 2, 3}
+    assert len(faces) == 2
+
+
+def chunks_of(path: Path) -> list[Path]:
+    return sorted(entry for entry in (path / "vertices" / "c").rglob("*") if entry.is_file())
+
+
+def test_a_missing_chunk_is_missed(tmp_path):
+    path = tmp_path / "mesh.zarr"
+    save_mesh(long_mesh(), path)
+    chunks = chunks_of(path)
+    assert len(chunks) > 1
+    chunks[-1].unlink()
+    with pytest.raises(Sd2Error, match=r"mesh\.zarr.*NaN"):
+        load_mesh(path).read(2990, 3000)
+
+
+def test_a_cut_chunk_is_named(tmp_path):
+    path = tmp_path / "mesh.zarr"
+    save_mesh(long_mesh(), path)
+    chunk = chunks_of(path)[-1]
+    chunk.write_bytes(chunk.read_bytes()[:100])
+    with pytest.raises(Sd2Error, match=r"mesh\.zarr.*cannot be read"):
+        load_mesh(path).read(2990, 3000)
+
+
+def test_no_faces_at_all_make_a_point_cloud(tmp_path):
+    path = tmp_path / "cloud.npz"
+    mesh = long_mesh(4)
+    np.savez(path, vertices=mesh.vertices, faces=np.zeros((0, 3), int), times_s=mesh.times_s)
+    assert load_mesh(path).faces is None
+
+
+@pytest.mark.skipif(sys.platform == "win32" or os.geteuid() == 0, reason="root may read all files")
+def test_a_forbidden_file_is_not_called_damaged(tmp_path):
+    path = tmp_path / "mesh.npz"
+    save_mesh(long_mesh(4), path)
+    path.chmod(0)
+    with pytest.raises(Sd2Error, match="may not be read"):
+        load_mesh(path)
+
+
+def test_a_forbidden_file_is_not_called_damaged_for_anyone(tmp_path, monkeypatch):
+    path = tmp_path / "mesh.npz"
+    save_mesh(long_mesh(4), path)
+
+    def refuse(*_: object, **__: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "open", refuse)
+    with pytest.raises(Sd2Error, match=r"mesh\.npz may not be read \(Permission denied\)"):
+        load_mesh(path)
