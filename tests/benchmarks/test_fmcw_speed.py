@@ -9,13 +9,13 @@ recording, 450 frames. What a run measures is printed; ratios and limits are ass
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from timing import best_s
 
 from sd2core.compiled import worker_count
 from sd2core.fmcw import WaveOptions, simulate_radar
@@ -51,16 +51,6 @@ def visible(mesh: MeshSequence) -> NDArray[np.bool_]:
     pose = facet_visibility(once, CAMERA)
     back = np.abs((np.arange(FRAMES) + 88) % 176 - 88) - np.abs((0 + 88) % 176 - 88)
     return pose[np.abs(back) % 89]
-
-
-def best_s(work: Callable[[], Any], rounds: int) -> float:
-    """Shortest of several: what the machine can do when nobody else is at it."""
-    spent = []
-    for _ in range(rounds):
-        start = time.perf_counter()
-        work()
-        spent.append(time.perf_counter() - start)
-    return min(spent)
 
 
 @pytest.mark.benchmark(group="FMCW, one frame")

@@ -8,7 +8,6 @@ to spare are asserted.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
+from timing import best_s
 
 from sd2core.compiled import warm_up, worker_count
 from sd2core.doppler import PRESETS, Synthesizer
@@ -36,16 +36,6 @@ def mesh(shared_data: Path) -> MeshSequence:
         vertices, faces = data["vertices"], data["faces"]
     there_and_back = np.abs((np.arange(FRAMES) + 88) % 176 - 88)
     return MeshSequence(vertices[there_and_back], faces, Timebase.regular(FRAMES, 30.0), "walk")
-
-
-def best_s(work: Callable[[], Any], rounds: int) -> float:
-    """Shortest of several: what the machine can do when nobody else is at it."""
-    spent = []
-    for _ in range(rounds):
-        start = time.perf_counter()
-        work()
-        spent.append(time.perf_counter() - start)
-    return min(spent)
 
 
 def copy_bytes_per_s(size_bytes: int) -> float:
