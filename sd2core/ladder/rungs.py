@@ -1,0 +1,215 @@
+"""The rungs of the ladder, and a plan: one choice of each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, fields, replace
+from itertools import product
+from typing import Any, Literal, get_args
+
+from sd2core.doppler.options import (
+    Beyond,
+    DepthResolution,
+    Visibility,
+    Weight,
+)
+from sd2core.errors import Sd2Error
+from sd2core.fmcw.options import Motion, WaveOptions
+
+Signal = Literal["histogram", "fmcw", "direct"]
+Family = Literal["histogram", "fmcw"]
+RangeLaw = Literal["vertex", "frame"]
+
+FRAME_RATE_FACTORS = (1, 2, 4, 8)
+MASK_STRIDES = (1, 2, 5, 10)
+MASK_REUSE_M = (0.02, 0.05, 0.1, 0.3)
+VERTICES_KEPT = (1.0, 0.5, 0.25, 0.1)
+BLOCKS = (1, 2, 4)
+
+_OCCLUSION = ("depth", "exact")
+
+
+@dataclass(frozen=True)
+class Plan:
+    """One choice of every rung.
+
+    Parameters
+    ----------
+    signal : {"histogram", "fmcw", "direct"}
+        Counting, the FMCW signal by a non-uniform FFT, or its direct sum.
+    visibility, depth_resolution, mask_stride
+        As in :class:`sd2core.doppler.SynthesisOptions`. FMCW takes ``facing`` and
+        ``exact``, for facets.
+    mask_reuse_m : float
+        How far the sensor may have moved since the mask was made; 0 makes it
+        anew for every place.
+    vertices_kept : float
+        Share of the mesh's vertices; 1 is the full mesh.
+    weight : {"count", "area", "projected"}
+        What a vertex counts: a choice of quantity, not of accuracy.
+    range_law : {"vertex", "frame"}
+        Range law for each vertex, or one factor for each frame.
+    beyond : {"drop", "wrap", "clip"}
+        What happens to velocities off the axis.
+    frame_rate_factor : int
+        By how much the frame rate is raised before velocities are taken.
+    blocks : int
+        FMCW: stretches of a frame's chirps with a beat frequency of their own.
+    motion : {"constant", "interpolated"}
+        FMCW: within a frame, constant velocity or interpolated at every chirp.
+    """
+
+    signal: Signal = "histogram"
+    visibility: Visibility = "exact"
+    depth_resolution: DepthResolution = 256
+    mask_stride: int = 1
+    mask_reuse_m: float = 0.0
+    vertices_kept: float = 1.0
+    weight: Weight = "count"
+    range_law: RangeLaw = "vertex"
+    beyond: Beyond = "wrap"
+    frame_rate_factor: int = 1
+    blocks: int = 1
+    motion: Motion = "constant"
+
+    def __post_init__(self) -> None:
+        if self.signal not in get_args(Signal):
+            raise Sd2Error(f"signal is {self.signal!r}", f"one of {', '.join(get_args(Signal))}")
+        if self.family == "fmcw" and self.visibility not in ("facing", "exact"):
+            raise Sd2Error(f"An FMCW plan has visibility {self.visibility}", "facing or exact")
+        if not 0 < self.vertices_kept <= 1:
+            raise Sd2Error(f"vertices_kept is {self.vertices_kept}", "above 0 and up to 1")
+        if not self.mask_reuse_m >= 0:
+            raise Sd2Error(f"mask_reuse_m is {self.mask_reuse_m}", "0 or more metres")
+        if self.visibility not in _OCCLUSION and (self.mask_stride > 1 or self.mask_reuse_m > 0):
+            raise Sd2Error(
+                f"A mask is to be reused with visibility {self.visibility}",
+                "depth or exact: the others keep none",
+            )
+
+    @property
+    def family(self) -> Family:
+        """Plans of one family have one reference."""
+        return "histogram" if self.signal == "histogram" else "fmcw"
+
+    def __str__(self) -> str:
+        return " · ".join(self._words())
+
+    def _words(self) -> Iterator[str]:
+        yield {"histogram": "count", "fmcw": "FMCW", "direct": "FMCW summed directly"}[self.signal]
+        sight = self.visibility
+        yield f"depth {self.depth_resolution}" if sight == "depth" else f"visibility {sight}"
+        if self.mask_stride > 1:
+            yield f"mask every {self.mask_stride} frames"
+        if self.mask_reuse_m > 0:
+            yield f"mask kept within {self.mask_reuse_m:g} m"
+        if self.vertices_kept < 1:
+            yield f"{100 * self.vertices_kept:g} % of the vertices"
+        if self.family == "fmcw":
+            yield "one block" if self.blocks == 1 else f"{self.blocks} blocks"
+            if self.motion == "interpolated":
+                yield "motion at every chirp"
+            return
+        yield {"count": "vertices", "area": "area", "projected": "projected area"}[self.weight]
+        if self.range_law == "frame":
+            yield "one range per frame"
+        if self.frame_rate_factor > 1:
+            yield f"frame rate × {self.frame_rate_factor}"
+        yield {"drop": "beyond dropped", "wrap": "wrapped", "clip": "clipped"}[self.beyond]
+
+    def wave(self, base: WaveOptions) -> WaveOptions:
+        """The options that carry an FMCW plan out."""
+        model: Literal["nufft", "direct"] = "direct" if self.signal == "direct" else "nufft"
+        return replace(base, model=model, blocks=self.blocks, motion=self.motion)
+
+    def to_json(self) -> dict[str, Any]:
+        """Every rung by name, for provenance."""
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, content: dict[str, Any]) -> Plan:
+        """A plan from :meth:`to_json`.
+
+        Raises
+        ------
+        Sd2Error
+            For rungs that this version does not know.
+        """
+        unknown = set(content) - {field.name for field in fields(cls)}
+        if unknown:
+            raise Sd2Error(f"A plan names {', '.join(sorted(unknown))}", "rungs of this version")
+        return cls(**content)
+
+
+def reference_plan(family: Family, weight: Weight = "count") -> Plan:
+    """What errors are measured against: the top of every rung."""
+    if family == "fmcw":
+        return Plan(signal="direct", weight=weight, motion="interpolated")
+    return Plan(weight=weight, frame_rate_factor=max(FRAME_RATE_FACTORS))
+
+
+def counting_plans(
+    weight: Weight = "count", *, surface: bool = True, range_law: bool = True
+) -> Iterator[Plan]:
+    """Every combination of the counting rungs, masks made for the place at hand.
+
+    Parameters
+    ----------
+    surface : bool
+        False for a point cloud, which has no visibility and cannot be decimated.
+    range_law : bool
+        Whether there is a range law to apply by vertex or by frame.
+    """
+    base = Plan(weight=weight)
+    if not surface:
+        sights = [replace(base, visibility="none")]
+    else:
+        sights = [replace(base, visibility="none"), replace(base, visibility="facing")]
+        for stride in MASK_STRIDES:
+            for resolution in get_args(DepthResolution):
+                sights.append(
+                    replace(
+                        base, visibility="depth", depth_resolution=resolution, mask_stride=stride
+                    )
+                )
+            sights.append(replace(base, mask_stride=stride))
+    laws: tuple[RangeLaw, ...] = ("vertex", "frame") if range_law else ("vertex",)
+    for sight, kept, factor, law in product(
+        sights, VERTICES_KEPT if surface else (1.0,), FRAME_RATE_FACTORS, laws
+    ):
+        yield replace(sight, vertices_kept=kept, frame_rate_factor=factor, range_law=law)
+
+
+def single_steps(plan: Plan, *, surface: bool = True, range_law: bool = True) -> Iterator[Plan]:
+    """Counting plans that differ from ``plan`` in one rung: what each of them is worth."""
+    for other in counting_plans(plan.weight, surface=surface, range_law=range_law):
+        if _differing(plan, replace(other, beyond=plan.beyond)) == 1:
+            yield replace(other, beyond=plan.beyond)
+    yield replace(plan, beyond="drop" if plan.beyond == "wrap" else "wrap")
+    if plan.visibility in _OCCLUSION:
+        for reach_m in MASK_REUSE_M:
+            yield replace(plan, mask_reuse_m=reach_m)
+
+
+def wave_plans(weight: Weight = "count") -> Iterator[Plan]:
+    """The FMCW plans worth a look; the last one leaves nothing out but subdivision."""
+    base = Plan(signal="fmcw", weight=weight)
+    for sight in ("facing", "exact"):
+        for kept in VERTICES_KEPT[:3]:
+            yield replace(base, visibility=sight, vertices_kept=kept)
+    for blocks in BLOCKS[1:]:
+        yield replace(base, blocks=blocks)
+    yield replace(base, motion="interpolated")
+    yield replace(base, signal="direct")
+
+
+def _differing(plan: Plan, other: Plan) -> int:
+    """In how many rungs two plans differ; visibility and its resolution are one."""
+    one, two = asdict(plan), asdict(other)
+    sight = ("visibility", "depth_resolution")
+    different = sum(one[name] != two[name] for name in one if name not in sight)
+    depth = "depth" in (plan.visibility, other.visibility)
+    same_sight = one["visibility"] == two["visibility"] and (
+        not depth or one["depth_resolution"] == two["depth_resolution"]
+    )
+    return different + (not same_sight)
