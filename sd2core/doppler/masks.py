@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -114,17 +115,21 @@ class VisibilityMasks:
         """Mask of a block's frames from this place, uint8 (n, V), if all are in memory."""
         if self._stride == 1:
             mask: _BlockMask | None = self._prepared.budget.get(
-                ("mask", occlusion, index, position_m)
+                self._key(occlusion, index, position_m)
             )
             return mask.visible[rows] if mask is not None and mask.done[rows].all() else None
         served = []
         for frame in self._serving(self._frames(index, rows)).tolist():
             home, local = divmod(frame, self._prepared.block_frames)
-            mask = self._prepared.budget.get(("mask", occlusion, home, position_m))
+            mask = self._prepared.budget.get(self._key(occlusion, home, position_m))
             if mask is None or not mask.done[local]:
                 return None
             served.append(mask.visible[local])
         return np.stack(served)
+
+    def _key(self, occlusion: Occlusion, index: int, position_m: Position) -> Hashable:
+        # Prepared blocks, and with them the budget, may serve several options.
+        return ("mask", self._prepared.options, occlusion, index, position_m)
 
     def _frames(self, index: int, rows: slice) -> NDArray[np.intp]:
         """Numbers, in the clip, of some of a block's frames."""
@@ -214,7 +219,7 @@ class VisibilityMasks:
             return _BlockMask(visible, np.zeros(stop - start, bool)), visible.nbytes
 
         mask: _BlockMask = self._prepared.budget.get_or_make(
-            ("mask", occlusion, index, position_m), make
+            self._key(occlusion, index, position_m), make
         )
         return mask
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
@@ -134,6 +135,15 @@ class PreparedMesh:
         # Several blocks with their normals must fit, or each would push out the other.
         bytes_per_block = min(_BLOCK_BYTES, self.budget.limit_bytes // 8)
         self.block_frames = max(_FEWEST_FRAMES, bytes_per_block // per_frame)
+
+    def with_options(self, options: SynthesisOptions) -> PreparedMesh | None:
+        """The same blocks, in the same budget, for other options; None if they need other knots."""
+        for name in ("oversampling", "trajectory_smoothing_s", "velocity"):
+            if getattr(options, name) != getattr(self.options, name):
+                return None
+        other = copy.copy(self)
+        other.options = options
+        return other
 
     @property
     def block_count(self) -> int:

@@ -90,6 +90,9 @@ class Synthesizer:
         Name of a preset, or options of one's own.
     memory_budget_bytes : int
         For prepared blocks and visibility.
+    blocks_of : Synthesizer, optional
+        Another one of the same mesh, whose prepared blocks and budget are shared
+        where the options allow it.
 
     Raises
     ------
@@ -103,6 +106,7 @@ class Synthesizer:
         preset: str | SynthesisOptions = "paper",
         *,
         memory_budget_bytes: int = _MEMORY_BUDGET_BYTES,
+        blocks_of: Synthesizer | None = None,
     ) -> None:
         if isinstance(preset, str) and preset not in PRESETS:
             raise Sd2Error(f"The preset is {preset!r}", f"one of {', '.join(PRESETS)}")
@@ -111,7 +115,10 @@ class Synthesizer:
             raise _no_surface(mesh, "Area weighting")
         self.mesh = mesh
         self.options = options
-        self.prepared = PreparedMesh(mesh, options, ByteBudget(memory_budget_bytes))
+        shared = blocks_of.prepared.with_options(options) if blocks_of is not None else None
+        if shared is None or shared.mesh is not mesh:
+            shared = PreparedMesh(mesh, options, ByteBudget(memory_budget_bytes))
+        self.prepared: PreparedMesh = shared
         self._counting = Counting(
             options.axis.bins,
             options.axis.v_max_mps,

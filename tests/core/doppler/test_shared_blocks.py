@@ -1,0 +1,49 @@
+"""Synthesizers that share prepared blocks count the same as those that do not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sd2core.doppler import PRESETS, Synthesizer
+from sd2core.doppler.options import SynthesisOptions
+from sd2core.recording import open_recording
+from sd2core.resources import resource_path
+from sd2core.sensor import VirtualSensor
+
+BASE = PRESETS["paper"]
+OTHERS = {
+    "stride": replace(BASE, mask_stride=5),
+    "all bins": replace(BASE, null_bins=()),
+    "facing": replace(BASE, visibility="facing"),
+    "depth 128": replace(BASE, visibility="depth", depth_resolution=128),
+    "depth 256": replace(BASE, visibility="depth"),
+    "area": replace(BASE, weight="area"),
+}
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_a_shared_block_changes_no_map(name: str) -> None:
+    mesh = open_recording(resource_path("swipes.sd2")).load_mesh()
+    first, sensor = Synthesizer(mesh, BASE), VirtualSensor()
+    first.stretch(sensor, 60, 70)
+    options: SynthesisOptions = OTHERS[name]
+    shared = Synthesizer(mesh, options, blocks_of=first)
+    assert shared.prepared.budget is first.prepared.budget
+    alone = Synthesizer(mesh, options)
+    np.testing.assert_array_equal(
+        shared.stretch(sensor, 60, 70).values, alone.stretch(sensor, 60, 70).values
+    )
+    # Nor has the other's visibility changed the first one's.
+    np.testing.assert_array_equal(
+        first.stretch(sensor, 60, 70).values, Synthesizer(mesh, BASE).stretch(sensor, 60, 70).values
+    )
+
+
+def test_other_knots_are_not_shared() -> None:
+    mesh = open_recording(resource_path("swipes.sd2")).load_mesh()
+    first = Synthesizer(mesh, BASE)
+    other = Synthesizer(mesh, replace(BASE, oversampling=3), blocks_of=first)
+    assert other.prepared.budget is not first.prepared.budget
