@@ -149,7 +149,8 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         "--oversampling",
         type=positive_int,
         metavar="N",
-        help="average each frame over N moments within it (odd)",
+        help="raise the frame rate N times before velocities are taken, and average each frame over"
+        " its N moments (default: 1)",
     )
     parser.add_argument(
         "--velocity-sigma-bins",

@@ -57,7 +57,9 @@ class SynthesisOptions:
         Central difference of the exact range, or that tool's own arithmetic
         (see :mod:`sd2core.doppler.vid2doppler`).
     oversampling : int
-        Odd; each frame's histogram is the mean over that many moments around it.
+        The frame rate is raised so many times before velocities are taken, and
+        folded back: each frame's histogram is the mean over that many moments
+        spread evenly around it.
     trajectory_smoothing_s : float
         Sigma of the zero-phase Gaussian on the vertices' paths; 0 is off.
     velocity_sigma_bins, time_sigma_s : float
@@ -122,8 +124,8 @@ class SynthesisOptions:
             )
         if self.mask_stride < 1:
             raise Sd2Error(f"mask_stride is {self.mask_stride}", "1 or more frames")
-        if self.oversampling < 1 or self.oversampling % 2 == 0:
-            raise Sd2Error(f"The oversampling is {self.oversampling}", "an odd number: 1, 3, 5 …")
+        if self.oversampling < 1:
+            raise Sd2Error(f"The oversampling is {self.oversampling}", "1 or more")
         if self.velocity == "vid2doppler" and self.oversampling > 1:
             raise Sd2Error(
                 f"The oversampling is {self.oversampling} with vid2doppler's velocities",

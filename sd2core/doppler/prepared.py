@@ -20,7 +20,7 @@ from sd2core.errors import Sd2Error
 from sd2core.mesh import MeshSequence
 from sd2core.scattering import amplitude, visibility
 from sd2core.scattering.trajectory import Trajectory
-from sd2core.scattering.velocity import central_difference
+from sd2core.scattering.velocity import moments
 
 _BLOCK_BYTES = 16 << 20
 _FEWEST_FRAMES = 8
@@ -118,7 +118,6 @@ class PreparedMesh:
             self.mesh.times_s, self.options.oversampling, self.options.trajectory_smoothing_s
         )
         self._knot_times_s = self._trajectory.knot_times_s
-        self._stencil = central_difference(self._knot_times_s)
         # The faces a kernel gets must be plain memory: a read-only or mapped
         # array is another type to the compiler, and would be compiled for again.
         self.faces = None if self.mesh.faces is None else np.array(self.mesh.faces, np.int32)
@@ -230,19 +229,16 @@ class PreparedMesh:
     def _prepare(self, index: int) -> Block:
         start, stop = self.span(index)
         every = self.options.oversampling
-        half = every // 2
         if self._compatible:
             reach_before, reach_after = vid2doppler.REACH_BEFORE, vid2doppler.REACH_AFTER
         else:
-            reach_before = reach_after = half + 1
+            reach_before = reach_after = every // 2 + every % 2
         first = max(start * every - reach_before, 0)
         last = min((stop - 1) * every + reach_after + 1, len(self._knot_times_s))
         positions = self._positions(first, last)
 
         centre = np.arange(start, stop) * every
-        samples = centre[:, None] + np.arange(-half, half + 1)
-        within = (samples >= 0) & (samples < len(self._knot_times_s))
-        samples = np.clip(samples, 0, len(self._knot_times_s) - 1)
+        between = moments(self._knot_times_s, centre, every)
         return Block(
             index,
             start,
@@ -250,9 +246,9 @@ class PreparedMesh:
             Frames(
                 positions,
                 centre - first,
-                np.maximum(self._stencil.before[samples] - first, 0),
-                np.minimum(self._stencil.after[samples] - first, last - first - 1),
-                np.where(within, self._stencil.duration_s[samples], 0.0),
+                between.before - first,
+                between.after - first,
+                between.duration_s,
             ),
             first,
         )

@@ -262,12 +262,14 @@ class Synthesizer:
             rows = slice(local, local + 1)
             velocity = self.prepared.velocities_vid2doppler(block, rows, place)[0]
         else:
-            middle = frames.before.shape[1] // 2
+            # The moment in the middle; of an even number the two that meet there.
+            moments = frames.before.shape[1]
+            low, high = (moments - 1) // 2, moments // 2
             velocity = radial_velocity(
-                frames.positions[frames.before[local, middle]],
-                frames.positions[frames.after[local, middle]],
+                frames.positions[frames.before[local, low]],
+                frames.positions[frames.after[local, high]],
                 place,
-                frames.duration_s[local, middle],
+                frames.duration_s[local, low : high + 1].sum(),
             )
         visible, quality = self._masks.for_frame(block, local, sensor.position_m, chosen)
         return FrameScattering(

@@ -33,7 +33,7 @@ class Trajectory:
     ----------
     frame_times_s : float64 array, shape (T,)
     oversampling : int
-        Odd: each frame is followed as that many knots centred on it.
+        Any number from 1.
     smoothing_s : float
         Sigma of a zero-phase Gaussian; 0 leaves the path alone. A straight line
         is fitted under the Gaussian, so uniform motion stays as it is, up to
@@ -45,8 +45,8 @@ class Trajectory:
     smoothing_s: float = 0.0
 
     def __post_init__(self) -> None:
-        if self.oversampling < 1 or self.oversampling % 2 == 0:
-            raise Sd2Error(f"The oversampling is {self.oversampling}", "an odd number: 1, 3, 5 …")
+        if self.oversampling < 1:
+            raise Sd2Error(f"The oversampling is {self.oversampling}", "1 or more")
         if not (np.isfinite(self.smoothing_s) and self.smoothing_s >= 0):
             raise Sd2Error(f"The trajectory smoothing is {self.smoothing_s} s", "0 or more seconds")
 

@@ -54,14 +54,14 @@ def _dot(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
 
 @dataclass(frozen=True, eq=False)
 class Stencil:
-    """Between which knots of a trajectory a velocity is measured.
+    """Between which knots of a trajectory velocities are measured.
 
     Parameters
     ----------
-    before, after : int64 array, shape (knots,)
+    before, after : int64 array, shape (n, moments)
         Knot numbers.
-    duration_s : float64 array, shape (knots,)
-        Time between the two; 0 where there is only one knot.
+    duration_s : float64 array, shape (n, moments)
+        Time between the two; 0 where there is nothing to measure.
     """
 
     before: NDArray[np.int64]
@@ -69,9 +69,34 @@ class Stencil:
     duration_s: NDArray[np.float64]
 
 
-def central_difference(times_s: NDArray[np.float64]) -> Stencil:
-    """Each knot between its neighbours, one-sided at the two ends, on real times."""
-    knots = np.arange(len(times_s))
-    before = np.maximum(knots - 1, 0)
-    after = np.minimum(knots + 1, len(times_s) - 1)
-    return Stencil(before, after, times_s[after] - times_s[before])
+def moments(times_s: NDArray[np.float64], centres: NDArray[np.int64], oversampling: int) -> Stencil:
+    """Between which knots the velocities of each frame are measured, on real times.
+
+    The moments of a frame are spread evenly and symmetrically around it. An odd
+    number are knots, each measured between its neighbours (one-sided at the two
+    ends of the clip); an even number lie midway between two knots, which they
+    are measured between.
+
+    Parameters
+    ----------
+    times_s : float64 array, shape (knots,)
+    centres : int64 array, shape (n,)
+        Knot of each frame.
+    oversampling : int
+        Knots per frame.
+
+    Returns
+    -------
+    Stencil
+        Of shape (n, oversampling). Where a moment lies outside the clip both
+        knots are its end, with a duration of 0.
+    """
+    half, odd = oversampling // 2, oversampling % 2
+    end = len(times_s) - 1
+    first = centres[:, None] + np.arange(-half, half + odd)
+    last = first + 1 - odd
+    within = (first >= 0) & (last <= end)
+    before = np.clip(np.where(within, first - odd, first), 0, end)
+    after = np.clip(np.where(within, last + odd, last), 0, end)
+    duration_s = np.where(within, times_s[after] - times_s[before], 0.0)
+    return Stencil(before, after, duration_s)

@@ -28,8 +28,8 @@ from sd2core.sensor import VelocityAxis
         ({"reference_range_m": 0.0}, "reference range is 0"),
         ({"reference_range_m": 2000.0}, "reference range is 2000"),
         ({"time_sigma_s": float("nan")}, "time_sigma_s is nan"),
-        ({"oversampling": 4}, "oversampling is 4"),
-        ({"oversampling": 3, "velocity": "vid2doppler"}, "oversampling is 3 with vid2doppler"),
+        ({"oversampling": 0}, "oversampling is 0"),
+        ({"oversampling": 2, "velocity": "vid2doppler"}, "oversampling is 2 with vid2doppler"),
     ],
 )
 def test_nonsense_is_refused(wrong: dict[str, Any], words: str) -> None:

@@ -40,6 +40,7 @@ def recording(tmp_path: Path) -> tuple[MeshSequence, MeshSequence]:
         {},
         {"weight": "area"},
         {"oversampling": 3, "trajectory_smoothing_s": 0.05},
+        {"oversampling": 4},
         {"time_sigma_s": 0.2},
         {"mask_stride": 7},
     ],

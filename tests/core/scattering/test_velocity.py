@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sd2core.scattering.velocity import central_difference, radial_velocity
+from sd2core.scattering.velocity import moments, radial_velocity
 
 
 def test_formula_is_the_exact_change_of_range() -> None:
@@ -50,13 +50,33 @@ def test_no_time_and_no_distance_give_zero() -> None:
 @given(st.lists(st.floats(0.001, 10.0), min_size=1, max_size=8))
 def test_central_difference_is_right_on_any_clock(gaps: list[float]) -> None:
     times = np.cumsum([0.0, *gaps])
-    stencil = central_difference(times)
+    stencil = moments(times, np.arange(len(times)), 1)
     position = 3.0 * times + 1.0
     slope = (position[stencil.after] - position[stencil.before]) / stencil.duration_s
     np.testing.assert_allclose(slope, 3.0, rtol=1e-9)
-    assert (stencil.after - stencil.before).tolist() == [1, *[2] * (len(times) - 2), 1]
+    steps = (stencil.after - stencil.before)[:, 0]
+    assert steps.tolist() == [1, *[2] * (len(times) - 2), 1]
+
+
+@pytest.mark.parametrize("every", [1, 2, 3, 4, 5, 8])
+def test_moments_lie_evenly_and_symmetrically_around_their_frame(every: int) -> None:
+    knots = np.arange(6 * every + 1, dtype=float)
+    frames = np.arange(7) * every
+    stencil = moments(knots, frames, every)
+    middle = 0.5 * (stencil.before + stencil.after)[1:-1] - frames[1:-1, None]
+    offsets = np.arange(every) - (every - 1) / 2
+    np.testing.assert_array_equal(middle, np.tile(offsets, (5, 1)))
+    np.testing.assert_array_equal(stencil.duration_s[1:-1], 2.0 if every % 2 else 1.0)
+    # At the ends half of the moments lie outside; the knot itself, if one, is one-sided.
+    inside = stencil.duration_s > 0
+    assert inside[0].tolist() == (offsets >= 0).tolist()
+    assert inside[-1].tolist() == (offsets <= 0).tolist()
+    assert stencil.before.min() == 0
+    assert stencil.after.max() == len(knots) - 1
+    assert (stencil.before <= stencil.after).all()
 
 
 def test_one_knot_has_no_duration() -> None:
-    stencil = central_difference(np.array([5.0]))
-    assert stencil.duration_s.tolist() == [0.0]
+    for every in (1, 2, 3):
+        stencil = moments(np.array([5.0]), np.array([0]), every)
+        assert not stencil.duration_s.any()
