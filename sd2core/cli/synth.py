@@ -110,8 +110,8 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     )
     parser.add_argument(
         "--weight",
-        choices=("count", "area"),
-        help="a vertex counts as one, or by its area",
+        choices=("count", "area", "projected"),
+        help="a vertex counts as one, by its area, or by the area it turns towards the sensor",
     )
     add_axis(parser)
     parser.add_argument(

@@ -9,15 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.doppler.kernels import (
+    ALL,
+    AREA,
     DROP,
     FACING,
+    HEADS,
     MASK,
+    PROJECTED,
     WRAP,
     count_kernel,
     needed_kernel,
 )
-from sd2core.scattering.amplitude import range_weight
-from sd2core.scattering.visibility import facing_mask
+from sd2core.doppler.scatterers import Scatterers
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +94,8 @@ class Counts:
     histogram : float64 array, shape (n, bins)
         Vertices, or their weights, per bin; the mean over a frame's samples.
     visible, beyond : float64 array, shape (n,)
-        Number of vertices that are seen, and of those beyond the axis.
+        Number of vertices that are seen, and of those beyond the axis; one that
+        stands for several counts as many.
     """
 
     histogram: NDArray[np.float64]
@@ -177,45 +181,31 @@ def count_plain(
     frames: Frames,
     sensor: NDArray[np.float64],
     counting: Counting,
-    which: int,
-    normals: NDArray[np.int8] | None,
-    mask: NDArray[np.uint8] | None,
-    areas: NDArray[np.float32] | None,
+    scatterers: Scatterers,
     into: Counts,
 ) -> None:
     """The same as :func:`count`, in NumPy."""
+    heads = scatterers.heads(frames.positions.shape[2])
     for t, knot in enumerate(frames.centre):
         points = frames.positions[knot]
-        seen = np.ones(points.shape[1], bool)
-        if which == FACING and normals is not None:
-            seen = facing_mask(points[None], normals[t : t + 1], sensor)[0] > 0
-        elif which == MASK and mask is not None:
-            seen = mask[t] > 0
-        into.visible[t] = seen.sum()
-        weight = np.ones(points.shape[1])
-        if areas is not None:
-            weight = areas[t].astype(np.float64)
-        if counting.range_exponent:
-            distance = relative_range(points, sensor) + _distance(sensor)
-            weight = weight * range_weight(
-                distance, counting.range_exponent, counting.reference_range_m
-            )
+        seen = scatterers.seen(t, points, sensor)
+        weight = scatterers.weights(
+            t, points, sensor, counting.range_exponent, counting.reference_range_m
+        )
+        into.visible[t] = heads[seen].sum()
         measured = max(1, int((frames.duration_s[t] > 0).sum()))
         for sample in np.flatnonzero(frames.duration_s[t] > 0).tolist():
             number, beyond = bins_plain(frames, t, sample, sensor, counting)
             total = np.bincount(number[seen], weight[seen], counting.bins + 1)
             into.histogram[t] += total[: counting.bins] / measured
-            into.beyond[t] += (beyond & seen).sum() / measured
+            into.beyond[t] += heads[beyond & seen].sum() / measured
 
 
 def count(
     frames: Frames,
     sensor: NDArray[np.float64],
     counting: Counting,
-    which: int,
-    normals: NDArray[np.int8] | None,
-    mask: NDArray[np.uint8] | None,
-    areas: NDArray[np.float32] | None,
+    scatterers: Scatterers,
     into: Counts,
 ) -> None:
     """Count all frames of a stretch, compiled.
@@ -224,13 +214,15 @@ def count(
     ----------
     sensor : float64 array, shape (3,)
         In the frame of the positions.
-    which : int
-        ALL, FACING (with ``normals`` (n, 3, V)) or MASK (with ``mask`` (n, V)).
-    areas : float32 array, shape (n, V), or None
-        Weight of every vertex; None counts 1.
+    scatterers : Scatterers
+        Of the same frames.
     into : Counts
         Of as many frames; zero at first.
     """
+    normals, mask, areas = scatterers.normals, scatterers.mask, scatterers.areas
+    vectors, heads = scatterers.area_vectors, scatterers.vertex_counts
+    which = MASK if mask is not None else FACING if normals is not None else ALL
+    weighting = PROJECTED if vectors is not None else AREA if areas is not None else HEADS
     count_kernel(
         frames.positions,
         frames.centre,
@@ -240,9 +232,11 @@ def count(
         normals if normals is not None else _NO_NORMALS,
         mask if mask is not None else _NO_MASK,
         areas if areas is not None else _NO_AREAS,
+        vectors if vectors is not None else _NO_VECTORS,
+        heads if heads is not None else _NO_HEADS,
         sensor.astype(np.float32),
         which,
-        areas is not None,
+        weighting,
         counting.bins,
         counting.beyond,
         counting.range_exponent,
@@ -256,6 +250,8 @@ def count(
 _NO_NORMALS = np.empty((0, 3, 0), np.int8)
 _NO_MASK = np.empty((0, 0), np.uint8)
 _NO_AREAS = np.empty((0, 0), np.float32)
+_NO_VECTORS = np.empty((0, 3, 0), np.float32)
+_NO_HEADS = np.empty(0, np.float32)
 
 
 def mark_needed(

@@ -21,6 +21,9 @@ _NEAREST = np.float32(NEAREST_RANGE_M)
 ALL, FACING, MASK = 0, 1, 2
 """Which vertices count: all, those facing the sensor, those marked in a mask."""
 
+HEADS, AREA, PROJECTED = 0, 1, 2
+"""What a vertex counts: the vertices it stands for, its area, that towards the sensor."""
+
 DROP, WRAP, CLIP = 0, 1, 2
 """What happens beyond the axis."""
 
@@ -133,6 +136,25 @@ def _raise_to(weight, exponent, spare):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def _projected(x, y, z, ax, ay, az, sx, sy, sz, weight):  # type: ignore[no-untyped-def]
+    """Compiled form of :func:`sd2core.scattering.amplitude.projected_areas`."""
+    for v in range(weight.shape[0]):
+        qx, qy, qz = sx - x[v], sy - y[v], sz - z[v]
+        along = max(qx * ax[v] + qy * ay[v] + qz * az[v], np.float32(0))
+        weight[v] = along / max(np.sqrt(qx * qx + qy * qy + qz * qz), np.float32(1e-30))
+
+
+@compiled
+def _heads_beyond(f, seen, heads, bins):  # type: ignore[no-untyped-def]
+    """How many vertices the seen ones beyond the axis stand for."""
+    end, total = np.float32(bins), 0.0
+    for v in range(f.shape[0]):
+        if (seen[v] != 0) & ((f[v] < np.float32(0)) | (f[v] > end)):
+            total += heads[v]
+    return total
+
+
+@compiled
 def _tally(slot, counts):  # type: ignore[no-untyped-def]
     """Add 1 per vertex; several tables in turn, so that equal slots do not wait."""
     whole = slot.shape[0] // _TABLES * _TABLES
@@ -155,10 +177,14 @@ def _tally_weights(slot, weight, sums):  # type: ignore[no-untyped-def]
 
 @compiled
 def count_kernel(  # type: ignore[no-untyped-def]
-    positions, centre, before, after, scale, normals, mask, areas, sensor,
-    which, weighted, bins, beyond, exponent, reference, histogram, visible, outside,
+    positions, centre, before, after, scale, normals, mask, areas, vectors, heads, sensor,
+    which, weighting, bins, beyond, exponent, reference, histogram, visible, outside,
 ):  # fmt: skip
-    """See :func:`sd2core.doppler.histogram.count`; the last three are written."""
+    """See :func:`sd2core.doppler.histogram.count`; the last three are written.
+
+    ``heads`` (V,) says how many vertices each stands for, and is empty where each
+    stands for itself.
+    """
     vertices = positions.shape[2]
     samples = before.shape[1]
     sx, sy, sz = sensor[0], sensor[1], sensor[2]
@@ -166,10 +192,13 @@ def count_kernel(  # type: ignore[no-untyped-def]
     f = np.empty(_RUN, np.float32)
     weight = np.empty(_RUN, np.float32)
     spare = np.empty(_RUN, np.float32)
+    turned = np.empty(_RUN, np.float32)
     seen = np.ones(_RUN, np.uint8)
     slot = np.empty(_RUN, np.uint8)
     counts = np.zeros((_TABLES, 256), np.int32)
     sums = np.zeros((_TABLES, 256), np.float64)
+    grouped = heads.shape[0] > 0
+    weighted = weighting != HEADS or grouped
     weights = weighted or exponent != 0
     distance = np.float32(np.sqrt(np.float64(sx) ** 2 + np.float64(sy) ** 2 + np.float64(sz) ** 2))
     ring = np.empty((samples + 2, vertices), np.float32)
@@ -178,8 +207,8 @@ def count_kernel(  # type: ignore[no-untyped-def]
         known = _extend(positions, sensor, distance, known, after[t, samples - 1], ring)
         counts[:, : bins + 2] = 0
         sums[:, : bins + 2] = 0
-        seen_count = np.int64(0)
-        outside_count = 0
+        seen_count, seen_heads = np.int64(0), 0.0
+        outside_count, outside_heads = np.int64(0), 0.0
         measured = 0
         for sample in range(samples):
             if scale[t, sample] > 0:
@@ -200,24 +229,40 @@ def count_kernel(  # type: ignore[no-untyped-def]
             elif which == MASK:
                 marks = mask[t]
                 sight = marks[v0:v1]
-            for v in range(n):
-                seen_count += np.int64(sight[v])
+            if grouped:
+                for v in range(n):
+                    seen_heads += heads[v0 + v] if sight[v] != 0 else np.float32(0)
+            else:
+                for v in range(n):
+                    seen_count += np.int64(sight[v])
             if exponent != 0:
                 here = ring[centre[t] % ring.shape[0]]
                 _squared_ratios(here[v0:v1], distance, reference, weight[:n])
                 _raise_to(weight[:n], exponent, spare[:n])
-                if weighted:
-                    area = areas[t, v0:v1]
+            if weighted:
+                own = heads[v0:v1]
+                if weighting == AREA:
+                    own = areas[t, v0:v1]
+                elif weighting == PROJECTED:
+                    own = turned[:n]
+                    ax, ay, az = vectors[t, 0], vectors[t, 1], vectors[t, 2]
+                    _projected(
+                        x[v0:v1], y[v0:v1], z[v0:v1], ax[v0:v1], ay[v0:v1], az[v0:v1],
+                        sx, sy, sz, own,
+                    )  # fmt: skip
+                if exponent != 0:
                     for v in range(n):
-                        weight[v] *= area[v]
-            elif weighted:
-                weight[:n] = areas[t, v0:v1]
+                        weight[v] *= own[v]
+                else:
+                    weight[:n] = own
             for sample in range(samples):
                 if scale[t, sample] <= 0:
                     continue
                 a = ring[before[t, sample] % ring.shape[0]]
                 b = ring[after[t, sample] % ring.shape[0]]
                 _axis_positions(a[v0:v1], b[v0:v1], scale[t, sample], offset, f[:n])
+                if grouped:
+                    outside_heads += _heads_beyond(f[:n], sight, heads[v0:v1], bins)
                 outside_count += _slots(f[:n], sight, bins, beyond, slot[:n])
                 if weights:
                     _tally_weights(slot[:n], weight[:n], sums)
@@ -228,8 +273,8 @@ def count_kernel(  # type: ignore[no-untyped-def]
             for table in range(_TABLES):
                 total += sums[table, bin_number] if weights else counts[table, bin_number]
             histogram[t, bin_number] = total / measured
-        visible[t] = seen_count
-        outside[t] = outside_count / measured
+        visible[t] = seen_heads if grouped else seen_count
+        outside[t] = (outside_heads if grouped else outside_count) / measured
 
 
 @compiled
@@ -269,7 +314,7 @@ def compile_kernels() -> None:
     normals, marks = np.zeros((1, 3, 4), np.int8), np.zeros((1, 4), np.uint8)
     count_kernel(
         positions, knots[0], knots, knots, scale, normals, marks, np.ones((1, 4), np.float32),
-        sensor, ALL, False, 32, DROP, 4.0, np.float32(2.2), np.zeros((1, 32)), np.zeros(1),
-        np.zeros(1),
+        positions, np.ones(4, np.float32), sensor, ALL, HEADS, 32, DROP, 4.0, np.float32(2.2),
+        np.zeros((1, 32)), np.zeros(1), np.zeros(1),
     )  # fmt: skip
     needed_kernel(positions, knots, knots, scale, sensor, 32, DROP, np.ones(33, np.uint8), marks)

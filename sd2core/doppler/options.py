@@ -11,7 +11,7 @@ from sd2core.sensor import VelocityAxis
 
 Visibility = Literal["none", "facing", "depth", "exact"]
 DepthResolution = Literal[128, 256]
-Weight = Literal["count", "area"]
+Weight = Literal["count", "area", "projected"]
 Beyond = Literal["drop", "wrap", "clip"]
 VelocityRule = Literal["central", "vid2doppler"]
 
@@ -37,9 +37,12 @@ class SynthesisOptions:
     mask_stride : int
         Depth or exact visibility is worked out for every so many frames, and
         serves the frames nearest to each.
-    weight : {"count", "area"}
-        A vertex counts 1 (the map is a share of all vertices) or its area (a
-        share of the surface).
+    weight : {"count", "area", "projected"}
+        A vertex counts 1 (the map is a share of all vertices), its area, or the
+        area that it turns towards the sensor, A·cos θ (shares of the surface; a
+        plate seen square on gives 1). With a range law of 4 the last is the
+        constant-gamma law of rough surfaces. It relies on faces that are
+        oriented outwards, as the facing test does.
     axis : VelocityAxis
         Up to 254 bins.
     null_bins : tuple of int

@@ -191,16 +191,36 @@ class PreparedMesh:
         """Vertex areas of a block's frames in m², float32 (n, V)."""
 
         def make() -> tuple[NDArray[np.float32], int]:
-            points, faces = self._at_frames(block), self._faces()
-            if kernels_ready():
-                areas = np.empty((len(points), points.shape[2]), np.float32)
-                amplitude.vertex_areas_kernel(points, faces, 0, len(points), areas)
-            else:
-                areas = amplitude.vertex_areas(points, faces)
+            areas = self._areas(block)
             return areas, areas.nbytes
 
         areas: NDArray[np.float32] = self.budget.get_or_make(("areas", block.index), make)
         return areas
+
+    def surface(self, block: Block) -> NDArray[np.float64]:
+        """Area of the whole surface in each of a block's frames in m², float64 (n,)."""
+
+        def make() -> tuple[NDArray[np.float64], int]:
+            surface = self._areas(block).sum(axis=1, dtype=np.float64)
+            return surface, surface.nbytes
+
+        surface: NDArray[np.float64] = self.budget.get_or_make(("surface", block.index), make)
+        return surface
+
+    def area_vectors(self, block: Block) -> NDArray[np.float32]:
+        """Vertex area vectors of a block's frames in m², float32 (n, 3, V)."""
+
+        def make() -> tuple[NDArray[np.float32], int]:
+            points, faces = self._at_frames(block), self._faces()
+            if kernels_ready():
+                vectors = np.empty(points.shape, np.float32)
+                amplitude.vertex_area_vectors_kernel(points, faces, 0, len(points), vectors)
+            else:
+                vectors = amplitude.vertex_area_vectors(points, faces)
+            return vectors, vectors.nbytes
+
+        vectors: NDArray[np.float32] = self.budget.get_or_make(("area vectors", block.index), make)
+        return vectors
 
     def velocities_vid2doppler(
         self, block: Block, rows: slice, sensor: NDArray[np.float64]
@@ -215,6 +235,14 @@ class PreparedMesh:
             sensor,
             self.mesh.timebase.frames_per_s,
         )
+
+    def _areas(self, block: Block) -> NDArray[np.float32]:
+        points, faces = self._at_frames(block), self._faces()
+        if not kernels_ready():
+            return amplitude.vertex_areas(points, faces)
+        areas = np.empty((len(points), points.shape[2]), np.float32)
+        amplitude.vertex_areas_kernel(points, faces, 0, len(points), areas)
+        return areas
 
     def _faces(self) -> NDArray[np.int32]:
         if self.faces is None:

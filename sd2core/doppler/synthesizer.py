@@ -13,11 +13,12 @@ from sd2core import __version__
 from sd2core.compiled import compile_in_background, kernels_ready
 from sd2core.doppler import histogram, vid2doppler
 from sd2core.doppler.histogram import Counting, Counts
-from sd2core.doppler.kernels import ALL, CLIP, DROP, FACING, MASK, WRAP
+from sd2core.doppler.kernels import CLIP, DROP, WRAP
 from sd2core.doppler.masks import Occlusion, Position, Quality, Visibility, VisibilityMasks
 from sd2core.doppler.options import PRESETS, SynthesisOptions
 from sd2core.doppler.parallel import Ticket, run_jobs
 from sd2core.doppler.prepared import Block, ByteBudget, PreparedMesh
+from sd2core.doppler.scatterers import Scatterers
 from sd2core.doppler.smoothing import frames_within_reach, smooth_time, velocity_kernel
 from sd2core.errors import Sd2Error
 from sd2core.mesh import MeshSequence
@@ -111,7 +112,7 @@ class Synthesizer:
         if isinstance(preset, str) and preset not in PRESETS:
             raise Sd2Error(f"The preset is {preset!r}", f"one of {', '.join(PRESETS)}")
         options = PRESETS[preset] if isinstance(preset, str) else preset
-        if mesh.faces is None and options.weight == "area":
+        if mesh.faces is None and options.weight != "count":
             raise _no_surface(mesh, "Area weighting")
         self.mesh = mesh
         self.options = options
@@ -133,7 +134,11 @@ class Synthesizer:
     def unit(self) -> str:
         """What a value of 1 in a map means."""
         options = self.options
-        share = {"count": "share of vertices", "area": "share of the surface"}[options.weight]
+        share = {
+            "count": "share of vertices",
+            "area": "share of the surface",
+            "projected": "share of the surface × cos θ",
+        }[options.weight]
         if not options.range_exponent:
             return share
         # Nearer than the reference a value may exceed 1.
@@ -371,25 +376,25 @@ class Synthesizer:
     ) -> Quality:
         """Count some of a block's frames; returns the visibility that was used."""
         place = self.prepared.sensor(position_m)
-        areas = None
-        if self.options.weight == "area":
-            areas = self.prepared.areas(block)[rows]
-            totals[:] = areas.sum(axis=1, dtype=np.float64)
-
+        weight = self.options.weight
+        if weight != "count":
+            totals[:] = self.prepared.surface(block)[rows]
         mask, quality = self._masks.for_rows(block, rows, position_m, visibility)
-        which = MASK if mask is not None else FACING if quality == "facing" else ALL
-        normals = self.prepared.normals(block)[rows] if which == FACING else None
-
+        facing = mask is None and quality == "facing"
+        scatterers = Scatterers(
+            normals=self.prepared.normals(block)[rows] if facing else None,
+            mask=mask,
+            areas=self.prepared.areas(block)[rows] if weight == "area" else None,
+            area_vectors=self.prepared.area_vectors(block)[rows] if weight == "projected" else None,
+        )
         frames = block.frames.rows(rows)
         if self.options.velocity == "vid2doppler":
             velocity = self.prepared.velocities_vid2doppler(block, rows, place)
             edges_mps = self.options.axis.edges_mps
-            vid2doppler.count(
-                frames, velocity, edges_mps, place, self._counting, normals, mask, areas, into
-            )
+            vid2doppler.count(frames, velocity, edges_mps, place, self._counting, scatterers, into)
         else:
             count = histogram.count if kernels_ready() else histogram.count_plain
-            count(frames, place, self._counting, which, normals, mask, areas, into)
+            count(frames, place, self._counting, scatterers, into)
         return quality
 
     # Blocks.

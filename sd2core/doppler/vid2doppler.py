@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from sd2core.doppler.histogram import Counting, Counts, Frames
 from sd2core.doppler.kernels import CLIP, DROP, WRAP
-from sd2core.scattering.amplitude import range_weight
-from sd2core.scattering.visibility import facing_mask
+from sd2core.doppler.scatterers import Scatterers
 
 TAPS = 5
 """Frames in its mean over time."""
@@ -94,9 +93,7 @@ def count(
     edges_mps: NDArray[np.float64],
     sensor: NDArray[np.float64],
     counting: Counting,
-    normals: NDArray[np.int8] | None,
-    mask: NDArray[np.uint8] | None,
-    areas: NDArray[np.float32] | None,
+    scatterers: Scatterers,
     into: Counts,
 ) -> None:
     """Count all frames of a stretch by these velocities, as :func:`histogram.count` does.
@@ -105,24 +102,18 @@ def count(
     ----------
     velocity_mps : float64 array, shape (n, V)
     edges_mps : float64 array, shape (bins + 1,)
-    normals, mask : arrays, shapes (n, 3, V) and (n, V), or None
-        Which vertices count; all when both are None.
     """
+    heads = scatterers.heads(frames.positions.shape[2])
     numbers, beyond = place_in_bins(velocity_mps, edges_mps, counting)
     for row, knot in enumerate(frames.centre):
         points = frames.positions[knot]
-        seen = np.ones(points.shape[1], bool)
-        if mask is not None:
-            seen = mask[row] > 0
-        elif normals is not None:
-            seen = facing_mask(points[None], normals[row : row + 1], sensor)[0] > 0
-        weight = np.ones(points.shape[1]) if areas is None else areas[row].astype(float)
-        if counting.range_exponent:
-            distance = np.linalg.norm(points - sensor[:, None], axis=0)
-            weight *= range_weight(distance, counting.range_exponent, counting.reference_range_m)
-        into.visible[row] = seen.sum()
+        seen = scatterers.seen(row, points, sensor)
+        weight = scatterers.weights(
+            row, points, sensor, counting.range_exponent, counting.reference_range_m
+        )
+        into.visible[row] = heads[seen].sum()
         # With one frame there is no velocity, not a velocity of zero.
         if frames.duration_s[row].any():
             total = np.bincount(numbers[row][seen], weight[seen], counting.bins + 1)
             into.histogram[row] = total[: counting.bins]
-            into.beyond[row] = (beyond[row] & seen).sum()
+            into.beyond[row] = heads[beyond[row] & seen].sum()

@@ -1,4 +1,4 @@
-"""How much a vertex sends back: its share of the surface and the range law."""
+"""How much a vertex sends back: its share of the surface, how it is turned, the range law."""
 
 from __future__ import annotations
 
@@ -60,6 +60,88 @@ def vertex_areas_kernel(
             area[k] += third
 
 
+def vertex_area_vectors(positions: NDArray[Any], faces: NDArray[np.int32]) -> NDArray[np.float32]:
+    """Area vector of each vertex: a third of the sum of its adjacent triangles'.
+
+    A triangle's area vector is its area times its outward unit normal. Its part
+    along a direction is the area seen from there; a closed surface's sum to zero.
+
+    Parameters
+    ----------
+    positions : float array, shape (n, 3, V)
+        Metres.
+    faces : int32 array, shape (F, 3)
+        Counter-clockwise seen from outside.
+
+    Returns
+    -------
+    float32 array, shape (n, 3, V)
+        Square metres.
+    """
+    vectors = np.empty(positions.shape, np.float32)
+    for frame, points in enumerate(positions.astype(np.float64, copy=False)):
+        corner = points[:, faces]  # (3, F, 3)
+        edge1, edge2 = corner[:, :, 1] - corner[:, :, 0], corner[:, :, 2] - corner[:, :, 0]
+        for axis, third in enumerate(np.cross(edge1, edge2, axis=0) / 6.0):
+            vectors[frame, axis] = np.bincount(faces.ravel(), np.repeat(third, 3), points.shape[1])
+    return vectors
+
+
+@compiled
+def vertex_area_vectors_kernel(
+    positions: NDArray[np.float32],  # (n, 3, V)
+    faces: NDArray[np.int32],
+    first: int,
+    last: int,
+    vectors: NDArray[np.float32],  # (n, 3, V), written
+) -> None:
+    """Compiled form of :func:`vertex_area_vectors` for frames ``first`` to ``last``."""
+    vertices = positions.shape[2]
+    total = np.empty((vertices, 3), np.float64)
+    for t in range(first, last):
+        x, y, z = positions[t, 0], positions[t, 1], positions[t, 2]
+        total[:] = 0
+        for f in range(faces.shape[0]):
+            i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
+            px, py, pz = np.float64(x[i]), np.float64(y[i]), np.float64(z[i])
+            ax, ay, az = x[j] - px, y[j] - py, z[j] - pz
+            bx, by, bz = x[k] - px, y[k] - py, z[k] - pz
+            nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+            for v in (i, j, k):
+                total[v, 0] += nx
+                total[v, 1] += ny
+                total[v, 2] += nz
+        for axis in range(3):
+            for v in range(vertices):
+                vectors[t, axis, v] = np.float32(total[v, axis] / 6.0)
+
+
+def projected_areas(
+    points: NDArray[Any], vectors: NDArray[np.float32], sensor: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Area that each vertex turns towards the sensor, A·cos θ.
+
+    Parameters
+    ----------
+    points : float array, shape (3, V)
+        Metres.
+    vectors : float32 array, shape (3, V)
+        Of :func:`vertex_area_vectors`.
+    sensor : float64 array, shape (3,)
+
+    Returns
+    -------
+    float64 array, shape (V,)
+        Square metres; 0 where the surface is turned away, and on the sensor itself.
+    """
+    ray = sensor[:, None] - points
+    along = (ray * vectors).sum(axis=0)
+    projected: NDArray[np.float64] = np.maximum(along, 0) / np.maximum(
+        np.linalg.norm(ray, axis=0), 1e-30
+    )
+    return projected
+
+
 def range_weight(
     range_m: NDArray[Any], exponent: float, reference_range_m: float
 ) -> NDArray[np.float32]:
@@ -78,3 +160,4 @@ def compile_kernels() -> None:
     positions = np.zeros((1, 3, 3), np.float32)
     faces = np.array([[0, 1, 2]], np.int32)
     vertex_areas_kernel(positions, faces, 0, 1, np.empty((1, 3), np.float32))
+    vertex_area_vectors_kernel(positions, faces, 0, 1, np.empty((1, 3, 3), np.float32))

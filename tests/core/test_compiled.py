@@ -141,7 +141,7 @@ faces = np.array([[0, 1, 2]], np.int32)
 faces.flags.writeable = False
 vertices = np.random.default_rng(0).normal(size=(40, 3, 3))
 for dtype in ("f4", "f8"):
-    for weight in ("count", "area"):
+    for weight in ("count", "area", "projected"):
         mesh = MeshSequence(vertices.astype(dtype), faces, Timebase.regular(40, 30), "x")
         maker = Synthesizer(mesh, SynthesisOptions(weight=weight))
         for seen in ("none", "facing", "depth", "exact", "frozen"):

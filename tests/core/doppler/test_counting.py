@@ -21,7 +21,12 @@ from sd2core.doppler import (
 from sd2core.doppler.masks import VisibilityMasks
 from sd2core.errors import Sd2Error
 from sd2core.mesh import MeshSequence
-from sd2core.scattering.amplitude import range_weight, vertex_areas
+from sd2core.scattering.amplitude import (
+    projected_areas,
+    range_weight,
+    vertex_area_vectors,
+    vertex_areas,
+)
 from sd2core.scattering.velocity import radial_velocity
 from sd2core.sensor import VelocityAxis, VirtualSensor
 
@@ -41,10 +46,14 @@ def restated(mesh: MeshSequence, chosen: SynthesisOptions, sensor: VirtualSensor
         elif chosen.beyond == "wrap":
             velocity = (velocity - edges[0]) % (edges[-1] - edges[0]) + edges[0]
         weight = np.ones(len(velocity))
-        if chosen.weight == "area":
+        total = weight.sum()
+        if chosen.weight != "count":
             points = np.ascontiguousarray(mesh.frame(index).T[None])
             weight = vertex_areas(points, mesh.faces)[0].astype(float)
-        total = weight.sum()
+            total = weight.sum()
+        if chosen.weight == "projected":
+            vectors = vertex_area_vectors(points, mesh.faces)[0]
+            weight = projected_areas(points[0], vectors, np.asarray(sensor.position_m))
         weight = weight * range_weight(
             frame.range_m, chosen.range_exponent, chosen.reference_range_m
         )
@@ -64,6 +73,8 @@ def restated(mesh: MeshSequence, chosen: SynthesisOptions, sensor: VirtualSensor
         {"beyond": "clip", "axis": VelocityAxis(7, 0.5), "null_bins": (3,)},
         {"weight": "area"},
         {"weight": "area", "range_exponent": 4.0, "visibility": "none"},
+        {"weight": "projected"},
+        {"weight": "projected", "range_exponent": 4.0, "visibility": "none"},
         {"range_exponent": 4.0},
         {"range_exponent": 3.0},
         {"range_exponent": 2.5, "reference_range_m": 1.0},
@@ -91,6 +102,8 @@ def test_against_numpy(changes: dict[str, Any]) -> None:
     [
         {},
         {"weight": "area", "range_exponent": 4.0},
+        {"weight": "projected"},
+        {"weight": "projected", "range_exponent": 4.0},
         {"oversampling": 3, "null_bins": (15, 16)},
         {"oversampling": 4},
     ],
@@ -228,8 +241,9 @@ def test_a_point_cloud_takes_visibility_none_only(preset: str) -> None:
     for visibility in (None, "facing", "exact", "frozen"):
         with pytest.raises(Sd2Error, match=r"cloud\.npz has no faces"):
             maker.map(SENSOR, visibility=visibility)  # type: ignore[arg-type]
-    with pytest.raises(Sd2Error, match="Area weighting"):
-        Synthesizer(cloud, replace(PRESETS[preset], weight="area"))
+    for weight in ("area", "projected"):
+        with pytest.raises(Sd2Error, match="Area weighting"):
+            Synthesizer(cloud, replace(PRESETS[preset], weight=weight))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("distance_m", [0.0, 0.3, 2.2, 300.0, 1e6])

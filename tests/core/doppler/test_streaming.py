@@ -39,6 +39,7 @@ def recording(tmp_path: Path) -> tuple[MeshSequence, MeshSequence]:
     [
         {},
         {"weight": "area"},
+        {"weight": "projected"},
         {"oversampling": 3, "trajectory_smoothing_s": 0.05},
         {"oversampling": 4},
         {"time_sigma_s": 0.2},

@@ -7,7 +7,10 @@ from scattering_scenes import columns, plate, sphere, together
 
 from sd2core.scattering.amplitude import (
     NEAREST_RANGE_M,
+    projected_areas,
     range_weight,
+    vertex_area_vectors,
+    vertex_area_vectors_kernel,
     vertex_areas,
     vertex_areas_kernel,
 )
@@ -62,6 +65,59 @@ def test_areas_add_up_to_the_surface() -> None:
     areas = vertex_areas(columns(vertices), faces)
     np.testing.assert_allclose(areas.sum(), 1.5**2, rtol=1e-5)
     assert areas.min() > 0
+
+
+def test_compiled_area_vectors_are_the_plain_ones() -> None:
+    vertices, faces = together(sphere(0.5), plate(1.0))
+    points = np.concatenate([columns(vertices), columns(vertices * [1.0, 0.7, 1.3])])
+    vectors = np.empty(points.shape, np.float32)
+    vertex_area_vectors_kernel(points, faces, 0, 2, vectors)
+    # Both sum in double precision; what is compared has been rounded to single.
+    plain = vertex_area_vectors(points, faces)
+    np.testing.assert_allclose(vectors, plain, rtol=1e-6, atol=1e-6 * np.abs(plain).max())
+
+
+def test_area_vectors_of_a_closed_surface_cancel() -> None:
+    vertices, faces = sphere(0.7)
+    vectors = vertex_area_vectors(columns(vertices), faces)[0].astype(float)
+    surface = np.linalg.norm(vectors, axis=0).sum()
+    assert np.abs(vectors.sum(axis=1)).max() <= 1e-6 * surface
+    assert ((vectors * vertices.T).sum(axis=0) > 0).all()
+
+
+def test_a_tilted_plate_turns_its_cosine_to_the_sensor() -> None:
+    vertices, faces = plate(1.5)
+    far = np.array([0.0, 0.0, -1e6])
+    for angle in np.radians([0.0, 30.0, 60.0, 89.0, 120.0, 180.0]):
+        cos, sin = np.cos(angle), np.sin(angle)
+        turned = vertices @ np.array([[1, 0, 0], [0, cos, sin], [0, -sin, cos]])
+        points = columns(turned)
+        vectors = vertex_area_vectors(points, faces)[0]
+        seen = projected_areas(points[0], vectors, far).sum()
+        # Single precision of coordinates of about a metre.
+        np.testing.assert_allclose(seen, 1.5**2 * max(cos, 0.0), atol=1e-5)
+
+
+def test_a_far_sphere_shows_its_disc() -> None:
+    vertices, faces = sphere(0.4, divisions=5)
+    points = columns(vertices)
+    vectors = vertex_area_vectors(points, faces)[0]
+    for direction in ([0.0, 0.0, -1.0], [0.36, 0.48, 0.8]):
+        seen = projected_areas(points[0], vectors, 1e5 * np.array(direction)).sum()
+        # The icosphere of 10,242 vertices lies inside the sphere by 3e-4 of its area, and
+        # along the horizon half-turned fans count 0 or their part.
+        np.testing.assert_allclose(seen, np.pi * 0.4**2, rtol=2e-3)
+    areas = vertex_areas(points, faces).sum()
+    np.testing.assert_allclose(areas, 4 * np.pi * 0.4**2, rtol=1e-3)
+
+
+def test_on_the_sensor_nothing_is_turned_to_it() -> None:
+    vertices, faces = plate()
+    points = columns(vertices)
+    vectors = vertex_area_vectors(points, faces)[0]
+    seen = projected_areas(points[0], vectors, points[0, :, 40].astype(float))
+    assert np.isfinite(seen).all()
+    assert seen[40] == 0
 
 
 def test_range_law() -> None:
