@@ -36,6 +36,7 @@ _COUNTING_ONLY = (
     "beyond",
     "range_exponent",
     "reference_range_m",
+    "range_law",
     "trajectory_smoothing_s",
     "oversampling",
     "velocity_sigma_bins",
@@ -138,6 +139,11 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         type=positive_float,
         metavar="R",
         help="range at which a vertex counts as one (paper: 2.2)",
+    )
+    parser.add_argument(
+        "--range-law",
+        choices=("vertex", "frame"),
+        help="echoes weaken with the range of each vertex or of the whole frame (default: vertex)",
     )
     parser.add_argument(
         "--trajectory-smoothing-s",

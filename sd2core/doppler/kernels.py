@@ -231,7 +231,8 @@ def count_kernel(  # type: ignore[no-untyped-def]
                 sight = marks[v0:v1]
             if grouped:
                 for v in range(n):
-                    seen_heads += heads[v0 + v] if sight[v] != 0 else np.float32(0)
+                    if sight[v] != 0:
+                        seen_heads += heads[v0 + v]
             else:
                 for v in range(n):
                     seen_count += np.int64(sight[v])

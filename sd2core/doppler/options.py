@@ -12,6 +12,7 @@ from sd2core.sensor import VelocityAxis
 Visibility = Literal["none", "facing", "depth", "exact"]
 DepthResolution = Literal[128, 256]
 Weight = Literal["count", "area", "projected"]
+RangeLaw = Literal["vertex", "frame"]
 Beyond = Literal["drop", "wrap", "clip"]
 VelocityRule = Literal["central", "vid2doppler"]
 
@@ -56,6 +57,9 @@ class SynthesisOptions:
         4 is the radar equation; 0 turns the law off.
     reference_range_m : float
         Where a vertex counts fully.
+    range_law : {"vertex", "frame"}
+        R is the range of each vertex, or one range per frame, that of the mean of
+        its vertices: cheaper, and as good for a body that is small for its range.
     velocity : {"central", "vid2doppler"}
         Central difference of the exact range, or that tool's own arithmetic
         (see :mod:`sd2core.doppler.vid2doppler`).
@@ -81,6 +85,7 @@ class SynthesisOptions:
     beyond: Beyond = "drop"
     range_exponent: float = 4.0
     reference_range_m: float = 2.2
+    range_law: RangeLaw = "vertex"
     velocity: VelocityRule = "central"
     oversampling: int = 1
     trajectory_smoothing_s: float = 0.0
@@ -94,6 +99,7 @@ class SynthesisOptions:
             ("depth_resolution", DepthResolution),
             ("weight", Weight),
             ("beyond", Beyond),
+            ("range_law", RangeLaw),
             ("velocity", VelocityRule),
         ):
             value = getattr(self, name)

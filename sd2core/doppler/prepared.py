@@ -207,6 +207,19 @@ class PreparedMesh:
         surface: NDArray[np.float64] = self.budget.get_or_make(("surface", block.index), make)
         return surface
 
+    def middles(self, block: Block) -> NDArray[np.float64]:
+        """Mean vertex of each of a block's frames, float64 (n, 3)."""
+
+        def make() -> tuple[NDArray[np.float64], int]:
+            frames = block.frames
+            middles = np.stack(
+                [frames.positions[knot].mean(axis=1, dtype=np.float64) for knot in frames.centre]
+            )
+            return middles, middles.nbytes
+
+        middles: NDArray[np.float64] = self.budget.get_or_make(("middles", block.index), make)
+        return middles
+
     def area_vectors(self, block: Block) -> NDArray[np.float32]:
         """Vertex area vectors of a block's frames in m², float32 (n, 3, V)."""
 

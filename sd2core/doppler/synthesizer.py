@@ -23,6 +23,7 @@ from sd2core.doppler.smoothing import frames_within_reach, smooth_time, velocity
 from sd2core.errors import Sd2Error
 from sd2core.mesh import MeshSequence
 from sd2core.progress import Progress, silent
+from sd2core.scattering.amplitude import range_weight
 from sd2core.scattering.velocity import radial_velocity
 from sd2core.sensor import VirtualSensor
 from sd2core.spectrum import DopplerMap
@@ -124,7 +125,7 @@ class Synthesizer:
             options.axis.bins,
             options.axis.v_max_mps,
             {"drop": DROP, "wrap": WRAP, "clip": CLIP}[options.beyond],
-            options.range_exponent,
+            options.range_exponent if options.range_law == "vertex" else 0.0,
             options.reference_range_m,
         )
         self._masks = VisibilityMasks(self.prepared, self._counting)
@@ -395,6 +396,10 @@ class Synthesizer:
         else:
             count = histogram.count if kernels_ready() else histogram.count_plain
             count(frames, place, self._counting, scatterers, into)
+        if self.options.range_law == "frame":
+            range_m = np.linalg.norm(self.prepared.middles(block)[rows] - place, axis=1)
+            law = range_weight(range_m, self.options.range_exponent, self.options.reference_range_m)
+            into.histogram[:] *= law[:, None]
         return quality
 
     # Blocks.

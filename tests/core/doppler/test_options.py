@@ -19,6 +19,7 @@ from sd2core.sensor import VelocityAxis
         ({"mask_stride": 0}, "mask_stride is 0"),
         ({"weight": "mass"}, "weight is 'mass'"),
         ({"beyond": "keep"}, "beyond is 'keep'"),
+        ({"range_law": "clip"}, "range_law is 'clip'"),
         ({"velocity": "forward"}, "velocity is 'forward'"),
         ({"axis": VelocityAxis(255)}, "255 bins"),
         ({"null_bins": (32,)}, r"null_bins is \(32,\)"),
