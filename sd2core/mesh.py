@@ -108,3 +108,35 @@ class MeshSequence:
         """Vertices of one frame, (V, 3)."""
         vertices: NDArray[Any] = self.read(index, index + 1)[0]
         return vertices
+
+
+def refuse_missing(vertices: NDArray[Any], first_frame: int, source: str) -> None:
+    """Stop at a coordinate that is NaN or infinite.
+
+    Parameters
+    ----------
+    vertices : float array, shape (n, V, 3)
+    first_frame : int
+        Number of the first of these frames.
+    source : str
+
+    Raises
+    ------
+    Sd2Error
+        Names file, frame, vertex and the three numbers.
+    """
+    finite = np.isfinite(vertices)
+    if finite.all():
+        return
+    frame, vertex = np.argwhere(~finite)[0][:2]
+    raise Sd2Error(
+        f"{source or 'The mesh'}: vertex {vertex} of frame {first_frame + frame} is at"
+        f" {place_in_words(vertices[frame, vertex])}",
+        "finite coordinates in metres in every frame",
+        "Fill that vertex, or leave out the frame, where the file is written",
+    )
+
+
+def place_in_words(place_m: NDArray[Any]) -> str:
+    """Coordinates for a message: ``(0.1, nan, 2.5)``."""
+    return f"({', '.join(f'{value:g}' for value in place_m)})"

@@ -16,8 +16,7 @@ from sd2core.compiled import kernels_ready
 from sd2core.doppler import vid2doppler
 from sd2core.doppler.histogram import Frames
 from sd2core.doppler.options import SynthesisOptions
-from sd2core.errors import Sd2Error
-from sd2core.mesh import MeshSequence
+from sd2core.mesh import MeshSequence, refuse_missing
 from sd2core.scattering import amplitude, visibility
 from sd2core.scattering.trajectory import Trajectory
 from sd2core.scattering.velocity import moments
@@ -299,13 +298,7 @@ class PreparedMesh:
         low, high = self._trajectory.frames_needed(first, last)
         with self._reading:
             vertices = self.mesh.read(low, high)
-        if not np.isfinite(vertices).all():
-            frame, vertex = np.argwhere(~np.isfinite(vertices))[0][:2]
-            raise Sd2Error(
-                f"{self.mesh.source or 'The mesh'}: vertex {vertex} of frame {low + frame} is"
-                f" {vertices[frame, vertex].tolist()}",
-                "finite coordinates in metres",
-            )
+        refuse_missing(vertices, low, self.mesh.source)
         knots = self._trajectory.knots(vertices, low, first, last)
         precise = self._compatible and (knots.dtype != np.float32)
         positions = np.empty(

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.triangle import mean_phasor
-from sd2core.mesh import MeshSequence
+from sd2core.mesh import MeshSequence, refuse_missing
 from sd2core.sensor import RadarConfig, VirtualSensor
 
 NEAREST_M = 0.05
@@ -230,17 +230,7 @@ class MeshScene:
                 first = max(index - 4, 0)
                 stop = min(first + _BLOCK_FRAMES, self.mesh.frame_count)
                 block = self.mesh.read(first, stop).astype(np.float64)
-                self._refuse_missing(block, first)
+                refuse_missing(block, first, self.mesh.source)
                 self._first, self._block = first, block
             frame: NDArray[np.float64] = self._block[index - self._first]
             return frame
-
-    def _refuse_missing(self, block: NDArray[np.float64], first: int) -> None:
-        bad = ~np.isfinite(block)
-        if bad.any():
-            frame, vertex, _ = np.argwhere(bad)[0]
-            raise Sd2Error(
-                f"{self.mesh.source or 'The mesh'}: vertex {vertex} of frame {first + frame} is"
-                f" at {block[frame, vertex]}",
-                "finite coordinates",
-            )

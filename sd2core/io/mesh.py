@@ -96,7 +96,7 @@ def load_mesh(
     _as_vertices(raw, source)
     times_s = drop_empty_frames(raw, _times(raw, frames_per_s, source), source)
     _place(raw, 1.0 if scale is None else scale, distance_m or 0.0)
-    check_mesh(raw, source, check_size=scale is None)
+    check_mesh(raw, times_s, source, check_size=scale is None)
     try:
         timebase = Timebase(times_s)
     except Sd2Error as error:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from sd2core.atomic import atomic_write
 from sd2core.errors import Sd2Error
-from sd2core.mesh import MeshSequence, VertexArray
+from sd2core.mesh import MeshSequence, VertexArray, refuse_missing
 from sd2core.progress import Progress, silent
 
 VERTEX_NAMES = ("vertices", "verts")
@@ -69,17 +69,21 @@ class StoredVertices:
         return self.frames_per_chunk * int(np.prod(self.shape[1:])) * self.dtype.itemsize
 
     def __getitem__(self, key: Any) -> NDArray[Any]:
+        first = None
         if isinstance(key, int | np.integer):
-            frame = range(self.shape[0])[key]
-            part = self._stretch(frame, frame + 1)[0]
+            first = range(self.shape[0])[key]
+            part = self._stretch(first, first + 1)[0]
         elif isinstance(key, slice) and key.step in (None, 1):
-            part = self._stretch(*key.indices(self.shape[0])[:2])
+            first, stop, _ = key.indices(self.shape[0])
+            part = self._stretch(first, stop)
         else:
             part = self._read(key)
         # A sum is finite only when its terms are, and costs next to nothing
         # beside the reading; a sum that overflowed is looked at again.
         with np.errstate(all="ignore"):
             suspect = not np.isfinite(part.sum())
+        if suspect and first is not None:
+            refuse_missing(part.reshape(-1, *self.shape[1:]), first, self._source)
         if suspect and not np.isfinite(part).all():
             raise Sd2Error(
                 f"{self._source}: vertices that are NaN or infinite in {_where(key)}",
@@ -257,13 +261,7 @@ def write_zarr(mesh: MeshSequence, path: Path, progress: Progress = silent) -> N
 
 def _block(mesh: MeshSequence, start: int, step: int) -> NDArray[Any]:
     block = mesh.read(start, min(start + step, mesh.frame_count))
-    if not np.isfinite(block).all():
-        frame = start + int(np.flatnonzero(~np.isfinite(block).all(axis=(1, 2)))[0])
-        raise Sd2Error(
-            f"{mesh.source or 'The mesh'}: frame {frame} has vertices that are NaN or infinite",
-            "finite coordinates in metres",
-            "Fill or leave out that frame before saving",
-        )
+    refuse_missing(block, start, mesh.source)
     return block
 
 

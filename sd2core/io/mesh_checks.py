@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.io.mesh_arrays import RawMesh, StoredVertices
+from sd2core.mesh import place_in_words
+from sd2core.precision import ROUNDING, SHARE_OF_A_BIN, stored_velocity_error_mps
+from sd2core.sensor import VelocityAxis
 
 _SAMPLE_FRAMES = 5
 _LARGEST_BODY_M = 10.0
@@ -51,8 +54,9 @@ def drop_empty_frames(
         frame = int(partial[0])
         bad = np.flatnonzero(~finite[frame])
         raise Sd2Error(
-            f"{source}: vertex {bad[0]} of frame {frame} is NaN or infinite ({bad.size:,} vertices "
-            f"of that frame, {partial.size:,} frames in all)",
+            f"{source}: vertex {bad[0]} of frame {frame} is at"
+            f" {place_in_words(vertices[frame, bad[0]])} ({bad.size:,} vertices of that frame are"
+            f" NaN or infinite, {partial.size:,} frames in all)",
             "finite coordinates in metres; only frames that are wholly NaN can be left out",
             "Fill those vertices where the file is written",
         )
@@ -65,8 +69,8 @@ def drop_empty_frames(
     return times_s[~empty]
 
 
-def check_mesh(raw: RawMesh, source: str, check_size: bool) -> None:
-    """Check size, place and faces on a few frames; flip faces that look inwards.
+def check_mesh(raw: RawMesh, times_s: NDArray[np.float64], source: str, check_size: bool) -> None:
+    """Check size, place, rounding and faces on a few frames; flip faces that look inwards.
 
     Raises
     ------
@@ -85,6 +89,7 @@ def check_mesh(raw: RawMesh, source: str, check_size: bool) -> None:
             "the camera's frame: x right, y down, z forward. A mesh with y up and z backward needs "
             "a half turn about x; one centred on its root needs its distance (--distance-m)."
         )
+    _note_rounding(raw, sample, times_s)
     if raw.faces is None:
         _note_missing_faces(raw)
     else:
@@ -110,6 +115,25 @@ def _check_size(raw: RawMesh, sample: list[NDArray[np.float64]], source: str) ->
             f"The mesh measures {extent_m * 1000:.3g} mm. When that is not its size in metres, "
             "pass --scale with the factor."
         )
+
+
+def _note_rounding(
+    raw: RawMesh, sample: list[NDArray[np.float64]], times_s: NDArray[np.float64]
+) -> None:
+    """Say so when single precision in the file itself spoils the velocities."""
+    if np.dtype(raw.vertices.dtype) != np.float32 or len(times_s) < 2:
+        return
+    duration_s = 2.0 * float(np.median(np.diff(times_s)))
+    reach_m = max(float(np.abs(frame).max()) for frame in sample)
+    allowed_mps = SHARE_OF_A_BIN * VelocityAxis().bin_width_mps
+    if not 0 < duration_s * allowed_mps < stored_velocity_error_mps(reach_m, 1.0):
+        return
+    raw.notes.append(
+        f"Coordinates reach {reach_m:,.4g} m and are stored in single precision, to"
+        f" {ROUNDING * reach_m * 1000:.2g} mm: velocities from frame to frame are wrong by up to"
+        f" {stored_velocity_error_mps(reach_m, duration_s):.2g} m/s. Store them in double"
+        " precision, or nearer to the origin."
+    )
 
 
 def _note_missing_faces(raw: RawMesh) -> None:

@@ -44,17 +44,21 @@ def vertex_areas_kernel(
     last: int,
     areas: NDArray[np.float32],  # (n, V), written
 ) -> None:
-    """Compiled form of :func:`vertex_areas` for frames ``first`` to ``last``."""
+    """Compiled form of :func:`vertex_areas` for frames ``first`` to ``last``.
+
+    In double precision: the area of a sliver is the small difference of large products.
+    """
     for t in range(first, last):
         x, y, z = positions[t, 0], positions[t, 1], positions[t, 2]
         area = areas[t]
         area[:] = 0
         for f in range(faces.shape[0]):
             i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
-            ax, ay, az = x[j] - x[i], y[j] - y[i], z[j] - z[i]
-            bx, by, bz = x[k] - x[i], y[k] - y[i], z[k] - z[i]
+            px, py, pz = np.float64(x[i]), np.float64(y[i]), np.float64(z[i])
+            ax, ay, az = x[j] - px, y[j] - py, z[j] - pz
+            bx, by, bz = x[k] - px, y[k] - py, z[k] - pz
             nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-            third = np.sqrt(nx * nx + ny * ny + nz * nz) * np.float32(1.0 / 6.0)
+            third = np.float32(np.sqrt(nx * nx + ny * ny + nz * nz) / 6.0)
             area[i] += third
             area[j] += third
             area[k] += third

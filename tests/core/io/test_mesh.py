@@ -176,7 +176,7 @@ def test_saving_replaces_the_old_file_only_when_it_succeeds(tmp_path: Path, suff
     def stop(done: int, total: int) -> None:
         raise Cancelled
 
-    with pytest.raises(Sd2Error, match="frame 4 has vertices that are NaN"):
+    with pytest.raises(Sd2Error, match=r"vertex 7 of frame 4 is at \(nan"):
         save_mesh(MeshSequence(broken, faces, Timebase(times(6))), path)
     with pytest.raises(Cancelled):
         save_mesh(good, path, progress=stop)
@@ -281,7 +281,7 @@ def test_units_are_guessed_from_the_size(tmp_path: Path) -> None:
         path = write(tmp_path / "m.npz", vertices=vertices * factor, faces=faces, fps=30)
         with pytest.raises(Sd2Error, match=text):
             load_mesh(path)
-        assert load_mesh(path, scale=1).notes == ()
+        assert not any("measures" in note for note in load_mesh(path, scale=1).notes)
     path = write(tmp_path / "m.npz", vertices=vertices / 1000, faces=faces, fps=30)
     one_note(load_mesh(path), "measures 1.7 mm.*--scale")
 
@@ -362,7 +362,7 @@ def test_single_bad_vertices_are_named(tmp_path: Path, value: float) -> None:
     vertices[4, 2] = value
     path = write(tmp_path / "m.npz", vertices=vertices, faces=faces, times_s=times(6))
     with pytest.raises(
-        Sd2Error, match=r"m\.npz: vertex 5 of frame 3 .*\(2 vertices of that frame, 2 frames"
+        Sd2Error, match=r"m\.npz: vertex 5 of frame 3 .*\(2 vertices of that frame .* 2 frames"
     ):
         load_mesh(path)
     path = write(tmp_path / "m.npz", vertices=vertices * np.nan, faces=faces, times_s=times(6))
@@ -377,7 +377,7 @@ def test_bad_vertices_on_disk_are_named_when_they_are_read(tmp_path: Path) -> No
     zarr.open_group(str(path), mode="r+")["vertices"][15, 3, 1] = np.nan
     mesh = load_mesh(path)
     np.testing.assert_array_equal(mesh.read(0, 15), vertices[:15])
-    with pytest.raises(Sd2Error, match=r"m\.zarr: vertices that are NaN .* in frames 10 to 19"):
+    with pytest.raises(Sd2Error, match=r"m\.zarr: vertex 3 of frame 15 is at \(.*nan"):
         mesh.read(10, 20)
 
 

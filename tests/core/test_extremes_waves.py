@@ -1,0 +1,277 @@
+"""The FMCW simulation at the extremes of wavelength, range, speed, and numbers of samples."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from decimal import Decimal, localcontext
+
+import numpy as np
+import pytest
+from extreme_tables import DIGITS, PI, exact_mean_phasor, exact_phasor, exact_ranges
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+from sd2core.fmcw.kernels import facet_echoes, triangle_phasor
+from sd2core.fmcw.processing import doppler_map
+from sd2core.fmcw.signal import SignalOptions
+from sd2core.fmcw.simulation import simulate_radar
+from sd2core.fmcw.sums import NUFFT_TOLERANCE, Echoes, direct, nufft
+from sd2core.fmcw.triangle import mean_phasor
+from sd2core.mesh import MeshSequence
+from sd2core.sensor import SPEED_OF_LIGHT_MPS, RadarConfig, VirtualSensor
+from sd2core.timebase import Timebase
+
+DOUBLE = 2.0**-53
+WAVELENGTHS_M = (1e-3, 5e-3, 1.0)
+RANGES_M = (1e-3, 0.5, 300.0, 1e6)
+SPEEDS_MPS = (1e-9, 0.1, 2.0, 300.0)
+COUNTS = ((2, 2), (2, 1024), (1024, 2), (64, 32), (1024, 1024))
+
+
+def radar(wavelength_m: float, chirps: int = 64, samples: int = 32) -> RadarConfig:
+    """A radar of this wavelength with 1 % bandwidth and a burst of 25 ms."""
+    centre_hz = SPEED_OF_LIGHT_MPS / wavelength_m
+    repetition_s = 25e-3 / chirps
+    return RadarConfig(
+        start_frequency_hz=0.995 * centre_hz,
+        end_frequency_hz=1.005 * centre_hz,
+        samples_per_chirp=samples,
+        chirps_per_frame=chirps,
+        chirp_repetition_s=repetition_s,
+        frame_repetition_s=1.0 / 30.0,
+        sample_rate_hz=2.0 * samples / repetition_s,
+    )
+
+
+@pytest.mark.parametrize("about_rad", [0.0, 1.0, 2e3 * math.pi, 2e9 * math.pi])
+@pytest.mark.parametrize("span_rad", [0.0, 1e-12, 1e-6, 0.3, 0.999, 1.001, 7.0, 300.0, 1e6])
+def test_mean_phasor_of_a_triangle(span_rad: float, about_rad: float) -> None:
+    for share in (0.0, 1e-9, 0.3, 0.5, 1.0):
+        corners = about_rad + span_rad * np.array([-0.5, share - 0.5, 0.5])
+        truth = exact_mean_phasor(corners)
+        # The mean of three phases is rounded: by half a unit of a phase of 1e9 turns,
+        # 5e-7 rad. The rest are some 30 operations on numbers of about 1.
+        tolerance = 32 * DOUBLE + 4 * DOUBLE * np.abs(corners).max()
+        assert abs(mean_phasor(corners[None])[0] - truth) <= tolerance
+        assert abs(complex(*triangle_phasor(*corners)) - truth) <= tolerance
+
+
+@given(
+    st.lists(st.floats(-50.0, 50.0), min_size=3, max_size=3),
+    st.sampled_from([1e-15, 1e-6, 1.0, 1e3]),
+)
+@settings(max_examples=100, derandomize=True)
+def test_mean_phasor_of_any_triangle(corners: list[float], scale: float) -> None:
+    phases = np.array(corners) * scale
+    tolerance = 32 * DOUBLE + 4 * DOUBLE * np.abs(phases).max()
+    truth = exact_mean_phasor(phases)
+    assert abs(mean_phasor(phases[None])[0] - truth) <= tolerance
+    assert abs(complex(*triangle_phasor(*phases)) - truth) <= tolerance
+
+
+@pytest.mark.parametrize("range_m", RANGES_M)
+@pytest.mark.parametrize("wavelength_m", WAVELENGTHS_M)
+def test_range_rate_and_phase_of_an_echo(wavelength_m: float, range_m: float) -> None:
+    random = np.random.default_rng(3)
+    centre = range_m * random.normal(size=(20, 3))
+    centre *= range_m / np.linalg.norm(centre, axis=1, keepdims=True)
+    # Facets an eighth of a wavelength wide, and no wider than a tenth of the range.
+    across = min(0.125 * wavelength_m, 0.1 * range_m)
+    corners = centre[:, None] + across * random.normal(size=(20, 3, 3))
+    vertices = corners.reshape(-1, 3)
+    faces = np.arange(60, dtype=np.int32).reshape(-1, 3)
+    velocity = np.repeat(random.normal(size=(20, 3)), 3, axis=0)
+    found = echoes_of(vertices, velocity, faces, wavelength_m)
+    turned = echoes_of(vertices, velocity, faces[:, ::-1].copy(), wavelength_m)
+    assert len(found.range_m) + len(turned.range_m) == 20
+    index, range_found = found.index, found.range_m
+    middles = vertices[faces[index]].mean(axis=1)
+    truth = np.array([float(value) for value in exact_ranges(middles.T, np.zeros(3))])
+    # Three sums and a root of numbers of the range's size.
+    np.testing.assert_allclose(range_found, truth, rtol=8 * DOUBLE)
+    rates = (velocity[faces[index, 0]] * middles).sum(axis=1) / truth
+    np.testing.assert_allclose(found.rate_mps, rates, rtol=0, atol=32 * DOUBLE)
+    for facet, amplitude in zip(index.tolist(), found.amplitude.tolist(), strict=True):
+        expected = exact_echo(vertices[faces[facet]], wavelength_m)
+        # Differences of ranges, in radians, and the normal's rounding, which is relative.
+        tolerance = 32 * DOUBLE * (1 + 4 * np.pi * range_m / wavelength_m)
+        assert abs(amplitude / expected - 1) <= tolerance
+
+
+class Found:
+    """What ``facet_echoes`` finds, cut to its length."""
+
+    def __init__(self, count: int) -> None:
+        self.index = np.empty(count, np.int32)
+        self.range_m, self.rate_mps = np.empty(count), np.empty(count)
+        self.amplitude = np.empty(count, np.complex128)
+
+    def cut(self, count: int) -> None:
+        self.index, self.range_m = self.index[:count], self.range_m[:count]
+        self.rate_mps, self.amplitude = self.rate_mps[:count], self.amplitude[:count]
+
+
+def echoes_of(
+    vertices: NDArray[np.float64],
+    velocity: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    wavelength_m: float,
+) -> Found:
+    antenna = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+    plane = np.array([0.0, 0.0, 0.0, 1.0])
+    found = Found(len(faces))
+    everyone = np.ones(len(faces), np.bool_)
+    number = facet_echoes(
+        vertices, velocity, faces, everyone, antenna, antenna, plane, 4 * np.pi / wavelength_m,
+        0.0, True, found.index, found.range_m, found.rate_mps, found.amplitude,
+    )  # fmt: skip
+    found.cut(number)
+    return found
+
+
+def exact_echo(corners: NDArray[np.float64], wavelength_m: float) -> complex:
+    """Amplitude of a facet about its centre: A cos / R^2 times the mean phasor."""
+    centre = corners.mean(axis=0)
+    normal = 0.5 * np.cross(corners[1] - corners[0], corners[2] - corners[0])
+    range_m = np.linalg.norm(centre)
+    near_m = max(range_m, 0.05)
+    with localcontext() as context:
+        context.prec = DIGITS
+        ranges = exact_ranges(corners.T, np.zeros(3))
+        middle = exact_ranges(centre[:, None], np.zeros(3))[0]
+        phases = [4 * PI / Decimal(wavelength_m) * (value - middle) for value in ranges]
+        off = sum(phases, Decimal(0)) / 4
+        excess = np.array([float(phase - off) for phase in phases])
+    return complex(-(normal @ centre) / near_m**3 * exact_mean_phasor(excess))
+
+
+@pytest.mark.parametrize("range_m", [0.5, 1e6])
+@pytest.mark.parametrize("wavelength_m", WAVELENGTHS_M)
+@pytest.mark.parametrize(("chirps", "samples"), COUNTS)
+def test_sums_against_exact_phases(
+    chirps: int, samples: int, wavelength_m: float, range_m: float
+) -> None:
+    config = radar(wavelength_m, chirps, samples)
+    random = np.random.default_rng(chirps + samples)
+    count = 5
+    echoes = Echoes(
+        range_m * random.uniform(0.5, 1.0, count),
+        np.array([0.0, 1e-9, -2.0, 30.0, -300.0]),
+        random.normal(size=count) + 1j * random.normal(size=count),
+    )
+    everything = float(np.abs(echoes.amplitude).sum())
+    found = direct(echoes, config)
+    still = Echoes(echoes.range_m, np.zeros(count), echoes.amplitude)
+    # Turns of the range, of the motion over the burst and of the beat over a chirp, each
+    # rounded a few times.
+    turns = (
+        2 * range_m / config.wavelength_m
+        + 2 * 300 * 25e-3 / config.wavelength_m
+        + samples * 2 / SPEED_OF_LIGHT_MPS * config.slope_hz_per_s / config.sample_rate_hz * range_m
+    )
+    tolerance = (64 * DOUBLE + 2 * np.pi * 8 * DOUBLE * turns) * everything
+    places = random.integers(0, [chirps, samples], (6, 2)).tolist()
+    for m, n in [(0, 0), (chirps - 1, samples - 1), *places]:
+        assert abs(found[m, n] - exact_sum(echoes, config, m, n)) <= tolerance
+    # One transform is exact for what does not move.
+    apart = np.abs(nufft(still, config) - direct(still, config)).max()
+    assert apart <= 10 * NUFFT_TOLERANCE * everything + tolerance
+
+
+def exact_sum(echoes: Echoes, config: RadarConfig, m: int, n: int) -> complex:
+    total = 0j
+    with localcontext() as context:
+        context.prec = DIGITS
+        light = Decimal(SPEED_OF_LIGHT_MPS)
+        carrier = 2 / Decimal(config.wavelength_m)
+        slope = 2 * Decimal(config.slope_hz_per_s) / light
+        t_m = (m - Decimal(config.chirps_per_frame - 1) / 2) * Decimal(config.chirp_repetition_s)
+        t_n = (n - Decimal(config.samples_per_chirp) / 2) / Decimal(config.sample_rate_hz)
+        for range_m, rate, amplitude in zip(
+            echoes.range_m.tolist(),
+            echoes.rate_mps.tolist(),
+            echoes.amplitude.tolist(),
+            strict=True,
+        ):
+            place = Decimal(range_m) + Decimal(rate) * t_m
+            turns = carrier * (place + Decimal(rate) * t_n) + slope * place * t_n
+            cosine, sine = exact_phasor(turns)
+            total += amplitude * complex(float(cosine), float(sine))
+    return total
+
+
+def plate(
+    range_m: float, speed_mps: float, side_m: float, offset_m: float = 0.0
+) -> tuple[MeshSequence, VirtualSensor]:
+    """A small square that comes straight at the sensor, in frames of 1/30 s."""
+    times = np.arange(9) / 30.0
+    corners = 0.5 * side_m * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    faces = np.array([[0, 2, 1], [0, 3, 2]], np.int32)
+    depth = range_m - speed_mps * (times - times[4])
+    vertices = corners + depth[:, None, None] * np.array([0.0, 0.0, 1.0]) + offset_m
+    mesh = MeshSequence(vertices, faces, Timebase(times), "plate.npz")
+    return mesh, VirtualSensor((offset_m, offset_m, offset_m))
+
+
+@pytest.mark.parametrize("offset_m", [0.0, 1e6])
+@pytest.mark.parametrize("speed_mps", [-300.0, -2.0, 1e-9, 0.1, 30.0, 300.0])
+@pytest.mark.parametrize("wavelength_m", WAVELENGTHS_M)
+def test_velocity_comes_back_wrapped_by_modular_arithmetic(
+    wavelength_m: float, speed_mps: float, offset_m: float
+) -> None:
+    # Gates of 20 m, so that nothing runs out of its gate within a burst.
+    half_hz = 0.25 * SPEED_OF_LIGHT_MPS / 20.0
+    centre_hz = SPEED_OF_LIGHT_MPS / wavelength_m
+    config = replace(
+        radar(wavelength_m),
+        start_frequency_hz=centre_hz - half_hz,
+        end_frequency_hz=centre_hz + half_hz,
+    )
+    mesh, sensor = plate(100.0, speed_mps, 0.25 * wavelength_m, offset_m)
+    capture = simulate_radar(mesh, config, sensor=sensor, options=SignalOptions(math.inf))
+    made = doppler_map(capture, window="hann")
+    assert np.isfinite(made.values).all()
+    v_max = config.v_max_mps
+    # Samples are real: a beat frequency, here that of 100 m and of the speed itself,
+    # beyond half the sample rate comes back as its mirror image, and so does the velocity.
+    samples = config.samples_per_chirp
+    beat_hz = config.slope_hz_per_s * 100.0 - centre_hz * speed_mps
+    gate = 2 * beat_hz / SPEED_OF_LIGHT_MPS / config.sample_rate_hz * samples % samples
+    seen_mps = speed_mps if gate < samples / 2 else -speed_mps
+    expected = (seen_mps + v_max) % (2 * v_max) - v_max
+    found = float(made.peak_velocity_mps()[4])
+    # The centre of the strongest bin, which is as wide as the radar's resolution.
+    apart = (found - expected + v_max) % (2 * v_max) - v_max
+    assert abs(apart) <= 0.5001 * config.velocity_resolution_mps
+
+
+@pytest.mark.parametrize("place", [0.0, 1e-3, 0.05, 1.0, 1e6])
+@pytest.mark.parametrize("coherent", [True, False])
+def test_no_place_of_the_sensor_gives_what_is_not_a_number(place: float, coherent: bool) -> None:
+    from sd2core.fmcw.options import WaveOptions
+    from sd2core.fmcw.wave import WaveScene
+
+    mesh, _ = plate(place, 0.0, 1.0)
+    vertices = np.asarray(mesh.vertices)[4]
+    for sensor_m in [(0.0, 0.0, 0.0), tuple(vertices[0].tolist()), (0.2, 0.1, 2 * place)]:
+        scene = WaveScene(
+            mesh,
+            radar(5e-3),
+            VirtualSensor(sensor_m),  # type: ignore[arg-type]
+            wave=WaveOptions(coherent=coherent, beam_width_deg=60.0),
+        )
+        assert np.isfinite(scene.frame(float(mesh.times_s[4]))).all()
+
+
+def test_one_chirp_or_one_sample_is_refused_in_words() -> None:
+    with pytest.raises(Sd2Error, match=r"chirps_per_frame is 1.*2 or more"):
+        radar(5e-3, chirps=1)
+    with pytest.raises(Sd2Error, match=r"samples_per_chirp is 1.*2 or more"):
+        radar(5e-3, samples=1)
+    mesh, sensor = plate(2.0, 0.0, 0.1)
+    few = simulate_radar(mesh, radar(5e-3, 2, 2), sensor=sensor)
+    with pytest.raises(Sd2Error, match="No range gate is left"):
+        doppler_map(few)
