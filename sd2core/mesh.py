@@ -44,6 +44,8 @@ class MeshSequence:
         Where it came from, for provenance.
     notes : tuple of str
         What the reader found and repaired or wants the user to know.
+    vertex_counts : int64 array, shape (V,), optional
+        How many vertices each stands for, after decimation; None: for itself.
     """
 
     vertices: VertexArray
@@ -51,6 +53,7 @@ class MeshSequence:
     timebase: Timebase
     source: str = ""
     notes: tuple[str, ...] = ()
+    vertex_counts: NDArray[np.int64] | None = None
 
     def __post_init__(self) -> None:
         shape = tuple(self.vertices.shape)
@@ -64,6 +67,15 @@ class MeshSequence:
                 f"{self.source or 'The mesh'}: {shape[0]} frames but {len(self.timebase)} times",
                 "one time per frame",
             )
+        if self.vertex_counts is not None:
+            counts = np.ascontiguousarray(self.vertex_counts, np.int64)
+            if counts.shape != (shape[1],) or counts.min() < 1:
+                raise Sd2Error(
+                    f"{self.source or 'The mesh'}: vertex_counts of shape {counts.shape},"
+                    f" the least of them {counts.min(initial=1)}",
+                    f"{shape[1]} numbers from 1",
+                )
+            object.__setattr__(self, "vertex_counts", counts)
         if self.faces is not None and not np.size(self.faces):
             object.__setattr__(self, "faces", None)
         if self.faces is None:
@@ -92,6 +104,13 @@ class MeshSequence:
     def vertex_count(self) -> int:
         """Number of vertices V."""
         return int(self.vertices.shape[1])
+
+    @property
+    def represented_count(self) -> int:
+        """Number of vertices that these stand for: V, or before decimation."""
+        if self.vertex_counts is None:
+            return self.vertex_count
+        return int(self.vertex_counts.sum())
 
     @property
     def times_s(self) -> NDArray[np.float64]:

@@ -110,6 +110,13 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         " frames nearest to each (default: 1)",
     )
     parser.add_argument(
+        "--vertices-kept",
+        type=positive_float,
+        default=1.0,
+        metavar="SHARE",
+        help="simplify the surface to this share of its vertices, 0.25 say (default: 1, all)",
+    )
+    parser.add_argument(
         "--weight",
         choices=("count", "area", "projected"),
         help="a vertex counts as one, by its area, or by the area it turns towards the sensor",
@@ -177,6 +184,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 def _synth(options: argparse.Namespace) -> None:
     from sd2core.cli.info import describe_map, show
     from sd2core.cli.reading import check_map_output, mesh_and_sensor
+    from sd2core.decimation import decimate
     from sd2core.doppler import Synthesizer
 
     check_map_output(options.out)
@@ -185,6 +193,7 @@ def _synth(options: argparse.Namespace) -> None:
     elif options.radar != "paper":
         raise Sd2Error("--radar is given", "it together with --model fmcw only")
     mesh, sensor = mesh_and_sensor(options)
+    mesh = decimate(mesh, options.vertices_kept)
     if options.model == "fmcw":
         doppler = _by_fmcw(options, mesh, sensor)
     else:

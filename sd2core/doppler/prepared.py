@@ -120,6 +120,8 @@ class PreparedMesh:
         # The faces a kernel gets must be plain memory: a read-only or mapped
         # array is another type to the compiler, and would be compiled for again.
         self.faces = None if self.mesh.faces is None else np.array(self.mesh.faces, np.int32)
+        counts = self.mesh.vertex_counts
+        self.heads = None if counts is None else counts.astype(np.float32)
         # Points are kept in single precision around the clip's own origin, so
         # that large coordinates cost nothing. The compatible rule works on the
         # numbers as they come, so that its bin edges fall where that tool's do.
@@ -211,9 +213,9 @@ class PreparedMesh:
 
         def make() -> tuple[NDArray[np.float64], int]:
             frames = block.frames
-            middles = np.stack(
-                [frames.positions[knot].mean(axis=1, dtype=np.float64) for knot in frames.centre]
-            )
+            heads = np.ones(self.mesh.vertex_count) if self.heads is None else self.heads
+            share = heads / heads.sum(dtype=np.float64)
+            middles = np.stack([frames.positions[knot] @ share for knot in frames.centre])
             return middles, middles.nbytes
 
         middles: NDArray[np.float64] = self.budget.get_or_make(("middles", block.index), make)

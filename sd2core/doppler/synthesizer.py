@@ -42,7 +42,8 @@ class Stretch:
     ----------
     values : float32 array, shape (bins, n)
     visible_share : float32 array, shape (n,)
-        Share of all vertices that the sensor sees. Vertices that cannot change
+        Share of all vertices that the sensor sees; of a decimated mesh, of the
+        vertices that the kept ones stand for. Vertices that cannot change
         the map (in nulled bins) are judged by the facing test.
     beyond_share : float32 array, shape (n,)
         Share of those whose velocity lies beyond the axis.
@@ -248,7 +249,7 @@ class Synthesizer:
         visible, beyond = counts.visible[inside], counts.beyond[inside]
         return Stretch(
             share.astype(np.float32),
-            (visible / self.mesh.vertex_count).astype(np.float32),
+            (visible / self.mesh.represented_count).astype(np.float32),
             (beyond / np.maximum(visible, 1)).astype(np.float32),
             quality,
         )
@@ -332,7 +333,7 @@ class Synthesizer:
         if not kernels_ready():
             compile_in_background()
         counts = Counts.empty(stop - start, self.options.axis.bins)
-        totals = np.full(stop - start, float(self.mesh.vertex_count))
+        totals = np.full(stop - start, float(self.mesh.represented_count))
         qualities: set[Quality] = set()
 
         def job(index: int, low: int, high: int) -> Callable[[Ticket], None]:
@@ -387,6 +388,7 @@ class Synthesizer:
             mask=mask,
             areas=self.prepared.areas(block)[rows] if weight == "area" else None,
             area_vectors=self.prepared.area_vectors(block)[rows] if weight == "projected" else None,
+            vertex_counts=self.prepared.heads,
         )
         frames = block.frames.rows(rows)
         if self.options.velocity == "vid2doppler":
