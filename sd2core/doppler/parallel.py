@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
+from itertools import islice
 
 from sd2core.compiled import workers
 from sd2core.progress import Cancelled, Progress
@@ -13,10 +14,17 @@ _POLL_S = 0.03
 
 
 class Ticket:
-    """What a running piece of work reports to, and asks whether to go on."""
+    """What a running piece of work reports to, and asks whether to go on.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    heard : callable, optional
+        Called in the worker's own thread with what is finished so far.
+    """
+
+    def __init__(self, heard: Callable[[int], None] | None = None) -> None:
         self.finished = 0
+        self._heard = heard
         self._stopped = threading.Event()
         self._lock = threading.Lock()
 
@@ -32,32 +40,61 @@ class Ticket:
             raise Cancelled
         with self._lock:
             self.finished += amount
+        if self._heard is not None:
+            self._heard(self.finished)
 
     def stop(self) -> None:
         """Make every piece of work stop at its next report."""
         self._stopped.set()
 
 
-def run_jobs(jobs: Sequence[Callable[[Ticket], None]], total: int, progress: Progress) -> None:
+def run_jobs(
+    jobs: Sequence[Callable[[Ticket], None]],
+    total: int,
+    progress: Progress,
+    threads: int | None = None,
+) -> None:
     """Run all jobs; return when they are done.
 
     ``progress`` is called in the calling thread, at least every 30 ms. When it
     raises, or a job does, the others stop at their next report before the
     exception goes on.
+
+    Parameters
+    ----------
+    jobs : sequence of callable
+    total : int
+        What they add up to.
+    progress : Progress
+    threads : int, optional
+        How many jobs may run at once; by default as many as there are cores. 1 runs
+        them one after the other in the calling thread.
     """
-    ticket = Ticket()
     progress(0, total)
-    pending: set[Future[None]] = {workers().submit(job, ticket) for job in jobs}
-    running = set(pending)
+    if threads == 1:
+        # Each report is passed on, and may stop the job by raising.
+        own = Ticket(lambda finished: progress(finished, total))
+        for job in jobs:
+            job(own)
+        return
+    ticket, waiting = Ticket(), iter(jobs)
+    running: set[Future[None]] = set()
+
+    def start() -> None:
+        free = len(jobs) if threads is None else threads - len(running)
+        running.update(workers().submit(job, ticket) for job in islice(waiting, free))
+
     try:
+        start()
         while running:
             ended, running = wait(running, _POLL_S, FIRST_COMPLETED)
             for future in ended:
                 future.result()
             progress(ticket.finished, total)
+            start()
     except BaseException:
         ticket.stop()
-        for future in pending:
+        for future in running:
             future.cancel()
-        wait(pending)
+        wait(running)
         raise

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
+
+from sd2core.doppler.options import SynthesisOptions
 
 _REACH = 4.0
 """Where the Gaussian on time is cut, in sigmas."""
@@ -12,14 +16,47 @@ _SLACK_S = 1e-9
 """A frame that lies on the cut is inside on both sides, whatever the last digit says."""
 
 
+def smooth(
+    raw: NDArray[np.float64],
+    times_s: NDArray[np.float64],
+    first: int,
+    start: int,
+    stop: int,
+    options: SynthesisOptions,
+) -> NDArray[np.float64]:
+    """A map's frames ``start`` to ``stop``, smoothed along velocity and time.
+
+    Parameters
+    ----------
+    raw : float64 array, shape (bins, n)
+        Columns of the frames that :func:`frames_within_reach` names, from frame
+        ``first`` on, with nulled bins emptied.
+    times_s : float64 array, shape (T,)
+        Times of all frames.
+    options : SynthesisOptions
+        Names the widths, and the bins that are emptied again afterwards.
+
+    Returns
+    -------
+    float64 array, shape (bins, stop - start)
+    """
+    values = velocity_kernel(options.axis.bins, options.velocity_sigma_bins) @ raw
+    values = smooth_time(values, times_s, first, start, stop, options.time_sigma_s)
+    if options.null_after_smoothing:
+        values[list(options.null_bins)] = 0
+    return values
+
+
+@lru_cache(maxsize=8)
 def velocity_kernel(bins: int, sigma_bins: float) -> NDArray[np.float64]:
     """Matrix (bins, bins) that smooths along velocity, reflecting at the axis's ends."""
-    if sigma_bins == 0:
-        return np.eye(bins)
-    from scipy.ndimage import gaussian_filter1d
+    kernel: NDArray[np.float64] = np.eye(bins)
+    if sigma_bins > 0:
+        from scipy.ndimage import gaussian_filter1d
 
-    smoothed: NDArray[np.float64] = gaussian_filter1d(np.eye(bins), sigma_bins, axis=0)
-    return smoothed
+        kernel = gaussian_filter1d(kernel, sigma_bins, axis=0)
+    kernel.flags.writeable = False
+    return kernel
 
 
 def frames_within_reach(

@@ -19,7 +19,7 @@ from sd2core.doppler.options import PRESETS, SynthesisOptions
 from sd2core.doppler.parallel import Ticket, run_jobs
 from sd2core.doppler.prepared import Block, ByteBudget, PreparedMesh
 from sd2core.doppler.scatterers import Scatterers
-from sd2core.doppler.smoothing import frames_within_reach, smooth_time, velocity_kernel
+from sd2core.doppler.smoothing import frames_within_reach, smooth
 from sd2core.errors import Sd2Error
 from sd2core.mesh import MeshSequence
 from sd2core.progress import Progress, silent
@@ -41,6 +41,8 @@ class Stretch:
     Parameters
     ----------
     values : float32 array, shape (bins, n)
+    raw : float64 array, shape (bins, n)
+        The same before any smoothing, with nulled bins emptied.
     visible_share : float32 array, shape (n,)
         Share of all vertices that the sensor sees; of a decimated mesh, of the
         vertices that the kept ones stand for. Vertices that cannot change
@@ -53,6 +55,7 @@ class Stretch:
     """
 
     values: NDArray[np.float32]
+    raw: NDArray[np.float64]
     visible_share: NDArray[np.float32]
     beyond_share: NDArray[np.float32]
     quality: Quality
@@ -93,6 +96,9 @@ class Synthesizer:
         Name of a preset, or options of one's own.
     memory_budget_bytes : int
         For prepared blocks and visibility.
+    threads : int, optional
+        On how many threads the work is spread; by default on all cores. With 1 all of
+        it is done in the calling thread.
     blocks_of : Synthesizer, optional
         Another one of the same mesh, whose prepared blocks and budget are shared
         where the options allow it.
@@ -109,6 +115,7 @@ class Synthesizer:
         preset: str | SynthesisOptions = "paper",
         *,
         memory_budget_bytes: int = _MEMORY_BUDGET_BYTES,
+        threads: int | None = None,
         blocks_of: Synthesizer | None = None,
     ) -> None:
         if isinstance(preset, str) and preset not in PRESETS:
@@ -116,8 +123,11 @@ class Synthesizer:
         options = PRESETS[preset] if isinstance(preset, str) else preset
         if mesh.faces is None and options.weight != "count":
             raise _no_surface(mesh, "Area weighting")
+        if threads is not None and threads < 1:
+            raise Sd2Error(f"threads is {threads}", "1 or more, or None for all cores")
         self.mesh = mesh
         self.options = options
+        self._threads = threads
         shared = blocks_of.prepared.with_options(options) if blocks_of is not None else None
         if shared is None or shared.mesh is not mesh:
             shared = PreparedMesh(mesh, options, ByteBudget(memory_budget_bytes))
@@ -130,7 +140,6 @@ class Synthesizer:
             options.reference_range_m,
         )
         self._masks = VisibilityMasks(self.prepared, self._counting)
-        self._smooth_velocity = velocity_kernel(options.axis.bins, options.velocity_sigma_bins)
 
     @property
     def unit(self) -> str:
@@ -163,7 +172,7 @@ class Synthesizer:
 
             return work
 
-        run_jobs([job(index) for index in blocks], len(blocks), progress)
+        run_jobs([job(index) for index in blocks], len(blocks), progress, self._threads)
 
     def map(
         self,
@@ -235,20 +244,16 @@ class Synthesizer:
             sensor, first, last, self._choose(visibility), progress
         )
 
-        share = np.divide(
+        raw = np.divide(
             counts.histogram.T, totals, out=np.zeros(counts.histogram.T.shape), where=totals > 0
         )
-        nulled = list(options.null_bins)
-        share[nulled] = 0
-        share = self._smooth_velocity @ share
-        share = smooth_time(share, times_s, first, start, stop, options.time_sigma_s)
-        if options.null_after_smoothing:
-            share[nulled] = 0
-
+        raw[list(options.null_bins)] = 0
+        values = smooth(raw, times_s, first, start, stop, options)
         inside = slice(start - first, stop - first)
         visible, beyond = counts.visible[inside], counts.beyond[inside]
         return Stretch(
-            share.astype(np.float32),
+            values.astype(np.float32),
+            raw[:, inside],
             (visible / self.mesh.represented_count).astype(np.float32),
             (beyond / np.maximum(visible, 1)).astype(np.float32),
             quality,
@@ -360,7 +365,7 @@ class Synthesizer:
             pieces = -(-(high - low) // _FAST_FRAMES) if self.prepared.has(index) else 1
             cuts = np.linspace(low, high, pieces + 1).astype(int).tolist()
             jobs += [job(index, a, b) for a, b in pairwise(cuts)]
-        run_jobs(jobs, stop - start, progress)
+        run_jobs(jobs, stop - start, progress, self._threads)
         if visibility == "frozen":
             quality: Quality = "frozen" if qualities == {"frozen"} else "facing"
         else:

@@ -11,7 +11,8 @@ from sd2core.sensor import VirtualSensor
 
 def stretch_of(frames, value, quality):
     ones = np.ones(frames, np.float32)
-    return Stretch(np.full((2, frames), value, np.float32), ones, 0 * ones, quality)
+    values = np.full((2, frames), value)
+    return Stretch(values.astype(np.float32), values, ones, 0 * ones, quality)
 
 
 @given(

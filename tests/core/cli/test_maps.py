@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -30,10 +31,10 @@ def test_without_options_it_is_the_preset() -> None:
 def test_every_option_arrives() -> None:
     chosen = options_of(
         *("--depth-resolution", "128", "--mask-stride", "3"),
-        *("--visibility", "facing", "--weight", "area", "--beyond", "wrap"),
+        *("--visibility", "facing", "--weight", "projected", "--beyond", "wrap"),
         *("--bins", "64", "--v-max", "3", "--null-bins", "1,2"),
-        *("--range-exponent", "2", "--reference-range-m", "1.5"),
-        *("--trajectory-smoothing-s", "0.1", "--oversampling", "3"),
+        *("--range-exponent", "2", "--reference-range-m", "1.5", "--range-law", "frame"),
+        *("--trajectory-smoothing-s", "0.1", "--oversampling", "4"),
         *("--velocity-sigma-bins", "0", "--time-sigma-s", "0"),
     )
     assert vars(chosen) == {
@@ -41,14 +42,15 @@ def test_every_option_arrives() -> None:
         "visibility": "facing",
         "depth_resolution": 128,
         "mask_stride": 3,
-        "weight": "area",
+        "weight": "projected",
         "beyond": "wrap",
         "axis": VelocityAxis(64, 3.0),
         "null_bins": (1, 2),
         "range_exponent": 2.0,
         "reference_range_m": 1.5,
+        "range_law": "frame",
         "trajectory_smoothing_s": 0.1,
-        "oversampling": 3,
+        "oversampling": 4,
         "velocity_sigma_bins": 0.0,
         "time_sigma_s": 0.0,
     }
@@ -88,6 +90,20 @@ def test_an_approaching_plate(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
     assert "32 bins of 0.125 m/s over ±2 m/s, approaching is positive" in outcome.out
     assert "nulled bins  14, 15, 16" in outcome.out
     assert "exact: 100.0% visible on average" in outcome.out
+
+
+@pytest.mark.parametrize("model", ["histogram", "fmcw"])
+def test_fewer_vertices_are_said(sd2: Sd2, plate: Path, tmp_path: Path, model: str) -> None:
+    out = tmp_path / "map.npz"
+    outcome = sd2("synth", plate, "--out", out, "--vertices-kept", 0.3, "--model", model)
+    assert outcome.code == 0, outcome.err
+    assert re.search(r"decimated to \d\d of 81 vertices", outcome.out)
+    doppler = DopplerMap.load(out)
+    assert re.search(r"plate.npz, decimated to \d\d of 81 vertices", str(doppler.meta))
+    assert doppler.peak_velocity_mps() == pytest.approx(1.3, abs=doppler.axis.bin_width_mps)
+    outcome = sd2("synth", plate, "--out", out, "--vertices-kept", 3)
+    assert outcome.code == 1
+    assert "a share above 0 and up to 1" in outcome.err
 
 
 def test_the_share_beyond_the_axis_is_said(sd2: Sd2, plate: Path, tmp_path: Path) -> None:

@@ -1,10 +1,19 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from doppler_scenes import CAMERA, wobbling
 from scipy.ndimage import gaussian_filter1d
 
-from sd2core.doppler.smoothing import frames_within_reach, smooth_time, velocity_kernel
+from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
+from sd2core.doppler.smoothing import (
+    frames_within_reach,
+    smooth,
+    smooth_time,
+    velocity_kernel,
+)
 
 
 @pytest.mark.parametrize("sigma", [0.7, 1.0, 5.0])
@@ -13,6 +22,36 @@ def test_velocity_kernel_is_scipys(sigma: float) -> None:
     np.testing.assert_allclose(
         velocity_kernel(32, sigma) @ values, gaussian_filter1d(values, sigma, axis=0), atol=1e-14
     )
+
+
+def test_smoothing_a_map_is_both_with_the_notch_around_them() -> None:
+    random = np.random.default_rng(4)
+    times = np.cumsum(random.uniform(0.02, 0.05, 40))
+    raw = random.random((32, 40))
+    for after in (True, False):
+        chosen = SynthesisOptions(
+            velocity_sigma_bins=1.3, time_sigma_s=0.06, null_after_smoothing=after
+        )
+        raw[list(chosen.null_bins)] = 0
+        expected = gaussian_filter1d(raw, 1.3, axis=0)
+        bell = np.exp(-0.5 * ((times[:, None] - times) / 0.06) ** 2)
+        bell[np.abs(times[:, None] - times) > 4 * 0.06] = 0
+        expected = expected @ (bell / bell.sum(axis=0))
+        if after:
+            expected[14:17] = 0
+        np.testing.assert_allclose(smooth(raw, times, 0, 0, 40, chosen), expected, atol=1e-12)
+
+
+def test_a_stretch_has_both_before_and_after() -> None:
+    maker = Synthesizer(wobbling(30, divisions=2), replace(PRESETS["paper"], time_sigma_s=0.1))
+    whole, part = maker.stretch(CAMERA, 0, 30), maker.stretch(CAMERA, 11, 17)
+    bare = replace(maker.options, velocity_sigma_bins=0.0, time_sigma_s=0.0)
+    plain = Synthesizer(maker.mesh, bare).stretch(CAMERA, 0, 30)
+    np.testing.assert_array_equal(whole.raw.astype(np.float32), plain.values)
+    np.testing.assert_array_equal(part.raw, whole.raw[:, 11:17])
+    assert not np.allclose(whole.values, plain.values)
+    again = smooth(whole.raw, maker.mesh.times_s, 0, 0, 30, maker.options)
+    np.testing.assert_array_equal(again.astype(np.float32), whole.values)
 
 
 def test_velocity_kernel_loses_nothing() -> None:

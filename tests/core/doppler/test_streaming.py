@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import tracemalloc
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +13,11 @@ import pytest
 import zarr
 from doppler_scenes import CAMERA, options, sensor_at, wobbling
 
-from sd2core.doppler import PRESETS, Synthesizer
+from sd2core.doppler import PRESETS, Synthesizer, parallel
 from sd2core.doppler.masks import VisibilityMasks
 from sd2core.doppler.parallel import run_jobs
 from sd2core.doppler.prepared import ByteBudget
+from sd2core.errors import Sd2Error
 from sd2core.mesh import MeshSequence
 from sd2core.progress import Cancelled, silent
 
@@ -223,6 +225,59 @@ def test_a_failing_job_stops_the_others_and_is_heard() -> None:
     with pytest.raises(ValueError, match="no"):
         run_jobs([failing, endless], 2, silent)
     assert stopped == ([True] if started.is_set() else [])
+
+
+@pytest.mark.parametrize("visibility", ["exact", "facing"])
+def test_one_thread_is_the_callers(visibility: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh, everywhere = wobbling(60), Synthesizer(wobbling(60), options())
+    alone = Synthesizer(mesh, options(), threads=1)
+    two = Synthesizer(mesh, options(), threads=2)
+    expected = everywhere.map(NEAR, visibility=visibility).values
+    np.testing.assert_array_equal(two.map(NEAR, visibility=visibility).values, expected)
+
+    def never() -> None:
+        raise AssertionError("the pool was asked")
+
+    monkeypatch.setattr(parallel, "workers", never)
+    alone.prepare()
+    reports: list[int] = []
+    made = alone.map(NEAR, visibility=visibility, progress=lambda done, total: reports.append(done))
+    np.testing.assert_array_equal(made.values, expected)
+    assert reports[0] == 0
+    assert reports[-1] == 60
+    assert reports == sorted(reports)
+
+    def stop(done: int, total: int) -> None:
+        if done:
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        alone.map(NEXT, visibility=visibility, progress=stop)
+    with pytest.raises(Sd2Error, match="threads is 0"):
+        Synthesizer(mesh, threads=0)
+
+
+def test_no_more_jobs_at_once_than_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
+    pool = ThreadPoolExecutor(6)
+    monkeypatch.setattr(parallel, "workers", lambda: pool)
+    lock, running, most = threading.Lock(), [0], [0]
+
+    def job(ticket: Any) -> None:
+        with lock:
+            running[0] += 1
+            most[0] = max(most[0], running[0])
+        threading.Event().wait(0.005)
+        ticket.advance(1)
+        with lock:
+            running[0] -= 1
+
+    reports: list[int] = []
+    run_jobs([job] * 12, 12, lambda done, total: reports.append(done), threads=2)
+    assert most[0] <= 2
+    assert reports[-1] == 12
+    run_jobs([job] * 12, 12, silent)
+    assert most[0] > 2
+    pool.shutdown()
 
 
 def test_several_threads_at_once() -> None:
