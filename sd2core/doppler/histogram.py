@@ -29,8 +29,8 @@ class Frames:
 
     Parameters
     ----------
-    positions : float32 array, shape (knots, 3, V)
-        Relative to the clip's origin.
+    positions : float32 or float64 array, shape (knots, 3, V)
+        Relative to the clip's origin; what is worked out from them has their precision.
     centre : int64 array, shape (n,)
         Knot of every frame.
     before, after : int64 array, shape (n, samples)
@@ -39,7 +39,7 @@ class Frames:
         Time between the two; 0 where there is nothing to measure.
     """
 
-    positions: NDArray[np.float32]
+    positions: NDArray[Any]
     centre: NDArray[np.int64]
     before: NDArray[np.int64]
     after: NDArray[np.int64]
@@ -78,10 +78,10 @@ class Counting:
     range_exponent: float
     reference_range_m: float
 
-    def scale(self, duration_s: NDArray[np.float64]) -> NDArray[np.float32]:
-        """Bins per metre of range change."""
+    def scale(self, duration_s: NDArray[np.float64], precision: Any) -> NDArray[Any]:
+        """Bins per metre of range change, in the precision of the positions."""
         rate = np.divide(1.0, duration_s, out=np.zeros_like(duration_s), where=duration_s > 0)
-        scale: NDArray[np.float32] = (rate * (0.5 * self.bins / self.v_max_mps)).astype(np.float32)
+        scale: NDArray[Any] = (rate * (0.5 * self.bins / self.v_max_mps)).astype(precision)
         return scale
 
 
@@ -112,41 +112,34 @@ class Counts:
         return Counts(self.histogram[rows], self.visible[rows], self.beyond[rows])
 
 
-def relative_range(
-    positions: NDArray[np.float32], sensor: NDArray[np.float64]
-) -> NDArray[np.float32]:
+def relative_range(positions: NDArray[Any], sensor: NDArray[np.float64]) -> NDArray[Any]:
     """Range of each vertex less the sensor's distance from the clip's origin.
 
     |p − s| − |s| = p·(p − 2s) / (|p − s| + |s|). What differs from vertex to vertex
     and from knot to knot is kept at the body's own scale, so the difference of two
     is the exact change of range of :func:`radial_velocity` however far the sensor
-    is, with one range per vertex and knot. In single precision its error is below
-    1e-5 m/s at 30 frames/s within a metre of the clip's origin and grows with the
-    distance from there, as does the rounding of the positions themselves.
+    is, with one range per vertex and knot. Its rounding error is a few roundings of
+    the largest coordinate (:func:`sd2core.precision.velocity_error_mps`).
 
     Parameters
     ----------
-    positions : float32 array, shape (3, V)
+    positions : float32 or float64 array, shape (3, V)
         Relative to the clip's origin.
     sensor : float64 array, shape (3,)
 
     Returns
     -------
-    float32 array, shape (V,)
+    float array, shape (V,)
+        In the precision of the positions.
     """
     x, y, z = positions
-    sx, sy, sz = sensor.astype(np.float32)
+    sx, sy, sz = place = sensor.astype(positions.dtype)
     two = np.float32(2)
+    distance = np.linalg.norm(place.astype(np.float64)).astype(positions.dtype)
     away = np.sqrt((x - sx) ** 2 + (y - sy) ** 2 + (z - sz) ** 2)
     difference = x * (x - two * sx) + y * (y - two * sy) + z * (z - two * sz)
-    ranges: NDArray[np.float32] = difference / np.maximum(
-        away + _distance(sensor), np.float32(1e-30)
-    )
+    ranges: NDArray[Any] = difference / np.maximum(away + distance, np.float32(1e-30))
     return ranges
-
-
-def _distance(sensor: NDArray[np.float64]) -> np.float32:
-    return np.float32(np.linalg.norm(sensor.astype(np.float32).astype(np.float64)))
 
 
 def bins_plain(
@@ -156,7 +149,8 @@ def bins_plain(
     closer = relative_range(frames.positions[frames.before[t, sample]], sensor) - relative_range(
         frames.positions[frames.after[t, sample]], sensor
     )
-    per_bin = closer * counting.scale(frames.duration_s[t, sample : sample + 1])
+    precision = frames.positions.dtype
+    per_bin = closer * counting.scale(frames.duration_s[t, sample : sample + 1], precision)
     return place_in_bins(per_bin + np.float32(0.5 * counting.bins), counting)
 
 
@@ -228,13 +222,13 @@ def count(
         frames.centre,
         frames.before,
         frames.after,
-        counting.scale(frames.duration_s),
+        counting.scale(frames.duration_s, frames.positions.dtype),
         normals if normals is not None else _NO_NORMALS,
         mask if mask is not None else _NO_MASK,
         areas if areas is not None else _NO_AREAS,
         vectors if vectors is not None else _NO_VECTORS,
         heads if heads is not None else _NO_HEADS,
-        sensor.astype(np.float32),
+        sensor.astype(frames.positions.dtype),
         which,
         weighting,
         counting.bins,
@@ -273,8 +267,8 @@ def mark_needed(
         frames.positions,
         frames.before,
         frames.after,
-        counting.scale(frames.duration_s),
-        sensor.astype(np.float32),
+        counting.scale(frames.duration_s, frames.positions.dtype),
+        sensor.astype(frames.positions.dtype),
         counting.bins,
         counting.beyond,
         live,

@@ -3,7 +3,9 @@
 Each frame is gone through in runs of vertices that stay in the second-level
 cache. Each step of a run is a loop of its own with few streams, which the compiler
 turns into vector instructions. :mod:`sd2core.doppler.histogram` says what the
-numbers mean.
+numbers mean. Positions, sensor and scale are all in single precision, or all in
+double: the compiler makes two forms of each loop, and constants are in single
+precision, so that they do not widen the first (docs/decisions/0013).
 """
 
 from __future__ import annotations
@@ -38,6 +40,15 @@ def _relative_ranges(x, y, z, sx, sy, sz, distance, ranges):  # type: ignore[no-
         away = np.sqrt(qx * qx + qy * qy + qz * qz)
         difference = px * (px - two * sx) + py * (py - two * sy) + pz * (pz - two * sz)
         ranges[v] = difference / max(away + distance, np.float32(1e-30))
+
+
+@compiled
+def _distance(sensor):  # type: ignore[no-untyped-def]
+    """Of the sensor from the origin, in the sensor's precision."""
+    away = np.sqrt(
+        np.float64(sensor[0]) ** 2 + np.float64(sensor[1]) ** 2 + np.float64(sensor[2]) ** 2
+    )
+    return sensor.dtype.type(away)
 
 
 @compiled
@@ -189,7 +200,7 @@ def count_kernel(  # type: ignore[no-untyped-def]
     samples = before.shape[1]
     sx, sy, sz = sensor[0], sensor[1], sensor[2]
     offset = np.float32(0.5 * bins)
-    f = np.empty(_RUN, np.float32)
+    f = np.empty(_RUN, positions.dtype)
     weight = np.empty(_RUN, np.float32)
     spare = np.empty(_RUN, np.float32)
     turned = np.empty(_RUN, np.float32)
@@ -200,8 +211,8 @@ def count_kernel(  # type: ignore[no-untyped-def]
     grouped = heads.shape[0] > 0
     weighted = weighting != HEADS or grouped
     weights = weighted or exponent != 0
-    distance = np.float32(np.sqrt(np.float64(sx) ** 2 + np.float64(sy) ** 2 + np.float64(sz) ** 2))
-    ring = np.empty((samples + 2, vertices), np.float32)
+    distance = _distance(sensor)
+    ring = np.empty((samples + 2, vertices), positions.dtype)
     known = before[0, 0]
     for t in range(centre.shape[0]):
         known = _extend(positions, sensor, distance, known, after[t, samples - 1], ring)
@@ -284,13 +295,12 @@ def needed_kernel(  # type: ignore[no-untyped-def]
 ) -> None:
     """See :func:`sd2core.doppler.histogram.mark_needed`; ``needed`` starts as zeros."""
     vertices = positions.shape[2]
-    sx, sy, sz = sensor[0], sensor[1], sensor[2]
     offset = np.float32(0.5 * bins)
-    f = np.empty(_RUN, np.float32)
+    f = np.empty(_RUN, positions.dtype)
     seen = np.ones(_RUN, np.uint8)
     slot = np.empty(_RUN, np.uint8)
-    distance = np.float32(np.sqrt(np.float64(sx) ** 2 + np.float64(sy) ** 2 + np.float64(sz) ** 2))
-    ring = np.empty((before.shape[1] + 2, vertices), np.float32)
+    distance = _distance(sensor)
+    ring = np.empty((before.shape[1] + 2, vertices), positions.dtype)
     known = before[0, 0]
     for t in range(needed.shape[0]):
         known = _extend(positions, sensor, distance, known, after[t, -1], ring)
@@ -309,13 +319,18 @@ def needed_kernel(  # type: ignore[no-untyped-def]
 
 
 def compile_kernels() -> None:
-    """Call every kernel of this module once."""
-    positions, sensor = np.ones((1, 3, 4), np.float32), np.zeros(3, np.float32)
-    knots, scale = np.zeros((1, 1), np.int64), np.ones((1, 1), np.float32)
+    """Call every kernel of this module once in single and once in double precision."""
+    knots = np.zeros((1, 1), np.int64)
     normals, marks = np.zeros((1, 3, 4), np.int8), np.zeros((1, 4), np.uint8)
-    count_kernel(
-        positions, knots[0], knots, knots, scale, normals, marks, np.ones((1, 4), np.float32),
-        positions, np.ones(4, np.float32), sensor, ALL, HEADS, 32, DROP, 4.0, np.float32(2.2),
-        np.zeros((1, 32)), np.zeros(1), np.zeros(1),
-    )  # fmt: skip
-    needed_kernel(positions, knots, knots, scale, sensor, 32, DROP, np.ones(33, np.uint8), marks)
+    vectors, heads = np.ones((1, 3, 4), np.float32), np.ones(4, np.float32)
+    for precision in (np.float32, np.float64):
+        positions, sensor = np.ones((1, 3, 4), precision), np.zeros(3, precision)
+        scale = np.ones((1, 1), precision)
+        count_kernel(
+            positions, knots[0], knots, knots, scale, normals, marks, heads[None],
+            vectors, heads, sensor, ALL, HEADS, 32, DROP, 4.0, np.float32(2.2),
+            np.zeros((1, 32)), np.zeros(1), np.zeros(1),
+        )  # fmt: skip
+        needed_kernel(
+            positions, knots, knots, scale, sensor, 32, DROP, np.ones(33, np.uint8), marks
+        )

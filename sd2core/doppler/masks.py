@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sd2core.compiled import kernels_ready
 from sd2core.doppler import histogram, vid2doppler
 from sd2core.doppler.histogram import Counting
-from sd2core.doppler.prepared import Block, PreparedMesh
+from sd2core.doppler.prepared import Block, PreparedMesh, near_points
 from sd2core.scattering import depth_plain, exact_plain
 from sd2core.scattering.depth import depth_visibility_kernel
 from sd2core.scattering.exact import exact_visibility_kernel
@@ -99,14 +99,14 @@ class VisibilityMasks:
         place = self._prepared.sensor(position_m)
         if visibility == "exact" or visibility == "depth":
             visible = np.empty((1, self._prepared.mesh.vertex_count), np.uint8)
-            points = self._points_of(int(self._serving(block.start + local)))
-            self._test(points, place, np.ones_like(visible), visible, visibility)
+            view = self._view_of(int(self._serving(block.start + local)), place)
+            self._test(view, np.ones_like(visible), visible, visibility)
             return visible[0] > 0, visibility
         mask, quality = self.for_rows(block, rows, position_m, visibility)
         if quality == "none":
             return np.ones(self._prepared.mesh.vertex_count, bool), quality
         if mask is None:
-            mask = _facing(_points(block, rows), self._prepared.normals(block)[rows], place)
+            mask = _facing(_view(block, rows, place), self._prepared.normals(block)[rows])
         return mask[0] > 0, quality
 
     def kept(
@@ -169,9 +169,10 @@ class VisibilityMasks:
             return np.stack(masks)[which]
         mask = self._block_mask(block.index, position_m, occlusion)
         if not mask.done[rows].all():
-            place, points = self._prepared.sensor(position_m), _points(block, rows)
-            visible = _facing(points, self._prepared.normals(block)[rows], place)
-            self._test(points, place, self._needed(block, rows, place), visible, occlusion)
+            place = self._prepared.sensor(position_m)
+            view = _view(block, rows, place)
+            visible = _facing(view, self._prepared.normals(block)[rows])
+            self._test(view, self._needed(block, rows, place), visible, occlusion)
             mask.visible[rows] = visible
             mask.done[rows] = True
         return mask.visible[rows]
@@ -197,18 +198,18 @@ class VisibilityMasks:
                 low, high = max(int(served[0]), start), min(int(served[-1]) + 1, stop)
                 rows = slice(low - start, high - start)
                 needed |= self._needed(self._prepared.block(index), rows, place).max(axis=0)
-            block, points = self._prepared.block(home), self._points_of(frame)
-            normals = self._prepared.normals(block)[local : local + 1]
-            visible = _facing(points, normals, place)
-            self._test(points, place, needed, visible, occlusion)
+            view = self._view_of(frame, place)
+            normals = self._prepared.normals(self._prepared.block(home))[local : local + 1]
+            visible = _facing(view, normals)
+            self._test(view, needed, visible, occlusion)
             mask.visible[local] = visible[0]
             mask.done[local] = True
         return mask.visible[local]
 
-    def _points_of(self, frame: int) -> NDArray[np.float32]:
-        """Positions of one frame of the clip in single precision, (1, 3, V)."""
+    def _view_of(self, frame: int, place: NDArray[np.float64]) -> _View:
+        """What a sensor looks at in one frame of the clip."""
         home, local = divmod(frame, self._prepared.block_frames)
-        return _points(self._prepared.block(home), slice(local, local + 1))
+        return _view(self._prepared.block(home), slice(local, local + 1), place)
 
     def _block_mask(self, index: int, position_m: Position, occlusion: Occlusion) -> _BlockMask:
         """Visibility from a place, as far as it has been worked out."""
@@ -235,8 +236,7 @@ class VisibilityMasks:
 
     def _test(
         self,
-        points: NDArray[np.float32],
-        place: NDArray[np.float64],
+        view: _View,
         needed: NDArray[np.uint8],
         visible: NDArray[np.uint8],
         occlusion: Occlusion,
@@ -244,17 +244,19 @@ class VisibilityMasks:
         """Write the visibility of the needed vertices into ``visible``."""
         faces = self._prepared.faces
         assert faces is not None  # the Synthesizer refuses to ask it of a point cloud
-        pixels = self._prepared.options.depth_resolution
+        points, pixels = view.points, self._prepared.options.depth_resolution
         if kernels_ready():
-            if occlusion == "exact":
-                exact_visibility_kernel(points, faces, place, needed, 0, len(points), visible)
-            else:
-                depth_visibility_kernel(
-                    points, faces, place, pixels, needed, 0, len(points), visible
-                )
+            for first, last in view.stretches():
+                place = view.places_m[first]
+                if occlusion == "exact":
+                    exact_visibility_kernel(points, faces, place, needed, first, last, visible)
+                else:
+                    depth_visibility_kernel(
+                        points, faces, place, pixels, needed, first, last, visible
+                    )
             return
         for t in np.flatnonzero(needed.any(axis=1)):
-            wanted = needed[t] > 0
+            wanted, place = needed[t] > 0, view.places_m[t]
             if occlusion == "exact":
                 seen = exact_plain.exact_visibility(points[t], faces, place, wanted)
             else:
@@ -262,18 +264,35 @@ class VisibilityMasks:
             visible[t][wanted] = seen[wanted]
 
 
-def _points(block: Block, rows: slice) -> NDArray[np.float32]:
-    """Positions of these frames in single precision, (n, 3, V)."""
-    return block.frames.positions[block.frames.centre[rows]].astype(np.float32, copy=False)
+@dataclass(frozen=True, eq=False)
+class _View:
+    """What a sensor looks at in some frames, in single precision near each frame's body.
+
+    ``points`` (n, 3, V) float32, ``places_m`` (n, 3) float64 the sensor, both around
+    the same place of each frame.
+    """
+
+    points: NDArray[np.float32]
+    places_m: NDArray[np.float64]
+
+    def stretches(self) -> list[tuple[int, int]]:
+        """Half-open stretches of frames in which the sensor stays where it is."""
+        if (self.places_m == self.places_m[0]).all():
+            return [(0, len(self.points))]
+        return [(t, t + 1) for t in range(len(self.points))]
 
 
-def _facing(
-    points: NDArray[np.float32], normals: NDArray[np.int8], place: NDArray[np.float64]
-) -> NDArray[np.uint8]:
-    if not kernels_ready():
-        return facing_mask(points, normals, place)
-    sx, sy, sz = place.astype(np.float32)
-    visible = np.empty((len(points), points.shape[2]), np.uint8)
-    for (x, y, z), (nx, ny, nz), row in zip(points, normals, visible, strict=True):
-        facing_kernel(x, y, z, nx, ny, nz, sx, sy, sz, row)
+def _view(block: Block, rows: slice, place: NDArray[np.float64]) -> _View:
+    points, around_m = near_points(block, rows)
+    return _View(points, place - around_m)
+
+
+def _facing(view: _View, normals: NDArray[np.int8]) -> NDArray[np.uint8]:
+    visible = np.empty((len(view.points), view.points.shape[2]), np.uint8)
+    for t, (points, place) in enumerate(zip(view.points, view.places_m, strict=True)):
+        if kernels_ready():
+            (x, y, z), (nx, ny, nz), (sx, sy, sz) = points, normals[t], place.astype(np.float32)
+            facing_kernel(x, y, z, nx, ny, nz, sx, sy, sz, visible[t])
+        else:
+            visible[t] = facing_mask(points[None], normals[t : t + 1], place)[0]
     return visible

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from sd2core.compiled import kernels_ready
 from sd2core.doppler import vid2doppler
 from sd2core.doppler.histogram import Frames
-from sd2core.doppler.options import SynthesisOptions
+from sd2core.doppler.options import STEEPEST_RANGE_LAW, SynthesisOptions
 from sd2core.mesh import MeshSequence, refuse_missing
+from sd2core.precision import single_is_enough
 from sd2core.scattering import amplitude, visibility
 from sd2core.scattering.trajectory import Trajectory
 from sd2core.scattering.velocity import moments
@@ -122,25 +123,32 @@ class PreparedMesh:
         self.faces = None if self.mesh.faces is None else np.array(self.mesh.faces, np.int32)
         counts = self.mesh.vertex_counts
         self.heads = None if counts is None else counts.astype(np.float32)
-        # Points are kept in single precision around the clip's own origin, so
-        # that large coordinates cost nothing. The compatible rule works on the
+        # Points are kept around the clip's own origin, in single precision where that
+        # is enough (see _positions), so that large coordinates cost nothing. The origin
+        # is a number that the mesh's own precision has. The compatible rule works on the
         # numbers as they come, so that its bin edges fall where that tool's do.
         self.origin_m = np.zeros(3)
         if not self._compatible:
             points = self.mesh.frame(0).astype(np.float64)
             middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-            rounded = np.where(np.isfinite(middle), middle, 0.0).astype(np.float32)
-            self.origin_m = rounded.astype(np.float64)
+            finite = np.where(np.isfinite(middle), middle, 0.0)
+            self.origin_m = finite.astype(self.mesh.vertices.dtype).astype(np.float64)
         per_frame = self.mesh.vertex_count * 12 * self.options.oversampling
         # Several blocks with their normals must fit, or each would push out the other.
         bytes_per_block = min(_BLOCK_BYTES, self.budget.limit_bytes // 8)
         self.block_frames = max(_FEWEST_FRAMES, bytes_per_block // per_frame)
 
     def with_options(self, options: SynthesisOptions) -> PreparedMesh | None:
-        """The same blocks, in the same budget, for other options; None if they need other knots."""
+        """The same blocks, in the same budget, for other options.
+
+        None if they need other knots, or their bins are not as wide: the precision of a
+        block depends on that.
+        """
         for name in ("oversampling", "trajectory_smoothing_s", "velocity"):
             if getattr(options, name) != getattr(self.options, name):
                 return None
+        if options.axis.bin_width_mps != self.options.axis.bin_width_mps:
+            return None
         other = copy.copy(self)
         other.options = options
         return other
@@ -264,9 +272,8 @@ class PreparedMesh:
         return self.faces
 
     def _at_frames(self, block: Block) -> NDArray[np.float32]:
-        """Positions of the block's own frames in single precision, (n, 3, V)."""
-        points = block.frames.positions[block.frames.centre]
-        return np.ascontiguousarray(points, np.float32)
+        """Shape in the block's own frames in single precision, (n, 3, V); not its place."""
+        return near_points(block, slice(None))[0]
 
     def _prepare(self, index: int) -> Block:
         start, stop = self.span(index)
@@ -277,10 +284,9 @@ class PreparedMesh:
             reach_before = reach_after = every // 2 + every % 2
         first = max(start * every - reach_before, 0)
         last = min((stop - 1) * every + reach_after + 1, len(self._knot_times_s))
-        positions = self._positions(first, last)
-
         centre = np.arange(start, stop) * every
         between = moments(self._knot_times_s, centre, every)
+        positions = self._positions(first, last, between.duration_s)
         return Block(
             index,
             start,
@@ -295,20 +301,61 @@ class PreparedMesh:
             first,
         )
 
-    def _positions(self, first: int, last: int) -> NDArray[Any]:
-        """Knots ``first`` to ``last`` around the clip's origin, (knots, 3, V)."""
+    def _positions(self, first: int, last: int, duration_s: NDArray[np.float64]) -> NDArray[Any]:
+        """Knots ``first`` to ``last`` around the clip's origin, (knots, 3, V).
+
+        In single precision where that is enough for velocities over ``duration_s``.
+        """
         low, high = self._trajectory.frames_needed(first, last)
         with self._reading:
             vertices = self.mesh.read(low, high)
         refuse_missing(vertices, low, self.mesh.source)
         knots = self._trajectory.knots(vertices, low, first, last)
-        precise = self._compatible and (knots.dtype != np.float32)
-        positions = np.empty(
-            (last - first, 3, self.mesh.vertex_count), np.float64 if precise else np.float32
-        )
+        if self._compatible:
+            precision = np.float32 if knots.dtype == np.float32 else np.float64
+            return self._around_origin(knots, precision)
+        positions = self._around_origin(knots, np.float32)
+        measured = duration_s[duration_s > 0]
+        if single_is_enough(
+            extent_m=float(max(positions.max(), -positions.min())),
+            size_m=float(np.ptp(positions[0], axis=1).max()),
+            duration_s=float(measured.min(initial=np.inf)),
+            bin_width_mps=self.options.axis.bin_width_mps,
+            range_exponent=STEEPEST_RANGE_LAW,
+            nearest_range_m=amplitude.NEAREST_RANGE_M,
+        ):
+            return positions
+        return self._around_origin(knots, np.float64)
+
+    def _around_origin(self, knots: NDArray[Any], precision: Any) -> NDArray[Any]:
+        """Knots less the clip's origin, (knots, 3, V)."""
+        positions = np.empty((len(knots), 3, self.mesh.vertex_count), precision)
         origin = self.origin_m.astype(knots.dtype)
         for axis in range(3):
             np.subtract(
                 knots[:, :, axis], origin[axis], out=positions[:, axis], casting="same_kind"
             )
         return positions
+
+
+def near_points(block: Block, rows: slice) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+    """Vertices of some of a block's frames in single precision, around a place near them.
+
+    Parameters
+    ----------
+    block : Block
+    rows : slice
+        Frames within the block.
+
+    Returns
+    -------
+    points : float32 array, shape (n, 3, V)
+    place_m : float64 array, shape (n, 3)
+        What was taken off each frame: zero where the block is in single precision.
+    """
+    points = block.frames.positions[block.frames.centre[rows]]
+    place_m = np.zeros((len(points), 3))
+    if points.dtype == np.float64:
+        place_m = 0.5 * (points.min(axis=2) + points.max(axis=2))
+        points = points - place_m[:, :, None]
+    return np.ascontiguousarray(points, np.float32), place_m

@@ -7,6 +7,7 @@ positions: a range is a distance, so it can be no better than the places it lies
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,13 +15,23 @@ import pytest
 from extreme_tables import Scene, every_scene, exact_velocities
 from numpy.typing import NDArray
 
+from sd2core.compiled import warm_up
+from sd2core.doppler import PRESETS, Synthesizer, masks, prepared, synthesizer
 from sd2core.doppler.histogram import relative_range
-from sd2core.precision import velocity_error_mps
+from sd2core.mesh import MeshSequence
+from sd2core.precision import SHARE_OF_A_BIN, velocity_error_mps
 from sd2core.scattering.velocity import radial_velocity
+from sd2core.sensor import VelocityAxis, VirtualSensor
+from sd2core.timebase import Timebase
 
 DOUBLE = 2.0**-53
 POINTS = 60
 EVERY_SCENE = pytest.mark.parametrize("scene", every_scene(), ids=str)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def kernels() -> None:
+    warm_up()
 
 
 def ends(scene: Scene, count: int = POINTS) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -61,3 +72,90 @@ def test_single_precision_is_as_good_as_predicted(scene: Scene) -> None:
         radial_velocity(first, last, place, scene.duration_s),
     ):
         assert np.abs(found - truth).max() <= tolerance
+
+
+RAW = replace(
+    PRESETS["paper"],
+    visibility="none",
+    null_bins=(),
+    range_exponent=0.0,
+    velocity_sigma_bins=0.0,
+    time_sigma_s=0.0,
+)
+FRAMES = 5
+
+
+def clip_of(scene: Scene, count: int = POINTS) -> MeshSequence:
+    """Five frames around the scene's middle, as a point cloud in double precision."""
+    number = np.arange(FRAMES) - FRAMES // 2
+    vertices = scene.points(count).T + number[:, None, None] * scene.step(count).T
+    return MeshSequence(vertices, None, Timebase.regular(FRAMES, scene.rate_hz), str(scene))
+
+
+def assert_counted(
+    column: NDArray[Any],
+    velocity: NDArray[np.float64],
+    axis: VelocityAxis,
+    beyond: str,
+    slack: float,
+) -> None:
+    """Each bin holds all that is certainly in it, and nothing that certainly is not."""
+    width, v_max = axis.bin_width_mps, axis.v_max_mps
+    place = velocity + v_max
+    if beyond == "clip":
+        place = np.clip(place, 0.0, 2 * v_max)
+    elif beyond == "wrap":
+        inside = (place >= 0) & (place <= 2 * v_max)
+        place = np.where(inside, place, place % (2 * v_max))
+    low = np.arange(axis.bins)[:, None] * width
+    # Round the circle where it wraps; the two ends of the axis are closed.
+    turns = (-2 * v_max, 0.0, 2 * v_max) if beyond == "wrap" else (0.0,)
+    possible = np.zeros((axis.bins, len(place)), bool)
+    for turn in turns:
+        possible |= (place + turn >= low - slack) & (place + turn <= low + width + slack)
+    certain = (place > low + slack) & (place < low + width - slack)
+    if beyond == "clip":
+        certain[0] |= place < width - slack
+        certain[-1] |= place > 2 * v_max - width + slack
+    assert (certain.sum(axis=1) <= column).all()
+    assert (column <= possible.sum(axis=1)).all()
+    if beyond != "drop":
+        assert column.sum() == len(place)
+
+
+def plainly(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let NumPy do what the kernels would."""
+    for module in (synthesizer, prepared, masks):
+        monkeypatch.setattr(module, "kernels_ready", lambda: False)
+    monkeypatch.setattr(synthesizer, "compile_in_background", lambda: None)
+
+
+@pytest.mark.parametrize("form", ["compiled", "plain"])
+@EVERY_SCENE
+def test_every_vertex_is_counted_in_its_bin(
+    scene: Scene, form: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if form == "plain":
+        plainly(monkeypatch)
+    mesh = clip_of(scene)
+    middle = FRAMES // 2
+    before, after = (np.asarray(mesh.vertices)[middle + step].T for step in (-1, 1))
+    sensor = VirtualSensor(tuple(scene.sensor_m.tolist()))
+    velocity = exact_velocities(before, after, scene.sensor_m, scene.duration_s)
+    around = np.full(3, scene.offset_m)[:, None]
+    # The axis that a user keeps, and one that the scene's own speeds spread over.
+    for axis in (VelocityAxis(), VelocityAxis(32, 0.7 * scene.speed_mps)):
+        # A hundredth of a bin is promised. Double precision, which is all there is,
+        # rounds ranges and the times of the frames (5 of them, to 1e-16 of the last).
+        slack = SHARE_OF_A_BIN * axis.bin_width_mps
+        slack += (
+            velocity_error_mps(largest(before - around, after - around), scene.duration_s) / 2**29
+        )
+        slack += 8 * DOUBLE * scene.speed_mps
+        for beyond in ("drop", "wrap", "clip"):
+            chosen = replace(RAW, axis=axis, beyond=beyond)
+            made = Synthesizer(mesh, chosen).map(sensor)
+            assert np.isfinite(made.values).all()
+            column = made.values[:, middle].astype(float) * POINTS
+            np.testing.assert_allclose(column, np.rint(column), atol=1e-4)
+            assert_counted(np.rint(column), velocity, axis, beyond, slack)
