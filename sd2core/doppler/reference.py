@@ -1,0 +1,184 @@
+"""The histogram in double precision, plainly: the truth that faster ways are measured by.
+
+Positions are the mesh's own, velocities and weights are worked out with NumPy, and
+every vertex is tested for occlusion. Nothing is shared with the compiled counting but the exact
+visibility, which decides in double precision.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.compiled import kernels_ready
+from sd2core.doppler import vid2doppler
+from sd2core.doppler.options import SynthesisOptions
+from sd2core.mesh import MeshSequence
+from sd2core.scattering.amplitude import NEAREST_RANGE_M
+from sd2core.scattering.exact import exact_visibility_kernel
+from sd2core.scattering.exact_plain import exact_visibility
+from sd2core.scattering.trajectory import Trajectory
+from sd2core.scattering.velocity import moments, radial_velocity
+from sd2core.sensor import VirtualSensor
+
+
+def reference_stretch(
+    mesh: MeshSequence, sensor: VirtualSensor, options: SynthesisOptions, start: int, stop: int
+) -> NDArray[np.float64]:
+    """What ``Synthesizer.stretch`` gives as ``raw``, in double precision, always exact.
+
+    The two differ by the vertices within single precision of an edge between two
+    bins, which a velocity is right to: 7e-7 m per metre of a vertex's distance from
+    the middle of the first frame, over the time between the two knots that it is
+    measured between. Weights differ by 1e-6 of themselves.
+
+    Parameters
+    ----------
+    mesh : MeshSequence
+        Without faces all vertices count: there is nothing to hide them.
+    sensor : VirtualSensor
+    options : SynthesisOptions
+        Visibility, its resolution and stride are not used, nor is the smoothing.
+    start, stop : int
+        Frames, half-open.
+
+    Returns
+    -------
+    float64 array, shape (bins, stop - start)
+        Shares, with nulled bins emptied.
+    """
+    place = np.asarray(sensor.position_m, np.float64)
+    first = mesh.frame(0).astype(np.float64)
+    middle = 0.5 * (first.min(axis=0) + first.max(axis=0))
+    raw = np.zeros((options.axis.bins, stop - start))
+    for column, frame in enumerate(range(start, stop)):
+        velocities, points = _at_frame(mesh, place, options, frame)
+        weight, total = _weights(mesh, options, points, place)
+        if total == 0 or not len(velocities):
+            continue
+        weight = weight * _range_law(mesh, options, points, place)
+        weight = weight * _visible(mesh, points, place, middle)
+        edges_mps = options.axis.edges_mps
+        for velocity in velocities:
+            folded = _on_axis(velocity, edges_mps, options)
+            raw[:, column] += np.histogram(folded, edges_mps, weights=weight)[0]
+        raw[:, column] /= len(velocities) * total
+    raw[list(options.null_bins)] = 0
+    return raw
+
+
+def reference_velocities(
+    mesh: MeshSequence, sensor: VirtualSensor, options: SynthesisOptions, frame: int
+) -> NDArray[np.float64]:
+    """Velocity of every vertex at each of a frame's moments, in double precision.
+
+    Returns
+    -------
+    float64 array, shape (moments, V)
+        m/s, positive when approaching; only moments that lie within the clip.
+    """
+    return _at_frame(mesh, np.asarray(sensor.position_m, np.float64), options, frame)[0]
+
+
+def _at_frame(
+    mesh: MeshSequence, place: NDArray[np.float64], options: SynthesisOptions, frame: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Velocities (moments, V) and positions (3, V) of one frame."""
+    every = options.oversampling
+    trajectory = Trajectory(mesh.times_s, every, options.trajectory_smoothing_s)
+    between = moments(trajectory.knot_times_s, np.array([frame * every]), every)
+    before, after = between.before[0], between.after[0]
+    low, high = int(before.min()), int(after.max()) + 1
+    if options.velocity == "vid2doppler":
+        low = max(frame - vid2doppler.REACH_BEFORE, 0)
+        high = min(frame + vid2doppler.REACH_AFTER + 1, mesh.frame_count)
+    first, last = trajectory.frames_needed(low, high)
+    knots = trajectory.knots(mesh.read(first, last).astype(np.float64), first, low, high)
+    points = np.ascontiguousarray(knots.transpose(0, 2, 1))
+    centre = points[frame * every - low]
+    if options.velocity == "vid2doppler" and mesh.frame_count > 1:
+        frames, rate = mesh.frame_count, mesh.timebase.frames_per_s
+        theirs = vid2doppler.velocities(points, low, frame, frame + 1, frames, place, rate)
+        return theirs, centre
+    found = [
+        radial_velocity(points[one - low], points[two - low], place, duration_s)
+        for one, two, duration_s in zip(before, after, between.duration_s[0], strict=True)
+        if duration_s > 0
+    ]
+    return np.array(found).reshape(-1, mesh.vertex_count), centre
+
+
+def _range_law(
+    mesh: MeshSequence,
+    options: SynthesisOptions,
+    points: NDArray[np.float64],
+    place: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """(R_ref / R)ⁿ of every vertex (V,), or of their mean (1,)."""
+    if options.range_law == "frame":
+        points = np.average(points, axis=1, weights=mesh.vertex_counts)[:, None]
+    range_m = np.linalg.norm(points - place[:, None], axis=0)
+    ratio = options.reference_range_m / np.maximum(range_m, NEAREST_RANGE_M)
+    law: NDArray[np.float64] = ratio**options.range_exponent
+    return law
+
+
+def _on_axis(
+    velocity: NDArray[np.float64], edges_mps: NDArray[np.float64], options: SynthesisOptions
+) -> NDArray[np.float64]:
+    """Velocities with those beyond the axis, which is closed at both ends, where they belong."""
+    low, high = edges_mps[0], edges_mps[-1]
+    if options.beyond == "clip":
+        return np.clip(velocity, low, high)
+    if options.beyond == "wrap":
+        beyond = (velocity < low) | (velocity > high)
+        return np.where(beyond, low + np.mod(velocity - low, high - low), velocity)
+    return velocity
+
+
+def _weights(
+    mesh: MeshSequence,
+    options: SynthesisOptions,
+    points: NDArray[np.float64],
+    place: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], float]:
+    """What each vertex counts before the range law, and what the map is a share of."""
+    if options.weight == "count" or mesh.faces is None:
+        heads = np.ones(points.shape[1])
+        if mesh.vertex_counts is not None:
+            heads *= mesh.vertex_counts
+        return heads, float(mesh.represented_count)
+    a, b, c = (points[:, mesh.faces[:, corner]] for corner in range(3))
+    thirds = np.cross(b - a, c - a, axis=0) / 6.0
+    corners = mesh.faces.ravel()
+    each = np.repeat(np.linalg.norm(thirds, axis=0), 3)
+    areas: NDArray[np.float64] = np.bincount(corners, each, points.shape[1])
+    if options.weight == "area":
+        return areas, float(areas.sum())
+    vectors = np.stack([np.bincount(corners, np.repeat(t, 3), points.shape[1]) for t in thirds])
+    ray = place[:, None] - points
+    distance = np.maximum(np.linalg.norm(ray, axis=0), 1e-30)
+    return np.maximum((vectors * ray).sum(axis=0) / distance, 0.0), float(areas.sum())
+
+
+def _visible(
+    mesh: MeshSequence,
+    points: NDArray[np.float64],
+    place: NDArray[np.float64],
+    middle: NDArray[np.float64],
+) -> NDArray[np.bool_]:
+    """Exact visibility of every vertex, decided in double precision on single coordinates.
+
+    They are taken around the clip's own middle, as everywhere.
+    """
+    if mesh.faces is None:
+        return np.ones(points.shape[1], bool)
+    origin = middle.astype(np.float32).astype(np.float64)
+    single = (points - origin[:, None]).astype(np.float32)
+    needed = np.ones((1, points.shape[1]), np.uint8)
+    faces = np.array(mesh.faces, np.int32)
+    if not kernels_ready():
+        return exact_visibility(single, faces, place - origin, needed[0] > 0) > 0
+    visible = np.empty_like(needed)
+    exact_visibility_kernel(single[None], faces, place - origin, needed, 0, 1, visible)
+    return visible[0] > 0
