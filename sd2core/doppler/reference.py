@@ -152,7 +152,7 @@ def _weights(
     thirds = np.cross(b - a, c - a, axis=0) / 6.0
     corners = mesh.faces.ravel()
     each = np.repeat(np.linalg.norm(thirds, axis=0), 3)
-    areas: NDArray[np.float64] = np.bincount(corners, each, points.shape[1])
+    areas = np.asarray(np.bincount(corners, each, points.shape[1]), np.float64)
     if options.weight == "area":
         return areas, float(areas.sum())
     vectors = np.stack([np.bincount(corners, np.repeat(t, 3), points.shape[1]) for t in thirds])
