@@ -157,6 +157,12 @@ def positive_float(text: str) -> float:
     return value
 
 
+def share(text: str) -> float:
+    """Parse a share above 0, as ``2%`` or ``0.02``."""
+    value = positive_float(text.removesuffix("%").rstrip())
+    return value / 100 if text.endswith("%") else value
+
+
 def not_negative_float(text: str) -> float:
     """Parse a number from 0 on."""
     value = finite_float(text)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from sd2core.cli.ladder import add_wish, chosen
 from sd2core.cli.options import (
     add_axis,
     add_command,
@@ -27,6 +28,17 @@ if TYPE_CHECKING:
     from sd2core.mesh import MeshSequence
     from sd2core.sensor import VelocityAxis, VirtualSensor
     from sd2core.spectrum import DopplerMap
+
+_RUNGS = (
+    "visibility",
+    "depth_resolution",
+    "mask_stride",
+    "vertices_kept",
+    "range_law",
+    "beyond",
+    "oversampling",
+)
+"""What a plan chooses."""
 
 _COUNTING_ONLY = (
     "depth_resolution",
@@ -64,6 +76,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "  sd2 synth walk.sd2 --out map.npz    (mesh and sensor of a recording)\n"
             "  sd2 synth points.npz --out map.npz --visibility none --null-bins none\n"
             "  sd2 synth walk.npz --out map.npz --preset vid2doppler\n"
+            "  sd2 synth walk.npz --out map.npz --tolerance 2%    (as quick as this allows)\n"
             "  sd2 synth walk.npz --out map.npz --model fmcw"
         ),
     )
@@ -90,6 +103,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         help="count vertices, or simulate the radar's signal (default: histogram)",
     )
     add_radar_choice(parser)
+    add_wish(parser, "none: what the options say")
     parser.add_argument(
         "--visibility",
         choices=("none", "facing", "depth", "exact"),
@@ -112,7 +126,6 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--vertices-kept",
         type=positive_float,
-        default=1.0,
         metavar="SHARE",
         help="simplify the surface to this share of its vertices, 0.25 say (default: 1, all)",
     )
@@ -192,10 +205,16 @@ def _synth(options: argparse.Namespace) -> None:
         _check_fmcw(options)
     elif options.radar != "paper":
         raise Sd2Error("--radar is given", "it together with --model fmcw only")
+    wish = options.tolerance is not None or options.budget_ms is not None
+    if wish:
+        _check_wish(options)
     mesh, sensor = mesh_and_sensor(options)
-    mesh = decimate(mesh, options.vertices_kept)
+    if not wish:
+        mesh = decimate(mesh, options.vertices_kept or 1.0)
     if options.model == "fmcw":
         doppler = _by_fmcw(options, mesh, sensor)
+    elif wish:
+        doppler = _as_chosen(options, mesh, sensor)
     else:
         synthesizer = Synthesizer(mesh, synthesis_options(options))
         with progress_bar("Synthesising") as progress:
@@ -205,6 +224,33 @@ def _synth(options: argparse.Namespace) -> None:
     description.notes = mesh.notes + description.notes
     description.data["notes"] = list(description.notes)
     show(description, as_json=options.json)
+
+
+def _check_wish(options: argparse.Namespace) -> None:
+    wish = "--tolerance" if options.tolerance is not None else "--budget-ms"
+    if options.model == "fmcw":
+        raise Sd2Error(f"{wish} is given with --model fmcw", f"{wish} with the histogram only")
+    for name in _RUNGS:
+        if getattr(options, name) is not None:
+            raise Sd2Error(
+                f"{wish} is given with --{name.replace('_', '-')}",
+                f"one of them: with {wish} the plan chooses how",
+            )
+
+
+def _as_chosen(
+    options: argparse.Namespace, mesh: MeshSequence, sensor: VirtualSensor
+) -> DopplerMap:
+    """The map of the plan that the scene requires; the choice goes into its provenance."""
+    from sd2core.ladder.carry_out import synthesizer_for
+
+    base = synthesis_options(options)
+    choice = chosen(mesh, sensor, base, options.tolerance, options.budget_ms)
+    if not choice.holds:
+        raise Sd2Error(choice.summary, "a tolerance or budget that can be held", "Allow more of it")
+    with progress_bar("Synthesising") as progress:
+        doppler = synthesizer_for(choice.plan, mesh, base).map(sensor, progress=progress)
+    return replace(doppler, meta=doppler.meta | {"choice": choice.to_json()})
 
 
 def _check_fmcw(options: argparse.Namespace) -> None:

@@ -141,6 +141,10 @@ class Measurement:
                 best.append(result)
         return tuple(best)
 
+    def to_json(self) -> dict[str, Any]:
+        """Plain content, with plans also in words."""
+        return asdict(self) | {"results": [result.to_json() for result in self.results]}
+
     def of(self, plan: Plan) -> PlanResult | None:
         """What was measured of a plan, if it was."""
         return next((result for result in self.results if result.plan == plan), None)
@@ -182,7 +186,8 @@ class Choice:
     errors : Errors
         On frames that were not used to choose.
     cost_ms : float
-        Milliseconds per frame on all cores, as measured while choosing.
+        Milliseconds per frame when all cores share the work: a forecast from the
+        processor time of its parts, measured while choosing.
     reasons : tuple of Reason
     tolerance : float or None
         Relative L1 after smoothing that was asked for.

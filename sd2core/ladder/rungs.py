@@ -10,6 +10,8 @@ from typing import Any, Literal, get_args
 from sd2core.doppler.options import (
     Beyond,
     DepthResolution,
+    RangeLaw,
+    SynthesisOptions,
     Visibility,
     Weight,
 )
@@ -18,7 +20,6 @@ from sd2core.fmcw.options import Motion, WaveOptions
 
 Signal = Literal["histogram", "fmcw", "direct"]
 Family = Literal["histogram", "fmcw"]
-RangeLaw = Literal["vertex", "frame"]
 
 FRAME_RATE_FACTORS = (1, 2, 4, 8)
 MASK_STRIDES = (1, 2, 5, 10)
@@ -117,6 +118,19 @@ class Plan:
             yield f"frame rate × {self.frame_rate_factor}"
         yield {"drop": "beyond dropped", "wrap": "wrapped", "clip": "clipped"}[self.beyond]
 
+    def options(self, base: SynthesisOptions) -> SynthesisOptions:
+        """The options that carry a counting plan out; what it does not choose is the base's."""
+        return replace(
+            base,
+            visibility=self.visibility,
+            depth_resolution=self.depth_resolution,
+            mask_stride=self.mask_stride,
+            weight=self.weight,
+            range_law=self.range_law,
+            beyond=self.beyond,
+            oversampling=self.frame_rate_factor,
+        )
+
     def wave(self, base: WaveOptions) -> WaveOptions:
         """The options that carry an FMCW plan out."""
         model: Literal["nufft", "direct"] = "direct" if self.signal == "direct" else "nufft"
@@ -148,6 +162,18 @@ def reference_plan(family: Family, weight: Weight = "count") -> Plan:
     return Plan(weight=weight, frame_rate_factor=max(FRAME_RATE_FACTORS))
 
 
+def sights(*, surface: bool = True) -> Iterator[Plan]:
+    """Every choice of visibility; for a point cloud there is but one."""
+    yield Plan(visibility="none")
+    if not surface:
+        return
+    yield Plan(visibility="facing")
+    for stride in MASK_STRIDES:
+        for resolution in get_args(DepthResolution):
+            yield Plan(visibility="depth", depth_resolution=resolution, mask_stride=stride)
+        yield Plan(mask_stride=stride)
+
+
 def counting_plans(
     weight: Weight = "count", *, surface: bool = True, range_law: bool = True
 ) -> Iterator[Plan]:
@@ -160,35 +186,40 @@ def counting_plans(
     range_law : bool
         Whether there is a range law to apply by vertex or by frame.
     """
-    base = Plan(weight=weight)
-    if not surface:
-        sights = [replace(base, visibility="none")]
-    else:
-        sights = [replace(base, visibility="none"), replace(base, visibility="facing")]
-        for stride in MASK_STRIDES:
-            for resolution in get_args(DepthResolution):
-                sights.append(
-                    replace(
-                        base, visibility="depth", depth_resolution=resolution, mask_stride=stride
-                    )
-                )
-            sights.append(replace(base, mask_stride=stride))
     laws: tuple[RangeLaw, ...] = ("vertex", "frame") if range_law else ("vertex",)
     for sight, kept, factor, law in product(
-        sights, VERTICES_KEPT if surface else (1.0,), FRAME_RATE_FACTORS, laws
+        sights(surface=surface), VERTICES_KEPT if surface else (1.0,), FRAME_RATE_FACTORS, laws
     ):
-        yield replace(sight, vertices_kept=kept, frame_rate_factor=factor, range_law=law)
+        yield replace(
+            sight, weight=weight, vertices_kept=kept, frame_rate_factor=factor, range_law=law
+        )
 
 
-def single_steps(plan: Plan, *, surface: bool = True, range_law: bool = True) -> Iterator[Plan]:
-    """Counting plans that differ from ``plan`` in one rung: what each of them is worth."""
-    for other in counting_plans(plan.weight, surface=surface, range_law=range_law):
-        if _differing(plan, replace(other, beyond=plan.beyond)) == 1:
-            yield replace(other, beyond=plan.beyond)
-    yield replace(plan, beyond="drop" if plan.beyond == "wrap" else "wrap")
-    if plan.visibility in _OCCLUSION:
+def compared_plans(
+    weight: Weight = "count", *, surface: bool = True, range_law: bool = True
+) -> Iterator[Plan]:
+    """The counting plans of a table: every rung alone, and the main combinations.
+
+    Parameters as for :func:`counting_plans`.
+    """
+    base = Plan(visibility="exact" if surface else "none", weight=weight)
+    for plan in counting_plans(weight, surface=surface, range_law=range_law):
+        taken_down = sum(
+            getattr(plan, name) != getattr(base, name)
+            for name in ("visibility", "mask_stride", "vertices_kept", "range_law")
+        ) + (plan.frame_rate_factor > 1)
+        usual = (
+            plan.mask_stride in (1, 5)
+            and plan.vertices_kept in (1, 0.25)
+            and plan.frame_rate_factor in (1, 4)
+            and plan.range_law == "vertex"
+        )
+        if taken_down <= 1 or usual:
+            yield plan
+    yield replace(base, beyond="drop")
+    if surface:
         for reach_m in MASK_REUSE_M:
-            yield replace(plan, mask_reuse_m=reach_m)
+            yield replace(base, mask_reuse_m=reach_m)
 
 
 def wave_plans(weight: Weight = "count") -> Iterator[Plan]:
@@ -201,15 +232,3 @@ def wave_plans(weight: Weight = "count") -> Iterator[Plan]:
         yield replace(base, blocks=blocks)
     yield replace(base, motion="interpolated")
     yield replace(base, signal="direct")
-
-
-def _differing(plan: Plan, other: Plan) -> int:
-    """In how many rungs two plans differ; visibility and its resolution are one."""
-    one, two = asdict(plan), asdict(other)
-    sight = ("visibility", "depth_resolution")
-    different = sum(one[name] != two[name] for name in one if name not in sight)
-    depth = "depth" in (plan.visibility, other.visibility)
-    same_sight = one["visibility"] == two["visibility"] and (
-        not depth or one["depth_resolution"] == two["depth_resolution"]
-    )
-    return different + (not same_sight)

@@ -1,0 +1,246 @@
+"""``sd2 ladder``: measured cost and error of every rung, and what a scene requires."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sd2core.cli.options import (
+    add_command,
+    add_json,
+    add_mesh_reading,
+    position,
+    positive_float,
+    positive_int,
+    share,
+)
+from sd2core.cli.output import print_json, progress_bar
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    from sd2core.doppler import SynthesisOptions
+    from sd2core.ladder import Choice, Measurement
+    from sd2core.mesh import MeshSequence
+    from sd2core.sensor import VirtualSensor
+
+_TOLERANCE = 0.02
+_PLOTS = (".png", ".svg", ".pdf")
+
+
+def add_commands(commands: argparse._SubParsersAction) -> None:
+    """Add ``ladder``."""
+    parser = add_command(
+        commands,
+        "ladder",
+        "measure what accuracy costs on a scene, and say what the scene requires",
+        handler=_ladder,
+        description=(
+            "Tries every sensible way of computing the Doppler of a mesh on some of its frames:\n"
+            "how long it takes on this machine, and how far its map is from the most accurate\n"
+            "one. Then says which is the cheapest that holds a tolerance, and why. A tolerance of\n"
+            "2 % means: the absolute differences between the two smoothed maps add up to 2 % of\n"
+            "the map. What was measured is kept until mesh, sensor or machine change."
+        ),
+        examples=(
+            "  sd2 ladder walk.npz\n"
+            "  sd2 ladder walk.npz --quick --tolerance 1%\n"
+            "  sd2 ladder walk.sd2 --sensor 1.5,0,2 --budget-ms 0.1\n"
+            "  sd2 ladder walk.npz --family fmcw\n"
+            "  sd2 ladder walk.npz --plot trade.png --json"
+        ),
+    )
+    parser.add_argument("mesh", type=Path, metavar="MESH", help="a mesh, or a recording")
+    parser.add_argument(
+        "--sensor",
+        type=position,
+        metavar="X,Y,Z",
+        help="where the radar is, in metres (default: the recording's sensor, or the camera)",
+    )
+    add_wish(parser, "2%%")
+    parser.add_argument(
+        "--family",
+        choices=("histogram", "fmcw"),
+        default="histogram",
+        help="measure counting, or the FMCW signal (default: histogram)",
+    )
+    parser.add_argument(
+        "--weight",
+        choices=("count", "area", "projected"),
+        default="count",
+        help="what a vertex counts (default: count)",
+    )
+    parser.add_argument(
+        "--quick", action="store_true", help="only say what the scene requires, without the table"
+    )
+    parser.add_argument(
+        "--repeats",
+        type=positive_int,
+        metavar="N",
+        help="how often every plan is timed (default: 5)",
+    )
+    parser.add_argument(
+        "--fresh", action="store_true", help="measure again what was measured before"
+    )
+    parser.add_argument(
+        "--plot", type=Path, metavar="FILE", help="draw error against cost, as .png, .svg or .pdf"
+    )
+    add_mesh_reading(parser)
+    add_json(parser)
+
+
+def _ladder(options: argparse.Namespace) -> int:
+    from sd2core.cli.reading import check_output, mesh_and_sensor
+    from sd2core.doppler import PRESETS
+    from sd2core.ladder.choose import checked_options
+
+    if options.plot is not None:
+        suffix = options.plot.suffix.lower()
+        if options.quick:
+            raise Sd2Error("--plot is given with --quick", "one of the two: nothing is measured")
+        check_output(options.plot, suffix if suffix in _PLOTS else ".png")
+    if options.quick and options.family == "fmcw":
+        raise Sd2Error("--quick is given with --family fmcw", "it with --family histogram only")
+    mesh, sensor = mesh_and_sensor(options)
+    synthesis = checked_options(mesh, replace(PRESETS["paper"], weight=options.weight))
+    choice = None
+    if options.family == "histogram":
+        tolerance = options.tolerance
+        if tolerance is None and options.budget_ms is None:
+            tolerance = _TOLERANCE
+        choice = chosen(mesh, sensor, synthesis, tolerance, options.budget_ms)
+    measurement = None if options.quick else _measured(mesh, sensor, synthesis, options)
+    if options.plot is not None and measurement is not None:
+        from sd2core.ladder.plot import plot_trade, save_plot
+
+        save_plot(plot_trade(measurement, choice), options.plot)
+    if options.json:
+        print_json(
+            {
+                "choice": None if choice is None else choice.to_json(),
+                "measurement": None if measurement is None else measurement.to_json(),
+            }
+        )
+    else:
+        if choice is not None:
+            _print_choice(choice)
+        if measurement is not None:
+            _print_measurement(measurement)
+    return 0 if choice is None or choice.holds else 1
+
+
+def add_wish(parser: argparse.ArgumentParser, default: str) -> None:
+    """Add ``--tolerance`` and ``--budget-ms``, of which one may be given."""
+    wanted = parser.add_mutually_exclusive_group()
+    wanted.add_argument(
+        "--tolerance",
+        type=share,
+        metavar="P",
+        help=f"the error that is allowed, as 2%% or 0.02: relative L1 of the smoothed map"
+        f" (default: {default})",
+    )
+    wanted.add_argument(
+        "--budget-ms",
+        type=positive_float,
+        metavar="B",
+        help="instead, the milliseconds per frame that are allowed",
+    )
+
+
+def chosen(
+    mesh: MeshSequence,
+    sensor: VirtualSensor,
+    options: SynthesisOptions,
+    tolerance: float | None,
+    budget_ms: float | None,
+) -> Choice:
+    """What a scene requires, with bars."""
+    from sd2core.compiled import warm_up
+    from sd2core.ladder.choose import choose
+
+    with progress_bar("Compiling", "file") as progress:
+        warm_up(progress)
+    with progress_bar("Choosing", "plan") as progress:
+        return choose(
+            mesh,
+            sensor,
+            tolerance=tolerance,
+            budget_ms=budget_ms,
+            options=options,
+            progress=progress,
+        )
+
+
+def _measured(
+    mesh: MeshSequence,
+    sensor: VirtualSensor,
+    synthesis: SynthesisOptions,
+    options: argparse.Namespace,
+) -> Measurement:
+    from sd2core.ladder.cache import remember, remembered
+    from sd2core.ladder.measure import REPEATS, measure
+
+    known = remembered(mesh, sensor, synthesis, options.family)
+    if known is not None and not (known.stale or options.fresh or options.repeats):
+        return known
+    with progress_bar("Measuring", "plan") as progress:
+        measurement = measure(
+            mesh,
+            sensor,
+            options=synthesis,
+            family=options.family,
+            repeats=options.repeats or REPEATS,
+            progress=progress,
+        )
+    remember(mesh, measurement)
+    return measurement
+
+
+def _print_choice(choice: Choice) -> None:
+    print(choice.summary)
+    print(
+        f"  on {choice.errors.frames} frames that were not used to choose: L1"
+        f" {_percent(choice.errors.l1)} after smoothing, {_percent(choice.errors.l1_raw)} before;"
+        f" peak velocity off by {choice.errors.peak_mps.median:.3g} m/s in the median frame,"
+        f" {choice.errors.peak_mps.p95:.3g} m/s in 95 %"
+    )
+    for reason in choice.reasons:
+        print(f"  {'+' if reason.modelled else '-'} {reason.text}")
+
+
+def _print_measurement(measurement: Measurement) -> None:
+    print()
+    print(
+        f"{measurement.source} on {measurement.machine}; {len(measurement.frames)} frames;"
+        f" against {measurement.reference}"
+    )
+    for pieces, change in measurement.convergence:
+        print(f"  reference with {pieces} pieces per facet: changed by {_percent(change)}")
+    print("  cost in ms per frame, 5 % of the runs took more than the number in brackets;")
+    print("  errors as median of frames, 95 % in brackets; L1 of all frames together")
+    header = (
+        f"{'one thread':>15} {'all cores':>15} {'MB':>6} {'L1':>7} {'raw L1':>7}"
+        f" {'peak m/s':>14} {'mean m/s':>14} {'wrong bins':>14}  plan"
+    )
+    print(header)
+    front = set(measurement.front)
+    for result in measurement.results:
+        cost, errors = result.cost, result.errors
+        one, cores = cost.one_thread_ms, cost.all_cores_ms
+        print(
+            f"{one.median:>7.3f} ({one.p95:.3f})"
+            f" {cores.median:>7.3f} ({cores.p95:.3f})"
+            f" {cost.peak_bytes / 1e6:>6.0f}"
+            f" {_percent(errors.l1):>7} {_percent(errors.l1_raw):>7}"
+            f" {errors.peak_mps.median:>6.3f} ({errors.peak_mps.p95:.3f})"
+            f" {errors.mean_mps.median:>6.3f} ({errors.mean_mps.p95:.3f})"
+            f" {_percent(errors.wrong_bins.median):>6} ({_percent(errors.wrong_bins.p95)})"
+            f"  {'*' if result in front else ' '} {result.plan}"
+        )
+    print("  * no other plan is both cheaper and nearer")
+
+
+def _percent(share: float) -> str:
+    value = 100 * share
+    return f"{value:.0f} %" if value >= 99.5 else f"{value:.2g} %"

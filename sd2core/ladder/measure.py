@@ -1,0 +1,120 @@
+"""Cost and error of every sensible plan on one scene and machine."""
+
+from __future__ import annotations
+
+import gc
+import time
+import tracemalloc
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from sd2core.doppler.options import SynthesisOptions
+from sd2core.errors import Sd2Error
+from sd2core.ladder.choose import checked_options
+from sd2core.ladder.deviation import spread
+from sd2core.ladder.results import Cost, Measurement, PlanResult, Spread
+from sd2core.ladder.rungs import Family, Plan, compared_plans, reference_plan
+from sd2core.ladder.sample import all_frames, take_sample
+from sd2core.ladder.scene import scene_fingerprint, this_machine
+from sd2core.ladder.trial import Trial
+from sd2core.mesh import MeshSequence
+from sd2core.progress import Progress, silent
+from sd2core.sensor import VirtualSensor
+
+REPEATS = 5
+
+
+def measure(
+    mesh: MeshSequence,
+    sensor: VirtualSensor,
+    *,
+    options: SynthesisOptions | None = None,
+    family: Family = "histogram",
+    repeats: int = REPEATS,
+    progress: Progress = silent,
+) -> Measurement:
+    """Try every sensible plan of a family on sampled frames of a clip.
+
+    Parameters
+    ----------
+    mesh : MeshSequence
+    sensor : VirtualSensor
+    options : SynthesisOptions
+        For what a plan does not choose; the paper's by default.
+    family : {"histogram", "fmcw"}
+        Counting, against the same in double precision with every rung at its top;
+        or the FMCW signal, against the direct sum over subdivided facets.
+    repeats : int
+        How often every plan is timed; all plans take turns, so that a busy machine
+        slows all of them alike.
+    progress : Progress
+        May raise Cancelled.
+
+    Raises
+    ------
+    Sd2Error
+        When the mesh or the options do not allow it.
+    """
+    options = checked_options(mesh, options)
+    if family == "fmcw":
+        raise Sd2Error("The FMCW family is to be measured", "the family histogram")
+    surface = mesh.faces is not None
+    plans = list(
+        compared_plans(options.weight, surface=surface, range_law=options.range_exponent > 0)
+    )
+    total = len(plans) * (repeats + 2)
+    trial = Trial(mesh, sensor, options, take_sample(mesh, options))
+    runs = trial.sample.runs
+    trial.reference(runs)
+    trial.load_kernels()
+    errors, memory = [], []
+    for number, plan in enumerate(plans):
+        progress(2 * number, total)
+        errors.append(trial.errors(plan, runs))
+        memory.append(_watched(trial, plan))
+    costs = _timed(trial, plans, repeats, lambda done, of: progress(total - of + done, total))
+    results = [
+        PlanResult(plan, error, Cost(one, every, peak_bytes, setup_s))
+        for plan, error, (one, every), (peak_bytes, setup_s) in zip(
+            plans, errors, costs, memory, strict=True
+        )
+    ]
+    return Measurement(
+        family=family,
+        reference=reference_plan(family, options.weight),
+        results=tuple(sorted(results, key=lambda result: result.cost.all_cores_ms.median)),
+        scene=scene_fingerprint(mesh, sensor, options, family),
+        machine=this_machine(),
+        frames=all_frames(runs),
+        source=Path(mesh.source).name,
+    )
+
+
+def _watched(trial: Trial, plan: Plan) -> tuple[int, float]:
+    """Most bytes allocated at once from scratch, and seconds before the first frame."""
+    trial.forget()
+    gc.collect()
+    tracemalloc.start()
+    try:
+        start = time.perf_counter()
+        trial.synthesizer(plan)
+        setup_s = time.perf_counter() - start
+        trial.milliseconds(plan)
+        return tracemalloc.get_traced_memory()[1], setup_s + trial.decimating_s(plan)
+    finally:
+        tracemalloc.stop()
+
+
+def _timed(
+    trial: Trial, plans: Sequence[Plan], repeats: int, progress: Progress
+) -> list[tuple[Spread, Spread]]:
+    """Milliseconds per frame of every plan on one thread and on all cores."""
+    spent = np.empty((repeats, 2, len(plans)))
+    for turn in range(repeats):
+        for number, plan in enumerate(plans):
+            progress(turn * len(plans) + number, repeats * len(plans))
+            for column, threads in enumerate((1, None)):
+                spent[turn, column, number] = trial.milliseconds(plan, threads)
+    return [(spread(spent[:, 0, k]), spread(spent[:, 1, k])) for k in range(len(plans))]

@@ -1,0 +1,107 @@
+"""``sd2 ladder`` and ``sd2 synth --tolerance``: the trade on the command line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from cli_outcome import Sd2
+
+from sd2core.spectrum import DopplerMap
+
+
+@pytest.fixture(autouse=True)
+def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    folder = tmp_path / "cache"
+    monkeypatch.setattr("platformdirs.user_cache_dir", lambda *_, **__: str(folder))
+    return folder
+
+
+def test_the_plan_its_error_and_the_reasons_are_printed(sd2: Sd2, plate: Path) -> None:
+    outcome = sd2("ladder", plate, "--quick", "--tolerance", "5%")
+    assert outcome.code == 0, outcome.err
+    lines = outcome.out.splitlines()
+    assert lines[0].startswith("count · ")
+    assert "ms per frame" in lines[0]
+    assert any("hidden vertices change this map by 0 %" in line for line in lines)
+    assert any("aliasing" in line for line in lines)
+
+
+def test_the_table_is_kept_and_reused(sd2: Sd2, plate: Path, own_cache: Path) -> None:
+    first = sd2("ladder", plate, "--repeats", 1, "--json")
+    assert first.code == 0, first.err
+    measured = json.loads(first.out)["measurement"]
+    assert len(list(own_cache.rglob("*.json"))) == 1
+    again = json.loads(sd2("ladder", plate, "--json").out)["measurement"]
+    assert again == measured
+    fresh = json.loads(sd2("ladder", plate, "--repeats", 1, "--fresh", "--json").out)
+    times = [result["cost"]["all_cores_ms"] for result in measured["results"]]
+    assert [r["cost"]["all_cores_ms"] for r in fresh["measurement"]["results"]] != times
+
+
+def test_the_table_names_what_it_was_measured_against(sd2: Sd2, plate: Path) -> None:
+    outcome = sd2("ladder", plate, "--repeats", 1)
+    assert "plate.npz on " in outcome.out
+    assert "against count · visibility exact" in outcome.out
+    assert "* count" in outcome.out
+
+
+def test_the_picture(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
+    picture = tmp_path / "trade.png"
+    assert sd2("ladder", plate, "--repeats", 1, "--plot", picture).code == 0
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_what_cannot_be_held_is_said(sd2: Sd2, plate: Path) -> None:
+    outcome = sd2("ladder", plate, "--quick", "--tolerance", "1e-12")
+    assert outcome.code == 1
+    assert "No plan holds" in outcome.out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--quick", "--plot", "x.png"), "--plot"),
+        (("--plot", "x.gif"), ".png"),
+        (("--quick", "--family", "fmcw"), "--quick"),
+    ],
+)
+def test_what_does_not_go_together(
+    sd2: Sd2, plate: Path, arguments: tuple[str, ...], message: str
+) -> None:
+    outcome = sd2("ladder", plate, *arguments)
+    assert outcome.code == 1
+    assert message in outcome.err
+
+
+@pytest.mark.parametrize("wrong", ["0", "-1%", "lots", "nan"])
+def test_a_tolerance_is_a_share(sd2: Sd2, plate: Path, wrong: str) -> None:
+    assert sd2("ladder", plate, f"--tolerance={wrong}").code == 2
+
+
+def test_synth_carries_the_plan_out(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
+    out = tmp_path / "map.npz"
+    outcome = sd2("synth", plate, "--out", out, "--tolerance", "5%")
+    assert outcome.code == 0, outcome.err
+    made = DopplerMap.load(out)
+    choice = made.meta["choice"]
+    assert choice["tolerance"] == 0.05
+    assert choice["holds"] is True
+    assert made.meta["options"]["visibility"] == choice["plan"]["visibility"]
+    assert choice["errors"]["l1"] <= 0.05
+
+
+def test_synth_refuses_what_cannot_be_held(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
+    out = tmp_path / "map.npz"
+    outcome = sd2("synth", plate, "--out", out, "--tolerance", "1e-12")
+    assert outcome.code == 1
+    assert "the best is" in outcome.err
+    assert not out.exists()
+
+
+def test_synth_takes_a_plan_or_its_rungs(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
+    out = tmp_path / "map.npz"
+    outcome = sd2("synth", plate, "--out", out, "--tolerance", "5%", "--visibility", "facing")
+    assert outcome.code == 1
+    assert "--visibility" in outcome.err

@@ -1,0 +1,138 @@
+"""Choosing: what holds, what is refused, and what is asked wrongly."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from ladder_scenes import ball, plate, steady, swinging, together
+
+from sd2core.doppler import PRESETS, Synthesizer
+from sd2core.errors import Sd2Error
+from sd2core.ladder.carry_out import synthesizer_for
+from sd2core.ladder.choose import choose
+from sd2core.ladder.deviation import relative_l1
+from sd2core.ladder.survey import survey_scene
+from sd2core.mesh import MeshSequence
+from sd2core.progress import Cancelled
+from sd2core.sensor import VirtualSensor
+
+CAMERA = VirtualSensor()
+PAPER = PRESETS["paper"]
+
+
+@pytest.fixture(scope="module")
+def scene() -> MeshSequence:
+    return together(ball(swinging((0, 0, 3), 1.5, 0.8)), plate((0.25, 0, 1), 0.5, 0.5))
+
+
+@pytest.mark.parametrize("tolerance", [0.3, 0.05, 0.01])
+def test_the_plan_holds_its_tolerance_on_the_whole_clip(
+    scene: MeshSequence, tolerance: float
+) -> None:
+    """Not only on the frames that were looked at: those stand for the others."""
+    choice = choose(scene, CAMERA, tolerance=tolerance)
+    assert choice.holds
+    found = synthesizer_for(choice.plan, scene, PAPER).map(CAMERA).values
+    best = replace(PAPER, oversampling=8, beyond="wrap")
+    truth = Synthesizer(scene, best).map(CAMERA).values
+    assert relative_l1(found.astype(float), truth.astype(float)) <= 1.25 * tolerance
+
+
+def test_less_accuracy_never_costs_more(scene: MeshSequence) -> None:
+    survey = survey_scene(scene, CAMERA, PAPER)
+    costs = [
+        choose(scene, CAMERA, tolerance=tolerance, survey=survey).cost_ms
+        for tolerance in (0.5, 0.1, 0.02)
+    ]
+    assert costs == sorted(costs)
+
+
+def test_a_larger_budget_never_costs_accuracy(scene: MeshSequence) -> None:
+    survey = survey_scene(scene, CAMERA, PAPER)
+    changes = [
+        survey.forecast_error(choose(scene, CAMERA, budget_ms=budget, survey=survey).plan)
+        for budget in (0.01, 0.1, 1.0, 100.0)
+    ]
+    assert changes == sorted(changes, reverse=True)
+
+
+def test_what_cannot_be_had_is_refused_with_the_best_there_is(scene: MeshSequence) -> None:
+    choice = choose(scene, CAMERA, tolerance=1e-9)
+    assert not choice.holds
+    assert choice.plan.visibility == "exact"
+    assert choice.plan.vertices_kept == 1
+    assert choice.summary.startswith("No plan holds 1e-07 %; the best is count")
+    soon = choose(scene, CAMERA, budget_ms=1e-9)
+    assert not soon.holds
+    assert "No plan keeps within 1e-09 ms" in soon.summary
+
+
+def test_a_point_cloud_has_a_plan() -> None:
+    full = ball(swinging((0, 0, 3), 1.5, 0.8))
+    cloud = MeshSequence(full.vertices, None, full.timebase, "cloud")
+    choice = choose(cloud, CAMERA, tolerance=0.05)
+    assert choice.holds
+    assert choice.plan.visibility == "none"
+    assert {reason.rung for reason in choice.reasons}.isdisjoint({"occlusion", "geometry"})
+
+
+def test_a_body_at_rest_needs_nothing() -> None:
+    choice = choose(ball(steady((0, 0, 3), (0, 0, 0))), CAMERA, tolerance=0.01)
+    assert choice.holds
+    assert choice.errors.l1 == 0
+    assert choice.plan.visibility == "none"
+
+
+@pytest.mark.parametrize("frames", [1, 2, 7, 39])
+def test_short_clips(frames: int) -> None:
+    choice = choose(ball(swinging((0, 0, 3), 1.5, 0.8), frames=frames), CAMERA, tolerance=0.1)
+    assert choice.errors.frames >= 1
+
+
+def test_a_choice_can_be_written_down(scene: MeshSequence) -> None:
+    choice = choose(scene, CAMERA, tolerance=0.1)
+    content = json.loads(json.dumps(choice.to_json()))
+    assert content["text"] == str(choice.plan)
+    assert content["plan"]["visibility"] == choice.plan.visibility
+
+
+@pytest.mark.parametrize(
+    "wanted",
+    [
+        {},
+        {"tolerance": 0.1, "budget_ms": 1.0},
+        {"tolerance": 0.0},
+        {"tolerance": -1.0},
+        {"tolerance": float("nan")},
+        {"budget_ms": 0.0},
+        {"budget_ms": float("inf")},
+    ],
+)
+def test_one_positive_wish(scene: MeshSequence, wanted: dict[str, float]) -> None:
+    with pytest.raises(Sd2Error):
+        choose(scene, CAMERA, **wanted)  # type: ignore[arg-type]
+
+
+def test_the_other_tool_has_no_rungs(scene: MeshSequence) -> None:
+    with pytest.raises(Sd2Error, match="vid2doppler"):
+        choose(scene, CAMERA, tolerance=0.1, options=PRESETS["vid2doppler"])
+
+
+def test_choosing_can_be_stopped(scene: MeshSequence) -> None:
+    def stop(done: int, total: int) -> None:
+        raise Cancelled
+
+    with pytest.raises(Cancelled):
+        choose(scene, CAMERA, tolerance=0.1, progress=stop)
+
+
+def test_nan_is_named() -> None:
+    mesh = ball(swinging((0, 0, 3), 1.5, 0.8))
+    vertices = mesh.read(0, mesh.frame_count).copy()
+    vertices[60, 7, 1] = np.nan
+    broken = replace(mesh, vertices=vertices)
+    with pytest.raises(Sd2Error, match="vertex 7 of frame 60"):
+        choose(broken, CAMERA, tolerance=0.1)
