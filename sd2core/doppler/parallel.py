@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from itertools import islice
@@ -24,6 +25,7 @@ class Ticket:
 
     def __init__(self, heard: Callable[[int], None] | None = None) -> None:
         self.finished = 0
+        self.processor_s = 0.0
         self._heard = heard
         self._stopped = threading.Event()
         self._lock = threading.Lock()
@@ -43,6 +45,15 @@ class Ticket:
         if self._heard is not None:
             self._heard(self.finished)
 
+    def run(self, job: Callable[[Ticket], None]) -> None:
+        """Do a piece of work in this thread, and keep count of its processor time."""
+        start_s = time.thread_time()
+        try:
+            job(self)
+        finally:
+            with self._lock:
+                self.processor_s += time.thread_time() - start_s
+
     def stop(self) -> None:
         """Make every piece of work stop at its next report."""
         self._stopped.set()
@@ -53,7 +64,7 @@ def run_jobs(
     total: int,
     progress: Progress,
     threads: int | None = None,
-) -> None:
+) -> float:
     """Run all jobs; return when they are done.
 
     ``progress`` is called in the calling thread, at least every 30 ms. When it
@@ -69,20 +80,26 @@ def run_jobs(
     threads : int, optional
         How many jobs may run at once; by default as many as there are cores. 1 runs
         them one after the other in the calling thread.
+
+    Returns
+    -------
+    float
+        Seconds of processor time that the jobs took, all threads together: what other
+        programs at work on this machine do not change.
     """
     progress(0, total)
     if threads == 1:
         # Each report is passed on, and may stop the job by raising.
         own = Ticket(lambda finished: progress(finished, total))
         for job in jobs:
-            job(own)
-        return
+            own.run(job)
+        return own.processor_s
     ticket, waiting = Ticket(), iter(jobs)
     running: set[Future[None]] = set()
 
     def start() -> None:
         free = len(jobs) if threads is None else threads - len(running)
-        running.update(workers().submit(job, ticket) for job in islice(waiting, free))
+        running.update(workers().submit(ticket.run, job) for job in islice(waiting, free))
 
     try:
         start()
@@ -98,3 +115,4 @@ def run_jobs(
             future.cancel()
         wait(running)
         raise
+    return ticket.processor_s

@@ -32,6 +32,7 @@ from sd2core.timebase import Timebase
 _MEMORY_BUDGET_BYTES = 512 << 20
 _FAST_FRAMES = 64
 _EXACT_FRAMES = 4
+_EXACT_JOB_FRAMES = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +53,8 @@ class Stretch:
     quality : {"none", "facing", "depth", "frozen", "exact"}
         The weakest visibility that was used: ``frozen`` falls back to facing
         where no depth or exact visibility is kept.
+    processor_s : float
+        Processor time that visibility and counting took, all threads together.
     """
 
     values: NDArray[np.float32]
@@ -59,6 +62,7 @@ class Stretch:
     visible_share: NDArray[np.float32]
     beyond_share: NDArray[np.float32]
     quality: Quality
+    processor_s: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,7 +244,7 @@ class Synthesizer:
             raise IndexError(f"frames {start} to {stop} of {self.mesh.frame_count}")
         options, times_s = self.options, self.mesh.times_s
         first, last = frames_within_reach(times_s, start, stop, options.time_sigma_s)
-        counts, totals, quality = self._count(
+        counts, totals, quality, processor_s = self._count(
             sensor, first, last, self._choose(visibility), progress
         )
 
@@ -257,6 +261,7 @@ class Synthesizer:
             (visible / self.mesh.represented_count).astype(np.float32),
             (beyond / np.maximum(visible, 1)).astype(np.float32),
             quality,
+            processor_s,
         )
 
     def frame(
@@ -333,18 +338,18 @@ class Synthesizer:
         stop: int,
         visibility: Visibility,
         progress: Progress,
-    ) -> tuple[Counts, NDArray[np.float64], Quality]:
-        """Counts per frame, what they are shares of, and the visibility that was used."""
+    ) -> tuple[Counts, NDArray[np.float64], Quality, float]:
+        """Counts per frame, what they are shares of, the visibility used, processor seconds."""
         if not kernels_ready():
             compile_in_background()
         counts = Counts.empty(stop - start, self.options.axis.bins)
         totals = np.full(stop - start, float(self.mesh.represented_count))
         qualities: set[Quality] = set()
+        quick = visibility not in ("depth", "exact") and kernels_ready()
 
         def job(index: int, low: int, high: int) -> Callable[[Ticket], None]:
             def work(ticket: Ticket) -> None:
-                small = visibility in ("depth", "exact") or not kernels_ready()
-                step = _EXACT_FRAMES if small else _FAST_FRAMES
+                step = _FAST_FRAMES if quick else _EXACT_FRAMES
                 ticket.advance(0)
                 block = self.prepared.block(index)
                 for first in range(low, high, step):
@@ -362,15 +367,16 @@ class Synthesizer:
         jobs = []
         for index, low, high in self._blocks_between(start, stop):
             # A block that must be read first is one job: its readers would wait.
-            pieces = -(-(high - low) // _FAST_FRAMES) if self.prepared.has(index) else 1
+            size = _FAST_FRAMES if quick else _EXACT_JOB_FRAMES
+            pieces = -(-(high - low) // size) if self.prepared.has(index) else 1
             cuts = np.linspace(low, high, pieces + 1).astype(int).tolist()
             jobs += [job(index, a, b) for a, b in pairwise(cuts)]
-        run_jobs(jobs, stop - start, progress, self._threads)
+        processor_s = run_jobs(jobs, stop - start, progress, self._threads)
         if visibility == "frozen":
             quality: Quality = "frozen" if qualities == {"frozen"} else "facing"
         else:
             quality = visibility
-        return counts, totals, quality
+        return counts, totals, quality, processor_s
 
     def _count_rows(
         self,
