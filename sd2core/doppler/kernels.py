@@ -158,10 +158,19 @@ def _projected(x, y, z, ax, ay, az, sx, sy, sz, weight):  # type: ignore[no-unty
 @compiled
 def _heads_beyond(f, seen, heads, bins):  # type: ignore[no-untyped-def]
     """How many vertices the seen ones beyond the axis stand for."""
-    end, total = np.float32(bins), 0.0
+    end, total = np.float32(bins), np.int32(0)
     for v in range(f.shape[0]):
-        if (seen[v] != 0) & ((f[v] < np.float32(0)) | (f[v] > end)):
-            total += heads[v]
+        outside = (seen[v] != 0) & ((f[v] < np.float32(0)) | (f[v] > end))
+        total += np.int32(heads[v]) if outside else np.int32(0)
+    return total
+
+
+@compiled
+def _heads_seen(seen, heads):  # type: ignore[no-untyped-def]
+    """How many vertices the seen ones stand for."""
+    total = np.int32(0)
+    for v in range(seen.shape[0]):
+        total += np.int32(heads[v]) if seen[v] != 0 else np.int32(0)
     return total
 
 
@@ -218,8 +227,8 @@ def count_kernel(  # type: ignore[no-untyped-def]
         known = _extend(positions, sensor, distance, known, after[t, samples - 1], ring)
         counts[:, : bins + 2] = 0
         sums[:, : bins + 2] = 0
-        seen_count, seen_heads = np.int64(0), 0.0
-        outside_count, outside_heads = np.int64(0), 0.0
+        seen_count = np.int64(0)
+        outside_count = np.int64(0)
         measured = 0
         for sample in range(samples):
             if scale[t, sample] > 0:
@@ -241,9 +250,7 @@ def count_kernel(  # type: ignore[no-untyped-def]
                 marks = mask[t]
                 sight = marks[v0:v1]
             if grouped:
-                for v in range(n):
-                    if sight[v] != 0:
-                        seen_heads += heads[v0 + v]
+                seen_count += _heads_seen(sight, heads[v0:v1])
             else:
                 for v in range(n):
                     seen_count += np.int64(sight[v])
@@ -274,8 +281,10 @@ def count_kernel(  # type: ignore[no-untyped-def]
                 b = ring[after[t, sample] % ring.shape[0]]
                 _axis_positions(a[v0:v1], b[v0:v1], scale[t, sample], offset, f[:n])
                 if grouped:
-                    outside_heads += _heads_beyond(f[:n], sight, heads[v0:v1], bins)
-                outside_count += _slots(f[:n], sight, bins, beyond, slot[:n])
+                    outside_count += _heads_beyond(f[:n], sight, heads[v0:v1], bins)
+                    _slots(f[:n], sight, bins, beyond, slot[:n])
+                else:
+                    outside_count += _slots(f[:n], sight, bins, beyond, slot[:n])
                 if weights:
                     _tally_weights(slot[:n], weight[:n], sums)
                 else:
@@ -285,8 +294,8 @@ def count_kernel(  # type: ignore[no-untyped-def]
             for table in range(_TABLES):
                 total += sums[table, bin_number] if weights else counts[table, bin_number]
             histogram[t, bin_number] = total / measured
-        visible[t] = seen_heads if grouped else seen_count
-        outside[t] = (outside_heads if grouped else outside_count) / measured
+        visible[t] = seen_count
+        outside[t] = outside_count / measured
 
 
 @compiled

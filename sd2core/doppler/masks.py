@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -16,7 +17,7 @@ from sd2core.doppler.prepared import Block, PreparedMesh, near_points
 from sd2core.scattering import depth_plain, exact_plain
 from sd2core.scattering.depth import depth_visibility_kernel
 from sd2core.scattering.exact import exact_visibility_kernel
-from sd2core.scattering.visibility import facing_kernel, facing_mask
+from sd2core.scattering.visibility import encloses, facing_kernel, facing_mask
 
 Visibility = Literal["none", "facing", "depth", "exact", "frozen"]
 """``frozen``: the last depth or exact visibility, kept while the sensor is dragged."""
@@ -67,6 +68,11 @@ class VisibilityMasks:
         self._stride = prepared.options.mask_stride
         # Newest first, per block.
         self._kept_at: dict[int, tuple[tuple[Occlusion, Position], ...]] = {}
+
+    @cached_property
+    def _closed(self) -> bool:
+        """Whether the mesh is a closed surface; found when a depth buffer first asks."""
+        return self._prepared.faces is not None and encloses(self._prepared.faces)
 
     def for_rows(
         self, block: Block, rows: slice, position_m: Position, visibility: Visibility
@@ -252,7 +258,7 @@ class VisibilityMasks:
                     exact_visibility_kernel(points, faces, place, needed, first, last, visible)
                 else:
                     depth_visibility_kernel(
-                        points, faces, place, pixels, needed, first, last, visible
+                        points, faces, self._closed, place, pixels, needed, first, last, visible
                     )
             return
         for t in np.flatnonzero(needed.any(axis=1)):
@@ -260,7 +266,9 @@ class VisibilityMasks:
             if occlusion == "exact":
                 seen = exact_plain.exact_visibility(points[t], faces, place, wanted)
             else:
-                seen = depth_plain.depth_visibility(points[t], faces, place, pixels, wanted)
+                seen = depth_plain.depth_visibility(
+                    points[t], faces, self._closed, place, pixels, wanted
+                )
             visible[t][wanted] = seen[wanted]
 
 

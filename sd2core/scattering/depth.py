@@ -1,9 +1,11 @@
 """Visibility by a depth buffer: the fast, approximate rung below exact.
 
 Each frame's triangles are drawn into a square picture of the depths that the
-sensor sees. A vertex counts when one of its triangles faces the sensor and it lies
-no deeper than the picture says at its place, within a bias. Faces must be oriented
-outwards, as for the facing test (see docs/decisions/0010).
+sensor sees. It decides for the vertices that lie clearly on or clearly behind the
+surface in it; a vertex beside a rim, or close beneath another surface, is decided
+by exact's own search, among the triangles there. A vertex counts only when one of
+its triangles faces the sensor, and of a closed surface only such triangles are
+drawn: faces must be oriented outwards (see docs/decisions/0010).
 
 Where one image plane does not serve (the body more than 63 degrees off the axis,
 or around the sensor), the frame is decided exactly.
@@ -15,16 +17,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.compiled import compiled
-from sd2core.scattering.exact import EDGE, WIDEST, axes_along, exact_visibility_kernel
+from sd2core.scattering.exact import (
+    CONTACT,
+    EDGE,
+    LANES,
+    MOST_CELLS,
+    WIDEST,
+    axes_along,
+    exact_visibility_kernel,
+    search_view,
+)
 
-BIAS_PIXELS = 0.7
-"""A vertex may lie this much deeper than the picture, in pixels at its own range.
+SMOOTH_PIXELS = 8.0
+"""Four neighbouring pixels whose depths differ by less than this, in pixels at the
+vertex's own range, show one surface; otherwise a rim may pass between them."""
 
-For a body of 1.8 m that is 1 cm at 128 pixels and 5 mm at 256. It grows and
-shrinks with the body; the sensor's distance does not change it."""
+ON_IT_PIXELS = 0.5
+"""A vertex that lies no deeper than this behind the surface lies on it.
 
-RIM_PIXELS = 3.0
-"""The same beside an empty pixel: there a round surface turns away within a pixel."""
+For a body of 1.8 m that is 7 mm at 128 pixels and 4 mm at 256. It grows and shrinks
+with the body; the sensor's distance does not change it."""
+
+BEHIND_PIXELS = 0.5
+"""A vertex deeper by this than all four pixels is hidden."""
 
 LOOSE = 2
 """Facing is unknown: no triangle with an area belongs to the vertex."""
@@ -43,11 +58,11 @@ def _project(positions, sensor, centre, axes, picture) -> float:  # type: ignore
     ``picture`` (4, V) receives right, up, the projective depth and the ratio of the
     distance of the body's centre to the vertex's own depth. The projective depth is
     the depth behind the centre times that ratio: linear over the image, free of
-    cancellation for far sensors. Returns the distance to the centre, or 0 when one
-    plane does not serve.
+    cancellation for far sensors. Returns the size of the body, or −1 when one plane
+    does not serve.
     """
     low, high = np.empty(3, np.float64), np.empty(3, np.float64)
-    distance = 0.0
+    distance = size = 0.0
     for axis in range(3):
         row = positions[axis]
         least = most = row[0]
@@ -56,9 +71,10 @@ def _project(positions, sensor, centre, axes, picture) -> float:  # type: ignore
         low[axis], high[axis] = least, most
         centre[axis] = 0.5 * (low[axis] + high[axis])
         distance += (centre[axis] - sensor[axis]) ** 2
+        size += (high[axis] - low[axis]) ** 2
     distance = np.sqrt(distance)
     if distance == 0:
-        return 0.0
+        return -1.0
     axes_along(
         (centre[0] - sensor[0]) / distance,
         (centre[1] - sensor[1]) / distance,
@@ -78,18 +94,21 @@ def _project(positions, sensor, centre, axes, picture) -> float:  # type: ignore
         scale = distance / (distance + behind)
         picture[0, v], picture[1, v] = right * scale, up * scale
         picture[2, v], picture[3, v] = behind * scale, scale
-    return distance if widest <= 0 and nearest > 0 else 0.0
+    return np.sqrt(size) if widest <= 0 and nearest > 0 else -1.0
 
 
 @compiled
-def _draw(picture, faces, depths, facing) -> None:  # type: ignore[no-untyped-def]
+def _draw(picture, faces, closed, depths, facing, drawn, bounds) -> int:  # type: ignore[no-untyped-def]
     """Draw the nearest depth into each pixel whose centre a triangle covers.
 
     ``picture`` (4, V) holds columns and rows in pixels, ``depths`` infinity where
     there is nothing. ``facing`` (V,) starts as :data:`LOOSE` and receives whether a
-    triangle of the vertex faces the sensor.
+    triangle of the vertex faces the sensor, ``drawn`` (F, 3) the triangles that can
+    hide something and ``bounds`` (F, 4) the columns and rows that each touches.
+    Returns how many.
     """
     x, y, depth = picture[0], picture[1], picture[2]
+    count = 0
     for f in range(faces.shape[0]):
         i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
         x0, x1, x2 = x[i], x[j], x[k]
@@ -99,13 +118,20 @@ def _draw(picture, faces, depths, facing) -> None:  # type: ignore[no-untyped-de
         area = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
         if abs(area) <= THINNEST * (right - left + bottom - top):
             continue
-        for v in (i, j, k):
-            # The view looks away from the sensor: what turns left outside turns right.
-            if area < 0:
-                facing[v] = 1
-            elif facing[v] == LOOSE:
-                facing[v] = 0
+        # The view looks away from the sensor: what turns left outside turns right.
+        if area < 0:
+            facing[i] = facing[j] = facing[k] = 1
+        else:
+            for v in (i, j, k):
+                if facing[v] == LOOSE:
+                    facing[v] = 0
+            if closed:
+                continue
+        drawn[count, 0], drawn[count, 1], drawn[count, 2] = i, j, k
         # Columns and rows are positive: truncating is rounding down.
+        bounds[count, 0], bounds[count, 1] = int(left), int(right)
+        bounds[count, 2], bounds[count, 3] = int(top), int(bottom)
+        count += 1
         c0, c1 = int(left + ALMOST_ONE), int(right)
         r0, r1 = int(top + ALMOST_ONE), int(bottom)
         if c0 > c1 or r0 > r1:
@@ -120,12 +146,77 @@ def _draw(picture, faces, depths, facing) -> None:  # type: ignore[no-untyped-de
                 if min(w0, w1, w2) >= -EDGE:
                     here = w0 * d0 + w1 * d1 + w2 * d2
                     depths[row, column] = min(depths[row, column], here)
+    return count
+
+
+@compiled
+def _look_up(  # type: ignore[no-untyped-def]
+    picture, depths, facing, pixel, needed, visible, doubtful, upto
+) -> int:
+    """Compare the needed vertices of one frame with the picture.
+
+    ``doubtful`` (V,) receives those that it cannot decide; they count as visible.
+    ``upto`` (resolution + 1, resolution + 1) receives how many of them lie above and
+    left of each pixel's corner. Returns how many there are.
+    """
+    count = 0
+    upto[:] = 0
+    for v in range(needed.shape[0]):
+        doubtful[v] = 0
+        if needed[v] == 0:
+            continue
+        if facing[v] == 0:
+            visible[v] = 0
+            continue
+        visible[v] = 1
+        column, row = int(picture[0, v]), int(picture[1, v])
+        a, b = depths[row, column], depths[row, column + 1]
+        c, d = depths[row + 1, column], depths[row + 1, column + 1]
+        nearest, farthest = min(min(a, b), min(c, d)), max(max(a, b), max(c, d))
+        depth, one = picture[2, v], pixel * picture[3, v]
+        if nearest < np.inf and depth <= nearest + ON_IT_PIXELS * one:
+            continue
+        if farthest < np.inf:
+            if depth > farthest + BEHIND_PIXELS * one:
+                visible[v] = 0
+                continue
+            if farthest - nearest <= SMOOTH_PIXELS * one:
+                u, w = picture[0, v] - column, picture[1, v] - row
+                surface = (1 - w) * ((1 - u) * a + u * b) + w * ((1 - u) * c + u * d)
+                if depth <= surface + ON_IT_PIXELS * one:
+                    continue
+        doubtful[v] = 1
+        upto[row + 1, column + 1] += 1
+        count += 1
+    for row in range(1, upto.shape[0]):
+        along = 0
+        for column in range(1, upto.shape[1]):
+            along += upto[row, column]
+            upto[row, column] = upto[row - 1, column] + along
+    return count
+
+
+@compiled
+def _beside_doubt(drawn, bounds, triangles, upto) -> int:  # type: ignore[no-untyped-def]
+    """Move the triangles that touch a pixel with a doubtful vertex to the front; how many."""
+    count = 0
+    for f in range(triangles):
+        left, right, top, bottom = bounds[f, 0], bounds[f, 1] + 1, bounds[f, 2], bounds[f, 3] + 1
+        if upto[bottom, right] - upto[bottom, left] > upto[top, right] - upto[top, left]:
+            drawn[count, 0], drawn[count, 1], drawn[count, 2] = (
+                drawn[f, 0],
+                drawn[f, 1],
+                drawn[f, 2],
+            )
+            count += 1
+    return count
 
 
 @compiled
 def depth_visibility_kernel(
     positions: NDArray[np.float32],  # (n, 3, V)
     faces: NDArray[np.int32],  # (F, 3)
+    closed: bool,  # they enclose a body, as :func:`.visibility.encloses` says
     sensor: NDArray[np.float64],  # (3,), in the frame of positions
     resolution: int,
     needed: NDArray[np.uint8],  # (n, V): which vertices to test
@@ -138,15 +229,30 @@ def depth_visibility_kernel(
     picture = np.empty((4, vertices), np.float64)
     depths = np.empty((resolution, resolution), np.float64)
     facing = np.empty(vertices, np.uint8)
+    drawn = np.empty(faces.shape, np.int32)
+    bounds = np.empty((faces.shape[0], 4), np.int32)
+    upto = np.empty((resolution + 1, resolution + 1), np.int32)
+    doubtful = np.empty(vertices, np.uint8)
     axes = np.empty((3, 3), np.float64)
     centre = np.empty(3, np.float64)
+    # Scratch of the search.
+    towards = np.empty((3, vertices), np.float64)
+    image = np.empty((2, vertices), np.float32)
+    depth = np.empty(vertices, np.float32)
+    cell = np.empty(vertices, np.int32)
+    start = np.empty(MOST_CELLS + 2, np.int32)
+    order = np.empty(vertices + LANES, np.int32)
+    sorted_image = np.empty((2, vertices + LANES), np.float32)
+    sorted_depth = np.empty(vertices + LANES, np.float32)
+    hidden = np.empty(vertices, np.uint8)
     for t in range(first, last):
         wanted = False
         for v in range(vertices):
             wanted |= needed[t, v] != 0
         if not wanted:
             continue
-        if _project(positions[t], sensor, centre, axes, picture) == 0:
+        size = _project(positions[t], sensor, centre, axes, picture)
+        if size < 0:
             exact_visibility_kernel(positions, faces, sensor, needed, t, t + 1, visible)
             continue
         x, y = picture[0], picture[1]
@@ -162,34 +268,23 @@ def depth_visibility_kernel(
             y[v] = (y[v] - ymin) * per_metre + 0.5
         depths[:] = np.inf
         facing[:] = LOOSE
-        _draw(picture, faces, depths, facing)
-        _look_up(picture, depths, facing, pixel, needed[t], visible[t])
-
-
-@compiled
-def _look_up(picture, depths, facing, pixel, needed, visible) -> None:  # type: ignore[no-untyped-def]
-    """Compare the needed vertices of one frame with the picture."""
-    for v in range(needed.shape[0]):
-        if needed[v] == 0:
+        triangles = _draw(picture, faces, closed, depths, facing, drawn, bounds)
+        count = _look_up(picture, depths, facing, pixel, needed[t], visible[t], doubtful, upto)
+        if count == 0:
             continue
-        if facing[v] == 0:
-            visible[v] = 0
-            continue
-        column, row = int(picture[0, v]), int(picture[1, v])
-        u, w = picture[0, v] - column, picture[1, v] - row
-        a, b = depths[row, column], depths[row, column + 1]
-        c, d = depths[row + 1, column], depths[row + 1, column + 1]
-        if max(max(a, b), max(c, d)) < np.inf:
-            limit = (1 - w) * ((1 - u) * a + u * b) + w * ((1 - u) * c + u * d)
-            bias = BIAS_PIXELS
-        else:
-            limit = -np.inf
-            for corner in (a, b, c, d):
-                if corner < np.inf:
-                    limit = max(limit, corner)
-            bias = RIM_PIXELS
-        near = limit == -np.inf or picture[2, v] <= limit + bias * pixel * picture[3, v]
-        visible[v] = 1 if near else 0
+        triangles = _beside_doubt(drawn, bounds, triangles, upto)
+        for v in range(vertices):
+            image[0, v], image[1, v], depth[v] = x[v], y[v], picture[2, v]
+            for axis in range(3):
+                towards[axis, v] = sensor[axis] - positions[t, axis, v]
+        search_view(
+            positions[t, 0], positions[t, 1], positions[t, 2], drawn[:triangles], towards, axes,
+            np.float32(-np.inf), CONTACT * size, doubtful, count, image, depth, cell, start,
+            order, sorted_image, sorted_depth, hidden,
+        )  # fmt: skip
+        for at in range(count):
+            if hidden[at]:
+                visible[t, order[at]] = 0
 
 
 def compile_kernels() -> None:
@@ -197,4 +292,4 @@ def compile_kernels() -> None:
     positions = np.array([[[0, 1, 0], [0, 0, 1], [2, 2, 2]]], np.float32)
     faces = np.array([[0, 1, 2]], np.int32)
     marks = np.ones((1, 3), np.uint8)
-    depth_visibility_kernel(positions, faces, np.zeros(3), 128, marks, 0, 1, marks.copy())
+    depth_visibility_kernel(positions, faces, False, np.zeros(3), 128, marks, 0, 1, marks.copy())

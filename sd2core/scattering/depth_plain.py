@@ -11,7 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.scattering.depth import ALMOST_ONE, BIAS_PIXELS, LOOSE, RIM_PIXELS, THINNEST
+from sd2core.scattering.depth import (
+    ALMOST_ONE,
+    BEHIND_PIXELS,
+    LOOSE,
+    ON_IT_PIXELS,
+    SMOOTH_PIXELS,
+    THINNEST,
+)
 from sd2core.scattering.exact import EDGE, WIDEST, axes_along
 from sd2core.scattering.exact_plain import exact_visibility
 
@@ -21,6 +28,7 @@ _PAIRS_AT_ONCE = 1 << 20
 def depth_visibility(
     points: NDArray[Any],
     faces: NDArray[np.int32],
+    closed: bool,
     sensor: NDArray[np.float64],
     resolution: int,
     needed: NDArray[np.bool_],
@@ -31,6 +39,8 @@ def depth_visibility(
     ----------
     points : float array, shape (3, V)
     faces : int32 array, shape (F, 3)
+    closed : bool
+        Whether they enclose a body, so that what faces away hides nothing more.
     sensor : float64 array, shape (3,)
     resolution : int
         Pixels along each side of the buffer.
@@ -61,25 +71,36 @@ def depth_visibility(
     pixel = float((high - low).max()) / (resolution - 2)
     image = (image - low[:, None]) * (1 / pixel if pixel > 0 else 0.0) + 0.5
     depth = behind * scale
-    depths, facing = _draw(image, depth, faces, resolution)
+    depths, facing, drawn = _draw(image, depth, faces, closed, resolution)
 
     column, row = image.astype(int)
     u, w = image - np.stack([column, row])
     around = np.stack([depths[row + r, column + c] for r in (0, 1) for c in (0, 1)])  # (4, V)
     inside = np.isfinite(around).all(axis=0)
+    nearest = around.min(axis=0)
+    around = np.where(inside, around, 0.0)
     weights = np.stack([(1 - w) * (1 - u), (1 - w) * u, w * (1 - u), w * u])
-    smooth = (weights * np.where(inside, around, 0.0)).sum(axis=0)
-    farthest = np.where(np.isfinite(around), around, -np.inf).max(axis=0)
-    limit = np.where(inside, smooth, np.where(np.isfinite(farthest), farthest, np.inf))
-    bias = np.where(inside, BIAS_PIXELS, RIM_PIXELS) * pixel * scale
-    seen: NDArray[np.bool_] = needed & (facing != 0) & (depth <= limit + bias)
+    one = pixel * scale
+    farthest = around.max(axis=0)
+    behind_all = inside & (depth > farthest + BEHIND_PIXELS * one)
+    smooth = inside & (farthest - nearest <= SMOOTH_PIXELS * one)
+    on_it = smooth & (depth <= (weights * around).sum(axis=0) + ON_IT_PIXELS * one)
+    on_it |= np.isfinite(nearest) & (depth <= nearest + ON_IT_PIXELS * one)
+    possible = needed & (facing != 0)
+    doubtful = possible & ~on_it & ~behind_all
+    seen: NDArray[np.bool_] = possible & on_it
+    seen |= exact_visibility(points, faces[drawn], sensor, doubtful)
     return seen
 
 
 def _draw(
-    image: NDArray[np.float64], depth: NDArray[np.float64], faces: NDArray[np.int32], size: int
-) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
-    """Nearest depth per pixel, and whether a triangle of each vertex faces the sensor."""
+    image: NDArray[np.float64],
+    depth: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    closed: bool,
+    size: int,
+) -> tuple[NDArray[np.float64], NDArray[np.uint8], NDArray[np.bool_]]:
+    """Nearest depth per pixel, which vertices face the sensor, which triangles can hide."""
     x, y = image[0][faces].T, image[1][faces].T  # (3, F) each
     low = np.stack([x.min(axis=0), y.min(axis=0)])
     high = np.stack([x.max(axis=0), y.max(axis=0)])
@@ -88,9 +109,10 @@ def _draw(
     facing = np.full(image.shape[1], LOOSE, np.uint8)
     facing[faces[solid]] = 0
     facing[faces[solid & (area < 0)]] = 1
+    drawn = solid & (area < 0) if closed else solid
 
     first, last = (low + ALMOST_ONE).astype(int), high.astype(int)
-    extent = np.maximum(last - first + 1, 0) * solid
+    extent = np.maximum(last - first + 1, 0) * drawn
     pixels = extent[0] * extent[1]
     depths = np.full(size * size, np.inf)
     parts = np.cumsum(pixels) // _PAIRS_AT_ONCE
@@ -109,4 +131,4 @@ def _draw(
         here = w0 * corner[0] + w1 * corner[1] + w2 * corner[2]
         covered = np.minimum(np.minimum(w0, w1), w2) >= -EDGE
         np.minimum.at(depths, (row * size + column)[covered], here[covered])
-    return depths.reshape(size, size), facing
+    return depths.reshape(size, size), facing, drawn

@@ -34,9 +34,16 @@ WIDEST = 2.0
 _ROUNDING = np.float32(1e-6)
 """Error of single-precision image coordinates, generously, relative to their size."""
 
-_CELLS_PER_ROOT = 3.0
-_MOST_CELLS = 384
-"""The image plane has about this many cells per vertex and axis, up to that many."""
+_COLUMNS_PER_ROOT, _ROWS_PER_ROOT = 4.0, 0.7
+_MOST_COLUMNS, _MOST_ROWS = 1024, 192
+"""Cells of the image plane, per square root of the number of vertices, up to that many.
+
+Beginning a row costs more than passing over a vertex: few rows, finely divided."""
+
+MOST_CELLS = _MOST_COLUMNS * _MOST_ROWS
+
+LANES = 8
+"""Vertices met at a time: as many as a vector register holds single-precision numbers."""
 
 
 @compiled
@@ -104,7 +111,31 @@ def _clipped_bounds(a: NDArray[Any], near: float, bounds: NDArray[Any]) -> bool:
 
 
 @compiled
-def _search_view(  # type: ignore[no-untyped-def]
+def _proposed(  # type: ignore[no-untyped-def]
+    sorted_x, sorted_y, sorted_depth, order, begin,
+    x0, y0, x1, y1, x2, y2, left, right, top, bottom, least, nearest, i, j, k,
+) -> np.int32:  # fmt: skip
+    """Which of the :data:`LANES` vertices from ``begin`` triangle (i, j, k) may hide, as bits.
+
+    Nearly every vertex fails some condition, and which one cannot be predicted:
+    without branches, the compiler judges all lanes at once.
+    """
+    found = np.int32(0)
+    first = np.uint64(begin)  # unsigned, so that no index is looked at for being negative
+    for lane in range(LANES):
+        at = first + np.uint64(lane)
+        px, py, v = sorted_x[at], sorted_y[at], order[at]
+        ax, ay, bx, by, cx, cy = x0 - px, y0 - py, x1 - px, y1 - py, x2 - px, y2 - py
+        wa, wb, wc = bx * cy - cx * by, cx * ay - ax * cy, ax * by - bx * ay
+        within = (px >= left) & (px <= right) & (py >= top) & (py <= bottom)
+        within &= (wa >= least) & (wb >= least) & (wc >= least)
+        within &= (sorted_depth[at] >= nearest) & (v != i) & (v != j) & (v != k)
+        found |= np.int32(within) << np.int32(lane)
+    return found
+
+
+@compiled
+def search_view(  # type: ignore[no-untyped-def]
     x, y, z, faces, g, axes, near, contact, owned, owned_count, image, depth, cell, start,
     order, sorted_image, sorted_depth, hidden,
 ) -> None:  # fmt: skip
@@ -113,7 +144,7 @@ def _search_view(  # type: ignore[no-untyped-def]
     ``g`` (3, V) float64 is sensor − vertex, ``axes`` (3, 3) the view's right, up
     and forward; ``image`` (2, V) and ``depth`` (V,) float32 hold each vertex's
     image coordinates and depth. In a view that looks in one direction only,
-    ``near`` cuts what lies behind.
+    ``near`` cuts what lies behind. What is sorted has room for :data:`LANES` more.
     """
     vertices = depth.shape[0]
     xmin = ymin = dmin = np.float32(np.inf)
@@ -124,7 +155,8 @@ def _search_view(  # type: ignore[no-untyped-def]
             ymin, ymax = min(ymin, image[1, v]), max(ymax, image[1, v])
             dmin, dmax = min(dmin, depth[v]), max(dmax, depth[v])
     # Each axis has its own cell size: a standing body is narrow and tall.
-    columns = rows = min(_MOST_CELLS, max(4, int(_CELLS_PER_ROOT * np.sqrt(owned_count))))
+    columns = min(_MOST_COLUMNS, max(4, int(_COLUMNS_PER_ROOT * np.sqrt(owned_count))))
+    rows = min(_MOST_ROWS, max(4, int(_ROWS_PER_ROOT * np.sqrt(owned_count))))
     wide, high = xmax - xmin, ymax - ymin
     xscale = np.float32(columns) / wide if wide > 0 else np.float32(0)
     yscale = np.float32(rows) / high if high > 0 else np.float32(0)
@@ -148,6 +180,7 @@ def _search_view(  # type: ignore[no-untyped-def]
             sorted_depth[at] = depth[v]
             hidden[at] = 0
     start[columns * rows + 1] = owned_count
+    sorted_depth[owned_count : owned_count + LANES] = -np.inf
 
     sorted_x, sorted_y = sorted_image[0], sorted_image[1]
     corners = np.empty((3, 3), np.float64)
@@ -193,24 +226,24 @@ def _search_view(  # type: ignore[no-untyped-def]
         r1 = min(int((min(bottom, ymax) - ymin) * yscale), rows - 1)
         if (x1 - x0) * (y2 - y0) < (x2 - x0) * (y1 - y0):
             x1, x2, y1, y2 = x2, x1, y2, y1
-        # Nearly everything fails some condition, and which one cannot be
-        # predicted: the least of all margins takes one branch instead of eight.
+        # A run's last lanes may be other cells' vertices: they are judged like any.
         for row in range(r0, r1 + 1):
-            for at in range(start[row * columns + c0 + 1], start[row * columns + c1 + 2]):
-                px, py = sorted_x[at], sorted_y[at]
-                ax, ay, bx, by, cx, cy = x0 - px, y0 - py, x1 - px, y1 - py, x2 - px, y2 - py
-                wa, wb, wc = bx * cy - cx * by, cx * ay - ax * cy, ax * by - bx * ay
-                within = min(min(px - left, right - px), min(py - top, bottom - py))
-                within = min(within, min(min(wa, wb), wc) - least)
-                # Zero for the triangle's own corners.
-                v = order[at]
-                own = np.float32(abs((v - i) * (v - j) * (v - k))) - np.float32(0.5)
-                if min(min(within, own), sorted_depth[at] - nearest) < 0:
+            first, last = start[row * columns + c0 + 1], start[row * columns + c1 + 2]
+            for begin in range(first, last, LANES):
+                found = _proposed(
+                    sorted_x, sorted_y, sorted_depth, order, begin,
+                    x0, y0, x1, y1, x2, y2, left, right, top, bottom, least, nearest, i, j, k,
+                )  # fmt: skip
+                if found == 0:
                     continue
-                if hides(x, y, z, i, j, k, v, g[0, v], g[1, v], g[2, v], contact):
-                    # Nothing more can be behind a triangle here.
-                    sorted_depth[at] = -np.inf
-                    hidden[at] = 1
+                for at in range(begin, begin + LANES):
+                    v = order[at]
+                    if found >> (at - begin) & 1 and hides(
+                        x, y, z, i, j, k, v, g[0, v], g[1, v], g[2, v], contact
+                    ):
+                        # Nothing more can be behind a triangle here.
+                        sorted_depth[at] = -np.inf
+                        hidden[at] = 1
 
 
 @compiled
@@ -230,10 +263,10 @@ def exact_visibility_kernel(
     depth = np.empty(vertices, np.float32)
     owned = np.empty(vertices, np.uint8)
     cell = np.empty(vertices, np.int32)
-    start = np.empty(_MOST_CELLS * _MOST_CELLS + 2, np.int32)
-    order = np.empty(vertices, np.int32)
-    sorted_image = np.empty((2, vertices), np.float32)
-    sorted_depth = np.empty(vertices, np.float32)
+    start = np.empty(MOST_CELLS + 2, np.int32)
+    order = np.empty(vertices + LANES, np.int32)
+    sorted_image = np.empty((2, vertices + LANES), np.float32)
+    sorted_depth = np.empty(vertices + LANES, np.float32)
     hidden = np.empty(vertices, np.uint8)
     axes = np.empty((3, 3), np.float64)
     for t in range(first, last):
@@ -276,7 +309,7 @@ def exact_visibility_kernel(
                 image[1, v] = up * distance / forward
                 depth[v] = forward - distance
         if narrow:
-            _search_view(
+            search_view(
                 x, y, z, faces, g, axes, np.float32(-np.inf), contact, needed[t], count, image,
                 depth, cell, start, order, sorted_image, sorted_depth, hidden,
             )  # fmt: skip
@@ -306,7 +339,7 @@ def exact_visibility_kernel(
                         mine += 1
             if mine == 0:
                 continue
-            _search_view(
+            search_view(
                 x, y, z, faces, g, axes, np.float32(contact), contact, owned, mine, image,
                 depth, cell, start, order, sorted_image, sorted_depth, hidden,
             )  # fmt: skip

@@ -101,6 +101,8 @@ def _search(
     slack = 1e-9
     ahead &= (bottom_right >= low - slack).all(axis=1) & (top_left <= high + slack).all(axis=1)
     chosen = np.flatnonzero(ahead)
+    if not len(chosen):
+        return
     first = np.clip(((top_left[chosen] - slack - low) / cell_size).astype(int), 0, None)
     last = ((bottom_right[chosen] + slack - low) / cell_size).astype(int)
     limit = np.array([columns, rows]) - 1

@@ -47,6 +47,25 @@ def vertex_normals(positions: NDArray[Any], faces: NDArray[np.int32]) -> NDArray
     return normals
 
 
+def encloses(faces: NDArray[np.int32]) -> bool:
+    """Whether faces are a closed surface, alike oriented all over.
+
+    Every edge then belongs to two triangles that run along it in opposite
+    directions, and what looks onto the body from outside meets a face that is
+    turned towards it before any that is turned away.
+
+    Parameters
+    ----------
+    faces : int32 array, shape (F, 3)
+    """
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
+    edges = edges[edges[:, 0] != edges[:, 1]]
+    vertices = int(edges.max(initial=0)) + 1
+    there = np.sort(edges[:, 0] * vertices + edges[:, 1])
+    back = np.sort(edges[:, 1] * vertices + edges[:, 0])
+    return bool((there == back).all() and (there[1:] != there[:-1]).all())
+
+
 @compiled
 def vertex_normals_kernel(
     positions: NDArray[np.float32],  # (n, 3, V)

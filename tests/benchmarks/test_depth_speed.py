@@ -71,7 +71,7 @@ def test_depth_visibility(
         start = time.perf_counter()
         if resolution:
             depth_visibility_kernel(
-                points, faces, place, resolution, needed, 0, len(points), visible
+                points, faces, True, place, resolution, needed, 0, len(points), visible
             )
         else:
             exact_visibility_kernel(points, faces, place, needed, 0, len(points), visible)

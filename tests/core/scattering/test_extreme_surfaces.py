@@ -26,6 +26,7 @@ from sd2core.scattering.depth_plain import depth_visibility
 from sd2core.scattering.exact import CONTACT, exact_visibility_kernel
 from sd2core.scattering.exact_plain import exact_visibility
 from sd2core.scattering.visibility import (
+    encloses,
     facing_kernel,
     facing_mask,
     vertex_normals,
@@ -55,14 +56,16 @@ def depth(
     points: NDArray[np.float32], faces: NDArray[np.int32], sensor: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
     visible = np.full((1, points.shape[2]), 7, np.uint8)
-    depth_visibility_kernel(points, faces, sensor, 256, np.ones_like(visible), 0, 1, visible)
+    needed, closed = np.ones_like(visible), encloses(faces)
+    depth_visibility_kernel(points, faces, closed, sensor, 256, needed, 0, 1, visible)
     return visible[0] == 1
 
 
 def depth_plainly(
     points: NDArray[np.float32], faces: NDArray[np.int32], sensor: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    return depth_visibility(points[0], faces, sensor, 256, np.ones(points.shape[2], bool))
+    needed = np.ones(points.shape[2], bool)
+    return depth_visibility(points[0], faces, encloses(faces), sensor, 256, needed)
 
 
 def facing(

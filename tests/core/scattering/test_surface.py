@@ -14,7 +14,12 @@ from sd2core.scattering.amplitude import (
     vertex_areas,
     vertex_areas_kernel,
 )
-from sd2core.scattering.visibility import facing_mask, vertex_normals, vertex_normals_kernel
+from sd2core.scattering.visibility import (
+    encloses,
+    facing_mask,
+    vertex_normals,
+    vertex_normals_kernel,
+)
 
 
 def test_normals_of_a_sphere_point_outwards() -> None:
@@ -128,3 +133,17 @@ def test_range_law() -> None:
     np.testing.assert_array_equal(range_weight(ranges, 0.0, 2.2), 1)
     nearest = (2.2 / NEAREST_RANGE_M) ** 4
     np.testing.assert_allclose(range_weight(np.array([0.0, 0.05]), 4.0, 2.2), nearest, rtol=1e-6)
+
+
+def test_what_encloses_a_body() -> None:
+    ball = sphere(1.0, 2)[1]
+    assert encloses(ball)
+    assert encloses(ball[:, ::-1])  # alike oriented, though inwards
+    assert encloses(together(sphere(0.5), sphere(1.0))[1])
+    assert encloses(np.concatenate([ball, [[3, 3, 4]]]).astype(np.int32))  # no area, no matter
+    assert not encloses(plate(1.0)[1])
+    assert not encloses(ball[1:])
+    assert not encloses(np.concatenate([ball, ball[:1]]))
+    turned = ball.copy()
+    turned[5] = turned[5, ::-1]
+    assert not encloses(turned)
