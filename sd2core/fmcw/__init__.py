@@ -5,10 +5,13 @@ from __future__ import annotations
 from sd2core.fmcw.chain import ProcessingOptions
 from sd2core.fmcw.options import Mirror, WaveOptions
 from sd2core.fmcw.processing import RangeDoppler, doppler_map, limits, range_doppler
+from sd2core.fmcw.reference import Converged, converged_frame, doppler_marginal
 from sd2core.fmcw.signal import Reflector, SignalOptions, capture_scene, simulate_capture
 from sd2core.fmcw.simulation import simulate_radar
+from sd2core.fmcw.spectra import frame_spectra, signal_spectra
 
 __all__ = [
+    "Converged",
     "Mirror",
     "ProcessingOptions",
     "RangeDoppler",
@@ -16,9 +19,13 @@ __all__ = [
     "SignalOptions",
     "WaveOptions",
     "capture_scene",
+    "converged_frame",
     "doppler_map",
+    "doppler_marginal",
+    "frame_spectra",
     "limits",
     "range_doppler",
+    "signal_spectra",
     "simulate_capture",
     "simulate_radar",
 ]

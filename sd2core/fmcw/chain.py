@@ -81,16 +81,15 @@ def taper(window: Window, length: int) -> NDArray[np.float32]:
     return np.sum(list(terms), axis=0).astype(np.float32)
 
 
-class Chain:
-    """Everything of one capture and one set of options that frames have in common.
+class FrameChain:
+    """What all frames of one radar and one set of options have in common.
 
     ``range_m`` (gates,) are the centres of the gates that count, ``doppler_bins``
     the length of the zero-padded Doppler FFT.
     """
 
-    def __init__(self, capture: RadarCapture, options: ProcessingOptions) -> None:
-        config = capture.config
-        self.capture = capture
+    def __init__(self, config: RadarConfig, options: ProcessingOptions) -> None:
+        self.config = config
         self.options = options
         self.doppler_bins = _ZERO_PADDING * config.chirps_per_frame
         self.gates = _gates(config, options)
@@ -107,6 +106,30 @@ class Chain:
         )
         self._fast = fast.astype(np.float32)
         self._slow = (slow * np.sqrt(norm)).astype(np.float32)[:, None]
+
+    def spectra(self, signal: NDArray[np.float32]) -> NDArray[np.complex64]:
+        """Spectra of frames (n, receivers, chirps, samples), (n, receivers, doppler, gates).
+
+        The signal, without clutter, is overwritten.
+        """
+        signal *= self._fast
+        profiles = scipy.fft.rfft(signal, axis=3)[..., self.gates] * self._slow
+        spectra: NDArray[np.complex64] = scipy.fft.fft(profiles, n=self.doppler_bins, axis=2)
+        return spectra
+
+    def power_over_doppler(self, signal: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Power of :meth:`spectra` summed over receivers and gates, (n, doppler)."""
+        parts = self.spectra(signal).view(np.float32)  # real, imaginary, real …
+        summed: NDArray[np.float32] = np.einsum("nrdk,nrdk->nd", parts, parts)
+        return summed
+
+
+class Chain(FrameChain):
+    """The frames of one capture."""
+
+    def __init__(self, capture: RadarCapture, options: ProcessingOptions) -> None:
+        super().__init__(capture.config, options)
+        self.capture = capture
         self._clipped = 0
         self._read = 0
 
@@ -141,35 +164,22 @@ class Chain:
 
     def doppler_power(self, start: int, stop: int) -> NDArray[np.float32]:
         """Power of frames [start, stop) summed over receivers and gates, (n, doppler)."""
-        parts = self._spectra(start, stop).view(np.float32)  # real, imaginary, real …
-        summed: NDArray[np.float32] = np.einsum("nrdk,nrdk->nd", parts, parts)
-        return summed
+        return self.power_over_doppler(self._without_clutter(start, stop))
 
     def cell_power(self, frame: int) -> NDArray[np.float32]:
         """Power of one frame summed over receivers, (doppler, gates)."""
-        spectra = self._spectra(frame, frame + 1)[0]
+        spectra = self.spectra(self._without_clutter(frame, frame + 1))[0]
         power: NDArray[np.float32] = (spectra.real**2 + spectra.imag**2).sum(axis=0)
         return power
-
-    def _spectra(self, start: int, stop: int) -> NDArray[np.complex64]:
-        """Spectra of frames [start, stop), (n, receivers, doppler, gates)."""
-        signal = self._without_clutter(start, stop)  # (n, receivers, chirps, samples)
-        signal *= self._fast
-        profiles = scipy.fft.rfft(signal, axis=3)[..., self.gates] * self._slow
-        spectra: NDArray[np.complex64] = scipy.fft.fft(profiles, n=self.doppler_bins, axis=2)
-        return spectra
 
     def _without_clutter(self, start: int, stop: int) -> NDArray[np.float32]:
         signal = self.capture.read(start, stop)
         top = 1.0 - 2.0 ** (1 - self.capture.config.adc_bits)
         self._clipped += int(np.count_nonzero((signal <= -1.0) | (signal >= top)))
         self._read += signal.size
+        if self.options.clutter != "moving":
+            return own_clutter_removed(signal, self.options.clutter)
         signal -= signal.mean(axis=3, keepdims=True)
-        if self.options.clutter == "none":
-            return signal
-        if self.options.clutter == "mean":
-            signal -= signal.mean(axis=2, keepdims=True)
-            return signal
         first = max(start - self._reach, 0)
         last = min(stop + self._reach, self.capture.frame_count)
         around = [self._mean_chirp(k, min(k + 64, last)) for k in range(first, last, 64)]
@@ -188,6 +198,16 @@ class Chain:
         signal -= signal.mean(axis=3, keepdims=True)
         mean: NDArray[np.float32] = signal.mean(axis=2)  # (n, rx, samples)
         return mean
+
+
+def own_clutter_removed(
+    signal: NDArray[np.float32], clutter: Literal["none", "mean"]
+) -> NDArray[np.float32]:
+    """Frames without the mean of every chirp and what else they tell of clutter, in place."""
+    signal -= signal.mean(axis=3, keepdims=True)
+    if clutter == "mean":
+        signal -= signal.mean(axis=2, keepdims=True)
+    return signal
 
 
 def _gates(config: RadarConfig, options: ProcessingOptions) -> slice:

@@ -9,59 +9,65 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.compiled import compiled
+from sd2core.fmcw.facet import facet_mean, unit_phasor
 
 Floats = NDArray[np.float64]
 
 # Must be plain numbers here: kernels read module constants when they are compiled.
 _NEAREST_M = 0.05
-_SERIES_BELOW_RAD = 1.0
-_SERIES_TERMS = 16
+_STEADY_BELOW_RAD = 0.1
+_TANGENT_BELOW_RAD = 0.5
+_NODE = 0.7
 
 
 @compiled
-def _sinc(x: float) -> Any:
-    """sin(x) / x."""
-    if abs(x) < 1e-4:
-        return 1.0 - x * x / 6.0
-    return math.sin(x) / x
+def _mean_at(phase: Floats, turn: Floats, weight: Floats, bend: Floats, time_s: float) -> Any:
+    return facet_mean(
+        phase[0] + time_s * turn[0],
+        phase[1] + time_s * turn[1],
+        phase[2] + time_s * turn[2],
+        weight[0],
+        weight[1],
+        weight[2],
+        turn[0],
+        turn[1],
+        turn[2],
+        bend[0],
+        bend[1],
+        bend[2],
+    )
 
 
 @compiled
-def triangle_phasor(p: float, q: float, r: float) -> Any:
-    """Mean of exp(j phase) over a triangle with these phases at its corners.
+def _turning(
+    phase: Floats,
+    turn: Floats,
+    weight: Floats,
+    bend: Floats,
+    half_s: float,
+    place: int,
+    amplitude: NDArray[np.complex128],
+) -> None:
+    """Echo of a facet whose corners recede at different rates, as a parabola in time.
 
-    Same formula as :func:`sd2core.fmcw.triangle.mean_phasor`.
+    How far the phases of its corners part decides between a constant, the tangent, and a
+    parabola through three moments; see docs/decisions/0011 for what that costs.
     """
-    low, high = min(p, q, r), max(p, q, r)
-    mid = p + q + r - low - high
-    middle = (p + q + r) / 3.0
-    low, mid, high = low - middle, mid - middle, high - middle
-    if high - low < _SERIES_BELOW_RAD:
-        second = low * mid + mid * high + high * low
-        third = low * mid * high
-        before, last, now = 0.0, 0.0, 1.0
-        real, imaginary, factor = 1.0, 0.0, 1.0
-        for order in range(1, _SERIES_TERMS):
-            factor /= order + 2
-            before, last, now = last, now, third * before - second * last
-            turn = order % 4
-            if turn == 0:
-                real += factor * now
-            elif turn == 1:
-                imaginary += factor * now
-            elif turn == 2:
-                real -= factor * now
-            else:
-                imaginary -= factor * now
-    else:
-        # 2j (first(low, mid) - first(mid, high)) / (high - low)
-        one, two = 0.5 * (low + mid), 0.5 * (mid + high)
-        a, b = _sinc(0.5 * (mid - low)), _sinc(0.5 * (high - mid))
-        scale = 2.0 / (high - low)
-        real = -scale * (a * math.sin(one) - b * math.sin(two))
-        imaginary = scale * (a * math.cos(one) - b * math.cos(two))
-    c, s = math.cos(middle), math.sin(middle)
-    return real * c - imaginary * s, real * s + imaginary * c
+    now, change = _mean_at(phase, turn, weight, bend, 0.0)
+    amplitude[0, place] = now
+    if amplitude.shape[0] == 1:
+        return
+    amplitude[1, place] = amplitude[2, place] = 0.0
+    parting = half_s * (max(turn[0], turn[1], turn[2]) - min(turn[0], turn[1], turn[2]))
+    if parting < _STEADY_BELOW_RAD:
+        return
+    if parting < _TANGENT_BELOW_RAD:
+        amplitude[1, place] = half_s * change
+        return
+    before, _ = _mean_at(phase, turn, weight, bend, -_NODE * half_s)
+    after, _ = _mean_at(phase, turn, weight, bend, _NODE * half_s)
+    amplitude[1, place] = (after - before) / (2.0 * _NODE)
+    amplitude[2, place] = (0.5 * (after + before) - now) / (_NODE * _NODE)
 
 
 @compiled
@@ -76,6 +82,7 @@ def facet_echoes(
     wave_number: float,
     pattern_exponent: float,
     coherent: bool,
+    half_s: float,
     index: NDArray[np.int32],
     range_m: Floats,
     rate_mps: Floats,
@@ -95,8 +102,13 @@ def facet_echoes(
         Facets with plane[:3] . p + plane[3] <= 0 are behind a mirror.
     wave_number : float
         4 pi / lambda: phase per metre of range.
-    index, range_m, rate_mps, amplitude : (F,)
-        Results: number of the facet, half the path and how fast it grows, echo.
+    half_s : float
+        Half the time that is looked at.
+    index, range_m, rate_mps : (F,)
+        Results: number of the facet, half the path and how fast it grows.
+    amplitude : (F,) per term
+        Result: echo as a polynomial in time over ``half_s``; one term, or three
+        for a facet that turns meanwhile.
 
     Returns
     -------
@@ -107,8 +119,9 @@ def facet_echoes(
     for k in range(3):
         same = same and transmitter[k] == receiver[k]
     found = 0
-    out = np.empty(9)
-    back = np.empty(9)
+    out, back, motion = np.empty(9), np.empty(9), np.empty(9)
+    corner_m, phase, turn = np.empty(3), np.empty(3), np.empty(3)
+    weight, bend = np.empty(3), np.empty(3)
     for f in range(faces.shape[0]):
         if not counts[f]:
             continue
@@ -143,50 +156,65 @@ def facet_echoes(
         there = math.sqrt(ox * ox + oy * oy + oz * oz)
         again = there if same else math.sqrt(tx * tx + ty * ty + tz * tz)
         near_there, near_again = max(there, _NEAREST_M), max(again, _NEAREST_M)
-        # Mean of the two cosines: cos(theta) when both antennas are in one place.
-        projected = 0.5 * (facing_out / near_there + facing_back / near_again)
-        if coherent:
-            strength = projected / (near_there * near_again)
-        else:
-            strength = math.sqrt(projected) * 2.0 * math.pi / wave_number
-            strength /= near_there * near_again
+        pattern = 1.0
         if pattern_exponent > 0.0:
             leaving = (ox * transmitter[3] + oy * transmitter[4] + oz * transmitter[5]) / near_there
             arriving = (tx * receiver[3] + ty * receiver[4] + tz * receiver[5]) / near_again
             if leaving <= 0.0 or arriving <= 0.0:
                 continue
-            strength *= (leaving * arriving) ** (0.5 * pattern_exponent)
+            pattern = (leaving * arriving) ** (0.5 * pattern_exponent)
         vx = vy = vz = 0.0
         for c in range(3):
             v = faces[f, c]
+            for k in range(3):
+                motion[3 * c + k] = velocity_mps[v, k]
             vx += velocity_mps[v, 0] / 3.0
             vy += velocity_mps[v, 1] / 3.0
             vz += velocity_mps[v, 2] / 3.0
         rate_there = (vx * ox + vy * oy + vz * oz) / max(there, 1e-9)
         rate_again = (vx * tx + vy * ty + vz * tz) / max(again, 1e-9)
         half = 0.5 * (there + again)
+        rate = 0.5 * (rate_there + rate_again)
         index[found] = f
         range_m[found] = half
-        rate_mps[found] = 0.5 * (rate_there + rate_again)
+        rate_mps[found] = rate
         if coherent:
-            p0 = math.sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2)
-            p1 = math.sqrt(out[3] ** 2 + out[4] ** 2 + out[5] ** 2)
-            p2 = math.sqrt(out[6] ** 2 + out[7] ** 2 + out[8] ** 2)
-            if not same:
-                p0 = 0.5 * (p0 + math.sqrt(back[0] ** 2 + back[1] ** 2 + back[2] ** 2))
-                p1 = 0.5 * (p1 + math.sqrt(back[3] ** 2 + back[4] ** 2 + back[5] ** 2))
-                p2 = 0.5 * (p2 + math.sqrt(back[6] ** 2 + back[7] ** 2 + back[8] ** 2))
-            p0, p1, p2 = (
-                wave_number * (p0 - half),
-                wave_number * (p1 - half),
-                wave_number * (p2 - half),
-            )
-            # Distance is convex: see facet_scatterers for where 3/4 comes from.
-            off = 0.25 * (p0 + p1 + p2)
-            real, imaginary = triangle_phasor(p0 - off, p1 - off, p2 - off)
-            amplitude[found] = complex(strength * real, strength * imaginary)
+            for c in range(3):
+                k = 3 * c
+                x, y, z = out[k], out[k + 1], out[k + 2]
+                far = math.sqrt(x * x + y * y + z * z)
+                recede = x * motion[k] + y * motion[k + 1] + z * motion[k + 2]
+                recede /= max(far, 1e-9)
+                near = max(far, _NEAREST_M)
+                if same:
+                    corner_m[c] = far
+                    phase[c] = wave_number * (far - half)
+                    turn[c] = wave_number * (recede - rate)
+                    weight[c] = pattern * facing_out / (near * near * near)
+                    continue
+                x, y, z = back[k], back[k + 1], back[k + 2]
+                far_back = math.sqrt(x * x + y * y + z * z)
+                recede_back = x * motion[k] + y * motion[k + 1] + z * motion[k + 2]
+                recede_back /= max(far_back, 1e-9)
+                near_back = max(far_back, _NEAREST_M)
+                corner_m[c] = 0.5 * (far + far_back)
+                phase[c] = wave_number * (corner_m[c] - half)
+                turn[c] = wave_number * (0.5 * (recede + recede_back) - rate)
+                # Mean of the two cosines: cos(theta) when both antennas are in one place.
+                weight[c] = 0.5 * pattern / (near * near_back)
+                weight[c] *= facing_out / near + facing_back / near_back
+            for c in range(3):
+                k, n = 3 * c, 3 * ((c + 1) % 3)
+                edge = 0.0
+                for i in range(3):
+                    edge += (out[n + i] - out[k + i]) ** 2
+                radial = corner_m[(c + 1) % 3] - corner_m[c]
+                bend[c] = wave_number * 0.5 * (edge - radial * radial) / max(half, 1e-9)
+            _turning(phase, turn, weight, bend, half_s, found, amplitude)
         else:
-            amplitude[found] = complex(strength, 0.0)
+            projected = 0.5 * (facing_out / near_there + facing_back / near_again)
+            strength = pattern * math.sqrt(projected) * 2.0 * math.pi / wave_number
+            amplitude[0, found] = complex(strength / (near_there * near_again), 0.0)
         found += 1
     return found
 
@@ -202,17 +230,23 @@ def direct_sum(
     stop: int,
     first_chirp: float,
     first_sample: float,
+    half_chirps: float,
     total: NDArray[np.complex128],
 ) -> None:
     """Add scatterers [start, stop) to ``total`` (chirps, samples), every phase on its own.
 
     Turns at chirp m and sample n, both counted from the frame's middle, are
-    start + m chirp + n sample + m n migration.
+    start + m chirp + n sample + m n migration; the amplitude (terms, k) is a
+    polynomial in m over ``half_chirps``.
     """
+    terms = amplitude.shape[0]
     for k in range(start, stop):
-        real, imaginary = amplitude[k].real, amplitude[k].imag
         for m in range(total.shape[0]):
             place = first_chirp + m
+            strength = amplitude[terms - 1, k]
+            for term in range(terms - 2, -1, -1):
+                strength = strength * (place / half_chirps) + amplitude[term, k]
+            real, imaginary = strength.real, strength.imag
             base = start_turns[k] + place * chirp_turns[k]
             base -= math.floor(base)
             step = sample_turns[k] + place * migration_turns[k]
@@ -222,10 +256,56 @@ def direct_sum(
                 total[m, n] += complex(real * c - imaginary * s, real * s + imaginary * c)
 
 
+@compiled
+def recurrent_sum(
+    start_turns: Floats,
+    chirp_turns: Floats,
+    sample_turns: Floats,
+    migration_turns: Floats,
+    amplitude: NDArray[np.complex128],
+    start: int,
+    stop: int,
+    first_chirp: float,
+    first_sample: float,
+    half_chirps: float,
+    real_total: Floats,
+    imaginary_total: Floats,
+) -> None:
+    """The sum of :func:`direct_sum` with one phasor per chirp, turned from sample to sample.
+
+    Totals are (samples, chirps) each; rounding grows with the number of samples, to some
+    1e-14 times it.
+    """
+    samples, chirps = real_total.shape
+    terms = amplitude.shape[0]
+    real, imaginary = np.empty(chirps), np.empty(chirps)
+    cosine, sine = np.empty(chirps), np.empty(chirps)
+    for k in range(start, stop):
+        for m in range(chirps):
+            place = first_chirp + m
+            strength = amplitude[terms - 1, k]
+            for term in range(terms - 2, -1, -1):
+                strength = strength * (place / half_chirps) + amplitude[term, k]
+            step = sample_turns[k] + place * migration_turns[k]
+            base = start_turns[k] + place * chirp_turns[k] + first_sample * step
+            angle = 2.0 * math.pi * (base - math.floor(base))
+            phasor = strength * unit_phasor(angle)
+            real[m], imaginary[m] = phasor.real, phasor.imag
+            phasor = unit_phasor(2.0 * math.pi * (step - math.floor(step)))
+            cosine[m], sine[m] = phasor.real, phasor.imag
+        for n in range(samples):
+            for m in range(chirps):
+                x, y = real[m], imaginary[m]
+                real_total[n, m] += x
+                imaginary_total[n, m] += y
+                real[m] = x * cosine[m] - y * sine[m]
+                imaginary[m] = x * sine[m] + y * cosine[m]
+
+
 def compile_kernels() -> None:
     """Call every kernel once with the types it is used with."""
     one = np.zeros(1)
-    echo = np.zeros(1, np.complex128)
+    echo = np.zeros((1, 1), np.complex128)
     corners = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 1.0], [1.0, 0.0, 1.0]])
     facet_echoes(
         corners,
@@ -238,9 +318,12 @@ def compile_kernels() -> None:
         1.0,
         1.0,
         True,
+        1.0,
         np.zeros(1, np.int32),
         one,
         one,
         echo,
     )
-    direct_sum(one, one, one, one, echo, 0, 1, 0.0, 0.0, np.zeros((1, 1), np.complex128))
+    direct_sum(one, one, one, one, echo, 0, 1, 0.0, 0.0, 1.0, np.zeros((1, 1), np.complex128))
+    square = np.zeros((1, 1))
+    recurrent_sum(one, one, one, one, echo, 0, 1, 0.0, 0.0, 1.0, square, square.copy())

@@ -76,8 +76,9 @@ class WaveOptions:
         Richards, *Fundamentals of Radar Signal Processing*); with one block per
         chirp nothing is left out.
     coherent : bool
-        True: a smooth surface. Physical optics with linear phase on every
-        facet: amplitude A cos(theta) / R^2 times the closed-form mean phasor.
+        True: a smooth surface. Physical optics on every facet: the closed-form
+        mean of cos(theta) / R^2 exp(j phase) over it, curvature of the wave front
+        to first order, followed through the frame as the facet turns.
         False: a rough one. Every facet has a random phase that stays with it,
         and the constant-gamma power gamma A cos(theta) / R^4 (Skolnik, *Radar
         Handbook*, ground echo), so that power does not depend on how finely the

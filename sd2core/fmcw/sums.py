@@ -10,17 +10,31 @@ product m n, the migration through range, it is a two-dimensional Fourier sum.
 from __future__ import annotations
 
 import itertools
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.fmcw.kernels import direct_sum
+from sd2core.fmcw.kernels import direct_sum, recurrent_sum
 from sd2core.sensor import SPEED_OF_LIGHT_MPS, RadarConfig
 
 NUFFT_TOLERANCE = 1e-9
 """Relative to the norm of the amplitudes; 1e-6 would save a tenth of the time."""
+
+_MOST_PLANS = 8
+
+
+class _Plans(threading.local):
+    """What finufft prepared for this thread: preparing takes a third as long as using."""
+
+    def __init__(self) -> None:
+        self.made: dict[tuple[tuple[int, int], int, float], Any] = {}
+
+
+_plans = _Plans()
 
 _TERMS_PER_STEP = 1_000_000
 """Some 30 ms, after which a direct sum asks whether it is still wanted."""
@@ -28,20 +42,32 @@ _TERMS_PER_STEP = 1_000_000
 
 @dataclass(frozen=True, eq=False)
 class Echoes:
-    """What comes back to one receiver, (n,) each.
+    """What comes back to one receiver.
 
     Parameters
     ----------
-    range_m : float64 array
+    range_m : float64 array, shape (n,)
         Half the path at the frame's middle.
-    rate_mps : float64 array
+    rate_mps : float64 array, shape (n,)
         How fast that grows.
-    amplitude : complex128 array
+    amplitude : complex128 array, shape (n,) or (terms, n)
+        Constant, or a polynomial in the time from the frame's middle over half
+        the radar's frame: constant, linear, quadratic.
     """
 
     range_m: NDArray[np.float64]
     rate_mps: NDArray[np.float64]
     amplitude: NDArray[np.complex128]
+
+    @property
+    def count(self) -> int:
+        """How many."""
+        return len(self.range_m)
+
+    @property
+    def terms(self) -> NDArray[np.complex128]:
+        """Amplitudes with their terms, (terms, n)."""
+        return np.atleast_2d(self.amplitude)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +98,7 @@ def direct(
     turns = _turns(echoes, config)
     shape = (chirps or config.chirps_per_frame, config.samples_per_chirp)
     total = np.zeros(shape, np.complex128)
-    count = len(echoes.amplitude)
+    count, amplitude = echoes.count, np.ascontiguousarray(echoes.terms)
     step = max(1, _TERMS_PER_STEP // total.size)
     for start in range(0, count, step):
         if go_on is not None:
@@ -82,14 +108,42 @@ def direct(
             turns.chirp,
             turns.sample,
             turns.migration,
-            echoes.amplitude,
+            amplitude,
             start,
             min(start + step, count),
             -0.5 * (shape[0] - 1),
             -0.5 * shape[1],
+            0.5 * config.chirps_per_frame,
             total,
         )
     return total
+
+
+def recurrent(
+    echoes: Echoes, config: RadarConfig, chirps: int | None = None
+) -> NDArray[np.complex128]:
+    """The direct sum with phasors turned from sample to sample, some ten times as fast.
+
+    Nothing is left out; rounding adds some 1e-14 times the samples of a chirp.
+    """
+    turns = _turns(echoes, config)
+    shape = (config.samples_per_chirp, chirps or config.chirps_per_frame)
+    real, imaginary = np.zeros(shape), np.zeros(shape)
+    recurrent_sum(
+        turns.start,
+        turns.chirp,
+        turns.sample,
+        turns.migration,
+        np.ascontiguousarray(echoes.terms),
+        0,
+        echoes.count,
+        -0.5 * (shape[1] - 1),
+        -0.5 * shape[0],
+        0.5 * config.chirps_per_frame,
+        real,
+        imaginary,
+    )
+    return (real + 1j * imaginary).T
 
 
 def nufft(
@@ -112,15 +166,17 @@ def nufft(
     tolerance : float
         Relative error of the sums.
     """
-    import finufft
-
     turns = _turns(echoes, config)
     chirps = chirps or config.chirps_per_frame
     samples = config.samples_per_chirp
     total = np.zeros((chirps, samples), np.complex128)
-    if not len(echoes.amplitude):
+    if not echoes.count:
         return total
     along_chirps = _angle(turns.chirp)
+    terms = echoes.terms
+    # Most facets turn too little within a frame to change.
+    changing = np.flatnonzero(terms[1:].any(axis=0))
+    times = (np.arange(chirps) - 0.5 * (chirps - 1)) / (0.5 * config.chirps_per_frame)
     edges = np.linspace(0, chirps, min(blocks, chirps) + 1).round().astype(int)
     for first, last in itertools.pairwise(edges):
         length = int(last - first)
@@ -130,16 +186,47 @@ def nufft(
         # -samples / 2.
         start = turns.start + (middle + length // 2 - 0.5 * (length - 1)) * turns.chirp
         start += (samples // 2 - 0.5 * samples) * sample
-        total[first:last] = finufft.nufft2d1(
-            along_chirps,
-            _angle(sample),
-            echoes.amplitude * np.exp(1j * _angle(start)),
-            (length, samples),
-            eps=tolerance,
-            isign=1,
-            nthreads=1,
+        along_samples, phasor = _angle(sample), np.exp(1j * _angle(start))
+        shape = (length, samples)
+        total[first:last] = _transform(
+            along_chirps, along_samples, terms[:1] * phasor, shape, tolerance
+        )[0]
+        if not len(changing):
+            continue
+        parts = _transform(
+            along_chirps[changing],
+            along_samples[changing],
+            terms[1:, changing] * phasor[changing],
+            shape,
+            tolerance,
         )
+        for power, part in enumerate(parts, start=1):
+            total[first:last] += times[first:last, None] ** power * part
     return total
+
+
+def _transform(
+    along_chirps: NDArray[np.float64],
+    along_samples: NDArray[np.float64],
+    strengths: NDArray[np.complex128],
+    shape: tuple[int, int],
+    tolerance: float,
+) -> NDArray[np.complex128]:
+    """Type-1 transforms of several strengths at the same points, (terms, chirps, samples)."""
+    import finufft
+
+    plans = _plans.made
+    key = (shape, len(strengths), tolerance)
+    if key not in plans:
+        if len(plans) >= _MOST_PLANS:
+            plans.clear()
+        plans[key] = finufft.Plan(
+            1, shape, n_trans=len(strengths), eps=tolerance, isign=1, nthreads=1
+        )
+    plan = plans[key]
+    plan.setpts(along_chirps, along_samples)
+    found: NDArray[np.complex128] = plan.execute(np.ascontiguousarray(strengths))
+    return found.reshape(len(strengths), *shape)
 
 
 def _turns(echoes: Echoes, config: RadarConfig) -> _Turns:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Literal
 
 import numpy as np
@@ -56,7 +56,6 @@ class WaveScene:
         faces = mesh.faces
         assert faces is not None  # MeshScene refuses a mesh without
         self.faces = faces
-        self._all = np.ones(len(faces), np.bool_)
         self._plane = self._oriented_plane(sensor)
         self._random: NDArray[np.complex128] | None = None
         if not self.wave.coherent:
@@ -67,17 +66,21 @@ class WaveScene:
     def frame(self, time_s: float, go_on: GoOn | None = None) -> NDArray[np.float64]:
         """Beat signal of the frame around a time, (receivers, chirps, samples)."""
         visible = self.scene.visible(time_s)
+        rows = [
+            self._signal(position, velocity, visible, chirps, go_on)
+            for (position, velocity), chirps in self.bursts(time_s)
+        ]
+        return rows[0] if len(rows) == 1 else np.concatenate(rows, axis=1)
+
+    def bursts(self, time_s: float) -> Iterator[tuple[tuple[NDArray[np.float64], ...], int]]:
+        """Vertices and their velocity, and for how many chirps of a frame these hold."""
         chirps = self.config.chirps_per_frame
         if self.wave.motion == "constant":
-            return self._signal(*self.scene.moving(time_s), visible, chirps, go_on)
+            yield self.scene.moving(time_s), chirps
+            return
         places = np.arange(chirps, dtype=np.float64) - 0.5 * (chirps - 1)
-        rows = [
-            self._signal(position, velocity, visible, 1, go_on)
-            for position, velocity in self.scene.between(
-                time_s + places * self.config.chirp_repetition_s
-            )
-        ]
-        return np.concatenate(rows, axis=1)
+        for moving in self.scene.between(time_s + places * self.config.chirp_repetition_s):
+            yield moving, 1
 
     def echoes(
         self,
@@ -85,10 +88,17 @@ class WaveScene:
         velocity_mps: NDArray[np.float64],
         visible: NDArray[np.bool_] | None,
         receiver: int = 0,
+        faces: NDArray[np.int32] | None = None,
     ) -> Echoes:
-        """What one receiver gets back from every facet on every path."""
+        """What one receiver gets back from every facet on every path.
+
+        Other ``faces`` than the mesh's own belong to other vertices, and are for a
+        smooth surface: the phases of a rough one belong to its facets.
+        """
+        assert faces is None or self._random is None
+        faces = self.faces if faces is None else faces
         parts = [
-            self._facets(position_m, velocity_mps, visible, out, back)
+            self._facets(position_m, velocity_mps, faces, visible, out, back)
             for out, back in self.paths[receiver]
         ]
         return parts[0] if len(parts) == 1 else _joined(parts)
@@ -127,31 +137,36 @@ class WaveScene:
         self,
         position_m: NDArray[np.float64],
         velocity_mps: NDArray[np.float64],
+        faces: NDArray[np.int32],
         visible: NDArray[np.bool_] | None,
         out: Antenna,
         back: Antenna,
     ) -> Echoes:
-        count = len(self.faces)
+        visible = np.ones(len(faces), np.bool_) if visible is None else visible
+        count = int(np.count_nonzero(visible))
         index = np.empty(count, np.int32)
         range_m, rate_mps = np.empty(count), np.empty(count)
-        amplitude = np.empty(count, np.complex128)
+        # Interpolated motion has every chirp's own corners.
+        turning = self.wave.coherent and self.wave.motion == "constant"
+        amplitude = np.empty((3 if turning else 1, count), np.complex128)
         found = facet_echoes(
             position_m,
             velocity_mps,
-            self.faces,
-            self._all if visible is None else visible,
+            faces,
+            visible,
             np.concatenate([out.position_m, out.boresight]),
             np.concatenate([back.position_m, back.boresight]),
             self._plane if out.image or back.image else _NO_PLANE,
             4.0 * np.pi / self.config.wavelength_m,
             self.wave.pattern_exponent,
             self.wave.coherent,
+            0.5 * self.config.chirps_per_frame * self.config.chirp_repetition_s,
             index,
             range_m,
             rate_mps,
             amplitude,
         )
-        strength = amplitude[:found] * (out.gain * back.gain)
+        strength = amplitude[:, :found] * (out.gain * back.gain)
         if self._random is not None:
             strength *= self._random[index[:found]]
         return Echoes(range_m[:found], rate_mps[:found], strength)
@@ -195,5 +210,5 @@ def _joined(parts: list[Echoes]) -> Echoes:
     return Echoes(
         np.concatenate([part.range_m for part in parts]),
         np.concatenate([part.rate_mps for part in parts]),
-        np.concatenate([part.amplitude for part in parts]),
+        np.concatenate([part.terms for part in parts], axis=1),
     )

@@ -1,0 +1,144 @@
+"""What the signal of a frame converges to when its facets are cut ever finer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.fmcw.chain import taper
+from sd2core.fmcw.sums import recurrent
+from sd2core.fmcw.wave import GoOn, WaveScene
+
+CONVERGED_L1 = 2e-3
+"""A tenth of the error that is looked for, 0.02."""
+
+_MOST_CUTS = 5
+_FACETS_PER_STEP = 20_000
+"""Some 40 ms, and memory that does not grow with the cutting."""
+
+
+@dataclass(frozen=True, eq=False)
+class Converged:
+    """A frame's signal on facets cut until nothing changes.
+
+    Parameters
+    ----------
+    signal : float64 array, shape (receivers, chirps, samples)
+        Of the finest cut.
+    pieces : tuple of int
+        Triangles per facet that were tried: 1, 4, 16 …
+    changes : tuple of float
+        L1 of the change of :func:`doppler_marginal` from one to the next of these.
+    tolerance : float
+        What the last change was to be below.
+    """
+
+    signal: NDArray[np.float64]
+    pieces: tuple[int, ...]
+    changes: tuple[float, ...]
+    tolerance: float
+
+    @property
+    def converged(self) -> bool:
+        """Whether the last change was below the tolerance."""
+        return not self.changes or self.changes[-1] <= self.tolerance
+
+
+def converged_frame(
+    scene: WaveScene,
+    time_s: float,
+    *,
+    tolerance: float = CONVERGED_L1,
+    most_cuts: int = _MOST_CUTS,
+    go_on: GoOn | None = None,
+) -> Converged:
+    """Direct complex128 sum over facets, all edges halved until the Doppler marginal stays.
+
+    Each piece has its own range, rate, amplitude and phase. What nothing hides
+    stays what it is for the whole facet, and a path is as long as the scene's
+    ``motion`` makes it, so that this is the limit of the same physics. A rough surface has
+    one random phase per facet and is summed as it is.
+
+    Parameters
+    ----------
+    scene : WaveScene
+    time_s : float
+        Middle of the frame.
+    tolerance : float
+        L1 between the last two marginals.
+    most_cuts : int
+        Halvings after which it stops, converged or not.
+    go_on : callable or None
+        Called every few ten milliseconds; may raise to stop.
+    """
+    signal = _cut(scene, time_s, 0, go_on)
+    pieces, changes = [1], list[float]()
+    while scene.wave.coherent and len(changes) < most_cuts:
+        finer = _cut(scene, time_s, len(pieces), go_on)
+        changes.append(float(np.abs(doppler_marginal(finer) - doppler_marginal(signal)).sum()))
+        pieces.append(4 * pieces[-1])
+        signal = finer
+        if changes[-1] <= tolerance:
+            break
+    return Converged(signal, tuple(pieces), tuple(changes), tolerance)
+
+
+def doppler_marginal(signal: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Share of a frame's power per Doppler bin, over all ranges and receivers.
+
+    Hann windows in both directions, no clutter filter.
+
+    Parameters
+    ----------
+    signal : float64 array, shape (receivers, chirps, samples)
+
+    Returns
+    -------
+    float64 array, shape (chirps,)
+        In FFT order; adds up to 1, or is 0 without any power.
+    """
+    _, chirps, samples = signal.shape
+    peak = np.abs(signal).max()
+    tapered = signal / (peak or 1.0) * taper("hann", chirps)[:, None] * taper("hann", samples)
+    power = np.abs(np.fft.fft(np.fft.rfft(tapered, axis=2), axis=1)) ** 2
+    share: NDArray[np.float64] = power.sum(axis=(0, 2))
+    return share / (share.sum() or 1.0)
+
+
+def subdivided(corners: NDArray[np.float64], cuts: int) -> NDArray[np.float64]:
+    """Triangles (n, 3 corners, 3) with all edges halved some times, (n 4^cuts, 3, 3)."""
+    for _ in range(cuts):
+        a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+        ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
+        parts = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
+        corners = np.concatenate([np.stack(part, axis=1) for part in parts])
+    return corners
+
+
+def _cut(scene: WaveScene, time_s: float, cuts: int, go_on: GoOn | None) -> NDArray[np.float64]:
+    """Beat signal with every facet in 4^cuts pieces, (receivers, chirps, samples)."""
+    visible = scene.scene.visible(time_s)
+    rows = []
+    for (position, velocity), chirps in scene.bursts(time_s):
+        shape = (len(scene.paths), chirps, scene.config.samples_per_chirp)
+        total = np.zeros(shape)
+        for receiver in range(shape[0]):
+            if not cuts:
+                echoes = scene.echoes(position, velocity, visible, receiver)
+                total[receiver] = recurrent(echoes, scene.config, chirps).real
+                continue
+            shown = scene.faces if visible is None else scene.faces[visible]
+            step = max(1, _FACETS_PER_STEP // 4**cuts)
+            for start in range(0, len(shown), step):
+                if go_on is not None:
+                    go_on()
+                some = shown[start : start + step]
+                corners = subdivided(position[some], cuts).reshape(-1, 3)
+                motion = subdivided(velocity[some], cuts).reshape(-1, 3)
+                loose = np.arange(len(corners), dtype=np.int32).reshape(-1, 3)
+                echoes = scene.echoes(corners, motion, None, receiver, loose)
+                total[receiver] += recurrent(echoes, scene.config, chirps).real
+        rows.append(total)
+    return np.concatenate(rows, axis=1)

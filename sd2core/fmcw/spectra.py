@@ -1,0 +1,103 @@
+"""Doppler columns of single frames, without simulating a whole clip."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sd2core.compiled import workers
+from sd2core.errors import Sd2Error
+from sd2core.fmcw.chain import FrameChain, ProcessingOptions, own_clutter_removed
+from sd2core.fmcw.options import WaveOptions
+from sd2core.fmcw.processing import rebinning
+from sd2core.fmcw.wave import WaveScene
+from sd2core.mesh import MeshSequence
+from sd2core.sensor import RadarConfig, VelocityAxis, VirtualSensor
+
+
+def frame_spectra(
+    mesh: MeshSequence,
+    config: RadarConfig,
+    times_s: ArrayLike,
+    *,
+    sensor: VirtualSensor | None = None,
+    visibility: NDArray[np.bool_] | Literal["facing"] = "facing",
+    wave: WaveOptions | None = None,
+    axis: VelocityAxis | None = None,
+    processing: ProcessingOptions | None = None,
+    seed: int = 0,
+    threads: Literal[1, "all"] = "all",
+) -> NDArray[np.float32]:
+    """Doppler columns of a moving mesh at some times.
+
+    The columns of :func:`~sd2core.fmcw.doppler_map` on
+    :func:`~sd2core.fmcw.simulate_radar`, up to one common gain, without noise, static
+    reflectors and rounding.
+
+    Parameters
+    ----------
+    mesh : MeshSequence
+        With faces.
+    config : RadarConfig
+    times_s : array_like, shape (n,)
+        Middles of the frames.
+    sensor : VirtualSensor
+        At the camera by default.
+    visibility : bool array, shape (T, F), or "facing"
+        Per mesh frame; only those nearest to the times are read.
+    wave : WaveOptions
+    axis : VelocityAxis or None
+        The 32 bins over ±2 m/s by default.
+    processing : ProcessingOptions
+        Clutter must be ``none`` or ``mean``: a moving average needs the frames between.
+    seed : int
+        Of the random phases of a rough surface.
+    threads : 1 or "all"
+        1 stays in the calling thread.
+
+    Returns
+    -------
+    float32 array, shape (bins, n)
+        Power; only ratios mean anything.
+    """
+    times = np.asarray(times_s, dtype=np.float64)
+    scene = WaveScene(mesh, config, sensor or VirtualSensor(), visibility, wave, seed)
+
+    def signal(time_s: float) -> NDArray[np.float64]:
+        return scene.frame(time_s)
+
+    found: Iterable[NDArray[np.float64]]
+    found = map(signal, times.tolist()) if threads == 1 else workers().map(signal, times.tolist())
+    return signal_spectra(np.stack(list(found)), config, axis=axis, processing=processing)
+
+
+def signal_spectra(
+    signal: NDArray[np.float64],
+    config: RadarConfig,
+    *,
+    axis: VelocityAxis | None = None,
+    processing: ProcessingOptions | None = None,
+) -> NDArray[np.float32]:
+    """Doppler columns of beat signals (n, receivers, chirps, samples), (bins, n).
+
+    Parameters are those of :func:`frame_spectra`; the signals may also come from
+    :func:`~sd2core.fmcw.reference.converged_frame`.
+    """
+    options = processing or ProcessingOptions()
+    if options.clutter == "moving":
+        raise Sd2Error(
+            "A moving average of the clutter is asked for single frames",
+            "clutter 'none' or 'mean', which a frame knows by itself",
+            "Simulate the whole clip with simulate_radar",
+        )
+    axis = axis or VelocityAxis()
+    chain = FrameChain(config, options)
+    # Brought to 1, or far echoes would be lost below the smallest float32.
+    scaled = (signal / (np.abs(signal).max() or 1.0)).astype(np.float32)
+    power = chain.power_over_doppler(own_clutter_removed(scaled, options.clutter))
+    weights = rebinning(config, axis, chain.doppler_bins).astype(np.float32)
+    columns: NDArray[np.float32] = weights @ power.T
+    return columns

@@ -1,0 +1,154 @@
+"""Converged frames, and Doppler columns of single frames."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sd2core.errors import Sd2Error
+from sd2core.fmcw import ProcessingOptions, SignalOptions, WaveOptions, doppler_map, simulate_radar
+from sd2core.fmcw.reference import converged_frame, doppler_marginal, subdivided
+from sd2core.fmcw.spectra import frame_spectra
+from sd2core.fmcw.sums import direct
+from sd2core.fmcw.wave import WaveScene
+from sd2core.mesh import MeshSequence
+from sd2core.progress import Cancelled
+from sd2core.sensor import PAPER_RADAR, VelocityAxis, VirtualSensor
+from sd2core.timebase import Timebase
+
+CAMERA = VirtualSensor()
+RADAR = replace(PAPER_RADAR, chirps_per_frame=16, samples_per_chirp=16, chirp_repetition_s=1.5e-3)
+
+
+def flapping(cells: int = 4, frames: int = 7) -> MeshSequence:
+    """A door of 0.2 m that swings about a vertical axis by 6 rad/s and comes nearer."""
+    grid = np.linspace(-0.1, 0.1, cells + 1)
+    x, y = (values.ravel() for values in np.meshgrid(grid, grid, indexing="ij"))
+    corner = np.arange((cells + 1) * cells).reshape(cells, cells + 1)[:, :-1].ravel()
+    a, b, c, d = corner, corner + 1, corner + cells + 1, corner + cells + 2
+    faces = np.concatenate([np.stack([a, b, c], 1), np.stack([b, d, c], 1)])
+    times_s = np.arange(frames) / 30.0
+    angle = 6.0 * (times_s - times_s[-1] / 2)[:, None]
+    places = np.stack(
+        [x * np.cos(angle), y + 0 * angle, 1.5 - 0.4 * times_s[:, None] + x * np.sin(angle)], axis=2
+    )
+    return MeshSequence(places, faces.astype(np.int32), Timebase(times_s), "door")
+
+
+def test_halved_edges_fill_the_triangle() -> None:
+    corners = np.random.default_rng(0).normal(size=(3, 3, 3))
+    pieces = subdivided(corners, 2)
+    assert pieces.shape == (48, 3, 3)
+
+    def normals(parts: np.ndarray) -> np.ndarray:
+        return np.cross(parts[:, 1] - parts[:, 0], parts[:, 2] - parts[:, 0])
+
+    # Every piece has a sixteenth of its facet's area and looks where it looks.
+    np.testing.assert_allclose(normals(pieces), np.tile(normals(corners) / 16, (16, 1)))
+    centre = pieces.mean(axis=1).reshape(16, 3, 3).mean(axis=0)
+    np.testing.assert_allclose(centre, corners.mean(axis=1), atol=1e-15)
+
+
+@pytest.mark.parametrize("motion", ["constant", "interpolated"])
+def test_large_facets_converge_to_what_small_ones_give(motion: str) -> None:
+    wave = WaveOptions(motion=motion)  # type: ignore[arg-type]
+    found = [
+        converged_frame(WaveScene(flapping(cells), RADAR, CAMERA, wave=wave), 0.1, tolerance=1e-3)
+        for cells in (4, 16)
+    ]
+    for one in found:
+        assert one.converged
+        assert one.changes[-1] <= 1e-3
+        assert one.pieces == tuple(4**k for k in range(len(one.changes) + 1))
+    assert found[0].changes[0] > 1e-3  # facets of 5 cm are too large
+    coarse, fine = (doppler_marginal(one.signal) for one in found)
+    # What is left after the last change is no larger than it, for either.
+    assert np.abs(coarse - fine).sum() <= 2e-3
+
+
+def test_what_does_not_converge_says_so() -> None:
+    scene = WaveScene(flapping(), RADAR, CAMERA)
+    one = converged_frame(scene, 0.1, tolerance=1e-9, most_cuts=1)
+    assert (one.pieces, one.converged) == ((1, 4), False)
+
+
+def test_a_rough_surface_is_summed_as_it_is() -> None:
+    scene = WaveScene(flapping(), RADAR, CAMERA, wave=WaveOptions(coherent=False), seed=3)
+    one = converged_frame(scene, 0.1)
+    assert (one.pieces, one.changes, one.converged) == ((1,), (), True)
+    position, velocity = scene.scene.moving(0.1)
+    expected = direct(scene.echoes(position, velocity, None), RADAR).real
+    np.testing.assert_allclose(one.signal[0], expected, atol=1e-12 * np.abs(expected).max())
+
+
+def test_hidden_facets_stay_hidden_and_a_reference_can_be_stopped() -> None:
+    mesh = flapping()
+    assert mesh.faces is not None
+    hidden = np.zeros((mesh.frame_count, len(mesh.faces)), np.bool_)
+    assert not converged_frame(WaveScene(mesh, RADAR, CAMERA, hidden), 0.1).signal.any()
+    half = hidden.copy()
+    half[:, ::2] = True
+    one = converged_frame(WaveScene(mesh, RADAR, CAMERA, half), 0.1)
+    some = MeshSequence(mesh.vertices, mesh.faces[::2], mesh.timebase)
+    other = converged_frame(WaveScene(some, RADAR, CAMERA), 0.1)
+    np.testing.assert_allclose(one.signal, other.signal, atol=1e-12 * np.abs(one.signal).max())
+
+    def stop() -> None:
+        raise Cancelled
+
+    with pytest.raises(Cancelled):
+        converged_frame(WaveScene(mesh, RADAR, CAMERA), 0.1, go_on=stop)
+
+
+@pytest.mark.parametrize(
+    ("wave", "processing", "receivers"),
+    [
+        (WaveOptions(), ProcessingOptions(), 1),
+        (WaveOptions(coherent=False), ProcessingOptions(clutter="mean"), 1),
+        (WaveOptions(blocks=2), ProcessingOptions(clutter="mean", range_m=(0.5, 3.0)), 2),
+    ],
+)
+def test_columns_of_single_frames_are_those_of_the_whole_map(
+    wave: WaveOptions, processing: ProcessingOptions, receivers: int
+) -> None:
+    mesh = flapping()
+    config = replace(RADAR, receivers=receivers, adc_bits=16)
+    axis = VelocityAxis(24, 1.5)
+    capture = simulate_radar(mesh, config, wave=wave, options=SignalOptions(snr_db=math.inf))
+    whole = doppler_map(
+        capture, axis=axis, clutter=processing.clutter, range_m=processing.range_m
+    ).values
+    some = [1, 4, 6]
+    for threads in (1, "all"):
+        columns = frame_spectra(
+            mesh,
+            config,
+            mesh.times_s[some],
+            wave=wave,
+            axis=axis,
+            processing=processing,
+            threads=threads,  # type: ignore[arg-type]
+        )
+        assert columns.shape == (24, 3)
+        expected = whole[:, some] / whole[:, some].sum()
+        # Rounding to 16 bits.
+        np.testing.assert_allclose(columns / columns.sum(), expected, atol=1e-4)
+
+
+def test_far_echoes_do_not_vanish() -> None:
+    mesh = flapping()
+    sensor = VirtualSensor((0.0, 0.0, -1e6))
+    config = replace(RADAR, end_frequency_hz=RADAR.start_frequency_hz + 1.0)
+    columns = frame_spectra(mesh, config, [0.1], sensor=sensor, processing=ProcessingOptions())
+    assert np.isfinite(columns).all()
+    assert columns.max() > 0
+
+
+def test_a_moving_average_needs_the_frames_between() -> None:
+    with pytest.raises(Sd2Error, match="moving average"):
+        frame_spectra(
+            flapping(), RADAR, [0.1], processing=ProcessingOptions(clutter="moving"), threads=1
+        )
