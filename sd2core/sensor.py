@@ -17,6 +17,9 @@ from sd2core.errors import Sd2Error
 
 SPEED_OF_LIGHT_MPS = 299_792_458.0
 
+FARTHEST_M = 1e9
+"""No sensor is farther from the camera: squares of ranges stay within single precision."""
+
 _LOWEST_HZ, _HIGHEST_HZ = 1e8, 1e12
 """No radar that sees a body works outside; figures outside are in MHz or GHz."""
 
@@ -90,10 +93,10 @@ class VirtualSensor:
 
     def __post_init__(self) -> None:
         position = tuple(float(value) for value in self.position_m)
-        if len(position) != 3 or not all(math.isfinite(value) for value in position):
+        if len(position) != 3 or not all(abs(value) <= FARTHEST_M for value in position):
             raise Sd2Error(
                 f"The sensor position is {self.position_m}",
-                "three finite numbers x, y, z in metres",
+                f"three finite numbers x, y, z in metres, up to {FARTHEST_M:g}",
             )
         object.__setattr__(self, "position_m", position)
         for name in ("azimuth_deg", "elevation_deg"):

@@ -104,11 +104,19 @@ class PreparedMesh:
     mesh : MeshSequence
     options : SynthesisOptions
     budget : ByteBudget
+
+    Attributes
+    ----------
+    origin_m : float64 array, shape (3,)
+        What positions are kept around.
+    reach_m : float
+        Largest coordinate in the first frame.
     """
 
     mesh: MeshSequence
     options: SynthesisOptions
     budget: ByteBudget
+    reach_m: float = field(init=False)
     origin_m: NDArray[np.float64] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -127,9 +135,10 @@ class PreparedMesh:
         # is enough (see _positions), so that large coordinates cost nothing. The origin
         # is a number that the mesh's own precision has. The compatible rule works on the
         # numbers as they come, so that its bin edges fall where that tool's do.
+        points = self.mesh.frame(0).astype(np.float64)
+        self.reach_m = float(np.abs(points).max())
         self.origin_m = np.zeros(3)
         if not self._compatible:
-            points = self.mesh.frame(0).astype(np.float64)
             middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
             finite = np.where(np.isfinite(middle), middle, 0.0)
             self.origin_m = finite.astype(self.mesh.vertices.dtype).astype(np.float64)
@@ -318,7 +327,7 @@ class PreparedMesh:
         measured = duration_s[duration_s > 0]
         if single_is_enough(
             extent_m=float(max(positions.max(), -positions.min())),
-            size_m=float(np.ptp(positions[0], axis=1).max()),
+            size_m=float((positions[0].max(axis=1) - positions[0].min(axis=1)).max()),
             duration_s=float(measured.min(initial=np.inf)),
             bin_width_mps=self.options.axis.bin_width_mps,
             range_exponent=STEEPEST_RANGE_LAW,
@@ -331,10 +340,12 @@ class PreparedMesh:
         """Knots less the clip's origin, (knots, 3, V)."""
         positions = np.empty((len(knots), 3, self.mesh.vertex_count), precision)
         origin = self.origin_m.astype(knots.dtype)
-        for axis in range(3):
-            np.subtract(
-                knots[:, :, axis], origin[axis], out=positions[:, axis], casting="same_kind"
-            )
+        # What single precision cannot even hold is infinite in it, and then not enough.
+        with np.errstate(over="ignore"):
+            for axis in range(3):
+                np.subtract(
+                    knots[:, :, axis], origin[axis], out=positions[:, axis], casting="same_kind"
+                )
         return positions
 
 

@@ -15,6 +15,7 @@ from sd2core.doppler import histogram, vid2doppler
 from sd2core.doppler.histogram import Counting, Counts
 from sd2core.doppler.kernels import CLIP, DROP, WRAP
 from sd2core.doppler.masks import Occlusion, Position, Quality, Visibility, VisibilityMasks
+from sd2core.doppler.notes import map_notes
 from sd2core.doppler.options import PRESETS, SynthesisOptions
 from sd2core.doppler.parallel import Ticket, run_jobs
 from sd2core.doppler.prepared import Block, ByteBudget, PreparedMesh
@@ -202,7 +203,8 @@ class Synthesizer:
         DopplerMap
             Of kind ``synthetic``. Its meta names sensor, options, source and
             version, the quality of the visibility, how many frames share a mask,
-            and per frame ``visible_share`` and ``beyond_share``.
+            per frame ``visible_share`` and ``beyond_share``, and in ``notes``
+            where single precision limits what the map says.
         """
         start, stop = frames or (0, self.mesh.frame_count)
         stretch = self.stretch(sensor, start, stop, visibility, progress)
@@ -224,6 +226,7 @@ class Synthesizer:
                 "version": __version__,
                 "visible_share": _rounded(stretch.visible_share),
                 "beyond_share": _rounded(stretch.beyond_share),
+                "notes": map_notes(self.prepared, sensor),
             },
         )
 

@@ -7,12 +7,15 @@ positions: a range is a distance, so it can be no better than the places it lies
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from extreme_tables import Scene, every_scene, exact_velocities
+from extreme_tables import PLACES, Scene, every_scene, exact_velocities
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from sd2core.compiled import warm_up
@@ -130,32 +133,82 @@ def plainly(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(synthesizer, "compile_in_background", lambda: None)
 
 
-@pytest.mark.parametrize("form", ["compiled", "plain"])
-@EVERY_SCENE
-def test_every_vertex_is_counted_in_its_bin(
-    scene: Scene, form: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    if form == "plain":
-        plainly(monkeypatch)
+def assert_scene_counted(scene: Scene) -> None:
+    """Every vertex of the scene's middle frame in its bin, off the axis as asked."""
     mesh = clip_of(scene)
     middle = FRAMES // 2
     before, after = (np.asarray(mesh.vertices)[middle + step].T for step in (-1, 1))
     sensor = VirtualSensor(tuple(scene.sensor_m.tolist()))
     velocity = exact_velocities(before, after, scene.sensor_m, scene.duration_s)
     around = np.full(3, scene.offset_m)[:, None]
+    extent_m = largest(before - around, after - around)
     # The axis that a user keeps, and one that the scene's own speeds spread over.
     for axis in (VelocityAxis(), VelocityAxis(32, 0.7 * scene.speed_mps)):
         # A hundredth of a bin is promised. Double precision, which is all there is,
-        # rounds ranges and the times of the frames (5 of them, to 1e-16 of the last).
+        # rounds ranges 2^29 times as finely, and the times of the frames: the last of
+        # four steps is good to an eighth of its own rounding.
         slack = SHARE_OF_A_BIN * axis.bin_width_mps
-        slack += (
-            velocity_error_mps(largest(before - around, after - around), scene.duration_s) / 2**29
-        )
+        slack += velocity_error_mps(extent_m, scene.duration_s) / 2**29
         slack += 8 * DOUBLE * scene.speed_mps
         for beyond in ("drop", "wrap", "clip"):
-            chosen = replace(RAW, axis=axis, beyond=beyond)
-            made = Synthesizer(mesh, chosen).map(sensor)
+            maker = Synthesizer(mesh, replace(RAW, axis=axis, beyond=beyond))
+            made = maker.map(sensor)
             assert np.isfinite(made.values).all()
             column = made.values[:, middle].astype(float) * POINTS
             np.testing.assert_allclose(column, np.rint(column), atol=1e-4)
             assert_counted(np.rint(column), velocity, axis, beyond, slack)
+        # What is shown for each vertex is rounded to single at the end.
+        shown = maker.frame(sensor, middle).velocity_mps
+        assert np.abs(shown - velocity).max() <= slack + 2.0**-23 * scene.speed_mps
+
+
+@EVERY_SCENE
+def test_every_vertex_is_counted_in_its_bin(scene: Scene) -> None:
+    assert_scene_counted(scene)
+
+
+@EVERY_SCENE
+def test_numpy_counts_every_vertex_in_its_bin(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plainly(monkeypatch)
+    assert_scene_counted(scene)
+
+
+def decades(low: float, high: float) -> st.SearchStrategy[float]:
+    """Numbers spread evenly over their logarithm."""
+    return st.floats(math.log10(low), math.log10(high)).map(lambda power: 10.0**power)
+
+
+@given(
+    st.builds(
+        Scene,
+        distance_m=decades(1e-3, 1e6),
+        place=st.sampled_from(PLACES),
+        speed_mps=decades(1e-9, 300.0),
+        rate_hz=decades(1.0, 1e4),
+        scale_m=decades(1e-3, 1e3),
+        offset_m=st.sampled_from([0.0, -12.5, 1e6]),
+    )
+)
+@settings(max_examples=60, derandomize=True)
+def test_any_scene_is_counted(scene: Scene) -> None:
+    assert_scene_counted(scene)
+
+
+@pytest.mark.parametrize(
+    ("changes", "precision"),
+    [
+        ({}, np.float32),
+        ({"rate_hz": 1e4}, np.float64),
+        ({"scale_m": 1e3}, np.float64),
+        ({"scale_m": 1e-3, "rate_hz": 1e4}, np.float32),
+        ({"offset_m": 1e6}, np.float32),
+        ({"distance_m": 1e6}, np.float32),
+        ({"speed_mps": 300.0}, np.float32),
+    ],
+    ids=str,
+)
+def test_double_precision_only_where_it_is_needed(changes: Any, precision: Any) -> None:
+    maker = Synthesizer(clip_of(Scene(**changes)), RAW)
+    assert maker.prepared.block(0).frames.positions.dtype == precision
