@@ -101,7 +101,8 @@ def load_mesh(
         timebase = Timebase(times_s)
     except Sd2Error as error:
         raise Sd2Error(f"{source}: {error.found}", error.expected, error.remedy) from error
-    return MeshSequence(raw.vertices, raw.faces, timebase, source, tuple(raw.notes))
+    notes = tuple(raw.notes)
+    return MeshSequence(raw.vertices, raw.faces, timebase, source, notes, raw.vertex_counts)
 
 
 def save_mesh(mesh: MeshSequence, path: Path | str, progress: Progress = silent) -> None:

@@ -21,6 +21,7 @@ VERTEX_NAMES = ("vertices", "verts")
 FACE_NAMES = ("faces", "triangles")
 TIME_NAMES = ("times_s", "times")
 RATE_NAMES = ("frames_per_s", "fps")
+COUNT_NAMES = ("vertex_counts",)
 
 _CHUNK_BYTES = 2 * 2**20
 _LARGEST_CHUNK_BYTES = 64 * 2**20
@@ -36,6 +37,7 @@ class RawMesh:
     times_s: NDArray[np.float64] | None = None
     frames_per_s: float | None = None
     notes: list[str] = field(default_factory=list)
+    vertex_counts: NDArray[np.int64] | None = None  # (V,), how many each stands for
     frame_numbers: NDArray[np.int64] | None = None  # (T,), of the video, when some are missing
 
 
@@ -132,7 +134,7 @@ def read_npz(path: Path) -> RawMesh:
     """Read ``vertices`` and, where present, ``faces``, ``times_s`` and ``fps``."""
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-            wanted = VERTEX_NAMES + FACE_NAMES + TIME_NAMES + RATE_NAMES
+            wanted = VERTEX_NAMES + FACE_NAMES + TIME_NAMES + RATE_NAMES + COUNT_NAMES
             arrays = {name: archive[name] for name in archive.files if name in wanted}
             names = list(archive.files)
     except PermissionError as error:
@@ -164,6 +166,7 @@ def named_arrays(arrays: dict[str, Any], names: list[str], source: str) -> RawMe
         faces=_first(arrays, FACE_NAMES),
         times_s=None if times is None else np.asarray(times, dtype=np.float64),
         frames_per_s=None if rate is None else float(np.asarray(rate).reshape(-1)[0]),
+        vertex_counts=_first(arrays, COUNT_NAMES),
     )
 
 
@@ -176,7 +179,7 @@ def read_zarr(path: Path) -> RawMesh:
         store = ZipStore(path, mode="r") if path.is_file() else str(path)
         group = zarr.open_group(store, mode="r")
         names = sorted(group.array_keys())
-        wanted = FACE_NAMES + TIME_NAMES + RATE_NAMES
+        wanted = FACE_NAMES + TIME_NAMES + RATE_NAMES + COUNT_NAMES
         arrays: dict[str, Any] = {name: group[name][...] for name in names if name in wanted}
         arrays.update({name: group[name] for name in names if name in VERTEX_NAMES})
     except (OSError, ValueError, KeyError, zipfile.BadZipFile, RuntimeError) as error:
@@ -215,6 +218,9 @@ def write_npz(mesh: MeshSequence, path: Path, progress: Progress = silent) -> No
                 np.lib.format.write_array(member, mesh.faces, allow_pickle=False)
         with archive.open(_member("times_s"), "w") as member:
             np.lib.format.write_array(member, mesh.times_s, allow_pickle=False)
+        if mesh.vertex_counts is not None:
+            with archive.open(_member("vertex_counts"), "w") as member:
+                np.lib.format.write_array(member, mesh.vertex_counts, allow_pickle=False)
     progress(mesh.frame_count, mesh.frame_count)
 
 
@@ -249,6 +255,8 @@ def write_zarr(mesh: MeshSequence, path: Path, progress: Progress = silent) -> N
         if mesh.faces is not None and len(mesh.faces):
             group.create_array("faces", data=np.ascontiguousarray(mesh.faces))
         group.create_array("times_s", data=np.array(mesh.times_s))
+        if mesh.vertex_counts is not None:
+            group.create_array("vertex_counts", data=mesh.vertex_counts)
         if zipped:
             with atomic_write(path) as stream:
                 _zip_folder(folder, stream)

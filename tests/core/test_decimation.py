@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from sd2core.decimation import decimate
 from sd2core.errors import Sd2Error
+from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.mesh import MeshSequence
 from sd2core.timebase import Timebase
 
@@ -138,6 +139,17 @@ def test_chunks_on_disk_are_read_a_stretch_at_a_time(tmp_path: Path) -> None:
 def area_of(mesh: MeshSequence) -> float:
     a, b, c = mesh.frame(0)[mesh.faces].transpose(1, 0, 2)
     return float(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+
+
+@pytest.mark.parametrize("name", ["small.npz", "small.zarr"])
+def test_it_is_saved_with_its_counts(tmp_path: Path, name: str) -> None:
+    small = decimate(moving(*ball(3)), 0.25)
+    save_mesh(small, tmp_path / name)
+    loaded = load_mesh(tmp_path / name)
+    assert loaded.represented_count == 642
+    np.testing.assert_array_equal(loaded.vertex_counts, small.vertex_counts)
+    np.testing.assert_array_equal(loaded.faces, small.faces)
+    np.testing.assert_array_equal(np.asarray(loaded.vertices[:]), np.asarray(small.vertices))
 
 
 def simplified(vertices: Any, faces: Any, kept: float = 0.5) -> MeshSequence:
