@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from sd2core.fmcw.chain import ProcessingOptions
-from sd2core.fmcw.options import Mirror, WaveOptions
+from sd2core.fmcw.options import Mirror, Reflector, SignalOptions, WaveOptions
 from sd2core.fmcw.processing import RangeDoppler, doppler_map, limits, range_doppler
 from sd2core.fmcw.reference import Converged, converged_frame, doppler_marginal
-from sd2core.fmcw.signal import Reflector, SignalOptions, capture_scene, simulate_capture
+from sd2core.fmcw.signal import capture_scene, simulate_capture
 from sd2core.fmcw.simulation import simulate_radar
 from sd2core.fmcw.spectra import frame_spectra, signal_spectra
 

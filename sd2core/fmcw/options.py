@@ -1,4 +1,4 @@
-"""What of the physics a simulated FMCW signal contains."""
+"""What of the physics a simulated FMCW signal contains, and what surrounds it."""
 
 from __future__ import annotations
 
@@ -130,6 +130,52 @@ class WaveOptions:
         if self.beam_width_deg is None:
             return 0.0
         return math.log(0.5) / math.log(math.cos(math.radians(0.5 * self.beam_width_deg)))
+
+
+@dataclass(frozen=True)
+class Reflector:
+    """A static point of the room.
+
+    Parameters
+    ----------
+    position_m : tuple of 3 floats
+        Camera frame.
+    area_m2 : float
+        Effective area: it echoes like a facet of this area seen square on.
+    """
+
+    position_m: Vector
+    area_m2: float
+
+
+@dataclass(frozen=True)
+class SignalOptions:
+    """What surrounds the moving scene, and the receiver.
+
+    Parameters
+    ----------
+    snr_db : float
+        Mean power of the moving scene's samples over the whole recording
+        against that of the thermal noise; ``inf`` for no noise.
+    reflectors : tuple of Reflector
+        Static clutter.
+    peak_share : float
+        Share of the converter's half range that the strongest sample without
+        noise reaches: this sets the gain.
+    seed : int
+        Same seed, same bits.
+    """
+
+    snr_db: float = 10.0
+    reflectors: tuple[Reflector, ...] = ()
+    peak_share: float = 0.5
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if not self.snr_db > -math.inf:
+            raise Sd2Error(f"snr_db is {self.snr_db}", "decibels, or inf for no noise")
+        if not 0 < self.peak_share <= 1:
+            raise Sd2Error(f"peak_share is {self.peak_share}", "a share above 0, up to 1")
 
 
 @dataclass(frozen=True, eq=False)

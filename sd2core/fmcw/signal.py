@@ -13,15 +13,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-import sd2core
-from sd2core.errors import Sd2Error
+from sd2core.fmcw.converter import check_converter, digitise, simulated_capture
+from sd2core.fmcw.options import SignalOptions
 from sd2core.fmcw.scene import MeshScene, Scatterers, point_scatterers
 from sd2core.io.radar.capture import RadarCapture
 from sd2core.mesh import MeshSequence
@@ -29,61 +27,11 @@ from sd2core.progress import Progress, silent
 from sd2core.sensor import (
     SPEED_OF_LIGHT_MPS,
     RadarConfig,
-    Vector,
     VirtualSensor,
 )
-from sd2core.timebase import Timebase
 
 _CHUNK = 4096
 """Scatterers per matrix product: their phasors stay in the cache."""
-
-_NOISE_WITHOUT_ECHO_COUNTS = 4.0
-
-
-@dataclass(frozen=True)
-class Reflector:
-    """A static point of the room.
-
-    Parameters
-    ----------
-    position_m : tuple of 3 floats
-        Camera frame.
-    area_m2 : float
-        Effective area: it echoes like a facet of this area seen square on.
-    """
-
-    position_m: Vector
-    area_m2: float
-
-
-@dataclass(frozen=True)
-class SignalOptions:
-    """What surrounds the moving scene, and the receiver.
-
-    Parameters
-    ----------
-    snr_db : float
-        Mean power of the moving scene's samples over the whole recording
-        against that of the thermal noise; ``inf`` for no noise.
-    reflectors : tuple of Reflector
-        Static clutter.
-    peak_share : float
-        Share of the converter's half range that the strongest sample without
-        noise reaches: this sets the gain.
-    seed : int
-        Same seed, same bits.
-    """
-
-    snr_db: float = 10.0
-    reflectors: tuple[Reflector, ...] = ()
-    peak_share: float = 0.5
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        if not self.snr_db > -math.inf:
-            raise Sd2Error(f"snr_db is {self.snr_db}", "decibels, or inf for no noise")
-        if not 0 < self.peak_share <= 1:
-            raise Sd2Error(f"peak_share is {self.peak_share}", "a share above 0, up to 1")
 
 
 def simulate_capture(
@@ -154,34 +102,18 @@ def capture_scene(
     sensor, options = sensor or VirtualSensor(), options or SignalOptions()
     check_converter(config)
     frames = len(times_s)
-    shape = (config.receivers, config.chirps_per_frame, config.samples_per_chirp)
-    signal = np.empty((frames, *shape))
+    shape = (frames, config.receivers, config.chirps_per_frame, config.samples_per_chirp)
+    signal = np.empty(shape)
     for frame, time_s in enumerate(times_s):
         progress(frame, frames)
         signal[frame] = echo(scatterers_at(float(time_s)), config, sensor)
     power = float(np.mean(signal**2))
     signal += _static(options, config, sensor)
-    samples, levels = digitise(signal, power, config, options)
+    samples = np.empty(shape, np.uint16)
+    levels = digitise(signal, float(np.abs(signal).max()), power, config, options, samples)
     progress(frames, frames)
-    return RadarCapture(
-        samples=samples,
-        config=config,
-        timebase=Timebase(np.asarray(times_s) - times_s[0]),
-        simulated=True,
-        source=f"simulated from {source or 'a scene'}",
-        meta={
-            "simulation": {
-                "model": "FMCW beat signal of facets",
-                # The name only: the folder says nothing on another machine.
-                "source": Path(source).name,
-                "sensor": asdict(sensor),
-                "options": asdict(options) | {"snr_db": finite_or_none(options.snr_db)},
-                "first_frame_s": float(times_s[0]),
-                "frame_time": "middle of the burst of chirps",
-                **levels,
-                "version": sd2core.__version__,
-            }
-        },
+    return simulated_capture(
+        samples, config, times_s, source, sensor=sensor, options=options, levels=levels
     )
 
 
@@ -262,42 +194,3 @@ def _static(
     positions = [reflector.position_m for reflector in options.reflectors]
     areas = [reflector.area_m2 for reflector in options.reflectors]
     return echo(point_scatterers(positions, (0.0, 0.0, 0.0), areas, sensor), config, sensor)
-
-
-def digitise(
-    signal: NDArray[np.float64], power: float, config: RadarConfig, options: SignalOptions
-) -> tuple[NDArray[np.uint16], dict[str, float]]:
-    """Gain, thermal noise and rounding to converter counts around mid-scale."""
-    middle = 2 ** (config.adc_bits - 1)
-    peak = float(np.abs(signal).max())
-    gain = options.peak_share * middle / peak if peak > 0 else 1.0
-    if math.isinf(options.snr_db) and options.snr_db > 0:
-        noise = 0.0
-    elif power > 0:
-        noise = gain * math.sqrt(power) * 10.0 ** (-options.snr_db / 20.0)
-    else:
-        noise = _NOISE_WITHOUT_ECHO_COUNTS
-    samples = np.empty(signal.shape, dtype=np.uint16)
-    clipped = 0
-    for frame, values in enumerate(signal):
-        random = np.random.default_rng([options.seed, frame])
-        counts = np.rint(middle + gain * values + noise * random.standard_normal(values.shape))
-        clipped += int(np.count_nonzero((counts < 0) | (counts > 2 * middle - 1)))
-        samples[frame] = np.clip(counts, 0, 2 * middle - 1)
-    return samples, {
-        # Rounded, so that the last bits of a machine's arithmetic are not in the file.
-        "counts_per_unit": float(f"{gain:.9g}"),
-        "noise_rms_counts": float(f"{noise:.9g}"),
-        "clipped_share": clipped / samples.size,
-    }
-
-
-def check_converter(config: RadarConfig) -> None:
-    """Refuse what does not fit into uint16."""
-    if config.adc_bits > 16:
-        raise Sd2Error(f"The converter has {config.adc_bits} bits", "16 or fewer")
-
-
-def finite_or_none(value: float) -> float | None:
-    """JSON has no infinity."""
-    return value if math.isfinite(value) else None

@@ -6,27 +6,27 @@ bytes must not change. Source of every formula: :class:`WaveOptions`.
 
 from __future__ import annotations
 
+import itertools
 import threading
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures import FIRST_COMPLETED, wait
 from dataclasses import asdict
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-import sd2core
-from sd2core.compiled import workers
-from sd2core.fmcw.options import WaveOptions
-from sd2core.fmcw.signal import SignalOptions, check_converter, digitise, finite_or_none
+from sd2core.compiled import worker_count, workers
+from sd2core.fmcw.converter import check_converter, digitise, simulated_capture, store
+from sd2core.fmcw.options import SignalOptions, WaveOptions
 from sd2core.fmcw.wave import WaveScene
 from sd2core.io.radar.capture import RadarCapture
 from sd2core.mesh import MeshSequence
 from sd2core.progress import Cancelled, Progress, silent
 from sd2core.sensor import RadarConfig, VirtualSensor
-from sd2core.timebase import Timebase
 
 _POLL_S = 0.03
+_QUEUED = 8
+"""Frames that wait for every thread."""
 
 
 def simulate_radar(
@@ -37,6 +37,7 @@ def simulate_radar(
     visibility: NDArray[np.bool_] | Literal["facing"] = "facing",
     wave: WaveOptions | None = None,
     options: SignalOptions | None = None,
+    memory_bytes: int = 500_000_000,
     progress: Progress = silent,
 ) -> RadarCapture:
     """Raw samples that a radar would record of a moving mesh.
@@ -55,6 +56,9 @@ def simulate_radar(
         Model of the sum, surface, motion, antennas, ground.
     options : SignalOptions
         Noise, static reflectors, converter, seed.
+    memory_bytes : int
+        A longer signal, and samples that are more, lie in temporary files, which
+        vanish with the result.
     progress : Progress
         Counts radar frames; called at least every 30 ms.
 
@@ -75,42 +79,45 @@ def simulate_radar(
     check_converter(config)
     scene = WaveScene(mesh, config, sensor, visibility, wave, options.seed)
     times_s = scene.scene.frame_times_s()
-    signal = _frames(scene, times_s, progress)
-    power = float(np.mean(np.square(signal)))
-    signal += scene.static(options.reflectors)
-    samples, levels = digitise(signal, power, config, options)
-    progress(len(times_s), len(times_s))
-    return RadarCapture(
-        samples=samples,
-        config=config,
-        timebase=Timebase(times_s - times_s[0]),
-        simulated=True,
-        source=f"simulated from {mesh.source or 'a mesh'}",
-        meta={
-            "simulation": {
-                "model": "FMCW beat signal of facets",
-                # The name only: the folder says nothing on another machine.
-                "source": Path(mesh.source).name,
-                "sensor": asdict(sensor),
-                "visibility": "facing" if isinstance(visibility, str) else "exact",
-                "wave": asdict(wave),
-                "options": asdict(options) | {"snr_db": finite_or_none(options.snr_db)},
-                "first_frame_s": float(times_s[0]),
-                "frame_time": "middle of the burst of chirps",
-                **levels,
-                "version": sd2core.__version__,
-            }
+    frames = len(times_s)
+    shape = (frames, config.receivers, config.chirps_per_frame, config.samples_per_chirp)
+    # The gain is known when the last frame is. Single precision rounds the strongest sample
+    # by a 2^9th of a count of 16 bits.
+    signal = store(shape, np.float32, memory_bytes)
+    power, peak = _fill(scene, times_s, scene.static(options.reflectors), signal, progress)
+    samples = store(shape, np.uint16, memory_bytes)
+    levels = digitise(
+        signal, peak, power, config, options, samples, lambda: progress(frames, frames)
+    )
+    progress(frames, frames)
+    return simulated_capture(
+        samples,
+        config,
+        times_s,
+        mesh.source,
+        sensor=sensor,
+        options=options,
+        levels=levels,
+        how={
+            "visibility": "facing" if isinstance(visibility, str) else "exact",
+            "wave": asdict(wave),
         },
     )
 
 
-def _frames(
-    scene: WaveScene, times_s: NDArray[np.float64], progress: Progress
-) -> NDArray[np.float64]:
-    """Beat signals of all frames, each on a thread of its own, (T, receivers, chirps, samples)."""
-    config, frames = scene.config, len(times_s)
-    shape = (config.receivers, config.chirps_per_frame, config.samples_per_chirp)
-    signal = np.empty((frames, *shape))
+def _fill(
+    scene: WaveScene,
+    times_s: NDArray[np.float64],
+    static: NDArray[np.float64],
+    signal: NDArray[np.float32],
+    progress: Progress,
+) -> tuple[float, float]:
+    """Beat signals of all frames, each on a thread of its own; mean square and peak.
+
+    The mean square is that without what stands still.
+    """
+    frames = len(times_s)
+    power, peak = np.empty(frames), np.empty(frames)
     stopped = threading.Event()
 
     def go_on() -> None:
@@ -119,21 +126,31 @@ def _frames(
 
     def fill(frame: int) -> None:
         go_on()
-        signal[frame] = scene.frame(float(times_s[frame]), go_on)
+        found = scene.frame(float(times_s[frame]), go_on)
+        power[frame] = np.mean(np.square(found))
+        found += static
+        peak[frame] = np.abs(found).max()
+        signal[frame] = found
 
     progress(0, frames)
-    pending: set[Future[None]] = {workers().submit(fill, frame) for frame in range(frames)}
-    running = set(pending)
+    waiting = iter(range(frames))
+    # No more than keep the threads busy: an hour of frames would be a lot of futures.
+    running = {
+        workers().submit(fill, k) for k in itertools.islice(waiting, _QUEUED * worker_count())
+    }
+    done = 0
     try:
         while running:
             ended, running = wait(running, _POLL_S, FIRST_COMPLETED)
             for future in ended:
                 future.result()
-            progress(frames - len(running), frames)
+            done += len(ended)
+            running |= {workers().submit(fill, k) for k in itertools.islice(waiting, len(ended))}
+            progress(done, frames)
     except BaseException:
         stopped.set()
-        for future in pending:
+        for future in running:
             future.cancel()
-        wait(pending)
+        wait(running)
         raise
-    return signal
+    return float(power.mean()), float(peak.max())

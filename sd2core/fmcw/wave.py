@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.kernels import facet_echoes
-from sd2core.fmcw.options import Antenna, WaveOptions, paths
+from sd2core.fmcw.options import Antenna, Reflector, WaveOptions, paths
 from sd2core.fmcw.scene import NEAREST_M, MeshScene
-from sd2core.fmcw.signal import Reflector
 from sd2core.fmcw.sums import Echoes, direct, nufft
 from sd2core.mesh import MeshSequence
 from sd2core.sensor import RadarConfig, VirtualSensor

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from sd2core.compiled import worker_count, workers
 from sd2core.errors import Sd2Error
-from sd2core.fmcw.signal import Reflector, SignalOptions, simulate_capture
+from sd2core.fmcw.options import Reflector, SignalOptions
+from sd2core.fmcw.signal import simulate_capture
 from sd2core.io.radar.infineon import write_capture
 from sd2core.mesh import MeshSequence
 from sd2core.progress import Progress, silent

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.facet import facet_mean
 from sd2core.fmcw.kernels import facet_echoes
+from sd2core.fmcw.options import SignalOptions
 from sd2core.fmcw.processing import doppler_map
 from sd2core.fmcw.reference import subdivided
-from sd2core.fmcw.signal import SignalOptions
 from sd2core.fmcw.simulation import simulate_radar
 from sd2core.fmcw.sums import NUFFT_TOLERANCE, Echoes, direct, nufft
 from sd2core.fmcw.triangle import mean_phasor
@@ -107,7 +107,8 @@ def test_range_rate_and_phase_of_an_echo(wavelength_m: float, range_m: float) ->
         edge_m = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).max()
         bend = 4 * np.pi / wavelength_m * edge_m**2 / (2 * range_m)
         # 1 / R^3 as a plane: its second derivative, 12, over an edge. The bend to first
-        # order here, and to none in a piece of a thousandth of it. Differences of ranges, in radians, and rounding of the normal.
+        # order here, and to none in a piece of a thousandth of it. Differences of ranges,
+        # in radians, and rounding of the normal.
         tolerance = 12 / 8 * (edge_m / range_m) ** 2 + 0.5 * bend**2 + 1e-3 * bend + FLAT
         tolerance += 32 * DOUBLE * (1 + 4 * np.pi * range_m / wavelength_m)
         assert abs(amplitude / expected - 1) <= tolerance
@@ -145,7 +146,7 @@ def echoes_of(
 
 
 def cut_echo(corners: NDArray[np.float64], wavelength_m: float) -> complex:
-    """Echo of a facet about its centre in 1024 pieces: A cos / R^2 and a linear phase on each."""
+    """Echo of a facet about its centre in 1024 pieces with a linear phase on each."""
     pieces = subdivided(corners[None], 5)
     normal = 0.5 * np.cross(corners[1] - corners[0], corners[2] - corners[0])
     middle_m = np.linalg.norm(corners.mean(axis=0))

@@ -13,15 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
+from sd2core.fmcw.options import Reflector, SignalOptions
 from sd2core.fmcw.processing import doppler_map, range_doppler
 from sd2core.fmcw.scene import MeshScene, Scatterers, facet_scatterers, point_scatterers
-from sd2core.fmcw.signal import (
-    Reflector,
-    SignalOptions,
-    capture_scene,
-    echo,
-    simulate_capture,
-)
+from sd2core.fmcw.signal import capture_scene, echo, simulate_capture
 from sd2core.fmcw.triangle import mean_phasor
 from sd2core.io.radar import load_capture, write_capture
 from sd2core.mesh import MeshSequence

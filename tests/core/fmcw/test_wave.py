@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import math
+import tracemalloc
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,11 +17,19 @@ from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.facet import facet_mean, unit_phasor
-from sd2core.fmcw.options import Antenna, Mirror, WaveOptions, paths, sensor_axes
+from sd2core.fmcw.options import (
+    Antenna,
+    Mirror,
+    Reflector,
+    SignalOptions,
+    WaveOptions,
+    paths,
+    sensor_axes,
+)
 from sd2core.fmcw.processing import doppler_map
 from sd2core.fmcw.reference import subdivided
 from sd2core.fmcw.scene import MeshScene, facet_scatterers
-from sd2core.fmcw.signal import Reflector, SignalOptions, echo
+from sd2core.fmcw.signal import echo
 from sd2core.fmcw.simulation import simulate_radar
 from sd2core.fmcw.sums import Echoes, direct, nufft, recurrent
 from sd2core.fmcw.triangle import mean_phasor
@@ -476,6 +485,29 @@ def test_same_seed_same_bits_whatever_the_threads() -> None:
     assert (first != other).any()
 
 
+def test_a_small_budget_of_memory_changes_nothing_but_the_memory() -> None:
+    # 300 frames of 16 kB in single precision and 8 kB of counts.
+    config = replace(PAPER_RADAR, receivers=2)
+    mesh = sheet(0.1, np.linspace([0, 0, 2.0], [0, 0, 2.5], 300))
+    peaks, captures = [], []
+    for budget in (100_000, 100_000_000):
+        tracemalloc.start()
+        captures.append(
+            simulate_radar(mesh, config, options=SignalOptions(20.0), memory_bytes=budget)
+        )
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    on_disk, in_memory = captures
+    np.testing.assert_array_equal(on_disk.samples, in_memory.samples)
+    assert on_disk.meta == in_memory.meta
+    assert isinstance(on_disk.samples, np.memmap)
+    whole = on_disk.samples.size * (4 + 2)
+    assert peaks[1] > whole
+    assert peaks[0] < 0.5 * whole
+    # Read like any other capture.
+    np.testing.assert_array_equal(on_disk.read(7, 9), in_memory.read(7, 9))
+
+
 @pytest.mark.parametrize("model", ["nufft", "direct"])
 def test_it_reports_and_stops_when_told(model: Any) -> None:
     mesh = sheet(0.2, np.linspace([0, 0, 2.0], [0, 0, 2.5], 9), cells=5)
@@ -492,6 +524,15 @@ def test_it_reports_and_stops_when_told(model: Any) -> None:
 
     with pytest.raises(Cancelled):
         simulate_radar(mesh, PAPER_RADAR, wave=wave, progress=stop)
+
+    def stop_late(done: int, total: int) -> None:
+        rounding.append(done)
+        if rounding.count(total) == 3:
+            raise Cancelled
+
+    rounding: list[int] = []
+    with pytest.raises(Cancelled):  # while samples are rounded
+        simulate_radar(mesh, PAPER_RADAR, wave=wave, progress=stop_late)
 
 
 def test_a_direct_sum_stops_in_the_middle_of_a_frame() -> None:

@@ -1,0 +1,132 @@
+"""From beat signals to a recording: gain, thermal noise, rounding, and how it was made."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+import sd2core
+from sd2core.errors import Sd2Error
+from sd2core.fmcw.options import SignalOptions
+from sd2core.io.radar.capture import RadarCapture
+from sd2core.sensor import RadarConfig, VirtualSensor
+from sd2core.timebase import Timebase
+
+_NOISE_WITHOUT_ECHO_COUNTS = 4.0
+
+
+def store(shape: tuple[int, ...], dtype: DTypeLike, memory_bytes: int) -> NDArray[Any]:
+    """Array in memory, or on disk when it is larger than this; it goes with its last user."""
+    if math.prod(shape) * np.dtype(dtype).itemsize <= memory_bytes:
+        return np.empty(shape, dtype)
+    with tempfile.TemporaryFile(prefix="sd2-radar-") as file:
+        return np.memmap(file, dtype, "w+", shape=shape)
+
+
+def digitise(
+    signal: NDArray[np.floating[Any]],
+    peak: float,
+    power: float,
+    config: RadarConfig,
+    options: SignalOptions,
+    samples: NDArray[np.uint16],
+    go_on: Callable[[], None] = lambda: None,
+) -> dict[str, float]:
+    """Gain, thermal noise and rounding to converter counts around mid-scale.
+
+    Parameters
+    ----------
+    signal : float array, shape (frames, receivers, chirps, samples)
+    peak : float
+        Largest magnitude in it.
+    power : float
+        Mean square of the moving scene's part.
+    config : RadarConfig
+    options : SignalOptions
+    samples : uint16 array
+        Result, of the same shape.
+    go_on : callable
+        Called once per frame; may raise to stop.
+
+    Returns
+    -------
+    dict
+        What the converter did, for provenance.
+    """
+    middle = 2 ** (config.adc_bits - 1)
+    gain = options.peak_share * middle / peak if peak > 0 else 1.0
+    if math.isinf(options.snr_db) and options.snr_db > 0:
+        noise = 0.0
+    elif power > 0:
+        noise = gain * math.sqrt(power) * 10.0 ** (-options.snr_db / 20.0)
+    else:
+        noise = _NOISE_WITHOUT_ECHO_COUNTS
+    clipped = 0
+    for frame, values in enumerate(signal):
+        go_on()
+        random = np.random.default_rng([options.seed, frame])
+        counts = np.rint(
+            middle + gain * values.astype(np.float64) + noise * random.standard_normal(values.shape)
+        )
+        clipped += int(np.count_nonzero((counts < 0) | (counts > 2 * middle - 1)))
+        samples[frame] = np.clip(counts, 0, 2 * middle - 1)
+    return {
+        # Rounded, so that the last bits of a machine's arithmetic are not in the file.
+        "counts_per_unit": float(f"{gain:.9g}"),
+        "noise_rms_counts": float(f"{noise:.9g}"),
+        "clipped_share": clipped / samples.size,
+    }
+
+
+def simulated_capture(
+    samples: NDArray[np.uint16],
+    config: RadarConfig,
+    times_s: NDArray[np.float64],
+    source: str,
+    *,
+    sensor: VirtualSensor,
+    options: SignalOptions,
+    levels: dict[str, float],
+    how: dict[str, Any] | None = None,
+) -> RadarCapture:
+    """The samples with what is needed to read them, and how they were computed.
+
+    ``times_s`` are the middles of the frames on the scene's clock, ``levels`` what
+    :func:`digitise` returned, ``how`` further entries about the simulation.
+    """
+    return RadarCapture(
+        samples=samples,
+        config=config,
+        timebase=Timebase(np.asarray(times_s) - times_s[0]),
+        simulated=True,
+        source=f"simulated from {source or 'a scene'}",
+        meta={
+            "simulation": {
+                "model": "FMCW beat signal of facets",
+                # The name only: the folder says nothing on another machine.
+                "source": Path(source).name,
+                "sensor": asdict(sensor),
+                **(how or {}),
+                # JSON has no infinity.
+                "options": asdict(options)
+                | {"snr_db": options.snr_db if math.isfinite(options.snr_db) else None},
+                "first_frame_s": float(times_s[0]),
+                "frame_time": "middle of the burst of chirps",
+                **levels,
+                "version": sd2core.__version__,
+            }
+        },
+    )
+
+
+def check_converter(config: RadarConfig) -> None:
+    """Refuse what does not fit into uint16."""
+    if config.adc_bits > 16:
+        raise Sd2Error(f"The converter has {config.adc_bits} bits", "16 or fewer")
