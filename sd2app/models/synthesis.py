@@ -34,7 +34,7 @@ _REST_MS = 300
 
 _WORDS = {
     RANK["facing"]: "preview: vertices facing the sensor",
-    RANK["frozen"]: "preview: visibility of the last exact placement",
+    RANK["frozen"]: "preview: visibility of the nearest exact placement",
 }
 _FINAL_WORDS = {
     "none": "all vertices of the point cloud",

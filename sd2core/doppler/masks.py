@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Hashable
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,7 +21,7 @@ from sd2core.scattering.exact import exact_visibility_kernel
 from sd2core.scattering.visibility import encloses, facing_kernel, facing_mask
 
 Visibility = Literal["none", "facing", "depth", "exact", "frozen"]
-"""``frozen``: the last depth or exact visibility, kept while the sensor is dragged."""
+"""``frozen``: depth or exact visibility of the nearest place that is kept, while dragging."""
 
 Quality = Literal["none", "facing", "depth", "exact", "frozen"]
 
@@ -89,7 +90,7 @@ class VisibilityMasks:
         if visibility == "exact" or visibility == "depth":
             return self._worked_out(block, rows, position_m, visibility), visibility
         if visibility == "frozen":
-            mask = self._frozen(block, rows)
+            mask = self._frozen(block, rows, position_m)
             return mask, "facing" if mask is None else "frozen"
         return None, visibility
 
@@ -150,13 +151,15 @@ class VisibilityMasks:
         last = (self._prepared.mesh.frame_count - 1) // every * every
         return np.minimum((np.asarray(frames) + every // 2) // every * every, last)
 
-    def _frozen(self, block: Block, rows: slice) -> NDArray[np.uint8] | None:
-        """The newest mask in which these rows are complete.
+    def _frozen(self, block: Block, rows: slice, position_m: Position) -> NDArray[np.uint8] | None:
+        """The mask in which these rows are complete that was made nearest to this place.
 
-        Not simply the newest: a drag that goes on cancels what its pause began.
+        Its error grows with the distance (docs/decisions/0010); of equally near ones
+        the newest. Not all are complete: a drag that goes on cancels what its pause began.
         """
-        for occlusion, position_m in self._kept_at.get(block.index, ()):
-            mask = self.kept(block.index, rows, position_m, occlusion)
+        kept = self._kept_at.get(block.index, ())
+        for occlusion, place in sorted(kept, key=lambda here: math.dist(here[1], position_m)):
+            mask = self.kept(block.index, rows, place, occlusion)
             if mask is not None:
                 return mask
         return None

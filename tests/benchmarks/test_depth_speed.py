@@ -1,6 +1,6 @@
-"""What the depth buffer and reused masks save, and what they cost in the map.
+"""What testing fewer vertices, the depth buffer and reused masks save, and cost in the map.
 
-Walk and sample, each from the camera, from beside, and after a small move. What a
+Walk and sample, each from the camera, from beside, and after moves. What a
 run measures is printed; errors are relative L1 of the whole map against exact.
 """
 
@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 
 from sd2core.compiled import warm_up
 from sd2core.doppler import PRESETS, Synthesizer
+from sd2core.doppler.masks import VisibilityMasks
+from sd2core.doppler.prepared import Block
 from sd2core.mesh import MeshSequence
 from sd2core.recording import open_recording
 from sd2core.resources import resource_path
@@ -91,6 +93,51 @@ def test_depth_visibility(
     assert coarse < fine < exact
 
 
+def everything(self: VisibilityMasks, block: Block, rows: slice, place: Any) -> NDArray[np.uint8]:
+    """In place of the choice of the vertices that can change the map."""
+    return np.ones((rows.stop - rows.start, self._prepared.mesh.vertex_count), np.uint8)
+
+
+@pytest.mark.benchmark(group="exact visibility, only vertices that matter")
+def test_only_what_matters(
+    benchmark: Any,
+    sample: MeshSequence,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The gesture clip's exact map for a new place of the sensor, everything included."""
+    maker = Synthesizer(sample, PAPER)
+    maker.prepare()
+    offsets = iter(np.arange(1, 10_000) * 1e-4)
+
+    def moved() -> VirtualSensor:
+        return VirtualSensor((next(offsets), 0.0, 0.0))
+
+    benchmark.pedantic(lambda: maker.map(moved()), rounds=5, warmup_rounds=1)
+    some_s, all_s = [], []
+    for _ in range(8):  # in turns, so that a busy machine slows both
+        place = moved()
+        start = time.perf_counter()
+        some = maker.map(place).values
+        some_s.append(time.perf_counter() - start)
+        whole = Synthesizer(sample, PAPER)
+        whole.prepare()
+        with monkeypatch.context() as patch:
+            patch.setattr(VisibilityMasks, "_needed", everything)
+            start = time.perf_counter()
+            values = whole.map(place).values
+            all_s.append(time.perf_counter() - start)
+        np.testing.assert_array_equal(some, values)
+    ratio = min(all_s) / min(some_s)
+    with capsys.disabled():
+        print(
+            f"\nsample, exact map: {1e3 * min(some_s) / sample.frame_count:.3f} ms a frame,"
+            f" with all vertices tested {1e3 * min(all_s) / sample.frame_count:.3f} ms"
+            f" = {ratio:.1f} times as long; the maps are identical"
+        )
+    assert ratio >= 3
+
+
 @pytest.mark.benchmark(group="masks, errors")
 def test_errors(
     benchmark: Any,
@@ -105,7 +152,7 @@ def test_errors(
     for name in ("walk", "sample"):
         for where in ("camera", "beside"):
             assert at[name, where, "depth 256"] < at[name, where, "depth 128"]
-    assert at["walk", "camera", "depth 256"] <= 0.03
+            assert at[name, where, "depth 256"] <= 0.03
 
 
 def measure(
@@ -124,11 +171,58 @@ def measure(
                 before, after = errors(mesh, place, **changes)
                 at[name, where, what] = before
                 lines.append(f"{name}, {where}, {what}: L1 {before:.4f}, smoothed {after:.4f}")
-            maker, truth = Synthesizer(mesh, ROUGH), Synthesizer(mesh, ROUGH)
-            maker.map(place)
-            x, y, z = place.position_m
-            moved = VirtualSensor((x + 0.1, y, z))
-            reused = error(maker.map(moved, visibility="frozen").values, truth.map(moved).values)
-            at[name, where, "moved"] = reused
-            lines.append(f"{name}, {where}, mask reused after 0.1 m: L1 {reused:.4f}")
     return at
+
+
+@pytest.mark.benchmark(group="masks reused after a move, errors")
+def test_moved(
+    benchmark: Any,
+    walk: MeshSequence,
+    sample: MeshSequence,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """How the error grows with the move, and what it would be if every vertex were tested.
+
+    The mean of moves to the right, down and forward.
+    """
+    lines: list[str] = []
+
+    def measured() -> dict[tuple[str, str, float], float]:
+        at: dict[tuple[str, str, float], float] = {}
+        for name, mesh in (("walk", walk), ("sample", sample)):
+            for where, place in (("camera", CAMERA), ("beside", BESIDE)):
+                kept, complete = Synthesizer(mesh, ROUGH), Synthesizer(mesh, ROUGH)
+                kept.map(place)
+                with monkeypatch.context() as patch:
+                    patch.setattr(VisibilityMasks, "_needed", everything)
+                    complete.map(place)
+                for move_m in (0.02, 0.05, 0.1, 0.3):
+                    found = []
+                    for axis in range(3):
+                        there = VirtualSensor(
+                            tuple(np.add(place.position_m, move_m * np.eye(3)[axis]).tolist())
+                        )
+                        truth = Synthesizer(mesh, ROUGH).map(there).values
+                        found.append(
+                            [
+                                error(maker.map(there, visibility="frozen").values, truth)
+                                for maker in (kept, complete)
+                            ]
+                        )
+                    reused, floor = np.mean(found, axis=0)
+                    at[name, where, move_m] = reused
+                    lines.append(
+                        f"{name}, {where}, mask reused after {move_m:g} m:"
+                        f" L1 {reused:.4f} (to the right {found[0][0]:.4f}, down"
+                        f" {found[1][0]:.4f}, forward {found[2][0]:.4f}), complete {floor:.4f}"
+                    )
+        return at
+
+    at = benchmark.pedantic(measured, rounds=1)
+    with capsys.disabled():
+        print("\n" + "\n".join(lines))
+    for name in ("walk", "sample"):
+        for where in ("camera", "beside"):
+            grows = [at[name, where, move_m] for move_m in (0.02, 0.05, 0.1, 0.3)]
+            assert grows == sorted(grows)

@@ -348,7 +348,7 @@ def test_a_drag_shows_a_preview_and_becomes_exact(window, qtbot):
     c.edits.end_sensor_drag()
     qtbot.waitUntil(lambda: c.synthesis.complete, timeout=10_000)
     assert c.synthetic.status == "exact visibility"
-    assert seen[0] == "preview: visibility of the last exact placement"
+    assert seen[0] == "preview: visibility of the nearest exact placement"
 
 
 def test_dragging_the_sensor_in_3d_follows_the_mouse_in_one_step(window, qtbot):
