@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import replace
 
@@ -23,6 +24,10 @@ _FREE_SHARE = 0.1
 
 _SLACK = 1.5
 """Changes of single rungs add up to more than a plan's error: how much more is let pass."""
+
+_WORTH_TAKING = 1.05
+_NEGLIGIBLE_MS = 0.002
+"""Per frame: a millisecond for a clip of some hundred frames."""
 
 _USUAL_TOLERANCE = 0.02
 """Where a budget rules: for what costs nothing."""
@@ -129,11 +134,11 @@ def _by_tolerance(
     survey: Survey, tolerance: float, progress: Progress
 ) -> tuple[Plan, bool, Errors]:
     """The cheapest of those tried that holds; else the nearest of them."""
-    plans = sorted(_candidates(survey, tolerance), key=survey.forecast_ms)
+    plans = sorted(_candidates(survey, tolerance), key=lambda plan: _dearness(survey, plan))
     forecast = {plan: survey.forecast_error(plan) for plan in plans}
     safe = [plan for plan in plans if forecast[plan] <= tolerance]
     # What must hold if anything does.
-    safe.append(min(plans, key=lambda plan: (forecast[plan], survey.forecast_ms(plan))))
+    safe.append(min(plans, key=forecast.__getitem__))
     failed: list[tuple[Plan, Errors]] = []
     for plan in (*safe[: _MOST_TRIALS - 1], safe[-1]):
         errors = _tried(survey, plan, tolerance, progress)
@@ -151,7 +156,7 @@ def _by_tolerance(
     ]
     for other in sorted(cheaper, key=forecast.__getitem__)[:_MORE_TRIALS]:
         found = _tried(survey, other, tolerance, progress)
-        if found.l1 <= tolerance and survey.forecast_ms(other) < survey.forecast_ms(plan):
+        if found.l1 <= tolerance and plans.index(other) < plans.index(plan):
             plan, errors = other, found
     return plan, True, errors
 
@@ -167,11 +172,20 @@ def _by_budget(survey: Survey, budget_ms: float, progress: Progress) -> tuple[Pl
         ]
     within = [plan for plan in plans if survey.forecast_ms(plan) <= budget_ms]
     if within:
-        plan = min(within, key=lambda plan: (survey.forecast_error(plan), survey.forecast_ms(plan)))
+        plan = min(within, key=lambda plan: (survey.forecast_error(plan), _dearness(survey, plan)))
     else:
         plan = min(plans, key=survey.forecast_ms)
     errors = survey.trial.errors(plan, survey.trial.sample.checked_on, progress=progress)
     return plan, bool(within), errors
+
+
+def _dearness(survey: Survey, plan: Plan) -> tuple[int, int]:
+    """Cost in steps that are worth taking, and within a step how much is unlike the base.
+
+    A rung that saves nothing to speak of is not taken down.
+    """
+    step = math.log(survey.forecast_ms(plan) + _NEGLIGIBLE_MS) / math.log(_WORTH_TAKING)
+    return round(step), survey.rungs_down(plan)
 
 
 def _reach_m(survey: Survey) -> float | None:

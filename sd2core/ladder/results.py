@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from sd2core.ladder.rungs import Family, Plan
@@ -146,8 +146,10 @@ class Measurement:
         return asdict(self) | {"results": [result.to_json() for result in self.results]}
 
     def of(self, plan: Plan) -> PlanResult | None:
-        """What was measured of a plan, if it was."""
-        return next((result for result in self.results if result.plan == plan), None)
+        """What was measured of a plan, if it was; else of the same with velocities wrapped."""
+        wrapped = replace(plan, beyond="wrap")
+        found = {result.plan: result for result in self.results}
+        return found.get(plan) or found.get(wrapped)
 
 
 @dataclass(frozen=True)

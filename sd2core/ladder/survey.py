@@ -60,6 +60,11 @@ class Survey:
             count_ms -= min(max(saved, 0.0), 0.9 * per_vertex)
         return plan.vertices_kept * (mask_ms + count_ms) / worker_count()
 
+    def rungs_down(self, plan: Plan) -> int:
+        """In how many rungs a plan differs from the base."""
+        alone = [*self._alone(plan), replace(self.base, frame_rate_factor=plan.frame_rate_factor)]
+        return sum(other != self.base for other in alone)
+
     def _alone(self, plan: Plan) -> Iterator[Plan]:
         """The base with each rung of a plan alone; frame rates stand for themselves."""
         yield _sight_of(plan, self.base)
