@@ -102,7 +102,8 @@ def test_a_long_body_near_the_sensor_requires_the_range_law() -> None:
 
 
 def test_a_small_body_far_away_does_not_require_the_range_law() -> None:
-    choice = chosen(ball(APPROACHING, radius_m=0.005))
+    # Fine, so that there is something to save.
+    choice = chosen(ball(APPROACHING, radius_m=0.005, fineness=5), 0.03)
     found = reason(choice, "range_law")
     assert not found.modelled
     assert found.value < TOLERANCE
