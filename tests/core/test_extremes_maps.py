@@ -78,6 +78,67 @@ def test_what_the_range_law_lets_through(scene: Scene, exponent: float) -> None:
     assert abs(found - weights.sum()) <= (weights * np.minimum(relative, 0.01)).sum()
 
 
+@pytest.mark.parametrize("distance_m", [1e-3, 0.03, 2.2, 300.0, 1e6])
+@pytest.mark.parametrize("scale_m", [1e-3, 1.0, 1e3])
+def test_area_that_is_turned_towards_the_sensor(scale_m: float, distance_m: float) -> None:
+    vertices, faces = ball(scale_m, 2)
+    path = vertices + 0.1 * scale_m * np.arange(3)[:, None, None] / 30.0
+    mesh = MeshSequence(path, faces, Timebase.regular(3, 30.0), "ball")
+    chosen = replace(RAW, weight="projected", visibility="none", beyond="clip")
+    sensor = path[1, 7] * (1 + distance_m / scale_m)
+    made = Synthesizer(mesh, chosen).map(at(*sensor))
+    corner = path[1][faces]
+    vectors = np.zeros_like(vertices)
+    thirds = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]) / 6
+    np.add.at(vectors, faces.ravel(), np.repeat(thirds, 3, axis=0))
+    ray = sensor - path[1]
+    range_m = np.linalg.norm(ray, axis=1)
+    projected = np.maximum((ray * vectors).sum(axis=1), 0) / range_m
+    truth = projected.sum() / np.linalg.norm(thirds, axis=1).sum() / 3
+    # Area vectors are rounded to single, positions to single around the clip's origin:
+    # that turns the line of sight by so much of the range.
+    slack = 8 * ROUNDING + 2 * ROUNDING * np.abs(path).max() / range_m.min()
+    assert made.values[:, 1].sum(dtype=np.float64) == pytest.approx(truth, rel=0, abs=slack)
+
+
+def damaged(kind: str) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """The two balls, less whole."""
+    vertices, faces = gesture(np.arange(6) / 30.0)
+    if kind == "open":
+        return vertices, faces[: len(faces) // 3]
+    if kind == "duplicate vertices":
+        return vertices[:, faces.ravel()], np.arange(faces.size, dtype=np.int32).reshape(-1, 3)
+    if kind == "zero area":
+        return vertices, np.concatenate([faces, [[0, 0, 1], [2, 2, 2]]]).astype(np.int32)
+    if kind == "slivers":
+        between = 0.5 * (vertices[:, :40] + vertices[:, 1:41]) + 1e-9
+        thin = np.stack([np.arange(40), np.arange(1, 41), vertices.shape[1] + np.arange(40)], 1)
+        vertices = np.concatenate([vertices, between], axis=1)
+        return vertices, np.concatenate([faces, thin]).astype(np.int32)
+    fins = np.stack([faces[:30, 0], faces[:30, 1], np.arange(200, 230)], axis=1)
+    return vertices, np.concatenate([faces, fins]).astype(np.int32)
+
+
+@pytest.mark.parametrize("weight", ["count", "area", "projected"])
+@pytest.mark.parametrize("visibility", ["none", "facing", "depth", "exact"])
+@pytest.mark.parametrize(
+    "kind", ["open", "duplicate vertices", "zero area", "slivers", "not a manifold"]
+)
+@pytest.mark.parametrize("place_m", [(0.0, 0.0, -2.2), (0.0, 0.0, 0.0), (0.0, 0.0, 1e6)])
+def test_damaged_surfaces(place_m: Any, kind: str, visibility: Any, weight: Any) -> None:
+    vertices, faces = damaged(kind)
+    mesh = MeshSequence(vertices, faces, Timebase.regular(6, 30.0), kind)
+    chosen = replace(RAW, visibility=visibility, weight=weight, beyond="clip")
+    values = Synthesizer(mesh, chosen).map(at(*place_m)).values.astype(np.float64)
+    assert np.isfinite(values).all()
+    assert (values >= 0).all()
+    # Shares: at most everything, and everything where all count alike.
+    share = values.sum(axis=0)
+    assert (share <= 1 + 1e-5).all()
+    if visibility == "none" and weight != "projected":
+        np.testing.assert_allclose(share, 1.0, rtol=1e-5)
+
+
 @pytest.mark.parametrize("exponent", [4.0, 8.0])
 def test_a_map_too_faint_for_its_numbers_says_so(exponent: float) -> None:
     times = np.arange(6) / 30.0

@@ -113,3 +113,13 @@ def test_coordinates_that_the_file_has_rounded_too_much(
     assert error_mps <= 1.25e-3 or said
     if said:
         assert error_mps >= 1.25e-3 / 8
+
+
+@WRONG
+def test_one_file_per_frame(tmp_path: Path, value: float) -> None:
+    for frame, corners in enumerate(tetrahedron(value)):
+        lines = [f"v {x} {y} {z}" for x, y, z in corners.tolist()]
+        lines += [f"f {a} {b} {c}" for a, b, c in (FACES + 1).tolist()]
+        (tmp_path / f"frame{frame}.obj").write_text("\n".join(lines))
+    with pytest.raises(Sd2Error, match=naming(tmp_path.name, value)):
+        load_mesh(tmp_path)
