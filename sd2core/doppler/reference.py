@@ -14,6 +14,7 @@ from sd2core.compiled import kernels_ready
 from sd2core.doppler import vid2doppler
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.mesh import MeshSequence
+from sd2core.precision import ROUNDING, SHARE_OF_THE_BODY
 from sd2core.scattering.amplitude import NEAREST_RANGE_M
 from sd2core.scattering.exact import exact_visibility_kernel
 from sd2core.scattering.exact_plain import exact_visibility
@@ -50,6 +51,7 @@ def reference_stretch(
     place = np.asarray(sensor.position_m, np.float64)
     first = mesh.frame(0).astype(np.float64)
     middle = 0.5 * (first.min(axis=0) + first.max(axis=0))
+    middle = middle.astype(mesh.vertices.dtype).astype(np.float64)
     raw = np.zeros((options.axis.bins, stop - start))
     for column, frame in enumerate(range(start, stop)):
         velocities, points = _at_frame(mesh, place, options, frame)
@@ -169,11 +171,15 @@ def _visible(
 ) -> NDArray[np.bool_]:
     """Exact visibility of every vertex, decided in double precision on single coordinates.
 
-    They are taken around the clip's own middle, as everywhere.
+    They are taken around the clip's own middle, as everywhere, or around the frame's
+    where single precision would spoil the shape so far out.
     """
     if mesh.faces is None:
         return np.ones(points.shape[1], bool)
-    origin = middle.astype(np.float32).astype(np.float64)
+    low, high = points.min(axis=1), points.max(axis=1)
+    origin, extent_m = middle, float(np.abs(points - middle[:, None]).max())
+    if ROUNDING * extent_m > SHARE_OF_THE_BODY * (high - low).max():
+        origin = 0.5 * (low + high)
     single = (points - origin[:, None]).astype(np.float32)
     needed = np.ones((1, points.shape[1]), np.uint8)
     faces = np.array(mesh.faces, np.int32)
