@@ -11,10 +11,12 @@ from sd2app.models.content import reference_of
 from sd2app.models.display import DisplayModel
 from sd2app.models.document import DocumentModel
 from sd2app.models.jobs import JobsModel
+from sd2app.models.ladder import CORE, Ladder
 from sd2app.models.playback import PlaybackModel
 from sd2app.models.sensor import SensorModel
 from sd2app.models.synthesis import SynthesisModel
 from sd2app.models.tracks import PointerModel, TrackModel
+from sd2app.models.trade import TradeModel
 from sd2app.models.video import VideoModel
 from sd2app.models.visible_span import VisibleSpanModel
 from sd2app.settings import Settings
@@ -35,6 +37,7 @@ class Context:
     pointer: PointerModel
     synthetic: TrackModel
     real: TrackModel
+    trade: TradeModel
     synthesis: SynthesisModel
     edits: Edits
 
@@ -48,12 +51,13 @@ class Context:
         """Stop every thread and let go of the files."""
         self.playback.pause()
         self.synthesis.close()
+        self.trade.close()
         self.video.close()
         self.document.close()
 
 
-def build_context(parent: QObject, settings: Settings) -> Context:
-    """Make the models and let them follow the document."""
+def build_context(parent: QObject, settings: Settings, ladder: Ladder | None = None) -> Context:
+    """Make the models and let them follow the document; the ladder is the library's by default."""
     jobs = JobsModel(parent)
     document = DocumentModel(jobs, parent)
     playback = PlaybackModel(parent)
@@ -61,6 +65,7 @@ def build_context(parent: QObject, settings: Settings) -> Context:
     span = VisibleSpanModel(parent)
     synthetic = TrackModel("Synthetic", parent)
     real = TrackModel("Real", parent)
+    trade = TradeModel(jobs, settings, ladder or CORE, parent)
     context = Context(
         settings=settings,
         jobs=jobs,
@@ -73,7 +78,8 @@ def build_context(parent: QObject, settings: Settings) -> Context:
         pointer=PointerModel(parent),
         synthetic=synthetic,
         real=real,
-        synthesis=SynthesisModel(document, sensor, playback, span, synthetic, jobs, parent),
+        trade=trade,
+        synthesis=SynthesisModel(document, sensor, playback, span, synthetic, jobs, trade, parent),
         edits=Edits(document, sensor),
     )
     document.opened.connect(lambda: _take_over(context))

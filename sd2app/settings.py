@@ -8,6 +8,7 @@ from typing import Any, Protocol
 from PySide6.QtCore import QByteArray, QSettings
 
 _RECENT = 10
+DEFAULT_TOLERANCE = 0.05
 
 
 class Store(Protocol):
@@ -40,7 +41,7 @@ class Settings:
         return cls(_Memory())
 
     def __init__(self, store: Store | None = None) -> None:
-        self._store = store if store is not None else QSettings("SD2 Studio", "SD2 Studio")
+        self._store: Store = store if store is not None else QSettings("SD2 Studio", "SD2 Studio")
 
     @property
     def recent(self) -> list[Path]:
@@ -63,6 +64,19 @@ class Settings:
     @dark.setter
     def dark(self, dark: bool) -> None:
         self._store.setValue("dark", dark)
+
+    @property
+    def tolerance(self) -> float:
+        """Error of a map that the user accepts: relative L1 after smoothing."""
+        try:
+            tolerance = float(self._store.value("tolerance", DEFAULT_TOLERANCE))
+        except (TypeError, ValueError):
+            return DEFAULT_TOLERANCE
+        return tolerance if 0 < tolerance <= 1 else DEFAULT_TOLERANCE
+
+    @tolerance.setter
+    def tolerance(self, tolerance: float) -> None:
+        self._store.setValue("tolerance", tolerance)
 
     def layout(self, name: str) -> QByteArray | None:
         """Saved geometry of a part of the window."""

@@ -8,15 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.doppler.synthesizer import Quality, Stretch
+from sd2core.doppler.synthesizer import Stretch
 from sd2core.sensor import VirtualSensor
 
-RANK: dict[Quality, int] = {"facing": 1, "frozen": 2, "none": 3, "depth": 3, "exact": 3}
-"""How good a frame is; 0 is not computed. ``none`` is final for a point cloud.
-
-``depth`` too is only ever asked for where the synthesizer's own options say so."""
-
-FINAL = 3
+ROUGH, AS_DRAGGED, FINAL = 1, 2, 3
+"""How good a frame is: a preview, what a hand gets that moves the sensor (or what was
+final for another plan), what the plan in use gives. 0 is not computed."""
 
 View = tuple[int, int]
 
@@ -29,7 +26,7 @@ class Canvas:
     ----------
     values : float32 array, shape (bins, T)
     rank : uint8 array, shape (T,)
-        See :data:`RANK`.
+        See :data:`FINAL`.
     sensor : VirtualSensor or None
         Placement that all of it is for.
     """
@@ -61,14 +58,18 @@ class Canvas:
         """Whether every frame is as good as it gets."""
         return bool(self.frames and self.rank.min() >= FINAL)
 
-    def paint(self, sensor: VirtualSensor, start: int, stretch: Stretch) -> None:
+    def paint(self, sensor: VirtualSensor, start: int, stretch: Stretch, rank: int) -> None:
         """Take a stretch over; what was there for another placement is forgotten."""
         if sensor != self.sensor:
             self.sensor = sensor
             self.rank[:] = 0
         inside = slice(start, start + stretch.values.shape[1])
         self.values[:, inside] = stretch.values
-        self.rank[inside] = RANK[stretch.quality]
+        self.rank[inside] = rank
+
+    def demote(self) -> None:
+        """What was final no longer is, but stays until it is replaced."""
+        np.minimum(self.rank, AS_DRAGGED, out=self.rank)
 
     def ranks_for(self, sensor: VirtualSensor) -> NDArray[np.uint8]:
         """A copy of the ranks as far as they hold for a placement."""

@@ -2,68 +2,55 @@
 
 from __future__ import annotations
 
-import subprocess
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from sd2app.jobs.latest import LatestRunner
-from sd2app.models.canvas import FINAL, RANK, Canvas, View
+from sd2app.jobs.latest import Emit, LatestRunner
+from sd2app.models.canvas import AS_DRAGGED, FINAL, Canvas, View
+from sd2app.models.carriers import Carriers
+from sd2app.models.compiling import CompilerModel
 from sd2app.models.content import reference_of
 from sd2app.models.document import DocumentModel
 from sd2app.models.jobs import Job, JobsModel
 from sd2app.models.playback import PlaybackModel
-from sd2app.models.refine import Part, refine, sweep
+from sd2app.models.readout import FrameReader, Readout
+from sd2app.models.refine import Part, Way, is_swept_whole, refine, worked_out
 from sd2app.models.sensor import SensorModel
 from sd2app.models.tracks import TrackModel
+from sd2app.models.trade import TradeModel
 from sd2app.models.visible_span import VisibleSpanModel
-from sd2core.compiled import compile_in_background, kernels_ready
+from sd2app.models.ways import budget_ms, distance_m, final_way, final_words, rough_way
 from sd2core.doppler.options import PRESETS
-from sd2core.doppler.synthesizer import FrameScattering, Synthesizer, Visibility
+from sd2core.doppler.synthesizer import FrameScattering
 from sd2core.errors import Sd2Error
 from sd2core.progress import Cancelled
-from sd2core.sensor import Vector
+from sd2core.sensor import Vector, VirtualSensor
 from sd2core.spectrum import DopplerMap
 
-_COMPILER_POLL_MS = 500
+if TYPE_CHECKING:
+    from sd2core.ladder.rungs import Plan
+
 _REST_MS = 300
 """A hand that holds the sensor still for so long is at rest."""
 
-_WORDS = {
-    RANK["facing"]: "preview: vertices facing the sensor",
-    RANK["frozen"]: "preview: visibility of the nearest exact placement",
-}
-_FINAL_WORDS = {
-    "none": "all vertices of the point cloud",
-    "facing": "vertices facing the sensor",
-    "depth": "visibility by depth buffer",
-    "exact": "exact visibility",
-}
-
-
-@dataclass(frozen=True)
-class Readout:
-    """What the sensor makes of the frame on screen."""
-
-    torso_range_m: float
-    visible_share: float
-    beyond_share: float
-
 
 class SynthesisModel(QObject):
-    """Recomputes when the sensor moves: at once roughly, exactly when the hand rests.
+    """Recomputes when the sensor moves: at once roughly, as the plan says when the hand rests.
 
     While a hand moves the sensor, one sweep runs at a time and the newest
-    position follows it. At rest an exact pass runs in the background, the
-    stretch in view first; any new move interrupts it.
+    position follows it. At rest the plan in use is carried out in the
+    background, the stretch in view first; then a plan is chosen for the new
+    place, carried out if it is another, and at last one for the next drag. Any
+    new move interrupts all of it. A map stays until it is replaced.
     """
 
     frame_changed = Signal()
     target_changed = Signal()
     readout_changed = Signal()
+    moving_changed = Signal()
     completed = Signal()
     failed = Signal(str)
 
@@ -75,29 +62,31 @@ class SynthesisModel(QObject):
         span: VisibleSpanModel,
         track: TrackModel,
         jobs: JobsModel,
+        trade: TradeModel,
         parent: QObject | None = None,
     ) -> None:
         super().__init__(parent)
         self._document = document
         self._sensor = sensor
-        self._playback = playback
         self._span = span
         self._track = track
         self._jobs = jobs
+        self._trade = trade
+        self._reader = FrameReader(document, sensor, playback)
         self._job: Job | None = None
-        self._synthesizer: Synthesizer | None = None
-        self._canvas = Canvas.blank(2, 0)
-        self._frame: tuple[Any, FrameScattering] | None = None
-        self._torso: tuple[int, Vector] | None = None
+        self._carriers: Carriers | None = None
+        self._moving = False
         self._forget()
         self._runner = LatestRunner("synthesis", self)
         self._runner.partial.connect(self._receive)
         self._runner.finished.connect(self._finish)
         self._runner.failed.connect(self._fail)
-        self._compiler: subprocess.Popen[bytes] | None = None
-        self._compiler_poll = QTimer(self)
-        self._compiler_poll.setInterval(_COMPILER_POLL_MS)
-        self._compiler_poll.timeout.connect(self._watch_compiler)
+        # Makes ready for the next drag.
+        self._readier = LatestRunner("ready", self)
+        self._readier.finished.connect(self._note_ready)
+        self._readier.failed.connect(lambda error: self.failed.emit(str(error)))
+        self._compiler = CompilerModel(self)
+        self._compiler.finished.connect(self._follow)
         self._rest = QTimer(self)
         self._rest.setSingleShot(True)
         self._rest.setInterval(_REST_MS)
@@ -106,108 +95,116 @@ class SynthesisModel(QObject):
         sensor.dragging_changed.connect(lambda _: self._follow())
         span.changed.connect(self._reorder)
         playback.frame_changed.connect(self._follow_clock)
+        trade.plan_changed.connect(self._take_plan)
+        trade.decided.connect(self._go_on)
+        trade.wished.connect(self._go_on)
 
     # --- what is known --------------------------------------------------------------------
 
     @property
     def v_max_mps(self) -> float:
         """Edge of the velocity axis."""
-        return self._synthesizer.options.axis.v_max_mps if self._synthesizer else 2.0
+        return self._carriers.options.axis.v_max_mps if self._carriers else 2.0
 
     @property
     def busy(self) -> bool:
         """Whether a better map is on its way."""
-        return self._runner.busy or self._compiling
+        return self._runner.busy or self._compiler.busy
+
+    @property
+    def moving(self) -> bool:
+        """Whether the sensor moves, so that the budget rules; else the tolerance does."""
+        return self._moving
 
     @property
     def complete(self) -> bool:
-        """Whether every frame is exact for the sensor where it stands."""
+        """Whether every frame is as the plan says for the sensor where it stands."""
         return self._canvas.final and self._canvas.sensor == self._sensor.sensor
 
     @property
     def torso_m(self) -> Vector | None:
         """Median vertex of the frame on screen: inside the torso whatever the limbs do."""
-        index = self._mesh_frame()
-        mesh = self._document.mesh
-        if index is None or mesh is None:
-            return None
-        if self._torso is None or self._torso[0] != index:
-            x, y, z = np.median(mesh.frame(index), axis=0)
-            self._torso = (index, (float(x), float(y), float(z)))
-        return self._torso[1]
+        return self._reader.torso_m()
 
     @property
     def frame(self) -> FrameScattering | None:
         """Velocity, range and visibility of every vertex in the frame on screen."""
-        index = self._mesh_frame()
-        if index is None or self._synthesizer is None:
+        if self._carriers is None:
             return None
-        key = (index, self._sensor.sensor, self._frame_visibility())
-        if self._frame is None or self._frame[0] != key:
-            self._frame = (key, self._synthesizer.frame(key[1], index, key[2]))
-        return self._frame[1]
+        full = self._carriers.full
+        if full.options.visibility == "none":
+            return self._reader.scattering(full, "none")
+        if self._compiler.ready and not self._moving:
+            return self._reader.scattering(full, full.options.visibility)
+        # The mask of the map, where the map has one and all vertices.
+        carrier = self._carriers.ready(self._plan)
+        same = carrier is not None and carrier.mesh is full.mesh
+        return self._reader.scattering(carrier if same and carrier else full, "frozen")
 
     def readout(self) -> Readout | None:
         """Numbers beside the sensor, None without a mesh on screen."""
-        frame, torso = self.frame, self.torso_m
-        if frame is None or torso is None:
-            return None
-        offset = np.subtract(self._sensor.sensor.position_m, torso)
-        seen = np.abs(frame.velocity_mps[frame.visible])
-        return Readout(
-            torso_range_m=float(np.linalg.norm(offset)),
-            visible_share=float(frame.visible.mean()),
-            beyond_share=float((seen > self.v_max_mps).mean()) if seen.size else 0.0,
-        )
+        return self._reader.readout(self.frame, self.v_max_mps)
 
     # --- requests -------------------------------------------------------------------------
 
     def take_over(self) -> None:
         """Start on the mesh of the document that is open now."""
-        self._rest.stop()
-        self._runner.cancel()
-        self._end_job()
-        self._synthesizer = None
+        self._stop()
+        self._carriers = None
         self._forget()
+        self._set_moving(False)
         self._track.set_map(None)
-        mesh = self._document.mesh
+        mesh, options = self._document.mesh, PRESETS["paper"]
+        if mesh is not None and mesh.faces is None:
+            options = replace(options, visibility="none")
+        self._trade.take_over(mesh, options)
         if mesh is None:
             self._announce()
             return
-        options = PRESETS["paper"]
-        if mesh.faces is None:
-            options = replace(options, visibility="none")
         try:
-            self._synthesizer = Synthesizer(mesh, options)
+            self._carriers = Carriers(mesh, options, self._trade.ladder)
         except Sd2Error as error:
             self.failed.emit(str(error))
             return
         self._canvas = Canvas.blank(options.axis.bins, mesh.frame_count)
-        self._compiler = compile_in_background()
-        if self._compiling:
-            self._compiler_poll.start()
+        self._compiler.start()
         self._announce()
         self._follow()
 
     def export(self, path: Path) -> None:
-        """Write the exact map with its provenance."""
-        if self._synthesizer is None or not self.complete:
-            raise Sd2Error("The synthetic map is not complete yet", "an exact map", "Wait for it")
-        self._synthesizer.map(self._sensor.sensor).save(path)
+        """Write the map that is shown with its provenance, the plan included."""
+        if self._carriers is None or not self.complete:
+            raise Sd2Error("The synthetic map is not complete yet", "a final map", "Wait for it")
+        made = self._carriers.of(self._plan).map(self._sensor.sensor)
+        in_use = self._trade.in_use
+        if in_use is not None:
+            plan = in_use.plan.to_json() | {"text": str(in_use.plan)}
+            made = replace(made, meta=made.meta | {"plan": plan, "plan_error_l1": in_use.error})
+        made.save(path)
 
     def close(self) -> None:
         """Stop computing."""
-        self._rest.stop()
-        self._compiler_poll.stop()
+        self._stop()
+        self._compiler.stop()
         self._runner.close()
+        self._readier.close()
+
+    def _stop(self) -> None:
+        self._rest.stop()
+        self._runner.cancel()
+        self._readier.cancel()
         self._end_job()
 
     # --- following ------------------------------------------------------------------------
 
     def _forget(self) -> None:
         self._canvas = Canvas.blank(2, 0)
-        self._frame = None
-        self._torso = None
+        self._reader.forget()
+        self._plan: Plan | None = None
+        self._dragging_plan: Plan | None = None
+        self._unit = ""
+        self._words: dict[int, str] = {}
+        self._masks_of: VirtualSensor | None = None
         self._needs_reference = True
         self._again = False
         self._sweeping = False
@@ -218,56 +215,112 @@ class SynthesisModel(QObject):
         self.readout_changed.emit()
 
     def _follow_clock(self) -> None:
-        if self._synthesizer is not None:
+        if self._carriers is not None:
             self._announce()
 
     def _follow(self) -> None:
-        if self._synthesizer is None:
+        if self._carriers is None:
             return
-        self.frame_changed.emit()
-        self.readout_changed.emit()
+        self._trade.hold()
+        self._readier.cancel()
         if self._sensor.dragging:
             self._rest.start()
+            self._set_moving(self._moving or self._sensor.sensor != self._canvas.sensor)
+            self._follow_clock()
             if self._sweeping and self._runner.busy:
                 self._again = True
-            else:
+            elif self._moving:
                 self._sweep()
         else:
             self._settle()
+            self._follow_clock()
+
+    def _set_moving(self, moving: bool) -> None:
+        if moving != self._moving:
+            self._moving = moving
+            self.moving_changed.emit()
 
     def _sweep(self) -> None:
         """One rough pass for the sensor where it is now, never interrupted."""
-        assert self._synthesizer is not None
         self._end_job()
         self._again, self._sweeping = False, True
-        synthesizer, sensor = self._synthesizer, self._sensor.sensor
-        view, rough = self._frames_in_view(), self._rough()
-        self._runner.submit(lambda emit: sweep(synthesizer, sensor, view, rough))
+        sensor, way, (start, stop) = self._sensor.sensor, self._rough_way(), self._swept()
+        self._runner.submit(lambda emit: worked_out(way, sensor, start, stop))
 
     def _settle(self) -> None:
-        """Rough where nothing is known yet, then exact; the stretch in view first."""
-        if self._synthesizer is None:
+        """Rough where nothing is known yet, then as planned; the stretch in view first."""
+        if self._carriers is None:
             return
         self._rest.stop()
         self._end_job()
         self._again = self._sweeping = False
-        synthesizer, sensor = self._synthesizer, self._sensor.sensor
+        sensor = self._sensor.sensor
+        self._trade.rest_at(sensor)
         rank = self._canvas.ranks_for(sensor)
         if rank.min() >= FINAL:
+            self._set_moving(False)
+            self._go_on()
             return
-        view, rough = self._frames_in_view(), self._rough()
-        to_the_end = synthesizer.options.visibility != "exact" or not self._compiling
-        if to_the_end:
-            self._job = self._jobs.start("Exact visibility", self._cancel)
-        self._runner.submit(
-            lambda emit: refine(
-                synthesizer, sensor, rank, view, rough, to_the_end=to_the_end, emit=emit
-            )
+        view, rough, vertices = self._frames_in_view(), self._rough_way(), self._vertices
+        self._set_moving(False)
+        final = self._final_way()
+        if final is not None:
+            self._job = self._jobs.start("Synthesising the map", self._cancel)
+        self._runner.submit(lambda emit: refine(sensor, rank, view, rough, final, vertices, emit))
+
+    def _go_on(self) -> None:
+        """What is to be done next while the sensor rests."""
+        if self._carriers is None or self._moving or self.busy:
+            return
+        if self._may_choose():
+            self._trade.choose(self._sensor.sensor, self._budget_ms())
+        elif not self.complete:
+            self._settle()
+        elif self._masks_of != self._sensor.sensor:
+            self._make_ready(self._sensor.sensor)
+
+    def _may_choose(self) -> bool:
+        """Whether the plans are for another place, and there is machine code to find others."""
+        decided = self._trade.is_decided(self._sensor.sensor, self._budget_ms())
+        return self._compiler.ready and not decided
+
+    def _make_ready(self, sensor: VirtualSensor) -> None:
+        """Prepare what the next drag needs: the mesh of its plan, and masks from here."""
+        dragging, carriers = self._trade.while_dragging, self._carriers
+        if dragging is None or carriers is None:
+            return
+        start, stop = self._swept()
+
+        def work(emit: Emit) -> VirtualSensor:
+            carrier = carriers.of(dragging.plan)
+            carrier.stretch(sensor, start, stop, progress=lambda *_: emit(None))
+            return sensor
+
+        self._readier.submit(work)
+
+    def _note_ready(self, sensor: VirtualSensor) -> None:
+        self._masks_of = sensor
+
+    def _take_plan(self) -> None:
+        """Follow the plans; what was made by another stays until it is replaced."""
+        plan, dragging = (
+            use.plan if use is not None else None
+            for use in (self._trade.in_use, self._trade.while_dragging)
         )
+        if dragging != self._dragging_plan:
+            self._dragging_plan, self._masks_of = dragging, None
+        if self._carriers is None or plan == self._plan:
+            self._say_quality()
+            return
+        self._plan = plan
+        self._canvas.demote()
+        self._words[AS_DRAGGED] = self._words.get(FINAL, self._words.get(AS_DRAGGED, ""))
+        if not self._moving:
+            self._settle()
 
     def _reorder(self) -> None:
         start, stop = self._frames_in_view()
-        if self._synthesizer is None or self._sensor.dragging or stop <= start:
+        if self._carriers is None or self._moving or stop <= start:
             return
         self._say_quality()
         if self._canvas.rank[start:stop].min() < FINAL and self._canvas.frames > stop - start:
@@ -277,16 +330,6 @@ class SynthesisModel(QObject):
         self._runner.cancel()
         self._end_job()
         self._say_quality()
-
-    @property
-    def _compiling(self) -> bool:
-        """Whether machine code is on its way; without it exact visibility takes too long."""
-        return not kernels_ready() and self._compiler is not None and self._compiler.poll() is None
-
-    def _watch_compiler(self) -> None:
-        if not self._compiling:
-            self._compiler_poll.stop()
-            self._follow()
 
     # --- results --------------------------------------------------------------------------
 
@@ -303,13 +346,15 @@ class SynthesisModel(QObject):
         self._end_job()
         if self._again and self._sensor.dragging:
             self._sweep()
-        elif self.complete:
+            return
+        if self.complete:
             self.completed.emit()
+        self._go_on()
 
     def _take(self, part: Part) -> None:
-        if part.synthesizer is not self._synthesizer:
-            return
-        self._canvas.paint(part.sensor, part.start, part.stretch)
+        self._canvas.paint(part.sensor, part.start, part.stretch, part.rank)
+        self._words[part.rank] = part.words
+        self._unit = part.unit
         if self._needs_reference and self._canvas.full:
             self._needs_reference = False
             self._track.set_reference(reference_of(self._canvas.values))
@@ -319,28 +364,30 @@ class SynthesisModel(QObject):
         self.readout_changed.emit()
 
     def _map(self) -> DopplerMap:
-        assert self._synthesizer is not None
-        options, mesh = self._synthesizer.options, self._synthesizer.mesh
+        assert self._carriers is not None
+        options, mesh = self._carriers.options, self._carriers.mesh
         return DopplerMap(
             values=self._canvas.values,
             axis=options.axis,
             timebase=mesh.timebase,
             kind="synthetic",
-            unit=self._synthesizer.unit,
+            unit=self._unit,
             null_bins=options.null_bins,
         )
 
     def _say_quality(self) -> None:
         start, stop = self._frames_in_view()
         rank = self._canvas.rank[start:stop]
-        if self._synthesizer is None or not rank.any():
+        if self._carriers is None or not rank.any():
             return
         final = float((rank >= FINAL).mean())
         lowest = int(rank[rank > 0].min())
-        words = _WORDS.get(lowest) or _FINAL_WORDS[self._synthesizer.options.visibility]
+        words = self._words.get(lowest, "")
+        if lowest == FINAL:
+            words = final_words(self._carriers, self._trade.in_use)
         if 0 < final < 1 and lowest < FINAL:
-            words = f"{words}, {100 * final:.0f} % exact"
-        if self._compiling:
+            words = f"{words}, {100 * final:.0f} % final"
+        if self._compiler.busy:
             words += " · compiling, exact follows"
         self._track.set_status(words)
 
@@ -357,26 +404,32 @@ class SynthesisModel(QObject):
 
     # --- helpers --------------------------------------------------------------------------
 
-    def _rough(self) -> Visibility:
-        assert self._synthesizer is not None
-        if self._synthesizer.options.visibility == "none":
-            return "none"
-        # Falls back to the facing test where no exact visibility is kept.
-        return "frozen"
+    def _rough_way(self) -> Way:
+        assert self._carriers is not None
+        moved_m = distance_m(self._masks_of, self._sensor.sensor)
+        return rough_way(self._carriers, self._plan, self._trade.while_dragging, moved_m)
 
-    def _frame_visibility(self) -> Visibility:
-        assert self._synthesizer is not None
-        final = self._synthesizer.options.visibility
-        if final == "exact" and (self._sensor.dragging or not kernels_ready()):
-            return self._rough()
-        return final
-
-    def _mesh_frame(self) -> int | None:
-        mesh = self._document.mesh
-        time_s = self._playback.time_s
-        if mesh is None or not mesh.timebase.covers(time_s):
+    def _final_way(self) -> Way | None:
+        """What the tolerance asks for; None while that is open."""
+        if self._carriers is None or self._compiler.busy:
             return None
-        return mesh.timebase.frame_at(time_s)
+        if self._plan is None and self._may_choose():
+            return None
+        return final_way(self._carriers, self._plan, self._trade.in_use)
+
+    @property
+    def _vertices(self) -> int:
+        assert self._carriers is not None
+        return self._carriers.mesh.vertex_count
+
+    def _swept(self) -> View:
+        """Frames that follow a hand: the whole clip when it is short, else what is in view."""
+        frames = self._canvas.frames
+        return (0, frames) if is_swept_whole(self._vertices, frames) else self._frames_in_view()
+
+    def _budget_ms(self) -> float:
+        start, stop = self._swept()
+        return budget_ms(stop - start)
 
     def _frames_in_view(self) -> View:
         mesh = self._document.mesh
