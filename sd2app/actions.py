@@ -197,6 +197,21 @@ ACTIONS: tuple[Action, ...] = (
         lambda w: w.context.reset_references(), _has_content,
     ),
     Action(
+        "show_sensor", "View", "Sensor panel", ("S",), "Where the sensor is and what it sees",
+        lambda w: w.side.bring_up("Sensor"), separator_before=True,
+    ),
+    Action(
+        "show_trade", "View", "Trade panel", ("T",),
+        "How exact the synthetic map is to be, and what that costs",
+        lambda w: w.side.bring_up("Trade"),
+    ),
+    Action(
+        "measure", "View", "Measure this scene", ("Ctrl+M",),
+        "Measure error and cost of every plan with the sensor where it is; takes a while",
+        lambda w: w.measure_scene(),
+        lambda c: c.trade.measured.can_measure,
+    ),
+    Action(
         "dark", "View", "Dark theme", ("Ctrl+D",), "Dark or light",
         lambda w: w.set_dark(not w.context.display.dark), checked=lambda c: c.display.dark,
         separator_before=True,

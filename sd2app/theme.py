@@ -62,6 +62,16 @@ def _style_sheet(c: Palette) -> str:
     QToolButton:hover {{ background: {c.well}; }}
     QToolButton:checked {{ background: {c.well}; border-color: {c.border}; }}
     QToolButton#outlined {{ border-color: {c.border}; padding: 2px 8px; }}
+    QToolButton#preset {{ border-color: {c.border}; padding: 3px 0; }}
+    QToolButton#preset:checked {{ border-color: {c.accent}; background: {c.well}; }}
+    QTabWidget::pane {{ border: none; border-top: 1px solid {c.border}; }}
+    QTabBar {{ background: transparent; }}
+    QTabBar::tab {{
+        color: {c.muted}; background: transparent; border: none;
+        border-bottom: 2px solid transparent; padding: 5px 12px; font-weight: 600;
+    }}
+    QTabBar::tab:selected {{ color: {c.text}; border-bottom-color: {c.accent}; }}
+    QTabBar::tab:hover, QTabBar::tab:focus {{ color: {c.text}; background: {c.well}; }}
     QToolButton:focus {{ border-color: {c.accent}; }}
     QScrollArea {{ border: none; background: transparent; }}
     QScrollArea > QWidget > QWidget#page {{ background: transparent; }}

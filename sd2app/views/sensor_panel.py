@@ -56,7 +56,7 @@ class SensorPanel(QWidget):
         layout.setContentsMargins(8, 6, 8, 6)
         layout.setSpacing(7)
         head = QHBoxLayout()
-        head.addWidget(_title("Sensor"))
+        head.addWidget(_title("Placement"))
         head.addStretch(1)
         for action, text in ((aim, "Aim at body"), (to_camera, "To camera")):
             button = QToolButton(self)

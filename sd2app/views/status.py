@@ -1,4 +1,4 @@
-"""The last line of the window: what the pointer reads, and what is under way."""
+"""The last line of the window: what the pointer reads, the plan in use, what is under way."""
 
 from __future__ import annotations
 
@@ -6,23 +6,35 @@ from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QToolButton, QWidget
 
 from sd2app.models.jobs import JobsModel
+from sd2app.models.synthesis import SynthesisModel
 from sd2app.models.tracks import PointerModel, Reading
+from sd2app.models.trade import TradeModel
+from sd2app.views.elided import ElidedLabel
 from sd2app.views.time_axis import clock_text
 
 _QUIET_MS = 300
 
 
 class StatusLine(QWidget):
-    """Pointer read-out on the left, the oldest job with a cancel button on the right."""
+    """Pointer read-out, plan in use, and the oldest job with a cancel button on the right."""
 
     def __init__(
-        self, pointer: PointerModel, jobs: JobsModel, parent: QWidget | None = None
+        self,
+        pointer: PointerModel,
+        jobs: JobsModel,
+        trade: TradeModel,
+        synthesis: SynthesisModel,
+        parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
         self._pointer = pointer
         self._jobs = jobs
-        self._reading = QLabel(self)
-        self._reading.setObjectName("muted")
+        self._trade = trade
+        self._synthesis = synthesis
+        self._reading = ElidedLabel(self)
+        self._plan = ElidedLabel(self)
+        for label in (self._reading, self._plan):
+            label.setObjectName("muted")
         self._title = QLabel(self)
         self._title.setObjectName("muted")
         self._bar = QProgressBar(self)
@@ -34,8 +46,10 @@ class StatusLine(QWidget):
         self._cancel.clicked.connect(self._cancel_job)
         layout = QHBoxLayout(self)
         layout.setContentsMargins(12, 0, 8, 4)
-        layout.setSpacing(8)
-        layout.addWidget(self._reading, 1)
+        layout.setSpacing(16)
+        layout.addWidget(self._reading)
+        layout.addStretch(1)
+        layout.addWidget(self._plan)
         for widget in (self._title, self._bar, self._cancel):
             layout.addWidget(widget)
             widget.hide()
@@ -46,11 +60,22 @@ class StatusLine(QWidget):
         self._delay.setInterval(_QUIET_MS)
         self._delay.timeout.connect(self._show_job)
         pointer.changed.connect(self._read)
+        for signal in (trade.changed, trade.plan_changed, synthesis.moving_changed):
+            signal.connect(self._show_plan)
         jobs.changed.connect(self._follow)
 
     def _read(self) -> None:
         reading = self._pointer.reading
         self._reading.setText(reading_text(reading) if reading is not None else "")
+
+    def _show_plan(self) -> None:
+        """While the sensor moves the budget rules, at rest the tolerance does."""
+        trade, moving = self._trade, self._synthesis.moving
+        in_use = trade.while_dragging if moving else trade.in_use
+        text = ""
+        if in_use is not None:
+            text = f"While dragging: {in_use}" if moving else f"Plan: {in_use}"
+        self._plan.setText(text)
 
     def _follow(self) -> None:
         if self._jobs.jobs and not self._bar.isVisible():

@@ -17,7 +17,6 @@ from PySide6.QtWidgets import (
     QApplication,
     QFrame,
     QMainWindow,
-    QScrollArea,
     QSplitter,
     QVBoxLayout,
     QWidget,
@@ -30,7 +29,9 @@ from sd2app.theme import apply_theme
 if TYPE_CHECKING:
     from sd2app.context import Context
     from sd2app.dialogs.dialogs import Dialogs
+    from sd2app.models.ladder import Ladder
     from sd2app.views.scene3d import SceneView
+    from sd2app.views.side_panel import SidePanel
 
 _PANELS = ("video", "scene", "sensor", "tracks", "spectrum")
 
@@ -42,10 +43,12 @@ class MainWindow(QMainWindow):
 
     context: Context
     dialogs: Dialogs
+    side: SidePanel
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Settings, ladder: Ladder | None = None) -> None:
         super().__init__()
         self._settings = settings
+        self._ladder = ladder
         self._scene: SceneView | None = None
         self._ready = False
         self._painted = False
@@ -106,7 +109,7 @@ class MainWindow(QMainWindow):
         from sd2app.views.status import StatusLine
         from sd2app.views.transport import TransportBar
 
-        self.context = build_context(self, self._settings)
+        self.context = build_context(self, self._settings, self._ladder)
         context = self.context
         context.display.set_dark(is_dark(self._settings))
         self.messages = MessageBar(self)
@@ -117,7 +120,9 @@ class MainWindow(QMainWindow):
         self._fill_panels()
         self._column.insertWidget(0, self.messages)
         self._column.addWidget(TransportBar(context.playback, self._actions, self))
-        self._column.addWidget(StatusLine(context.pointer, context.jobs, self))
+        self._column.addWidget(
+            StatusLine(context.pointer, context.jobs, context.trade, context.synthesis, self)
+        )
         self._connect()
         self._restyle()
         self._refresh()
@@ -134,15 +139,19 @@ class MainWindow(QMainWindow):
         from sd2app.views.heatmap import HeatmapView
         from sd2app.views.level_bar import LevelBar
         from sd2app.views.sensor_panel import SensorPanel
+        from sd2app.views.side_panel import SidePanel
         from sd2app.views.spectrum import Curve, SpectrumView
         from sd2app.views.timeline import Overview, SpanStrip, TimeRuler
+        from sd2app.views.trade_panel import TradePanel
         from sd2app.views.video import VideoView
 
         c = self.context
         _fill(self._panels["video"], VideoView(c.video, c.document, c.playback, c.display))
         to_camera, aim = self._actions["sensor_to_camera"], self._actions["aim_sensor"]
-        panel = SensorPanel(c.sensor, c.document, c.synthesis, c.edits, to_camera, aim)
-        _fill(self._panels["sensor"], _scrolled(panel))
+        sensor = SensorPanel(c.sensor, c.document, c.synthesis, c.edits, to_camera, aim)
+        trade = TradePanel(c.trade, c.display, self._actions["measure"])
+        self.side = SidePanel({"Sensor": sensor, "Trade": trade})
+        _fill(self._panels["sensor"], self.side)
         self._synthetic_view = HeatmapView(c.synthetic, c.span, c.playback, c.display, c.pointer)
         self._real_view = HeatmapView(
             c.real, c.span, c.playback, c.display, c.pointer, alignable=True
@@ -198,6 +207,8 @@ class MainWindow(QMainWindow):
         c.document.failed.connect(self.messages.warn)
         c.document.noted.connect(self.messages.note)
         c.synthesis.failed.connect(self.messages.warn)
+        c.trade.failed.connect(self.messages.warn)
+        c.trade.noted.connect(self.messages.note)
         c.video.failed.connect(self.messages.warn)
         c.document.undo_stack.indexChanged.connect(self._refresh)
         c.document.undo_stack.cleanChanged.connect(self._refresh)
@@ -206,6 +217,8 @@ class MainWindow(QMainWindow):
             c.playback.loop_changed,
             c.display.mesh_changed,
             c.synthesis.completed,
+            c.trade.plan_changed,
+            c.trade.measured.changed,
         ):
             signal.connect(self._refresh)
         c.display.theme_changed.connect(self._restyle)
@@ -274,6 +287,11 @@ class MainWindow(QMainWindow):
         """Look at the scene from somewhere else."""
         if self._scene is not None:
             self._scene.set_view(name)
+
+    def measure_scene(self) -> None:
+        """Measure every plan, where one can watch it."""
+        self.side.bring_up("Trade")
+        self.context.trade.measured.measure()
 
     def close_window(self) -> None:
         """Close, after asking when edits would be lost."""
@@ -378,13 +396,3 @@ def _fill_layout(panel: QFrame, layout: QVBoxLayout) -> None:
     layout.setContentsMargins(1, 1, 1, 1)
     layout.setSpacing(0)
     panel.setLayout(layout)
-
-
-def _scrolled(widget: QWidget) -> QScrollArea:
-    scroll = QScrollArea()
-    scroll.setWidget(widget)
-    scroll.setWidgetResizable(True)
-    scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-    bar = scroll.verticalScrollBar().sizeHint().width()
-    scroll.setMinimumWidth(widget.minimumSizeHint().width() + bar)
-    return scroll

@@ -8,6 +8,7 @@ import av
 import numpy as np
 import pytest
 import trimesh
+from fake_ladder import FakeLadder
 
 from sd2core.io.mesh import save_mesh
 from sd2core.io.radar.infineon import write_capture
@@ -89,17 +90,24 @@ def compiled_kernels() -> None:
 
 
 @pytest.fixture
-def empty_window(qtbot, compiled_kernels):
+def fake() -> FakeLadder:
+    """Chooses exact visibility unless a test tells it otherwise."""
+    return FakeLadder()
+
+
+@pytest.fixture
+def empty_window(qtbot, compiled_kernels, fake):
     """The window without a recording, all views in place."""
     from sd2app.settings import Settings
     from sd2app.views.window import MainWindow
 
-    window = MainWindow(Settings.forgetful())
+    window = MainWindow(Settings.forgetful(), fake.ladder)
     window.resize(1280, 800)
     window.show()
     window.populate()
     qtbot.waitUntil(lambda: window.settled, timeout=20_000)
     yield window
+    fake.gate.set()
     if window.ready:
         window.context.document.undo_stack.clear()
     window.close()

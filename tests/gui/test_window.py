@@ -13,6 +13,7 @@ from sd2app.dialogs.dialogs import KeysDialog
 from sd2app.views.heatmap import HeatmapView
 from sd2app.views.timeline import Overview, TimeRuler
 from sd2app.views.video import VideoView
+from sd2core.ladder.rungs import Plan
 from sd2core.sensor import VirtualSensor
 from sd2core.spectrum import DopplerMap
 
@@ -31,7 +32,7 @@ def test_opening_shows_every_part(window):
     assert window.windowTitle().startswith("ball (simulated)")
     assert c.video.picture.shape == (120, 160, 3)
     assert c.synthetic.map.values.max() > 0
-    assert c.synthetic.status == "exact visibility"
+    assert c.synthetic.status == "visibility exact, ±0 %"
     assert c.real.map.kind == "simulated"
     assert c.real.title == "Radar (simulated)"
     assert all(view.isVisible() for view in heatmaps(window))
@@ -343,12 +344,12 @@ def test_a_drag_shows_a_preview_and_becomes_exact(window, qtbot):
     c.synthetic.status_changed.connect(lambda: seen.append(c.synthetic.status))
     c.edits.begin_sensor_drag()
     c.edits.drag_sensor((0.1, 0.0, 0.0))
-    qtbot.waitUntil(lambda: c.synthetic.status.startswith("preview"), timeout=5_000)
+    qtbot.waitUntil(lambda: c.synthetic.status.startswith("while"), timeout=5_000)
     c.edits.drag_sensor((0.2, 0.0, 0.0))
     c.edits.end_sensor_drag()
     qtbot.waitUntil(lambda: c.synthesis.complete, timeout=10_000)
-    assert c.synthetic.status == "exact visibility"
-    assert seen[0] == "preview: visibility of the nearest exact placement"
+    assert c.synthetic.status == "visibility exact, ±0 %"
+    assert seen[0] == "while dragging: visibility facing, ±13 %"
 
 
 def test_dragging_the_sensor_in_3d_follows_the_mouse_in_one_step(window, qtbot):
@@ -374,7 +375,7 @@ def test_dragging_the_sensor_in_3d_follows_the_mouse_in_one_step(window, qtbot):
     end = start + QPoint(24, 12)
     assert (pixel() - end).manhattanLength() <= 1
     qtbot.waitUntil(lambda: not np.array_equal(before, c.synthetic.map.values), timeout=5_000)
-    assert c.synthetic.status.startswith("preview")
+    assert c.synthetic.status.startswith("while dragging")
     qtbot.mouseRelease(canvas, Qt.MouseButton.LeftButton, pos=end)
     assert not c.sensor.dragging
     assert c.document.undo_stack.count() == 1
@@ -418,7 +419,8 @@ def test_dropped_files_are_opened_and_added(empty_window, small_recording, qtbot
     assert empty_window.findChild(VideoView).isVisible()
 
 
-def test_a_point_cloud_counts_every_point(empty_window, tmp_path, qtbot):
+def test_a_point_cloud_counts_every_point(empty_window, fake, tmp_path, qtbot):
+    fake.plan = fake.dragging = Plan(visibility="none")
     rng = np.random.default_rng(0)
     points = np.repeat(rng.normal(size=(1, 25, 3)), 20, axis=0)
     points[:, :, 2] += 3.0 - np.arange(20)[:, None] / 30.0  # approaches at 1 m/s
@@ -427,7 +429,7 @@ def test_a_point_cloud_counts_every_point(empty_window, tmp_path, qtbot):
     with qtbot.waitSignal(c.document.opened, timeout=10_000):
         empty_window.open_paths([tmp_path / "cloud.npz"])
     qtbot.waitUntil(lambda: c.synthesis.complete, timeout=10_000)
-    assert c.synthetic.status == "all vertices of the point cloud"
+    assert c.synthetic.status == "all vertices, ±0 %"
     assert c.synthesis.readout().visible_share == 1.0
     assert np.nanmean(c.synthetic.map.mean_velocity_mps()) == pytest.approx(0.9, abs=0.15)
 

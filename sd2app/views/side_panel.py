@@ -1,0 +1,38 @@
+"""Panels that share one place, one tab each."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QScrollArea, QTabWidget, QWidget
+
+
+class SidePanel(QTabWidget):
+    """Tabs by name; what does not fit is scrolled."""
+
+    def __init__(self, pages: dict[str, QWidget], parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setDocumentMode(True)
+        self.tabBar().setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        self._names = list(pages)
+        for name, page in pages.items():
+            self.addTab(_scrolled(page), name)
+
+    @property
+    def shown(self) -> str:
+        """Name of the panel in front."""
+        return self._names[self.currentIndex()]
+
+    def bring_up(self, name: str) -> None:
+        """Show a panel."""
+        self.setCurrentIndex(self._names.index(name))
+
+
+def _scrolled(widget: QWidget) -> QScrollArea:
+    scroll = QScrollArea()
+    scroll.setWidget(widget)
+    scroll.setWidgetResizable(True)
+    scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+    scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    bar = scroll.verticalScrollBar().sizeHint().width()
+    scroll.setMinimumWidth(widget.minimumSizeHint().width() + bar)
+    return scroll
