@@ -8,7 +8,7 @@ from sd2core.fmcw.processing import RangeDoppler, doppler_map, limits, range_dop
 from sd2core.fmcw.reference import Converged, converged_frame, doppler_marginal
 from sd2core.fmcw.signal import capture_scene, simulate_capture
 from sd2core.fmcw.simulation import simulate_radar
-from sd2core.fmcw.spectra import frame_spectra, signal_spectra
+from sd2core.fmcw.spectra import frame_spectra, signal_spectra, velocity_response
 
 __all__ = [
     "Converged",
@@ -28,4 +28,5 @@ __all__ = [
     "signal_spectra",
     "simulate_capture",
     "simulate_radar",
+    "velocity_response",
 ]

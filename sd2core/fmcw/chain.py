@@ -200,9 +200,7 @@ class Chain(FrameChain):
         return mean
 
 
-def own_clutter_removed(
-    signal: NDArray[np.float32], clutter: Literal["none", "mean"]
-) -> NDArray[np.float32]:
+def own_clutter_removed(signal: NDArray[np.float32], clutter: Clutter) -> NDArray[np.float32]:
     """Frames without the mean of every chirp and what else they tell of clutter, in place."""
     signal -= signal.mean(axis=3, keepdims=True)
     if clutter == "mean":

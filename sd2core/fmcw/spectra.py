@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sd2core.compiled import workers
 from sd2core.errors import Sd2Error
-from sd2core.fmcw.chain import FrameChain, ProcessingOptions, own_clutter_removed
+from sd2core.fmcw.chain import FrameChain, ProcessingOptions, own_clutter_removed, taper
 from sd2core.fmcw.options import WaveOptions
 from sd2core.fmcw.processing import rebinning
 from sd2core.fmcw.wave import WaveScene
@@ -74,6 +74,54 @@ def frame_spectra(
     return signal_spectra(np.stack(list(found)), config, axis=axis, processing=processing)
 
 
+def velocity_response(
+    config: RadarConfig,
+    velocity_mps: ArrayLike,
+    *,
+    axis: VelocityAxis | None = None,
+    processing: ProcessingOptions | None = None,
+) -> NDArray[np.float64]:
+    """What a radar shows of an echo with constant velocity: its window and clutter filter.
+
+    A histogram over fine bins, multiplied by this, is what the radar would show of it if
+    powers added up.
+
+    Parameters
+    ----------
+    velocity_mps : array_like, shape (n,)
+        Positive when approaching.
+
+    Other parameters are those of :func:`frame_spectra`.
+
+    Returns
+    -------
+    float64 array, shape (bins, n)
+        Power per bin; without a filter columns add up to 1, less what is beyond the axis.
+    """
+    options = processing or ProcessingOptions()
+    _refuse_moving(options)
+    chirps = config.chirps_per_frame
+    doppler_bins = FrameChain(config, options).doppler_bins
+    turns = -2.0 / config.wavelength_m * np.asarray(velocity_mps, dtype=np.float64)
+    signal = np.exp(2j * np.pi * config.chirp_repetition_s * np.outer(turns, np.arange(chirps)))
+    if options.clutter == "mean":
+        signal -= signal.mean(axis=1, keepdims=True)
+    window = taper(options.window, chirps).astype(np.float64)
+    power = np.abs(np.fft.fft(signal * window, n=doppler_bins, axis=1)) ** 2
+    power /= doppler_bins * (window**2).sum()
+    shown: NDArray[np.float64] = rebinning(config, axis or VelocityAxis(), doppler_bins) @ power.T
+    return shown
+
+
+def _refuse_moving(options: ProcessingOptions) -> None:
+    if options.clutter == "moving":
+        raise Sd2Error(
+            "A moving average of the clutter is asked for single frames",
+            "clutter 'none' or 'mean', which a frame knows by itself",
+            "Simulate the whole clip with simulate_radar",
+        )
+
+
 def signal_spectra(
     signal: NDArray[np.float64],
     config: RadarConfig,
@@ -87,17 +135,11 @@ def signal_spectra(
     :func:`~sd2core.fmcw.reference.converged_frame`.
     """
     options = processing or ProcessingOptions()
-    if options.clutter == "moving":
-        raise Sd2Error(
-            "A moving average of the clutter is asked for single frames",
-            "clutter 'none' or 'mean', which a frame knows by itself",
-            "Simulate the whole clip with simulate_radar",
-        )
-    axis = axis or VelocityAxis()
+    _refuse_moving(options)
     chain = FrameChain(config, options)
     # Brought to 1, or far echoes would be lost below the smallest float32.
     scaled = (signal / (np.abs(signal).max() or 1.0)).astype(np.float32)
     power = chain.power_over_doppler(own_clutter_removed(scaled, options.clutter))
-    weights = rebinning(config, axis, chain.doppler_bins).astype(np.float32)
+    weights = rebinning(config, axis or VelocityAxis(), chain.doppler_bins).astype(np.float32)
     columns: NDArray[np.float32] = weights @ power.T
     return columns

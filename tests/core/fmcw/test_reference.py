@@ -11,7 +11,7 @@ import pytest
 from sd2core.errors import Sd2Error
 from sd2core.fmcw import ProcessingOptions, SignalOptions, WaveOptions, doppler_map, simulate_radar
 from sd2core.fmcw.reference import converged_frame, doppler_marginal, subdivided
-from sd2core.fmcw.spectra import frame_spectra
+from sd2core.fmcw.spectra import frame_spectra, velocity_response
 from sd2core.fmcw.sums import direct
 from sd2core.fmcw.wave import WaveScene
 from sd2core.mesh import MeshSequence
@@ -152,3 +152,26 @@ def test_a_moving_average_needs_the_frames_between() -> None:
         frame_spectra(
             flapping(), RADAR, [0.1], processing=ProcessingOptions(clutter="moving"), threads=1
         )
+
+
+@pytest.mark.parametrize("clutter", ["none", "mean"])
+@pytest.mark.parametrize("speed_mps", [-0.9, -0.1, 0.05, 0.6])
+def test_the_response_to_a_velocity_is_the_column_of_a_point(
+    clutter: str, speed_mps: float
+) -> None:
+    # A facet far smaller than the wave, at a gate's middle and far from the leakage.
+    gate_m = 5 * PAPER_RADAR.range_resolution_m
+    times_s = np.arange(3) / 30.0
+    corners = 1e-4 * np.array([[0.0, 0, 0], [0, 1, 0], [1, 0, 0]])
+    places = (
+        corners
+        + np.array([0, 0, 1.0]) * (gate_m - speed_mps * (times_s - times_s[1]))[:, None, None]
+    )
+    mesh = MeshSequence(places, np.array([[0, 1, 2]], np.int32), Timebase(times_s))
+    processing = ProcessingOptions(clutter=clutter)  # type: ignore[arg-type]
+    column = frame_spectra(mesh, PAPER_RADAR, times_s[1:2], processing=processing)[:, 0]
+    shown = velocity_response(PAPER_RADAR, [speed_mps], processing=processing)[:, 0]
+    if clutter == "none":
+        assert shown.sum() == pytest.approx(1.0, abs=1e-4)
+    # Migration through range, and what of the windows' skirts lies beyond the gates.
+    np.testing.assert_allclose(column / column.sum(), shown / shown.sum(), atol=0.01)
