@@ -167,7 +167,7 @@ def simulated(
 
     seen = None
     if visibility == "exact":
-        from sd2core.simulate.sample import facet_visibility
+        from sd2core.scattering.facets import facet_visibility
 
         with progress_bar("Looking at what is hidden") as progress:
             seen = facet_visibility(mesh, sensor, progress)

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from sd2core.doppler.options import SynthesisOptions
-from sd2core.errors import Sd2Error
 from sd2core.ladder.choose import checked_options
 from sd2core.ladder.deviation import spread
 from sd2core.ladder.results import Cost, Measurement, PlanResult, Spread
@@ -59,7 +58,9 @@ def measure(
     """
     options = checked_options(mesh, options)
     if family == "fmcw":
-        raise Sd2Error("The FMCW family is to be measured", "the family histogram")
+        from sd2core.ladder.measure_waves import measure_waves
+
+        return measure_waves(mesh, sensor, options, repeats, progress)
     surface = mesh.faces is not None
     plans = list(
         compared_plans(options.weight, surface=surface, range_law=options.range_exponent > 0)

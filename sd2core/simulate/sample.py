@@ -23,7 +23,7 @@ from sd2core.io.radar.infineon import write_capture
 from sd2core.mesh import MeshSequence
 from sd2core.progress import Progress, silent
 from sd2core.recording import SUFFIX, Recording, Span
-from sd2core.scattering.exact import exact_visibility_kernel
+from sd2core.scattering.facets import facet_visibility
 from sd2core.sensor import PAPER_RADAR, VirtualSensor
 from sd2core.simulate.bodies import Body, Resolution
 from sd2core.simulate.encode import write_compact_mesh, write_video
@@ -168,36 +168,6 @@ def body_sequence(
         one = slice(frame, frame + 1)
         vertices[one] = body.pose(motion.rotations[one], motion.translation_m[one] + place)
     return MeshSequence(vertices, body.faces, Timebase(times_s), source="simulated body")
-
-
-def facet_visibility(
-    mesh: MeshSequence, sensor: VirtualSensor, progress: Progress = silent
-) -> NDArray[np.bool_]:
-    """Which facets face the sensor and have a centre that nothing hides, (T, F)."""
-    faces = mesh.faces
-    if faces is None:
-        raise Sd2Error("The mesh has no faces", "a surface, which alone can hide anything")
-    visible = np.zeros((mesh.frame_count, len(faces)), dtype=np.bool_)
-    place = np.asarray(sensor.position_m)
-
-    def fill(frame: int) -> None:
-        vertices = np.asarray(mesh.frame(frame), dtype=np.float64)
-        corners = vertices[faces]  # (F, 3, 3)
-        centres = corners.mean(axis=1)
-        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        facing = ((place - centres) * across).sum(axis=1) > 0
-        # The centres go along as loose vertices, which the surface may hide.
-        points = np.concatenate([vertices, centres]).T[None]  # (1, 3, V + F)
-        needed = np.concatenate([np.zeros(len(vertices), bool), facing])[None].astype(np.uint8)
-        seen = np.zeros_like(needed)
-        exact_visibility_kernel(
-            np.ascontiguousarray(points, dtype=np.float32), faces, place, needed, 0, 1, seen
-        )
-        visible[frame] = seen[0, len(vertices) :].astype(bool)
-
-    for done, _ in enumerate(workers().map(fill, range(mesh.frame_count))):
-        progress(done, mesh.frame_count)
-    return visible
 
 
 def _pictures(

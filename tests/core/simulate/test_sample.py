@@ -15,6 +15,7 @@ from sd2core.io.video import open_video
 from sd2core.progress import Cancelled
 from sd2core.recording import Recording, open_recording
 from sd2core.resources import resource_path
+from sd2core.scattering.facets import facet_visibility
 from sd2core.sensor import PAPER_RADAR, VirtualSensor
 from sd2core.simulate.gestures import DURATION_S, SPANS
 from sd2core.simulate.render import Camera
@@ -22,7 +23,6 @@ from sd2core.simulate.sample import (
     FRAMES_PER_S,
     RECORDED,
     body_sequence,
-    facet_visibility,
     make_sample,
 )
 
