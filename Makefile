@@ -12,7 +12,7 @@ COMPILED := .venv/.compiled
 # Among them every module in KERNEL_MODULES of sd2core/compiled.py.
 KERNELS := $(wildcard sd2core/compiled.py sd2core/scattering/*.py sd2core/doppler/*.py sd2core/fmcw/*.py sd2core/simulate/*.py)
 
-.PHONY: help setup demo test test-slow lint format bench wheel screenshots clean
+.PHONY: help setup demo test test-slow lint format bench wheel screenshots accuracy clean
 
 help:
 	@echo "make demo         set up, and open the sample recording in the window"
@@ -24,6 +24,7 @@ help:
 	@echo "make bench        the benchmarks"
 	@echo "make wheel        dist/*.whl"
 	@echo "make screenshots  the pictures in docs/"
+	@echo "make accuracy     docs/accuracy-and-speed.md, measured (some ten minutes)"
 	@echo "make clean        remove what the above made, .venv included"
 
 setup: system-packages $(COMPILED)
@@ -71,6 +72,9 @@ wheel: $(INSTALLED)
 
 screenshots: system-packages-for-tests setup
 	scripts/on_display.sh $(BIN)/python docs/screenshots.py
+
+accuracy: setup
+	$(BIN)/python docs/accuracy_and_speed.py
 
 clean:
 	rm -rf .venv build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks \

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.ladder.rungs import MASK_STRIDES
-from sd2core.mesh import MeshSequence
+from sd2core.mesh import MeshSequence, refuse_missing
 from sd2core.timebase import Timebase
 
 KEPT = 10
@@ -66,11 +66,19 @@ class Sample:
         return tuple(dict.fromkeys((*self.chosen_on, *self.checked_on)))
 
     def of(self, mesh: MeshSequence) -> MeshSequence:
-        """The sampled frames of a mesh in memory, one run after the other on their own times."""
+        """The sampled frames of a mesh in memory, one run after the other on their own times.
+
+        Raises
+        ------
+        Sd2Error
+            When a vertex is not finite; it is named by its frame in the clip.
+        """
         cuts = np.flatnonzero(np.diff(self.frames) > 1) + 1
-        stretches = [
-            mesh.read(int(part[0]), int(part[-1]) + 1) for part in np.split(self.frames, cuts)
-        ]
+        stretches = []
+        for part in np.split(self.frames, cuts):
+            vertices = mesh.read(int(part[0]), int(part[-1]) + 1)
+            refuse_missing(vertices, int(part[0]), mesh.source)
+            stretches.append(vertices)
         return replace(
             mesh,
             vertices=np.concatenate(stretches),
@@ -150,6 +158,7 @@ def _apart(starts: NDArray[np.intp], length: int) -> NDArray[np.intp]:
 def _speed(mesh: MeshSequence, frame: int) -> float:
     """Mean squared speed of some vertices, in (m/s)²."""
     two = mesh.read(frame, frame + 2).astype(np.float64)
+    refuse_missing(two, frame, mesh.source)
     step = two[1, :: max(1, mesh.vertex_count // _PROBED_VERTICES)]
     step = step - two[0, :: max(1, mesh.vertex_count // _PROBED_VERTICES)]
     duration_s = mesh.times_s[frame + 1] - mesh.times_s[frame]

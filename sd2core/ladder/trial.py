@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.compiled import workers
 from sd2core.decimation import decimate
 from sd2core.doppler.masks import Visibility
 from sd2core.doppler.options import SynthesisOptions
@@ -80,10 +81,13 @@ class Trial:
         """The reference plan's columns, in double precision."""
         options = reference_plan("histogram", self.options.weight).options(self._unsmoothed)
         mesh = self._sampled(1.0)
-        for run in runs:
-            if run not in self._references:
-                raw = reference_stretch(mesh, self.sensor, options, run.start, run.stop)
-                self._references[run] = Columns(raw, self._smoothed(raw, run))
+
+        def work(run: Run) -> NDArray[np.float64]:
+            return reference_stretch(mesh, self.sensor, options, run.start, run.stop)
+
+        missing = [run for run in runs if run not in self._references]
+        for run, raw in zip(missing, workers().map(work, missing), strict=True):
+            self._references[run] = Columns(raw, self._smoothed(raw, run))
         return _joined([self._references[run] for run in runs])
 
     def columns(self, plan: Plan, runs: Sequence[Run], *, progress: Progress = silent) -> Columns:

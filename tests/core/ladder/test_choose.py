@@ -14,6 +14,7 @@ from sd2core.errors import Sd2Error
 from sd2core.ladder.carry_out import synthesizer_for
 from sd2core.ladder.choose import choose
 from sd2core.ladder.deviation import relative_l1
+from sd2core.ladder.sample import take_sample
 from sd2core.ladder.survey import survey_scene
 from sd2core.mesh import MeshSequence
 from sd2core.progress import Cancelled
@@ -129,10 +130,11 @@ def test_choosing_can_be_stopped(scene: MeshSequence) -> None:
         choose(scene, CAMERA, tolerance=0.1, progress=stop)
 
 
-def test_nan_is_named() -> None:
-    mesh = ball(swinging((0, 0, 3), 1.5, 0.8))
+def test_a_missing_number_is_named_by_its_frame_in_the_clip() -> None:
+    mesh = ball(swinging((0, 0, 3), 1.5, 0.8), frames=400)
+    frame = take_sample(mesh, PAPER).checked_on[0].first + 3
     vertices = mesh.read(0, mesh.frame_count).copy()
-    vertices[60, 7, 1] = np.nan
+    vertices[frame, 7, 1] = np.nan
     broken = replace(mesh, vertices=vertices)
-    with pytest.raises(Sd2Error, match="vertex 7 of frame 60"):
+    with pytest.raises(Sd2Error, match=f"scene: vertex 7 of frame {frame} is at"):
         choose(broken, CAMERA, tolerance=0.1)
