@@ -53,6 +53,19 @@ def stored_velocity_error_mps(reach_m: float, duration_s: float) -> float:
     return 2.0 * ROUNDING * reach_m / duration_s
 
 
+def keeps_shape(extent_m: float, size_m: float) -> bool:
+    """Whether single precision keeps the shape of a body of ``size_m`` so far from the origin.
+
+    Parameters
+    ----------
+    extent_m : float
+        Largest coordinate.
+    size_m : float
+        Largest extent of the body itself; 0 for a point, which has no shape.
+    """
+    return size_m == 0 or ROUNDING * extent_m <= SHARE_OF_THE_BODY * size_m
+
+
 def single_is_enough(
     extent_m: float,
     size_m: float,
@@ -80,6 +93,6 @@ def single_is_enough(
     range_error_m = velocity_error_mps(extent_m, 1.0)
     return (
         range_error_m <= SHARE_OF_A_BIN * bin_width_mps * duration_s
-        and (size_m == 0 or ROUNDING * extent_m <= SHARE_OF_THE_BODY * size_m)
+        and keeps_shape(extent_m, size_m)
         and range_exponent * range_error_m <= SHARE_OF_A_WEIGHT * nearest_range_m
     )

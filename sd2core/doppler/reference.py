@@ -14,7 +14,7 @@ from sd2core.compiled import kernels_ready
 from sd2core.doppler import vid2doppler
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.mesh import MeshSequence
-from sd2core.precision import ROUNDING, SHARE_OF_THE_BODY
+from sd2core.precision import keeps_shape
 from sd2core.scattering.amplitude import NEAREST_RANGE_M
 from sd2core.scattering.exact import exact_visibility_kernel
 from sd2core.scattering.exact_plain import exact_visibility
@@ -178,7 +178,7 @@ def _visible(
         return np.ones(points.shape[1], bool)
     low, high = points.min(axis=1), points.max(axis=1)
     origin, extent_m = middle, float(np.abs(points - middle[:, None]).max())
-    if ROUNDING * extent_m > SHARE_OF_THE_BODY * (high - low).max():
+    if not keeps_shape(extent_m, float((high - low).max())):
         origin = 0.5 * (low + high)
     single = (points - origin[:, None]).astype(np.float32)
     needed = np.ones((1, points.shape[1]), np.uint8)

@@ -12,6 +12,7 @@ from extreme_tables import Scene, every_scene, exact_ranges
 from numpy.typing import NDArray
 
 from sd2core.compiled import warm_up
+from sd2core.decimation import decimate
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.doppler.reference import reference_stretch
 from sd2core.errors import Sd2Error
@@ -258,6 +259,25 @@ def test_one_vertex(visibility: Any) -> None:
     made = Synthesizer(mesh, replace(RAW, visibility=visibility)).map(at(0, 0, 0))
     assert made.values[RAW.axis.bin_of(1.3), 2] == 1.0
     assert made.values.sum() == 5.0
+
+
+@pytest.mark.parametrize("scale", [2.0**-10, 1.0, 2.0**10])
+@pytest.mark.parametrize("offset_m", [0.0, 1e6])
+def test_decimation_keeps_the_same_vertices_anywhere(scale: float, offset_m: float) -> None:
+    vertices, faces = gesture(np.arange(3) / 30.0, divisions=3)
+    clock = Timebase.regular(3, 30.0)
+    usual = decimate(MeshSequence(vertices, faces, clock), 0.2)
+    moved = decimate(MeshSequence(vertices * scale + offset_m, faces, clock), 0.2)
+    assert usual.vertex_counts is not None
+    assert moved.vertex_counts is not None
+    # A power of two changes no digit. Many edges of these regular balls are equally good,
+    # and at 10^6 m the last digits decide between them.
+    kept = {tuple(point) for point in np.round(usual.frame(1), 5).tolist()}
+    back = (moved.frame(1) - offset_m) / scale
+    same = {tuple(point) for point in np.round(back, 5).tolist()}
+    assert moved.vertex_count == usual.vertex_count
+    assert len(kept & same) >= (0.8 if offset_m else 1.0) * usual.vertex_count
+    assert moved.vertex_counts.sum() == vertices.shape[1]
 
 
 @pytest.mark.slow
