@@ -63,7 +63,8 @@ def reference_stretch(
         edges_mps = options.axis.edges_mps
         for velocity in velocities:
             folded = _on_axis(velocity, edges_mps, options)
-            raw[:, column] += np.histogram(folded, edges_mps, weights=weight)[0]
+            ends_mps = float(edges_mps[0]), float(edges_mps[-1])
+            raw[:, column] += np.histogram(folded, options.axis.bins, ends_mps, weights=weight)[0]
         raw[:, column] /= len(velocities) * total
     raw[list(options.null_bins)] = 0
     return raw
