@@ -196,6 +196,23 @@ def test_any_scene_is_counted(scene: Scene) -> None:
     assert_scene_counted(scene)
 
 
+@pytest.mark.parametrize("start_s", [0.0, 1e5, 1.7e9])
+def test_any_clock(start_s: float) -> None:
+    scene = Scene(speed_mps=2.0)
+    mesh = clip_of(scene)
+    late = replace(mesh, timebase=mesh.timebase.shifted(start_s))
+    chosen = replace(RAW, beyond="wrap", axis=VelocityAxis(254, 1.5))
+    sensor = VirtualSensor(tuple(scene.sensor_m.tolist()))
+    found = Synthesizer(late, chosen).map(sensor).values[:, 2].astype(float) * POINTS
+    before, after = (np.asarray(mesh.vertices)[step].T for step in (1, 3))
+    velocity = exact_velocities(before, after, scene.sensor_m, scene.duration_s)
+    # Seconds since 1970 are good to 1.2e-7 s, twice in the 0.067 s of a velocity.
+    slack = (SHARE_OF_A_BIN * chosen.axis.bin_width_mps) + scene.speed_mps * (
+        2 * DOUBLE * (start_s + 1.0) / scene.duration_s
+    )
+    assert_counted(np.rint(found), velocity, chosen.axis, "wrap", slack)
+
+
 @pytest.mark.parametrize(
     ("changes", "precision"),
     [

@@ -217,13 +217,14 @@ def test_ten_kilometres_down_the_road_nothing_has_changed(
     assert (apart > 1e-6).sum() <= 6
 
 
+@pytest.mark.parametrize("oversampling", [1, 8])
 @pytest.mark.parametrize("weight", ["count", "area", "projected"])
 @pytest.mark.parametrize(
     ("rate_hz", "away_m", "offset_m"),
     [(30.0, 0.0, 0.0), (1e4, 0.0, 0.0), (30.0, 1e4, 0.0), (1.0, 1e6, 0.0), (30.0, 0.0, 1e6)],
 )
 def test_whole_maps_against_the_reference(
-    rate_hz: float, away_m: float, offset_m: float, weight: Any
+    rate_hz: float, away_m: float, offset_m: float, weight: Any, oversampling: int
 ) -> None:
     times = np.arange(7) / rate_hz
     vertices, faces = gesture(times)
@@ -231,7 +232,9 @@ def test_whole_maps_against_the_reference(
     path = np.where(np.arange(7) < 1, 0.0, away_m)[:, None, None] * np.array([0.6, 0.0, 0.8])
     mesh = MeshSequence(vertices + path + offset_m, faces, Timebase(times), "balls")
     sensor = at(0.6 * away_m + offset_m, offset_m, 0.8 * away_m + offset_m - 2.2)
-    chosen = replace(RAW, weight=weight, range_exponent=4.0, beyond="wrap")
+    chosen = replace(
+        RAW, weight=weight, range_exponent=4.0, beyond="wrap", oversampling=oversampling
+    )
     found = Synthesizer(mesh, chosen).map(sensor).values[:, 3:6]
     truth = reference_stretch(mesh, sensor, chosen, 3, 6)
     apart = np.abs(found - truth)

@@ -270,6 +270,25 @@ def test_velocity_comes_back_wrapped_by_modular_arithmetic(
     assert abs(apart) <= 0.5001 * config.velocity_resolution_mps
 
 
+@pytest.mark.parametrize(("chirps", "samples"), [(2, 1024), (16, 8), (1024, 8), (1024, 1024)])
+def test_few_and_many_chirps_and_samples(chirps: int, samples: int) -> None:
+    # The range is the middle gate's, the speed a quarter of what wraps.
+    centre_hz = SPEED_OF_LIGHT_MPS / 5e-3
+    config = replace(
+        radar(5e-3, chirps, samples),
+        start_frequency_hz=centre_hz - 2.5e8,
+        end_frequency_hz=centre_hz + 2.5e8,
+    )
+    speed = 0.25 * config.v_max_mps
+    mesh, sensor = plate(0.5 * config.range_max_m, speed, 1.25e-3)
+    capture = simulate_radar(mesh, config, sensor=sensor, options=SignalOptions(math.inf))
+    made = doppler_map(capture)
+    assert np.isfinite(made.values).all()
+    # Of the middle of the strongest bin, as wide as the radar resolves.
+    apart = float(made.peak_velocity_mps()[4]) - speed
+    assert abs(apart) <= 0.5001 * config.velocity_resolution_mps
+
+
 @pytest.mark.parametrize("place", [0.0, 1e-3, 0.05, 1.0, 1e6])
 @pytest.mark.parametrize("coherent", [True, False])
 def test_no_place_of_the_sensor_gives_what_is_not_a_number(place: float, coherent: bool) -> None:
