@@ -9,20 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.compiled import compiled
-from sd2core.fmcw.facet import facet_mean, unit_phasor
+from sd2core.fmcw.facet import bent_facet_mean, unit_phasor
 
 Floats = NDArray[np.float64]
 
 # Must be plain numbers here: kernels read module constants when they are compiled.
 _NEAREST_M = 0.05
 _STEADY_BELOW_RAD = 0.1
-_TANGENT_BELOW_RAD = 0.5
+_TANGENT_BELOW_RAD = 0.7
 _NODE = 0.7
 
 
 @compiled
 def _mean_at(phase: Floats, turn: Floats, weight: Floats, bend: Floats, time_s: float) -> Any:
-    return facet_mean(
+    return bent_facet_mean(
         phase[0] + time_s * turn[0],
         phase[1] + time_s * turn[1],
         phase[2] + time_s * turn[2],

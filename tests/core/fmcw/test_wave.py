@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
-from sd2core.fmcw.facet import facet_mean, unit_phasor
+from sd2core.fmcw.facet import bent_facet_mean, facet_mean, unit_phasor
 from sd2core.fmcw.options import (
     Antenna,
     Mirror,
@@ -228,6 +228,28 @@ def test_bends_are_followed_to_first_order() -> None:
     ]
     assert even[1] < 0.3 * even[0]  # what is left is of second order
     assert even[2] < 0.3 * even[1]
+
+
+def test_a_facet_that_bends_much_is_cut() -> None:
+    phase, weight, bend = (3.0, 0.0, 7.0), (0.9, 1.0, 1.1), (1.5, 0.8, 2.0)
+    wanted = cut_mean(phase, weight, bend)
+    whole, cut = (
+        abs(mean(*phase, *weight, 1.0, -2.0, 0.5, *bend)[0] - wanted)
+        for mean in (facet_mean, bent_facet_mean)
+    )
+    # Bends of a quarter leave a sixteenth of the second order.
+    assert cut < 0.2 * whole
+    little = (*phase, *weight, 1.0, -2.0, 0.5, 0.2, 0.1, 0.3)
+    assert bent_facet_mean(*little) == facet_mean(*little)
+    # Changes leave the bend out, which is small in every piece.
+    _, change = bent_facet_mean(*phase, *(1.0,) * 3, 1.0, -2.0, 0.5, 1.0, 0.0, 0.0)
+    later, before = (
+        bent_facet_mean(
+            *np.add(phase, step * np.array([1.0, -2.0, 0.5])), *(1.0,) * 3, *(0.0,) * 3, 1.0, 0, 0
+        )[0]
+        for step in (1e-3, -1e-3)
+    )
+    assert abs(change - (later - before) / 2e-3) < 0.05 * abs(change)
 
 
 @settings(max_examples=200, deadline=None, derandomize=True)
