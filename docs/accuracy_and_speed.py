@@ -32,6 +32,7 @@ IMAGES = DOCS / "images"
 SHARED = Path(os.environ.get("SD2_SHARED_DATA", DOCS.parent.parent / "shared" / "data"))
 
 sys.path.insert(0, str(DOCS.parent / "tests" / "benchmarks"))
+from precisions import costs, errors, in_both_precisions  # noqa: E402
 from scaling import BUDGET_BYTES, Scaling, scalings  # noqa: E402
 
 TOLERANCES = (0.2, 0.1, 0.05, 0.02, 0.01, 0.005)
@@ -69,6 +70,7 @@ def main() -> None:
             measurement = measure(mesh, sensor, family=family)  # type: ignore[arg-type]
             parts += _measured(measurement, f"trade-{name}-{family}.png")
     parts += _scaling()
+    parts += _precision()
     (DOCS / "accuracy-and-speed.md").write_text("\n".join(parts), encoding="utf-8")
 
 
@@ -154,6 +156,30 @@ def _scaling() -> Iterator[str]:
             f" | {_list(f'{g:.1f}' for g in scaling.growth)}"
             f" | {_list(f'{p.peak_bytes / 1e6:.0f}' for p in scaling.points)} |"
         )
+    yield ""
+
+
+def _precision() -> Iterator[str]:
+    """What single precision gets wrong far out, and what double costs, on the sample."""
+    mesh = open_recording(resource_path("swipes.sd2")).load_mesh()
+    yield "## Single and double precision\n"
+    yield (
+        "The sample's body so far from the clip's origin; error of the worst vertex's velocity, in"
+        " bins of 0.125 m/s. Where more than 0.01 is predicted, frames are counted in double"
+        " precision ([decision 13](decisions/0013-single-and-double-precision.md)).\n"
+    )
+    yield "| from the origin, m | predicted | single | double | is used |"
+    yield "|---|---|---|---|---|"
+    for at in errors(mesh):
+        yield (
+            f"| {at.away_m:g} | {at.predicted:.0e} | {at.single:.0e} | {at.double:.0e}"
+            f" | {at.used} |"
+        )
+    yield "\nWhat double costs, ms per frame of the whole clip on all cores:\n"
+    yield "| what | single | double | ratio |"
+    yield "|---|---|---|---|"
+    for cost in costs(in_both_precisions(mesh)):
+        yield (f"| {cost.what} | {cost.single_ms:.3f} | {cost.double_ms:.3f} | {cost.ratio:.2f} |")
     yield ""
 
 
