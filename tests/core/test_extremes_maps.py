@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 from extreme_tables import Scene, every_scene, exact_ranges
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from sd2core.compiled import warm_up
 from sd2core.decimation import decimate
-from sd2core.doppler import PRESETS, Synthesizer
+from sd2core.doppler import PRESETS, Synthesizer, masks, prepared, synthesizer
 from sd2core.doppler.reference import reference_stretch
 from sd2core.errors import Sd2Error
 from sd2core.mesh import MeshSequence
@@ -217,6 +219,29 @@ def test_ten_kilometres_down_the_road_nothing_has_changed(
     assert (apart > 1e-6).sum() <= 6
 
 
+@pytest.mark.parametrize("weight", ["count", "projected"])
+@pytest.mark.parametrize("visibility", ["facing", "depth", "exact"])
+@pytest.mark.parametrize("away_m", [0.0, 1e4])
+def test_numpy_makes_the_same_maps(
+    away_m: float, visibility: Any, weight: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    times = np.arange(6) / 30.0
+    vertices, faces = gesture(times)
+    path = np.where(np.arange(6) < 1, 0.0, away_m)[:, None, None] * np.array([0.6, 0.0, 0.8])
+    mesh = MeshSequence(vertices + path, faces, Timebase(times), "balls")
+    chosen = replace(RAW, visibility=visibility, weight=weight, range_exponent=4.0)
+    sensor = at(0.6 * away_m, 0.1, 0.8 * away_m - 2.2)
+    compiled = Synthesizer(mesh, chosen).map(sensor).values
+    for module in (synthesizer, prepared, masks):
+        monkeypatch.setattr(module, "kernels_ready", lambda: False)
+    monkeypatch.setattr(synthesizer, "compile_in_background", lambda: None)
+    plain = Synthesizer(mesh, chosen).map(sensor).values
+    # One rounding more or less decides a tie for a vertex or two.
+    apart = np.abs(plain - compiled)
+    assert (apart > 1e-5 * compiled.max()).sum() <= 4
+    assert apart.max() <= 2 * 8.3 * heaviest(vertices, faces, weight)
+
+
 @pytest.mark.parametrize("oversampling", [1, 8])
 @pytest.mark.parametrize("weight", ["count", "area", "projected"])
 @pytest.mark.parametrize(
@@ -242,6 +267,46 @@ def test_whole_maps_against_the_reference(
     # which each changes two bins. Range weights are up to (2.2 / 1.3)^4 here.
     assert apart.max() <= 8.3 * heaviest(vertices, faces, weight)
     assert (apart > 1e-4 * truth.max()).sum() <= 6
+
+
+PLACES_M = st.sampled_from([0.0, -0.0, 1e-12, -1e-3, 0.1, 1.0, -1.0, 1e3, 1e6, -1e6])
+
+
+@given(
+    points=st.lists(st.tuples(PLACES_M, PLACES_M, PLACES_M), min_size=6, max_size=12),
+    corners=st.lists(st.integers(0, 2), min_size=12, max_size=12),
+    sensor_m=st.tuples(PLACES_M, PLACES_M, PLACES_M),
+    rate_hz=st.sampled_from([1.0, 30.0, 1e4]),
+    visibility=st.sampled_from(["none", "facing", "depth", "exact"]),
+    weight=st.sampled_from(["count", "area", "projected"]),
+    preset=st.sampled_from(list(PRESETS)),
+    single=st.booleans(),
+)
+@settings(max_examples=150, derandomize=True)
+def test_nothing_makes_what_is_not_a_number(
+    points: Any,
+    corners: Any,
+    sensor_m: Any,
+    rate_hz: float,
+    visibility: Any,
+    weight: Any,
+    preset: str,
+    single: bool,
+) -> None:
+    # Frames of three vertices each, at random corners of a very large room.
+    count = len(points) // 3
+    vertices = np.array(points[: 3 * count]).reshape(count, 3, 3)
+    vertices = vertices.astype(np.float32 if single else np.float64)
+    faces = np.array(corners, np.int32).reshape(-1, 3)
+    mesh = MeshSequence(vertices, faces, Timebase.regular(count, rate_hz), "heap")
+    chosen = replace(PRESETS[preset], visibility=visibility, weight=weight)
+    maker = Synthesizer(mesh, chosen)
+    values = maker.map(VirtualSensor(sensor_m)).values
+    assert np.isfinite(values).all()
+    assert (values >= 0).all()
+    frame = maker.frame(VirtualSensor(sensor_m), 0)
+    assert np.isfinite(frame.velocity_mps).all()
+    assert np.isfinite(frame.range_m).all()
 
 
 @pytest.mark.parametrize("preset", list(PRESETS))
