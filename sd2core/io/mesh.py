@@ -14,6 +14,7 @@ from sd2core.io.mesh_arrays import (
     StoredVertices,
     read_npz,
     read_zarr,
+    real_type,
     write_npz,
     write_zarr,
 )
@@ -173,8 +174,7 @@ def _as_vertices(raw: RawMesh, source: str) -> None:
             raise Sd2Error(
                 f"{source}: the vertices are of type {vertices.dtype}", "numbers in metres"
             )
-        if vertices.dtype != np.float64:
-            vertices = vertices.astype(np.float32, copy=False)
+        vertices = vertices.astype(real_type(vertices.dtype), copy=False)
         raw.vertices = vertices[None] if vertices.ndim == 2 else vertices
     shape = tuple(raw.vertices.shape)
     if len(shape) != 3 or shape[2] != 3 or 0 in shape:

@@ -58,7 +58,7 @@ class StoredVertices:
         self.scale = 1.0
         self.shift_m = np.zeros(3, np.float32)
         self.shape: tuple[int, ...] = tuple(array.shape)
-        self.dtype = _real_type(array.dtype)
+        self.dtype = real_type(array.dtype)
 
     @property
     def frames_per_chunk(self) -> int:
@@ -311,8 +311,9 @@ def _first(arrays: dict[str, Any], names: tuple[str, ...]) -> Any | None:
     return next((arrays[name] for name in names if name in arrays), None)
 
 
-def _real_type(dtype: Any) -> np.dtype[Any]:
-    return np.dtype(np.float64 if np.dtype(dtype) == np.float64 else np.float32)
+def real_type(dtype: Any) -> np.dtype[Any]:
+    """Single precision where it holds every number of this type, otherwise double."""
+    return np.dtype(np.float32 if np.can_cast(dtype, np.float32) else np.float64)
 
 
 def _where(key: Any) -> str:

@@ -123,3 +123,30 @@ def test_one_file_per_frame(tmp_path: Path, value: float) -> None:
         (tmp_path / f"frame{frame}.obj").write_text("\n".join(lines))
     with pytest.raises(Sd2Error, match=naming(tmp_path.name, value)):
         load_mesh(tmp_path)
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".zarr"])
+@pytest.mark.parametrize(
+    ("dtype", "kept"),
+    [
+        ("f2", "f4"), ("f4", "f4"), ("f8", "f8"), (">f8", "f8"), ("i2", "f4"), ("i4", "f8"),
+        ("i8", "f8"), ("u1", "f4"),
+    ],
+)  # fmt: skip
+def test_no_type_of_number_is_rounded(tmp_path: Path, dtype: str, kept: str, suffix: str) -> None:
+    # 2^24 + 1 is the first whole number that single precision does not hold.
+    largest = {"f2": 2048, "f4": 2**24, "i2": 32767, "u1": 255}.get(dtype, 2**24 + 1)
+    vertices = np.tile(np.arange(12).reshape(4, 3), (3, 1, 1)).astype(dtype)
+    vertices[1, 2, 0] = largest
+    path = tmp_path / f"whole{suffix}"
+    if suffix == ".npz":
+        np.savez(path, vertices=vertices, faces=FACES, fps=30.0)
+    else:
+        import zarr
+
+        group = zarr.open_group(str(path), mode="w")
+        group.create_array("vertices", data=vertices, chunks=(2, 4, 3))
+        group.create_array("times_s", data=np.arange(3) / 30.0)
+    mesh = load_mesh(path, scale=1.0)
+    assert np.dtype(mesh.vertices.dtype).newbyteorder("=") == np.dtype(kept)
+    assert mesh.read(0, 3)[1, 2, 0] == largest
