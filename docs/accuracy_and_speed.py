@@ -16,8 +16,8 @@ from matplotlib.figure import Figure
 from sd2core.compiled import warm_up
 from sd2core.doppler import PRESETS
 from sd2core.io.mesh import load_mesh
-from sd2core.ladder.choose import choose
-from sd2core.ladder.measure import measure
+from sd2core.ladder.choosing import choose
+from sd2core.ladder.measuring import measure
 from sd2core.ladder.plot import plot_trade, save_plot
 from sd2core.ladder.results import Measurement
 from sd2core.ladder.scene import this_machine

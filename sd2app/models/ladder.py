@@ -42,13 +42,13 @@ def _survey(
 
 
 def _choose(mesh: MeshSequence, sensor: VirtualSensor, **wish: Any) -> Choice:
-    from sd2core.ladder.choose import choose
+    from sd2core.ladder.choosing import choose
 
     return choose(mesh, sensor, **wish)
 
 
 def _measure(mesh: MeshSequence, sensor: VirtualSensor, **wish: Any) -> Measurement:
-    from sd2core.ladder.measure import measure
+    from sd2core.ladder.measuring import measure
 
     return measure(mesh, sensor, **wish)
 

@@ -93,7 +93,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 def _ladder(options: argparse.Namespace) -> int:
     from sd2core.cli.reading import check_output, mesh_and_sensor
     from sd2core.doppler import PRESETS
-    from sd2core.ladder.choose import checked_options
+    from sd2core.ladder.choosing import checked_options
 
     if options.plot is not None:
         suffix = options.plot.suffix.lower()
@@ -157,7 +157,7 @@ def chosen(
 ) -> Choice:
     """What a scene requires, with bars."""
     from sd2core.compiled import warm_up
-    from sd2core.ladder.choose import choose
+    from sd2core.ladder.choosing import choose
 
     with progress_bar("Compiling", "file") as progress:
         warm_up(progress)
@@ -179,7 +179,7 @@ def _measured(
     options: argparse.Namespace,
 ) -> Measurement:
     from sd2core.ladder.cache import remember, remembered
-    from sd2core.ladder.measure import REPEATS, measure
+    from sd2core.ladder.measuring import REPEATS, measure
 
     known = remembered(mesh, sensor, synthesis, options.family)
     if known is not None and not (known.stale or options.fresh or options.repeats):

@@ -11,7 +11,7 @@ import pytest
 
 from sd2core.compiled import warm_up
 from sd2core.io.mesh import load_mesh
-from sd2core.ladder.choose import choose
+from sd2core.ladder.choosing import choose
 from sd2core.ladder.results import Choice
 from sd2core.mesh import MeshSequence
 from sd2core.recording import open_recording

@@ -12,7 +12,7 @@ from ladder_scenes import ball, plate, steady, swinging, together
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.ladder.carry_out import synthesizer_for
-from sd2core.ladder.choose import choose
+from sd2core.ladder.choosing import choose
 from sd2core.ladder.deviation import relative_l1
 from sd2core.ladder.sample import take_sample
 from sd2core.ladder.survey import survey_scene

@@ -10,7 +10,7 @@ from ladder_scenes import ball, plate, steady, swinging, together
 
 from sd2core.doppler import PRESETS
 from sd2core.errors import Sd2Error
-from sd2core.ladder.measure import measure
+from sd2core.ladder.measuring import measure
 from sd2core.ladder.results import Measurement
 from sd2core.ladder.rungs import Plan, compared_plans, wave_plans
 from sd2core.mesh import MeshSequence

@@ -10,7 +10,7 @@ import trimesh
 from ladder_scenes import ball, moving, plate, steady, swinging, together
 
 from sd2core.doppler import PRESETS
-from sd2core.ladder.choose import choose
+from sd2core.ladder.choosing import choose
 from sd2core.ladder.results import Choice, Reason
 from sd2core.mesh import MeshSequence
 from sd2core.sensor import VirtualSensor

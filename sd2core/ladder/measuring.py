@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import time
 import tracemalloc
 from collections.abc import Sequence
@@ -11,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from sd2core.doppler.options import SynthesisOptions
-from sd2core.ladder.choose import checked_options
+from sd2core.ladder.choosing import checked_options
 from sd2core.ladder.deviation import spread
 from sd2core.ladder.results import Cost, Measurement, PlanResult, Spread
 from sd2core.ladder.rungs import Family, Plan, compared_plans, reference_plan
@@ -58,7 +57,7 @@ def measure(
     """
     options = checked_options(mesh, options)
     if family == "fmcw":
-        from sd2core.ladder.measure_waves import measure_waves
+        from sd2core.ladder.measuring_waves import measure_waves
 
         return measure_waves(mesh, sensor, options, repeats, progress)
     surface = mesh.faces is not None
@@ -96,7 +95,6 @@ def measure(
 def _watched(trial: Trial, plan: Plan) -> tuple[int, float]:
     """Most bytes allocated at once from scratch, and seconds before the first frame."""
     trial.forget()
-    gc.collect()
     tracemalloc.start()
     try:
         start = time.perf_counter()

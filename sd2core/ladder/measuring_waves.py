@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import time
 import tracemalloc
 from collections.abc import Callable, Sequence
@@ -149,7 +148,7 @@ def measure_waves(
     repeats: int,
     progress: Progress,
 ) -> Measurement:
-    """Try the FMCW plans; see :func:`sd2core.ladder.measure.measure`.
+    """Try the FMCW plans; see :func:`sd2core.ladder.measure`.
 
     Errors are of the Doppler marginal: every frame's power over velocity adds up to 1.
     """
@@ -209,7 +208,6 @@ def _milliseconds(trial: WaveTrial, plan: Plan) -> tuple[float, float]:
 
 
 def _peak_bytes(trial: WaveTrial, plan: Plan) -> int:
-    gc.collect()
     tracemalloc.start()
     try:
         trial.columns(plan)
