@@ -10,6 +10,7 @@ import numpy as np
 from sd2core.ladder.results import Reason
 from sd2core.ladder.rungs import Plan
 from sd2core.ladder.trial import Trial
+from sd2core.progress import Progress, silent
 
 
 @dataclass(frozen=True)
@@ -36,11 +37,13 @@ class SceneFacts:
     motion_bins: float
 
 
-def look_at(trial: Trial) -> SceneFacts:
+def look_at(trial: Trial, progress: Progress = silent) -> SceneFacts:
     """Velocities and ranges of every vertex in the frames to choose on."""
     options = trial.options
     axis = options.axis
-    synthesizer = trial.synthesizer(Plan(visibility="none", weight=options.weight))
+    synthesizer = trial.synthesizer(
+        Plan(visibility="none", weight=options.weight), progress=progress
+    )
     live = np.zeros(synthesizer.mesh.vertex_count, np.bool_)
     beyond: list[float] = []
     spreads: list[float] = []
@@ -49,6 +52,7 @@ def look_at(trial: Trial) -> SceneFacts:
     for run in trial.sample.chosen_on:
         before = None
         for frame in range(run.start, run.stop):
+            progress(frame - run.start, run.stop - run.start)
             seen = synthesizer.frame(trial.sensor, frame, "none")
             place = np.floor((seen.velocity_mps / axis.v_max_mps + 1) * 0.5 * axis.bins)
             outside = np.abs(seen.velocity_mps) > axis.v_max_mps

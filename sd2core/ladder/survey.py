@@ -80,6 +80,8 @@ def survey_scene(
     sensor: VirtualSensor,
     options: SynthesisOptions,
     progress: Progress = silent,
+    *,
+    like: Survey | None = None,
 ) -> Survey:
     """Take down each rung alone.
 
@@ -91,9 +93,15 @@ def survey_scene(
         For what a plan does not choose.
     progress : Progress
         Counts what was tried; may raise Cancelled.
+    like : Survey, optional
+        Of the same mesh with the same options from another place: saves sampling and
+        decimating again.
     """
     surface = mesh.faces is not None
-    trial = Trial(mesh, sensor, options, take_sample(mesh, options))
+    if like is not None:
+        trial = like.trial.at(sensor)
+    else:
+        trial = Trial(mesh, sensor, options, take_sample(mesh, options))
     base = Plan(visibility="exact" if surface else "none", weight=options.weight)
     single = [replace(sight, weight=options.weight) for sight in sights(surface=surface)]
     single += [replace(base, vertices_kept=kept) for kept in VERTICES_KEPT if surface and kept < 1]
@@ -112,27 +120,32 @@ def survey_scene(
         done += 1
         progress(done, total)
 
+    def within(*_: int) -> None:
+        progress(done, total)
+
     runs = trial.sample.chosen_on
-    reference = trial.reference(runs)
+    reference = trial.reference(runs, progress=within)
     step()
-    survey = Survey(trial, base, look_at(trial))
-    trial.load_kernels()
+    survey = Survey(trial, base, look_at(trial, within))
+    trial.load_kernels(within)
     step()
     for plan in rates:
-        found = trial.columns(plan, runs)
+        found = trial.columns(plan, runs, progress=within)
         survey.change[plan] = relative_l1(found.smooth, reference.smooth)
         step()
     # Counting alone, over many frames at once: it is too quick for a few.
     for plan in (*rates, *(plan for plan in single if plan.range_law == "frame")):
         cheap = replace(plan, visibility="facing" if surface else "none")
         # The first time prepares what only this plan needs.
-        survey.count_ms[plan] = min(trial.milliseconds(cheap, threads=1) for _ in range(2))
+        survey.count_ms[plan] = min(
+            trial.milliseconds(cheap, threads=1, progress=within) for _ in range(2)
+        )
     step()
-    against = trial.columns(base, runs)
+    against = trial.columns(base, runs, progress=within)
     quick_ms = survey.count_ms[base]
     survey.mask_ms[base] = max(against.milliseconds - quick_ms, 0.0)
     for plan in single:
-        found = trial.columns(plan, runs)
+        found = trial.columns(plan, runs, progress=within)
         truth = against.twice() if plan.mask_reuse_m else against
         survey.change[plan] = relative_l1(found.smooth, truth.smooth)
         survey.mask_ms[plan] = max(found.milliseconds - quick_ms, 0.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -77,16 +78,30 @@ class Trial:
         self._references: dict[Run, Columns] = {}
         self._tried = 0
 
-    def reference(self, runs: Sequence[Run]) -> Columns:
+    def at(self, sensor: VirtualSensor) -> Trial:
+        """The same plans from another place; what does not depend on it is shared."""
+        other = copy.copy(self)
+        other.sensor = sensor
+        other._references = {}
+        return other
+
+    def reference(self, runs: Sequence[Run], *, progress: Progress = silent) -> Columns:
         """The reference plan's columns, in double precision."""
         options = reference_plan("histogram", self.options.weight).options(self._unsmoothed)
         mesh = self._sampled(1.0)
 
-        def work(run: Run) -> NDArray[np.float64]:
-            return reference_stretch(mesh, self.sensor, options, run.start, run.stop)
+        def work(frame: int) -> NDArray[np.float64]:
+            return reference_stretch(mesh, self.sensor, options, frame, frame + 1)
 
-        missing = [run for run in runs if run not in self._references]
-        for run, raw in zip(missing, workers().map(work, missing), strict=True):
+        for run in runs:
+            if run in self._references:
+                continue
+            frames = range(run.start, run.stop)
+            columns = []
+            for number, column in enumerate(workers().map(work, frames)):
+                columns.append(column)
+                progress(number + 1, len(frames))
+            raw = np.concatenate(columns, axis=1)
             self._references[run] = Columns(raw, self._smoothed(raw, run))
         return _joined([self._references[run] for run in runs])
 
@@ -96,51 +111,60 @@ class Trial:
         A plan that reuses masks is tried with masks made to the left and to the
         right of the sensor; both count.
         """
-        synthesizer = self.synthesizer(plan)
+        synthesizer = self.synthesizer(plan, progress=progress)
         if not plan.mask_reuse_m:
             return self._counted(synthesizer, runs, self._aside(), progress=progress)
         parts = []
         for side in (-1.0, 1.0):
             made_at = self._beside(side * plan.mask_reuse_m)
             self._counted(synthesizer, runs, made_at, progress=progress)
-            parts.append(self._counted(synthesizer, runs, self._aside(), reused=True))
+            parts.append(
+                self._counted(synthesizer, runs, self._aside(), reused=True, progress=progress)
+            )
         return _joined(parts)
 
     def errors(self, plan: Plan, runs: Sequence[Run], *, progress: Progress = silent) -> Errors:
         """How far a plan is from the reference on some runs."""
-        reference = self.reference(runs)
+        reference = self.reference(runs, progress=progress)
         found = self.columns(plan, runs, progress=progress)
         if plan.mask_reuse_m:
             reference = reference.twice()
         return errors(found.raw, reference.raw, found.smooth, reference.smooth, self.options.axis)
 
-    def milliseconds(self, plan: Plan, threads: int | None = None) -> float:
+    def milliseconds(
+        self, plan: Plan, threads: int | None = None, *, progress: Progress = silent
+    ) -> float:
         """How long a plan takes per frame, over all sampled frames, after the sensor has moved.
 
         With one thread that thread's own processor time, otherwise the time that
         passes.
         """
-        synthesizer = self.synthesizer(plan, threads)
+        synthesizer = self.synthesizer(plan, threads, progress=progress)
         frames = synthesizer.mesh.frame_count
         if plan.mask_reuse_m:
-            synthesizer.stretch(self.sensor, 0, frames)
+            synthesizer.stretch(self.sensor, 0, frames, progress=progress)
         visibility: Visibility | None = "frozen" if plan.mask_reuse_m else None
         place = self._aside()
         start = time.perf_counter()
-        stretch = synthesizer.stretch(place, 0, frames, visibility)
+        stretch = synthesizer.stretch(place, 0, frames, visibility, progress)
         passed_s = time.perf_counter() - start
         return 1e3 * (stretch.processor_s if threads == 1 else passed_s) / frames
 
-    def load_kernels(self) -> None:
+    def load_kernels(self, progress: Progress = silent) -> None:
         """Call what is compiled once, so that reading it from disk is not timed."""
         for plan in (Plan(visibility="none"), *sights(surface=self.mesh.faces is not None)):
             if plan.mask_stride == 1:
                 run = self.sample.runs[0]
                 self._counted(
-                    self.synthesizer(plan), [Run(run.start, run.start + 1, 0)], self._aside()
+                    self.synthesizer(plan, progress=progress),
+                    [Run(run.start, run.start + 1, 0)],
+                    self._aside(),
+                    progress=progress,
                 )
 
-    def synthesizer(self, plan: Plan, threads: int | None = None) -> Synthesizer:
+    def synthesizer(
+        self, plan: Plan, threads: int | None = None, *, progress: Progress = silent
+    ) -> Synthesizer:
         """What carries a plan out on the sampled frames; prepared."""
         key = plan.vertices_kept, plan.frame_rate_factor
         like = self._prepared.get(key)
@@ -150,7 +174,7 @@ class Trial:
             blocks_of=like,
             threads=threads,
         )
-        made.prepare()
+        made.prepare(progress)
         self._prepared.setdefault(key, made)
         return made
 

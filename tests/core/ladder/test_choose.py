@@ -138,3 +138,11 @@ def test_a_missing_number_is_named_by_its_frame_in_the_clip() -> None:
     broken = replace(mesh, vertices=vertices)
     with pytest.raises(Sd2Error, match=f"scene: vertex 7 of frame {frame} is at"):
         choose(broken, CAMERA, tolerance=0.1)
+
+
+def test_a_survey_that_builds_on_another_finds_the_same(scene: MeshSequence) -> None:
+    aside = VirtualSensor(position_m=(0.4, 0.0, 0.0))
+    anew = survey_scene(scene, aside, PAPER)
+    built_on = survey_scene(scene, aside, PAPER, like=survey_scene(scene, CAMERA, PAPER))
+    assert built_on.change == anew.change
+    assert built_on.facts == anew.facts
