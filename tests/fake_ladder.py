@@ -72,7 +72,7 @@ class FakeLadder:
         self.plans = {}
         self.plan, self.error, self.holds = plan, error, True
         self.dragging = dragging
-        self.asked, self.surveyed, self.cancelled = [], [], []
+        self.asked, self.surveyed, self.alike, self.cancelled = [], [], [], []
         self.failure = None
         self.gate = threading.Event()
         self.gate.set()
@@ -96,8 +96,9 @@ class FakeLadder:
             raise
         progress(10, 10)
 
-    def _survey(self, mesh, sensor, options, progress):
+    def _survey(self, mesh, sensor, options, progress, like):
         self.surveyed.append(sensor)
+        self.alike.append(like)
         self._wait(progress)
         return sensor
 

@@ -15,13 +15,14 @@ if TYPE_CHECKING:
     from sd2core.doppler.synthesizer import Synthesizer
     from sd2core.ladder.results import Choice, Measurement
     from sd2core.ladder.rungs import Family, Plan
+    from sd2core.ladder.survey import Survey
 
 
 @dataclass(frozen=True)
 class Ladder:
     """What the models ask of :mod:`sd2core.ladder`; a test puts its own answers here."""
 
-    survey: Callable[[MeshSequence, VirtualSensor, SynthesisOptions, Progress], Any]
+    survey: Callable[[MeshSequence, VirtualSensor, SynthesisOptions, Progress, Any], Any]
     choose: Callable[..., Choice]
     measure: Callable[..., Measurement]
     remembered: Callable[..., Measurement | None]
@@ -34,11 +35,15 @@ class Ladder:
 
 
 def _survey(
-    mesh: MeshSequence, sensor: VirtualSensor, options: SynthesisOptions, progress: Progress
-) -> Any:
+    mesh: MeshSequence,
+    sensor: VirtualSensor,
+    options: SynthesisOptions,
+    progress: Progress,
+    like: Survey | None,
+) -> Survey:
     from sd2core.ladder.survey import survey_scene
 
-    return survey_scene(mesh, sensor, options, progress)
+    return survey_scene(mesh, sensor, options, progress, like=like)
 
 
 def _choose(mesh: MeshSequence, sensor: VirtualSensor, **wish: Any) -> Choice:

@@ -15,7 +15,7 @@ from sd2core.mesh import MeshSequence
 from sd2core.sensor import VirtualSensor
 
 if TYPE_CHECKING:
-    from sd2core.ladder.results import Measurement
+    from sd2core.ladder.results import Measurement, PlanResult
     from sd2core.ladder.rungs import Family
 
 FAMILIES: tuple[Family, ...] = ("histogram", "fmcw")
@@ -74,17 +74,6 @@ class MeasuredModel(QObject):
     def can_measure(self) -> bool:
         """Whether there is a scene at rest, and no measurement under way."""
         return self._scene is not None and self._place is not None and self._job is None
-
-    def cost_at(self, tolerance: float) -> float | None:
-        """Milliseconds per frame of the cheapest counting plan that was within a tolerance."""
-        if self.counting is None:
-            return None
-        costs = [
-            result.cost.all_cores_ms.median
-            for result in self.counting.results
-            if result.errors.l1 <= tolerance
-        ]
-        return min(costs, default=None)
 
     # --- requests -------------------------------------------------------------------------
 
@@ -180,3 +169,14 @@ class MeasuredModel(QObject):
         if self._job is not None:
             self._jobs.finish(self._job)
             self._job = None
+
+
+def serves_at_rest(result: PlanResult) -> bool:
+    """Whether a plan is one for a sensor at rest; kept masks only serve one that moves."""
+    return result.plan.mask_reuse_m == 0
+
+
+def front_at_rest(measurement: Measurement) -> tuple[PlanResult, ...]:
+    """The Pareto front of the plans that serve at rest, cheapest first."""
+    resting = tuple(result for result in measurement.results if serves_at_rest(result))
+    return replace(measurement, results=resting).front

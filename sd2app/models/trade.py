@@ -9,7 +9,7 @@ from PySide6.QtCore import QObject, Signal
 from sd2app.jobs.latest import LatestRunner
 from sd2app.models.jobs import Job, JobsModel
 from sd2app.models.ladder import Ladder
-from sd2app.models.measured import MeasuredModel
+from sd2app.models.measured import MeasuredModel, serves_at_rest
 from sd2app.models.plan_words import InUse
 from sd2app.settings import Settings
 from sd2core.doppler.options import SynthesisOptions
@@ -147,6 +147,23 @@ class TradeModel(QObject):
         measurement, in_use = self.measured.measurement, self.in_use
         return measurement.of(in_use.plan) if measurement and in_use else None
 
+    def cost_at(self, tolerance: float) -> float | None:
+        """Milliseconds per frame of the cheapest counting plan known to hold a tolerance.
+
+        Of those that were measured, and the one that was chosen; None until the
+        scene has been measured, and where none holds.
+        """
+        if self.measured.counting is None:
+            return None
+        known = [
+            (result.errors.l1, result.cost.all_cores_ms.median)
+            for result in self.measured.counting.results
+            if serves_at_rest(result)
+        ]
+        if self._choice is not None:
+            known.append((self._choice.errors.l1, self._choice.cost_ms))
+        return min((cost_ms for error, cost_ms in known if error <= tolerance), default=None)
+
     def is_decided(self, sensor: VirtualSensor, budget_ms: float) -> bool:
         """Whether the plans are for this place, this budget, and the tolerance as it is."""
         return self._decided_for == self._wish(sensor, budget_ms)
@@ -221,6 +238,12 @@ class TradeModel(QObject):
                 "Run one with: sd2 synth MESH --out map.npz --model fmcw"
             )
             return
+        if not serves_at_rest(result):
+            self.noted.emit(
+                "That plan keeps a mask while the sensor moves; it is used for dragging where it "
+                "is the best. At rest the mask is made anew: click a filled point."
+            )
+            return
         self.hold()
         self._clicked = result
         counting = self.measured.counting
@@ -242,7 +265,8 @@ class TradeModel(QObject):
         """In the background: the choices for a wish; a place is surveyed once."""
         known = self._surveyed
         if known is None or known.mesh is not mesh or known.sensor != wish.sensor:
-            survey = self.ladder.survey(mesh, wish.sensor, options, progress)
+            like = known.survey if known is not None and known.mesh is mesh else None
+            survey = self.ladder.survey(mesh, wish.sensor, options, progress, like)
             self._surveyed = known = _Surveyed(mesh, wish.sensor, survey)
         limits = [{"budget_ms": wish.budget_ms}]
         if wish.tolerance is not None:

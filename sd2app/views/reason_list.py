@@ -33,7 +33,9 @@ class ReasonList(QWidget):
                 widget.deleteLater()
         for row, reason in enumerate(sorted(reasons, key=lambda reason: not reason.modelled)):
             mark = QLabel("✓" if reason.modelled else "–", self)
-            text = QLabel(reason.text[:1].upper() + reason.text[1:], self)
+            sentence = reason.text[:1].upper() + reason.text[1:]
+            # A number and its unit stay on one line.
+            text = QLabel(sentence.replace(" %", "\N{NO-BREAK SPACE}%"), self)
             text.setWordWrap(True)
             text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
             text.setAccessibleName(

@@ -53,8 +53,8 @@ class SensorPanel(QWidget):
         self._synthesis = synthesis
         self._edits = edits
         layout = QVBoxLayout(self)
-        layout.setContentsMargins(8, 6, 8, 6)
-        layout.setSpacing(7)
+        layout.setContentsMargins(8, 4, 8, 4)
+        layout.setSpacing(5)
         head = QHBoxLayout()
         head.addWidget(_title("Placement"))
         head.addStretch(1)
@@ -89,7 +89,7 @@ class SensorPanel(QWidget):
     def _placement_form(self) -> QGridLayout:
         grid = QGridLayout()
         grid.setHorizontalSpacing(6)
-        grid.setVerticalSpacing(4)
+        grid.setVerticalSpacing(3)
         self._xyz = [
             NumberBox(-100.0, 100.0, " m", f"Sensor position, {axis}: {meaning}")
             for axis, meaning in (("x", "to the right"), ("y", "down"), ("z", "forward"))
@@ -143,7 +143,7 @@ class SensorPanel(QWidget):
         part = QWidget(self)
         layout = QVBoxLayout(part)
         layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(8)
+        layout.setSpacing(5)
         layout.addWidget(_rule())
         self._capture_title = _title("Radar capture")
         layout.addWidget(self._capture_title)
@@ -177,7 +177,7 @@ class SensorPanel(QWidget):
         layout.addLayout(form)
         limits = QGridLayout()
         limits.setHorizontalSpacing(12)
-        limits.setVerticalSpacing(4)
+        limits.setVerticalSpacing(3)
         for place, (name, label) in enumerate(self._limits.items()):
             row, column = divmod(place, 2)
             limits.addWidget(QLabel(name, self), row, 2 * column)
@@ -272,7 +272,7 @@ def _percent(share: float) -> str:
 def _form() -> QFormLayout:
     form = QFormLayout()
     form.setHorizontalSpacing(12)
-    form.setVerticalSpacing(4)
+    form.setVerticalSpacing(3)
     form.setLabelAlignment(Qt.AlignmentFlag.AlignLeft)
     return form
 

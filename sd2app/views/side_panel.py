@@ -12,6 +12,7 @@ class SidePanel(QTabWidget):
     def __init__(self, pages: dict[str, QWidget], parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setDocumentMode(True)
+        self.tabBar().setDrawBase(False)
         self.tabBar().setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self._names = list(pages)
         for name, page in pages.items():

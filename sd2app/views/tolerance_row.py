@@ -3,7 +3,14 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QHBoxLayout,
+    QLabel,
+    QSizePolicy,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
 
 from sd2app.models.plan_words import milliseconds, number, percent
 from sd2app.models.trade import PRESETS, TradeModel
@@ -39,6 +46,7 @@ class ToleranceRow(QWidget):
             button.setObjectName("preset")
             button.setCheckable(True)
             button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+            button.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
             button.clicked.connect(lambda _=False, value=tolerance: trade.set_tolerance(value))
             row.addWidget(button, 1)
             self._presets[tolerance] = button
@@ -60,7 +68,7 @@ class ToleranceRow(QWidget):
         clicked = trade.in_use is not None and trade.in_use.origin == "clicked"
         known = trade.measured.counting is not None
         for tolerance, button in self._presets.items():
-            cost_ms = trade.measured.cost_at(tolerance)
+            cost_ms = trade.cost_at(tolerance)
             cost = number(cost_ms) if cost_ms is not None else "–"
             # What a tolerance costs stands under it once the scene has been measured.
             button.setText(f"{percent(tolerance)}\n{cost}" if known else percent(tolerance))
@@ -72,9 +80,8 @@ class ToleranceRow(QWidget):
                 price = f"{milliseconds(cost_ms)} per frame here"
             button.setToolTip(f"Accept an error of {percent(tolerance)}: {price}")
             button.setAccessibleName(button.toolTip())
-        unit = ", in ms per frame" if known else ""
+        here = " Under each its cost here, ms per frame." if known else ""
         self._meaning.setText(
             f"{percent(trade.tolerance)}: the differences from the reference map add up to"
-            f" {percent(trade.tolerance)} of it."
-            + (f" Under each tolerance its cost here{unit}." if known else "")
+            f" {percent(trade.tolerance)} of it.{here}"
         )

@@ -47,14 +47,13 @@ class TradePanel(QWidget):
         self.setObjectName("page")
         self._trade = trade
         layout = QVBoxLayout(self)
-        layout.setContentsMargins(8, 8, 8, 8)
-        layout.setSpacing(8)
+        layout.setContentsMargins(8, 6, 8, 6)
+        layout.setSpacing(6)
         self._nothing = _text(_NO_MESH)
         layout.addWidget(self._nothing)
         self._parts = [
             ToleranceRow(trade, self),
             self._use_part(),
-            _rule(),
             self._plot_part(display, measure),
             self._reason_part(),
         ]
@@ -87,24 +86,18 @@ class TradePanel(QWidget):
 
     def _plot_part(self, display: DisplayModel, measure: QAction) -> QWidget:
         part, layout = _part(self)
-        head = QHBoxLayout()
-        head.addWidget(_title("All plans"))
-        head.addStretch(1)
+        self._empty = _text("", "muted")
+        layout.addWidget(self._empty)
+        self._plot = TradePlot(self._trade, display, self)
+        layout.addWidget(self._plot)
+        self._source = _text("", "muted")
+        row = QHBoxLayout()
         self._family = Choice("Plans of which signal model", self)
         for family in FAMILIES:
             self._family.addItem(_FAMILY_TEXT[family], family)
         self._family.currentIndexChanged.connect(
             lambda _: self._trade.measured.set_family(self._family.currentData())
         )
-        head.addWidget(self._family)
-        layout.addLayout(head)
-        self._empty = _text("", "muted")
-        layout.addWidget(self._empty)
-        self._plot = TradePlot(self._trade, display, self)
-        layout.addWidget(self._plot)
-        self._source = _text("", "muted")
-        layout.addWidget(self._source)
-        row = QHBoxLayout()
         self._measure = QToolButton(self)
         self._measure.setObjectName("outlined")
         self._measure.setToolTip(measure.toolTip())
@@ -120,10 +113,11 @@ class TradePanel(QWidget):
         self._cancel.setToolTip("Stop measuring")
         self._cancel.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self._cancel.clicked.connect(self._trade.measured.cancel)
-        for widget in (self._measure, self._bar, self._cancel):
+        for widget in (self._family, self._measure, self._bar, self._cancel):
             row.addWidget(widget)
         row.addStretch(1)
         layout.addLayout(row)
+        layout.addWidget(self._source)
         return part
 
     def _reason_part(self) -> QWidget:
@@ -157,13 +151,13 @@ class TradePanel(QWidget):
         else:
             clip = seconds(1e-3 * in_use.cost_ms * trade.frames)
             self._figures.setText(
-                f"±{percent(in_use.error)} for {milliseconds(in_use.cost_ms)} per frame, "
-                f"{clip} for the clip"
+                f"±{percent(in_use.error)} · {milliseconds(in_use.cost_ms)}/frame · {clip} the clip"
             )
-            self._plan.setText(str(in_use.plan))
+            self._plan.setText(_unbroken(str(in_use.plan)))
         if in_use is not None and clicked:
-            where = " at another place of the sensor" if in_use.elsewhere else ""
-            warning = f"You clicked this point, measured{where}. The tolerance is not applied."
+            warning = "You clicked this point; the tolerance is not applied."
+            if in_use.elsewhere:
+                warning += " It was measured with the sensor at another place."
         elif trade.choice is not None and not trade.choice.holds and not trade.choosing:
             warning = (
                 f"No plan holds {percent(trade.tolerance)} here. This is the best that can be had."
@@ -228,6 +222,12 @@ def _text(text: str, role: str = "muted") -> QLabel:
     label.setWordWrap(True)
     label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
     return label
+
+
+def _unbroken(plan: str) -> str:
+    """No line starts with a separator, or ends between a sign and its number."""
+    space = "\N{NO-BREAK SPACE}"
+    return plan.replace(" ·", f"{space}·").replace("× ", f"×{space}").replace(" %", f"{space}%")
 
 
 def _rule() -> QFrame:

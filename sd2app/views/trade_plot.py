@@ -19,6 +19,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
 
 from sd2app.models.display import DisplayModel
+from sd2app.models.measured import front_at_rest, serves_at_rest
 from sd2app.models.plan_words import percent, point_text
 from sd2app.models.trade import TradeModel
 from sd2app.views.log_axis import LogAxis, tick_text
@@ -55,7 +56,9 @@ class TradePlot(QWidget):
         self._pointed: PlanResult | None = None
         self.setMouseTracking(True)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.setMinimumHeight(164)
+        self.setMaximumHeight(260)
         self.setAccessibleName("Error against cost of every plan")
         trade.changed.connect(self._refresh)
         trade.plan_changed.connect(self._refresh)
@@ -63,7 +66,7 @@ class TradePlot(QWidget):
 
     def sizeHint(self) -> QSize:
         """A little wider than high."""
-        return QSize(260, 200)
+        return QSize(260, 164)
 
     @property
     def pointed(self) -> PlanResult | None:
@@ -119,20 +122,16 @@ class TradePlot(QWidget):
         accent = QColor(colours.synthetic if measurement.family == "histogram" else colours.real)
         if measurement.stale:
             accent = QColor(colours.muted)
-        front = measurement.front
-        faint = QColor(colours.muted)
-        faint.setAlpha(150)
+        front = front_at_rest(measurement)
         for result in measurement.results:
             if result not in front:
-                self._paint_point(painter, result, faint, 2.0)
+                self._paint_point(painter, result, QColor(colours.muted), 2.0)
         self._paint_front(painter, plot, front, accent)
         for result in front:
             self._paint_point(painter, result, accent, 3.5)
+        self._paint_tolerance_text(painter, plot, errors)
+        self._paint_in_use(painter, costs, errors)
         painter.setBrush(Qt.BrushStyle.NoBrush)
-        current = self._trade.current_point
-        if current is not None:
-            painter.setPen(QPen(QColor(colours.text), 2))
-            painter.drawEllipse(self.point_of(current), 7.0, 7.0)
         if self._pointed is not None:
             painter.setPen(QPen(QColor(colours.accent), 1.5))
             painter.drawEllipse(self.point_of(self._pointed), 5.5, 5.5)
@@ -181,17 +180,36 @@ class TradePlot(QWidget):
         painter.fillRect(QRectF(plot.left(), y, plot.width(), plot.bottom() - y), below)
         painter.setPen(QPen(QColor(colours.accent), 1.5, Qt.PenStyle.DashLine))
         painter.drawLine(QPointF(plot.left(), y), QPointF(plot.right(), y))
-        painter.setPen(QColor(colours.accent))
-        text, line_px = (
-            f"tolerance {percent(self._trade.tolerance)}",
-            painter.fontMetrics().height(),
-        )
+
+    def _paint_tolerance_text(self, painter: QPainter, plot: QRectF, errors: LogAxis) -> None:
+        if self._trade.measured.family != "histogram":
+            return
+        colours, metrics = self._display.palette, painter.fontMetrics()
+        text, line_px = f"tolerance {percent(self._trade.tolerance)}", metrics.height()
+        y, width = errors.px(100 * self._trade.tolerance), metrics.horizontalAdvance(text) + 6
         above = y - line_px - 1 if y - line_px > plot.top() else y + 1
-        painter.drawText(
-            QRectF(plot.left(), above, plot.width() - 2, line_px),
-            Qt.AlignmentFlag.AlignRight,
-            text,
-        )
+        box = QRectF(plot.right() - width, above, width, line_px)
+        ground = QColor(colours.panel)
+        ground.setAlpha(220)
+        painter.fillRect(box, ground)
+        painter.setPen(QColor(colours.accent))
+        painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)
+
+    def _paint_in_use(self, painter: QPainter, costs: LogAxis, errors: LogAxis) -> None:
+        """Where the plan in use was measured; else where the choice of it found it to be."""
+        in_use, current = self._trade.in_use, self._trade.current_point
+        if in_use is None or self._trade.measured.family != in_use.plan.family:
+            return
+        place = QPointF(costs.px(in_use.cost_ms), errors.px(100 * in_use.error))
+        if current is not None:
+            place = self.point_of(current)
+        colour = QColor(self._display.palette.text)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(colour)
+        painter.drawEllipse(place, 3.5, 3.5)
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        painter.setPen(QPen(colour, 2))
+        painter.drawEllipse(place, 7.0, 7.0)
 
     def _paint_front(
         self, painter: QPainter, plot: QRectF, front: tuple[PlanResult, ...], colour: QColor
@@ -214,6 +232,10 @@ class TradePlot(QWidget):
         place, (_, errors) = self.point_of(result), self._axes()
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(colour)
+        if not serves_at_rest(result):
+            painter.setPen(QPen(colour, 1))
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            radius_px = 3.0
         if errors.is_below(100 * result.errors.l1):
             # On the edge: an arrow down, its value is off the axis.
             painter.drawPolygon(
@@ -253,7 +275,7 @@ class TradePlot(QWidget):
         measurement = self._trade.measured.measurement
         if measurement is None:
             return None
-        front = set(map(id, measurement.front))
+        front = set(map(id, front_at_rest(measurement)))
 
         def distance_px(result: PlanResult) -> float:
             offset = self.point_of(result) - place
@@ -283,6 +305,8 @@ class TradePlot(QWidget):
             return f"In use\n{point_text(result)}"
         if result.plan.family != "histogram":
             return f"For comparison\n{point_text(result)}"
+        if not serves_at_rest(result):
+            return f"For a sensor that moves\n{point_text(result)}"
         return f"{point_text(result)}\nClick to use it"
 
     # --- keyboard -------------------------------------------------------------------------
@@ -313,7 +337,7 @@ class TradePlot(QWidget):
             if self._pointed is not None:
                 self._trade.use(self._pointed)
         else:
-            along = list(measurement.front)
+            along = list(front_at_rest(measurement))
             if key in (Qt.Key.Key_Up, Qt.Key.Key_Down):
                 along = sorted(measurement.results, key=lambda result: result.errors.l1)
             self._point_at(self._next(along, _STEPS[Qt.Key(key)]))

@@ -94,6 +94,8 @@ def test_another_tolerance_asks_for_a_choice_and_surveys_the_place_once(desk, qt
     assert desk.fake.surveyed == [HERE]
     desk.choose(qtbot, THERE)
     assert desk.fake.surveyed == [HERE, THERE]
+    # The second one builds on the first.
+    assert desk.fake.alike == [None, HERE]
 
 
 def test_the_newest_wish_wins(desk, qtbot):
@@ -189,16 +191,36 @@ def test_measuring_is_a_job_and_is_remembered(desk, qtbot):
     assert desk.fake.remembered == [measured.measurement]
     assert trade.current_point.errors.l1 == 0.008
     # The cheapest within 2 % is the mask every 5 frames; within 0.5 % only exact is.
-    assert measured.cost_at(0.02) == 0.6
-    assert measured.cost_at(0.005) == 2.1
-    assert measured.cost_at(0.2) == 0.02
+    assert trade.cost_at(0.02) == 0.6
+    assert trade.cost_at(0.005) == 2.1
+    assert trade.cost_at(0.2) == 0.02
 
 
 def test_no_plan_within_a_tolerance_has_no_cost(desk, qtbot):
     desk.fake.known["histogram", THERE] = measurement_of(*COUNTING[:1])
     desk.trade.rest_at(THERE)
     qtbot.waitUntil(lambda: desk.trade.measured.counting is not None)
-    assert desk.trade.measured.cost_at(0.01) is None
+    assert desk.trade.cost_at(0.01) is None
+    assert desk.trade.cost_at(0.2) == 0.02
+
+
+def test_the_cost_of_a_tolerance_counts_the_chosen_plan_and_no_kept_mask(desk, qtbot):
+    kept = result_of(Plan(mask_reuse_m=0.1), 0.004, 0.01)
+    desk.fake.known["histogram", THERE] = measurement_of(*COUNTING, kept)
+    desk.fake.plan, desk.fake.error = Plan(mask_stride=10), 0.001
+    desk.trade.rest_at(THERE)
+    qtbot.waitUntil(lambda: desk.trade.measured.counting is not None)
+    assert desk.trade.cost_at(0.005) == 2.1
+    desk.choose(qtbot, THERE)
+    assert desk.trade.cost_at(0.005) == 0.6
+
+
+def test_a_plan_that_keeps_its_mask_is_not_used_at_rest(desk, qtbot):
+    desk.choose(qtbot)
+    before = desk.trade.in_use
+    desk.trade.use(result_of(Plan(mask_reuse_m=0.1), 0.004, 0.01))
+    assert desk.trade.in_use == before
+    assert "while the sensor moves" in desk.notes[0]
 
 
 def test_a_measurement_cancelled_leaves_what_was_known(desk, qtbot):

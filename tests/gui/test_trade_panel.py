@@ -81,8 +81,8 @@ def test_the_panel_says_what_the_tolerance_means_and_what_the_plan_costs(panel):
     shown = texts(panel)
     assert "5 %: the differences from the reference map add up to 5 % of it" in shown
     # 0.6 ms for each of 60 frames.
-    assert "±0 % for 0.6 ms per frame, 36 ms for the clip" in shown
-    assert str(EXACT) in shown
+    assert "±0 % · 0.6 ms/frame · 36 ms the clip" in shown
+    assert str(EXACT) in shown.replace("\N{NO-BREAK SPACE}", " ")
     assert "Measure this scene to see them all" in shown
 
 
