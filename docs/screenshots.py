@@ -44,6 +44,14 @@ def far_in_the_dark(window: MainWindow) -> None:
     context.display.set_mesh_colour("range")
 
 
+def trade(window: MainWindow) -> None:
+    """The Trade panel on the sample, measured, for a tolerance of 2 %."""
+    window.resize(1280, 960)
+    window.context.playback.seek(1.9)
+    window.context.trade.set_tolerance(0.02)
+    window.measure_scene()
+
+
 def real(window: MainWindow) -> None:
     """A real person with the mesh fitted to the video."""
     window.context.playback.seek(1.9)
@@ -83,6 +91,7 @@ def main() -> None:
     swipes = [resource_path("swipes.sd2")]
     take(application, "sample.png", swipes, sample)
     take(application, "dark.png", swipes, far_in_the_dark)
+    take(application, "trade.png", swipes, trade)
     walk = [SHARED / "video" / "walk.mkv", SHARED / "mesh" / "walk.npz"]
     if all(path.exists() for path in walk):
         take(application, "real-video.png", walk, real)

@@ -38,7 +38,7 @@ class InUse:
     @property
     def figures(self) -> str:
         """Error and cost."""
-        figures = f"±{percent(self.error)} · {milliseconds(self.cost_ms)}/frame"
+        figures = f"{deviation(self.error)} · {milliseconds(self.cost_ms)}/frame"
         return f"{figures} (measured elsewhere)" if self.elsewhere else figures
 
     def __str__(self) -> str:
@@ -55,6 +55,11 @@ def percent(share: float) -> str:
     if 0 < share < 1e-4:
         return "<0.01 %"
     return f"{number(100 * share)} %"
+
+
+def deviation(error: float) -> str:
+    """By how much a map is off."""
+    return percent(error) if 0 < error < 1e-4 else f"±{percent(error)}"
 
 
 def milliseconds(value_ms: float) -> str:

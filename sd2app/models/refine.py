@@ -83,6 +83,8 @@ def refine(
     final: Way | None,
     vertices: int,
     emit: Emit,
+    *,
+    only_view: bool = False,
 ) -> None:
     """Raise the rank of every frame, what is in view first.
 
@@ -100,6 +102,8 @@ def refine(
         How many the mesh has: decides how much is done at once.
     emit : callable
         Receives each :class:`Part`, and ``(done, total)`` frames; raises to stop.
+    only_view : bool
+        Leave the others for later.
     """
     rough_size = max(AT_ONCE // vertices, 64)
     final_size = min(max(len(rank) // _EXACT_PARTS, 8), max(rough_size // 16, 8))
@@ -115,7 +119,8 @@ def refine(
                 done += stop - start
                 emit((done, total))
 
-    for part in (view, (view[1], len(rank)), (0, view[0])):
+    others = () if only_view else ((view[1], len(rank)), (0, view[0]))
+    for part in (view, *others):
         if rough.rank < FINAL:
             run(ROUGH, part, rough_size, rough)
         if final is not None:

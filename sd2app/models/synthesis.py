@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from sd2app.jobs.latest import Emit, LatestRunner
+from sd2app.jobs.latest import LatestRunner
 from sd2app.models.canvas import AS_DRAGGED, FINAL, Canvas, View
 from sd2app.models.carriers import Carriers
 from sd2app.models.compiling import CompilerModel
@@ -16,6 +16,7 @@ from sd2app.models.content import reference_of
 from sd2app.models.document import DocumentModel
 from sd2app.models.jobs import Job, JobsModel
 from sd2app.models.playback import PlaybackModel
+from sd2app.models.readier import Readier
 from sd2app.models.readout import FrameReader, Readout
 from sd2app.models.refine import Part, Way, is_swept_whole, refine, worked_out
 from sd2app.models.sensor import SensorModel
@@ -27,7 +28,7 @@ from sd2core.doppler.options import PRESETS
 from sd2core.doppler.synthesizer import FrameScattering
 from sd2core.errors import Sd2Error
 from sd2core.progress import Cancelled
-from sd2core.sensor import Vector, VirtualSensor
+from sd2core.sensor import Vector
 from sd2core.spectrum import DopplerMap
 
 if TYPE_CHECKING:
@@ -76,15 +77,13 @@ class SynthesisModel(QObject):
         self._job: Job | None = None
         self._carriers: Carriers | None = None
         self._moving = False
+        self._readier = Readier(self)
+        self._readier.failed.connect(self.failed)
         self._forget()
         self._runner = LatestRunner("synthesis", self)
         self._runner.partial.connect(self._receive)
         self._runner.finished.connect(self._finish)
         self._runner.failed.connect(self._fail)
-        # Makes ready for the next drag.
-        self._readier = LatestRunner("ready", self)
-        self._readier.finished.connect(self._note_ready)
-        self._readier.failed.connect(lambda error: self.failed.emit(str(error)))
         self._compiler = CompilerModel(self)
         self._compiler.finished.connect(self._follow)
         self._rest = QTimer(self)
@@ -204,7 +203,7 @@ class SynthesisModel(QObject):
         self._dragging_plan: Plan | None = None
         self._unit = ""
         self._words: dict[int, str] = {}
-        self._masks_of: VirtualSensor | None = None
+        self._readier.forget()
         self._needs_reference = True
         self._again = False
         self._sweeping = False
@@ -266,7 +265,14 @@ class SynthesisModel(QObject):
         final = self._final_way()
         if final is not None:
             self._job = self._jobs.start("Synthesising the map", self._cancel)
-        self._runner.submit(lambda emit: refine(sensor, rank, view, rough, final, vertices, emit))
+        # Much of a long clip can wait until it is known how it is to be done.
+        long = not is_swept_whole(vertices, len(rank))
+        only_view = final is None and not self._compiler.busy and long
+        self._runner.submit(
+            lambda emit: refine(
+                sensor, rank, view, rough, final, vertices, emit, only_view=only_view
+            )
+        )
 
     def _go_on(self) -> None:
         """What is to be done next while the sensor rests."""
@@ -276,30 +282,15 @@ class SynthesisModel(QObject):
             self._trade.choose(self._sensor.sensor, self._budget_ms())
         elif not self.complete:
             self._settle()
-        elif self._masks_of != self._sensor.sensor:
-            self._make_ready(self._sensor.sensor)
+        elif self._dragging_plan is not None and self._readier.ready_at != self._sensor.sensor:
+            self._readier.make_ready(
+                self._carriers, self._dragging_plan, self._sensor.sensor, self._swept()
+            )
 
     def _may_choose(self) -> bool:
         """Whether the plans are for another place, and there is machine code to find others."""
         decided = self._trade.is_decided(self._sensor.sensor, self._budget_ms())
         return self._compiler.ready and not decided
-
-    def _make_ready(self, sensor: VirtualSensor) -> None:
-        """Prepare what the next drag needs: the mesh of its plan, and masks from here."""
-        dragging, carriers = self._trade.while_dragging, self._carriers
-        if dragging is None or carriers is None:
-            return
-        start, stop = self._swept()
-
-        def work(emit: Emit) -> VirtualSensor:
-            carrier = carriers.of(dragging.plan)
-            carrier.stretch(sensor, start, stop, progress=lambda *_: emit(None))
-            return sensor
-
-        self._readier.submit(work)
-
-    def _note_ready(self, sensor: VirtualSensor) -> None:
-        self._masks_of = sensor
 
     def _take_plan(self) -> None:
         """Follow the plans; what was made by another stays until it is replaced."""
@@ -308,7 +299,8 @@ class SynthesisModel(QObject):
             for use in (self._trade.in_use, self._trade.while_dragging)
         )
         if dragging != self._dragging_plan:
-            self._dragging_plan, self._masks_of = dragging, None
+            self._dragging_plan = dragging
+            self._readier.forget()
         if self._carriers is None or plan == self._plan:
             self._say_quality()
             return
@@ -406,7 +398,7 @@ class SynthesisModel(QObject):
 
     def _rough_way(self) -> Way:
         assert self._carriers is not None
-        moved_m = distance_m(self._masks_of, self._sensor.sensor)
+        moved_m = distance_m(self._readier.ready_at, self._sensor.sensor)
         return rough_way(self._carriers, self._plan, self._trade.while_dragging, moved_m)
 
     def _final_way(self) -> Way | None:

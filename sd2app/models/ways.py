@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from sd2app.models.canvas import AS_DRAGGED, FINAL
 from sd2app.models.carriers import Carriers
-from sd2app.models.plan_words import InUse, percent, short
+from sd2app.models.plan_words import InUse, deviation, short
 from sd2app.models.refine import Way
 from sd2core.sensor import VirtualSensor
 
@@ -43,7 +43,7 @@ def rough_way(carriers: Carriers, plan: Plan | None, dragging: InUse | None, mov
     """
     carrier = carriers.ready(dragging.plan) if dragging is not None else None
     if dragging is not None and carrier is not None:
-        words = f"while dragging: {short(dragging.plan)}, ±{percent(dragging.error)}"
+        words = f"while dragging: {short(dragging.plan)}, {deviation(dragging.error)}"
         if dragging.plan.mask_reuse_m == 0:
             return Way(lambda: carrier, AS_DRAGGED, words)
         if moved_m <= dragging.plan.mask_reuse_m:
@@ -64,6 +64,6 @@ def final_way(carriers: Carriers, plan: Plan | None, in_use: InUse | None) -> Wa
 def final_words(carriers: Carriers, in_use: InUse | None) -> str:
     """What a map of the plan in use is worth."""
     if in_use is not None:
-        return f"{short(in_use.plan)}, ±{percent(in_use.error)}"
+        return f"{short(in_use.plan)}, {deviation(in_use.error)}"
     cloud = carriers.options.visibility == "none"
     return "all vertices of the point cloud" if cloud else "exact visibility"

@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
 
 from sd2app.models.display import DisplayModel
 from sd2app.models.measured import FAMILIES
-from sd2app.models.plan_words import milliseconds, percent, seconds
+from sd2app.models.plan_words import deviation, milliseconds, percent, seconds
 from sd2app.models.trade import TradeModel
 from sd2app.views.inputs import Choice
 from sd2app.views.reason_list import ReasonList
@@ -149,10 +149,9 @@ class TradePanel(QWidget):
             self._figures.setText("Choosing what this scene requires…" if trade.choosing else "–")
             self._plan.setText("Until then occlusion is worked out exactly.")
         else:
+            off, cost = deviation(in_use.error), milliseconds(in_use.cost_ms)
             clip = seconds(1e-3 * in_use.cost_ms * trade.frames)
-            self._figures.setText(
-                f"±{percent(in_use.error)} · {milliseconds(in_use.cost_ms)}/frame · {clip} the clip"
-            )
+            self._figures.setText(f"{off} · {cost}/frame · {clip} the clip")
             self._plan.setText(_unbroken(str(in_use.plan)))
         if in_use is not None and clicked:
             warning = "You clicked this point; the tolerance is not applied."

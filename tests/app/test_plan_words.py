@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from sd2app.models.plan_words import InUse, milliseconds, percent, seconds, short
+from sd2app.models.plan_words import InUse, deviation, milliseconds, percent, seconds, short
 from sd2core.ladder.rungs import Plan
 
 
@@ -21,6 +21,11 @@ from sd2core.ladder.rungs import Plan
 )
 def test_shares_have_two_digits_and_no_exponent(share, text):
     assert percent(share) == text
+
+
+def test_a_map_is_off_either_way_unless_hardly_at_all():
+    assert deviation(0.008) == "±0.8 %"
+    assert deviation(1e-6) == "<0.01 %"
 
 
 @pytest.mark.parametrize(

@@ -252,7 +252,7 @@ def test_a_hand_gets_the_plan_for_dragging(context, fake, qtbot, ball):
     fake.dragging = Plan(visibility="depth", depth_resolution=128, mask_stride=5)
     open_ball(context, qtbot, ball)
     wait_until_done(context, qtbot)
-    qtbot.waitUntil(lambda: context.synthesis._masks_of is not None, timeout=10_000)
+    qtbot.waitUntil(lambda: context.synthesis._readier.ready_at is not None, timeout=10_000)
     context.edits.begin_sensor_drag()
     assert not context.synthesis.moving  # the hand has hold of it; nothing moves yet
     context.edits.drag_sensor((0.2, 0.0, 0.0))
@@ -272,7 +272,7 @@ def test_masks_are_kept_within_their_reach_and_not_beyond(context, fake, qtbot, 
     fake.dragging = Plan(mask_reuse_m=0.1)
     open_ball(context, qtbot, ball)
     wait_until_done(context, qtbot)
-    qtbot.waitUntil(lambda: context.synthesis._masks_of is not None, timeout=10_000)
+    qtbot.waitUntil(lambda: context.synthesis._readier.ready_at is not None, timeout=10_000)
     context.edits.begin_sensor_drag()
     for x_m, words in ((0.05, "while dragging: visibility exact"), (0.15, "facing the sensor")):
         context.edits.drag_sensor((x_m, 0.0, 0.0))
@@ -341,3 +341,24 @@ def test_the_library_chooses_for_a_small_scene(qapp, qtbot, ball):
     finally:
         context.close()
         parent.deleteLater()
+
+
+def test_a_long_clip_waits_with_what_is_out_of_view_until_the_plan_is_known(
+    context, fake, qtbot, ball, monkeypatch
+):
+    monkeypatch.setattr("sd2app.models.refine.AT_ONCE", 1000)
+    fake.gate.clear()
+    open_ball(context, qtbot, ball)
+    context.span.set_span(1.0, 2.0)
+    qtbot.waitUntil(lambda: context.trade.choosing, timeout=10_000)
+    # All was in view at first; nothing is done again.
+    wanted = VirtualSensor(position_m=(0.2, 0.0, 0.0))
+    context.edits.place_sensor(wanted)
+    qtbot.waitUntil(lambda: context.trade.choosing, timeout=10_000)
+    covered = context.synthetic.covered
+    assert covered[30:60].all()
+    assert not covered[:30].any()
+    assert not covered[60:].any()
+    fake.gate.set()
+    wait_until_done(context, qtbot)
+    assert context.synthetic.covered is None
