@@ -135,8 +135,12 @@ class VisibilityMasks:
         return np.stack(served)
 
     def _key(self, occlusion: Occlusion, index: int, position_m: Position) -> Hashable:
-        # Prepared blocks, and with them the budget, may serve several options.
-        return ("mask", self._prepared.options, occlusion, index, position_m)
+        # Prepared blocks, and with them the budget, may serve several options: those with the
+        # same masks share them. Which vertices are tested depends on the bins they fall into.
+        options = self._prepared.options
+        pixels = options.depth_resolution if occlusion == "depth" else None
+        needed = options.axis, options.null_bins, options.beyond
+        return ("mask", occlusion, pixels, self._stride, needed, index, position_m)
 
     def _frames(self, index: int, rows: slice) -> NDArray[np.intp]:
         """Numbers, in the clip, of some of a block's frames."""

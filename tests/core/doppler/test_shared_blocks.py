@@ -47,3 +47,36 @@ def test_other_knots_are_not_shared() -> None:
     first = Synthesizer(mesh, BASE)
     other = Synthesizer(mesh, replace(BASE, oversampling=3), blocks_of=first)
     assert other.prepared.budget is not first.prepared.budget
+
+
+@pytest.mark.parametrize(
+    ("other", "shared"),
+    [
+        (replace(BASE, weight="area"), True),
+        (replace(BASE, range_law="frame", velocity_sigma_bins=0.0), True),
+        (replace(BASE, depth_resolution=128), True),
+        (replace(BASE, null_bins=()), False),
+        (replace(BASE, beyond="wrap"), False),
+        (replace(BASE, mask_stride=5), False),
+    ],
+    ids=["weight", "range law", "pixels of another test", "nulled bins", "beyond", "stride"],
+)
+def test_masks_are_shared_by_what_they_depend_on(other: SynthesisOptions, shared: bool) -> None:
+    mesh = open_recording(resource_path("swipes.sd2")).load_mesh()
+    first, sensor = Synthesizer(mesh, BASE), VirtualSensor()
+    first.stretch(sensor, 60, 70)
+    second = Synthesizer(mesh, other, blocks_of=first)
+    assert (second.cached_mask(sensor, 60, 70) is not None) == shared
+    again = second.stretch(sensor, 60, 70)
+    np.testing.assert_array_equal(
+        again.values, Synthesizer(mesh, other).stretch(sensor, 60, 70).values
+    )
+
+
+def test_depth_masks_of_another_resolution_are_not_shared() -> None:
+    mesh = open_recording(resource_path("swipes.sd2")).load_mesh()
+    coarse = Synthesizer(mesh, OTHERS["depth 128"])
+    coarse.stretch(VirtualSensor(), 60, 70)
+    fine = Synthesizer(mesh, OTHERS["depth 256"], blocks_of=coarse)
+    assert coarse.cached_mask(VirtualSensor(), 60, 70, "depth") is not None
+    assert fine.cached_mask(VirtualSensor(), 60, 70, "depth") is None
