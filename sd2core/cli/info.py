@@ -253,7 +253,9 @@ def _synthesis_facts(provenance: dict[str, Any]) -> dict[str, str]:
     worst = max(range(len(beyond)), key=beyond.__getitem__)
     stride = provenance.get("mask_stride", 1)
     shared = "" if stride == 1 else f", worked out for one frame in {stride}"
+    choice = provenance.get("choice")
     return {
+        "plan": "" if choice is None else choice["summary"],
         "sensor": f"at x {x:g}, y {y:g}, z {z:g} m",
         "visibility": f"{provenance['visibility']}: {fmean(visible):.1%} visible on average"
         + shared,

@@ -154,8 +154,10 @@ def chosen(
     options: SynthesisOptions,
     tolerance: float | None,
     budget_ms: float | None,
+    *,
+    dragging: bool = True,
 ) -> Choice:
-    """What a scene requires, with bars."""
+    """What a scene requires, with bars; arguments as for :func:`sd2core.ladder.choose`."""
     from sd2core.compiled import warm_up
     from sd2core.ladder.choosing import choose
 
@@ -167,6 +169,7 @@ def chosen(
             sensor,
             tolerance=tolerance,
             budget_ms=budget_ms,
+            dragging=dragging,
             options=options,
             progress=progress,
         )
@@ -198,29 +201,35 @@ def _measured(
 
 
 def _print_choice(choice: Choice) -> None:
+    from sd2core.ladder.results import percent
+
     print(choice.summary)
+    errors = choice.errors
+    unseen = "not used to choose" if choice.unseen else "also used to choose: the clip is short"
     print(
-        f"  on {choice.errors.frames} frames that were not used to choose: L1"
-        f" {_percent(choice.errors.l1)} after smoothing, {_percent(choice.errors.l1_raw)} before;"
-        f" peak velocity off by {choice.errors.peak_mps.median:.3g} m/s in the median frame,"
-        f" {choice.errors.peak_mps.p95:.3g} m/s in 95 %"
+        f"  on {errors.frames} frames ({unseen}): L1 {percent(errors.l1)} after smoothing,"
+        f" {percent(errors.l1_raw)} before; peak velocity off by {errors.peak_mps.median:.3g} m/s"
+        f" in the median frame, by up to {errors.peak_mps.p95:.3g} m/s in 95 % of them"
     )
+    print("  what the scene requires (+) and what it does not (-), on the frames used to choose:")
     for reason in choice.reasons:
         print(f"  {'+' if reason.modelled else '-'} {reason.text}")
 
 
 def _print_measurement(measurement: Measurement) -> None:
+    from sd2core.ladder.results import percent
+
     print()
     print(
         f"{measurement.source} on {measurement.machine}; {len(measurement.frames)} frames;"
         f" against {measurement.reference}"
     )
     for pieces, change in measurement.convergence:
-        print(f"  reference with {pieces} pieces per facet: changed by {_percent(change)}")
+        print(f"  reference with {pieces} pieces per facet: changed by {percent(change)}")
     print("  cost in ms per frame, 5 % of the runs took more than the number in brackets;")
     print("  errors as median of frames, 95 % in brackets; L1 of all frames together")
     header = (
-        f"{'one thread':>15} {'all cores':>15} {'MB':>6} {'L1':>7} {'raw L1':>7}"
+        f"{'one thread':>15} {'all cores':>15} {'MB':>6} {'L1':>8} {'raw L1':>8}"
         f" {'peak m/s':>14} {'mean m/s':>14} {'wrong bins':>14}  plan"
     )
     print(header)
@@ -232,15 +241,10 @@ def _print_measurement(measurement: Measurement) -> None:
             f"{one.median:>7.3f} ({one.p95:.3f})"
             f" {cores.median:>7.3f} ({cores.p95:.3f})"
             f" {cost.peak_bytes / 1e6:>6.0f}"
-            f" {_percent(errors.l1):>7} {_percent(errors.l1_raw):>7}"
+            f" {percent(errors.l1):>8} {percent(errors.l1_raw):>8}"
             f" {errors.peak_mps.median:>6.3f} ({errors.peak_mps.p95:.3f})"
             f" {errors.mean_mps.median:>6.3f} ({errors.mean_mps.p95:.3f})"
-            f" {_percent(errors.wrong_bins.median):>6} ({_percent(errors.wrong_bins.p95)})"
+            f" {percent(errors.wrong_bins.median):>6} ({percent(errors.wrong_bins.p95)})"
             f"  {'*' if result in front else ' '} {result.plan}"
         )
     print("  * no other plan is both cheaper and nearer")
-
-
-def _percent(share: float) -> str:
-    value = 100 * share
-    return f"{value:.0f} %" if value >= 99.5 else f"{value:.2g} %"

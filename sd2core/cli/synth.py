@@ -245,7 +245,7 @@ def _as_chosen(
     from sd2core.ladder.carry_out import synthesizer_for
 
     base = synthesis_options(options)
-    choice = chosen(mesh, sensor, base, options.tolerance, options.budget_ms)
+    choice = chosen(mesh, sensor, base, options.tolerance, options.budget_ms, dragging=False)
     if not choice.holds:
         raise Sd2Error(choice.summary, "a tolerance or budget that can be held", "Allow more of it")
     with progress_bar("Synthesising") as progress:

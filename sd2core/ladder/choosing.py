@@ -39,6 +39,7 @@ def choose(
     *,
     tolerance: float | None = None,
     budget_ms: float | None = None,
+    dragging: bool = True,
     options: SynthesisOptions | None = None,
     survey: Survey | None = None,
     progress: Progress = silent,
@@ -57,8 +58,10 @@ def choose(
         Relative L1 of the map after smoothing against the reference plan in double
         precision, on frames that were not used to choose.
     budget_ms : float
-        Milliseconds per frame on all cores, after a move of the sensor. Plans that keep
-        a mask while it moves are among those considered.
+        Milliseconds per frame on all cores, after a move of the sensor.
+    dragging : bool
+        Whether plans that keep a mask while the sensor moves are among those that a
+        budget considers: such a plan saves nothing for a single map.
     options : SynthesisOptions
         For what a plan does not choose; the paper's by default.
     survey : Survey
@@ -85,7 +88,7 @@ def choose(
         plan, holds, errors = _by_tolerance(survey, tolerance, progress)
     else:
         assert budget_ms is not None
-        plan, holds, errors = _by_budget(survey, budget_ms, progress)
+        plan, holds, errors = _by_budget(survey, budget_ms, dragging, progress)
     return Choice(
         plan=plan,
         holds=holds,
@@ -97,6 +100,7 @@ def choose(
         tolerance=tolerance,
         budget_ms=budget_ms,
         spent_s=time.perf_counter() - started,
+        unseen=set(survey.trial.sample.chosen_on).isdisjoint(survey.trial.sample.checked_on),
     )
 
 
@@ -161,9 +165,11 @@ def _by_tolerance(
     return plan, True, errors
 
 
-def _by_budget(survey: Survey, budget_ms: float, progress: Progress) -> tuple[Plan, bool, Errors]:
+def _by_budget(
+    survey: Survey, budget_ms: float, dragging: bool, progress: Progress
+) -> tuple[Plan, bool, Errors]:
     plans = _candidates(survey, _USUAL_TOLERANCE)
-    reach_m = _reach_m(survey)
+    reach_m = _reach_m(survey) if dragging else None
     if reach_m is not None:
         plans += [
             replace(plan, mask_reuse_m=reach_m)
@@ -219,5 +225,6 @@ def _candidates(survey: Survey, tolerance: float) -> list[Plan]:
             options.weight,
             surface=survey.base.visibility != "none",
             range_law=options.range_exponent > 0,
+            vertices_kept=survey.trial.vertices_kept,
         )
     ]

@@ -61,11 +61,16 @@ def measure(
 
         return measure_waves(mesh, sensor, options, repeats, progress)
     surface = mesh.faces is not None
+    trial = Trial(mesh, sensor, options, take_sample(mesh, options))
     plans = list(
-        compared_plans(options.weight, surface=surface, range_law=options.range_exponent > 0)
+        compared_plans(
+            options.weight,
+            surface=surface,
+            range_law=options.range_exponent > 0,
+            vertices_kept=trial.vertices_kept,
+        )
     )
     total = len(plans) * (repeats + 2)
-    trial = Trial(mesh, sensor, options, take_sample(mesh, options))
     runs = trial.sample.runs
     trial.reference(runs)
     trial.load_kernels()
@@ -83,7 +88,7 @@ def measure(
     ]
     return Measurement(
         family=family,
-        reference=reference_plan(family, options.weight),
+        reference=reference_plan(family, options.weight, surface=surface),
         results=tuple(sorted(results, key=lambda result: result.cost.all_cores_ms.median)),
         scene=scene_fingerprint(mesh, sensor, options, family),
         machine=this_machine(),

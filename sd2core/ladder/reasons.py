@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sd2core.ladder.results import Reason
+from sd2core.ladder.results import Reason, percent
 from sd2core.ladder.rungs import Plan
 from sd2core.ladder.trial import Trial
 from sd2core.progress import Progress, silent
@@ -29,12 +29,15 @@ class SceneFacts:
     motion_bins : float
         By how many bins a velocity changes from one frame to the next; mean over
         the vertices that leave the nulled bins.
+    empty : bool
+        Nothing of what is seen leaves the nulled bins.
     """
 
     still_share: float
     beyond_share: float
     range_spread: float
     motion_bins: float
+    empty: bool
 
 
 def look_at(trial: Trial, progress: Progress = silent) -> SceneFacts:
@@ -70,6 +73,7 @@ def look_at(trial: Trial, progress: Progress = silent) -> SceneFacts:
         beyond_share=float(np.mean(beyond)),
         range_spread=float(np.median(spreads)),
         motion_bins=float(np.mean(changes)) if changes else 0.0,
+        empty=not trial.reference(trial.sample.chosen_on).raw.any(),
     )
 
 
@@ -110,6 +114,9 @@ def reasons_for(
 
 
 def _static(facts: SceneFacts) -> Reason:
+    if facts.empty:
+        text = "this map is empty: nothing that is seen leaves the nulled bins"
+        return Reason("static", False, facts.still_share, text)
     share = percent(facts.still_share)
     return Reason(
         "static",
@@ -123,16 +130,19 @@ def _static(facts: SceneFacts) -> Reason:
 
 def _occlusion(plan: Plan, base: Plan, change: Mapping[Plan, float]) -> Reason:
     facing = change[replace(base, visibility="facing")]
-    text = f"what stands in between changes this map by {percent(facing)}"
+    every = change[replace(base, visibility="none")]
+    # What no other visibility can do: inside a body the facing test hides all of it.
+    needed = min(facing, every)
+    text = f"what stands in between changes this map by {percent(needed)}"
     if plan.visibility == "exact":
-        return Reason("occlusion", True, facing, f"{text}: occlusion is modelled exactly")
+        return Reason("occlusion", True, needed, f"{text}: occlusion is modelled exactly")
     if plan.visibility == "depth":
         at = change[replace(base, visibility="depth", depth_resolution=plan.depth_resolution)]
         how = f"a depth buffer of {plan.depth_resolution} pixels, off by {percent(at)}"
-        return Reason("occlusion", True, facing, f"{text}: occlusion is modelled by {how}")
+        return Reason("occlusion", True, needed, f"{text}: occlusion is modelled by {how}")
     if plan.visibility == "facing":
+        text = f"what stands in between changes this map by {percent(facing)}"
         return Reason("occlusion", False, facing, f"{text}: occlusion is not modelled")
-    every = change[replace(base, visibility="none")]
     return Reason(
         "occlusion", False, every, f"hidden vertices change this map by {percent(every)}: all count"
     )
@@ -154,6 +164,8 @@ def _mask_age(plan: Plan, base: Plan, change: Mapping[Plan, float]) -> list[Reas
 
 
 def _mask_reuse(plan: Plan, base: Plan, change: Mapping[Plan, float]) -> list[Reason]:
+    if plan.visibility not in ("depth", "exact"):
+        return []
     tried = [other for other in change if other == replace(base, mask_reuse_m=other.mask_reuse_m)]
     reused = [other for other in tried if other.mask_reuse_m > 0]
     if not reused:
@@ -226,14 +238,6 @@ def _motion(plan: Plan, base: Plan, change: Mapping[Plan, float], facts: SceneFa
         return Reason("motion", False, off, f"{text}: one moment per frame is enough")
     use = f"frame rate raised {plan.frame_rate_factor} times"
     return Reason("motion", True, off, f"{text}: {use}")
-
-
-def percent(share: float) -> str:
-    """A share with two figures; whole above 10 %."""
-    value = 100 * share
-    if value == 0:
-        return "0 %"
-    return f"{value:.0f} %" if value >= 9.95 else f"{value:.2g} %"
 
 
 def _ordinal(number: int) -> str:

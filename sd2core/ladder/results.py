@@ -7,6 +7,23 @@ from typing import Any
 
 from sd2core.ladder.rungs import Family, Plan
 
+_LEAST_PERCENT = 1e-3
+
+
+def percent(share: float) -> str:
+    """A share with two figures; whole above 10 %, and not more than a map can tell below.
+
+    Infinite is what changes an empty map.
+    """
+    value = 100 * share
+    if value == 0:
+        return "0 %"
+    if value == float("inf"):
+        return "∞ %"
+    if value < _LEAST_PERCENT:
+        return f"<{_LEAST_PERCENT:g} %"
+    return f"{value:.0f} %" if value >= 9.95 else f"{value:.2g} %"
+
 
 @dataclass(frozen=True)
 class Spread:
@@ -186,7 +203,7 @@ class Choice:
         Whether tolerance or budget is held; otherwise the plan is the best that
         can be had.
     errors : Errors
-        On frames that were not used to choose.
+        On the frames to check on.
     cost_ms : float
         Milliseconds per frame when all cores share the work: a forecast from the
         processor time of its parts, measured while choosing.
@@ -197,6 +214,9 @@ class Choice:
         Milliseconds per frame that were allowed.
     spent_s : float
         How long the choosing took.
+    unseen : bool
+        Whether the errors are of frames that were not used to choose: a clip of fewer
+        than ten frames has none to spare.
     """
 
     plan: Plan
@@ -207,13 +227,16 @@ class Choice:
     tolerance: float | None
     budget_ms: float | None
     spent_s: float
+    unseen: bool = True
 
     @property
     def summary(self) -> str:
         """One line: the plan, its measured error and cost."""
-        found = f"{self.plan}: off by {100 * self.errors.l1:.2g} %, {self.cost_ms:.2g} ms per frame"
+        cost = f"{self.cost_ms:.2g} ms per frame"
         if self.holds:
-            return found
+            return f"{self.plan}: off by {percent(self.errors.l1)}, {cost}"
+        # However little that is: the tolerance may be less.
+        found = f"{self.plan}: off by {100 * self.errors.l1:.2g} %, {cost}"
         if self.tolerance is not None:
             return f"No plan holds {100 * self.tolerance:g} %; the best is {found}"
         return f"No plan keeps within {self.budget_ms:g} ms per frame; the fastest is {found}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from itertools import product
 from typing import Any, Literal, get_args
@@ -155,11 +155,18 @@ class Plan:
         return cls(**content)
 
 
-def reference_plan(family: Family, weight: Weight = "count") -> Plan:
-    """What errors are measured against: the top of every rung."""
+def reference_plan(family: Family, weight: Weight = "count", *, surface: bool = True) -> Plan:
+    """What errors are measured against: the top of every rung.
+
+    Of a point cloud, without a ``surface``, every point is seen.
+    """
     if family == "fmcw":
         return Plan(signal="direct", weight=weight, motion="interpolated")
-    return Plan(weight=weight, frame_rate_factor=max(FRAME_RATE_FACTORS))
+    return Plan(
+        visibility="exact" if surface else "none",
+        weight=weight,
+        frame_rate_factor=max(FRAME_RATE_FACTORS),
+    )
 
 
 def sights(*, surface: bool = True) -> Iterator[Plan]:
@@ -175,7 +182,11 @@ def sights(*, surface: bool = True) -> Iterator[Plan]:
 
 
 def counting_plans(
-    weight: Weight = "count", *, surface: bool = True, range_law: bool = True
+    weight: Weight = "count",
+    *,
+    surface: bool = True,
+    range_law: bool = True,
+    vertices_kept: Sequence[float] = VERTICES_KEPT,
 ) -> Iterator[Plan]:
     """Every combination of the counting rungs, masks made for the place at hand.
 
@@ -185,10 +196,12 @@ def counting_plans(
         False for a point cloud, which has no visibility and cannot be decimated.
     range_law : bool
         Whether there is a range law to apply by vertex or by frame.
+    vertices_kept : sequence of float
+        Shares that the surface can be decimated to, and 1: a few faces cannot be.
     """
     laws: tuple[RangeLaw, ...] = ("vertex", "frame") if range_law else ("vertex",)
     for sight, kept, factor, law in product(
-        sights(surface=surface), VERTICES_KEPT if surface else (1.0,), FRAME_RATE_FACTORS, laws
+        sights(surface=surface), vertices_kept if surface else (1.0,), FRAME_RATE_FACTORS, laws
     ):
         yield replace(
             sight, weight=weight, vertices_kept=kept, frame_rate_factor=factor, range_law=law
@@ -196,14 +209,20 @@ def counting_plans(
 
 
 def compared_plans(
-    weight: Weight = "count", *, surface: bool = True, range_law: bool = True
+    weight: Weight = "count",
+    *,
+    surface: bool = True,
+    range_law: bool = True,
+    vertices_kept: Sequence[float] = VERTICES_KEPT,
 ) -> Iterator[Plan]:
     """The counting plans of a table: every rung alone, and the main combinations.
 
     Parameters as for :func:`counting_plans`.
     """
     base = Plan(visibility="exact" if surface else "none", weight=weight)
-    for plan in counting_plans(weight, surface=surface, range_law=range_law):
+    for plan in counting_plans(
+        weight, surface=surface, range_law=range_law, vertices_kept=vertices_kept
+    ):
         taken_down = sum(
             getattr(plan, name) != getattr(base, name)
             for name in ("visibility", "mask_stride", "vertices_kept", "range_law")

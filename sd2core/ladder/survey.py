@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from itertools import pairwise, product
 
 from sd2core.compiled import worker_count
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.ladder.deviation import relative_l1
 from sd2core.ladder.reasons import SceneFacts, look_at
-from sd2core.ladder.rungs import FRAME_RATE_FACTORS, MASK_REUSE_M, VERTICES_KEPT, Plan, sights
+from sd2core.ladder.rungs import FRAME_RATE_FACTORS, MASK_REUSE_M, Plan, sights
 from sd2core.ladder.sample import take_sample
 from sd2core.ladder.trial import Trial
 from sd2core.mesh import MeshSequence
 from sd2core.progress import Progress, silent
 from sd2core.sensor import VirtualSensor
+
+_COUNTING_REPEATS = 4
 
 
 @dataclass(eq=False)
@@ -32,6 +35,8 @@ class Survey:
         the reference.
     mask_ms, count_ms : dict of Plan to float
         Milliseconds of processor time per frame for visibility, and for counting.
+    cost_share : dict of float to float
+        What a share of the vertices costs, of what all of them cost.
     facts : SceneFacts
     """
 
@@ -41,6 +46,7 @@ class Survey:
     change: dict[Plan, float] = field(default_factory=dict)
     mask_ms: dict[Plan, float] = field(default_factory=dict)
     count_ms: dict[Plan, float] = field(default_factory=dict)
+    cost_share: dict[float, float] = field(default_factory=lambda: {1.0: 1.0})
 
     def forecast_error(self, plan: Plan) -> float:
         """What the rungs of a plan change, added up: more than they do together."""
@@ -58,7 +64,7 @@ class Survey:
             per_vertex = self.count_ms[base]
             saved = per_vertex - self.count_ms[replace(base, range_law="frame")]
             count_ms -= min(max(saved, 0.0), 0.9 * per_vertex)
-        return plan.vertices_kept * (mask_ms + count_ms) / worker_count()
+        return self.cost_share[plan.vertices_kept] * (mask_ms + count_ms) / worker_count()
 
     def rungs_down(self, plan: Plan) -> int:
         """In how many rungs a plan differs from the base."""
@@ -104,7 +110,7 @@ def survey_scene(
         trial = Trial(mesh, sensor, options, take_sample(mesh, options))
     base = Plan(visibility="exact" if surface else "none", weight=options.weight)
     single = [replace(sight, weight=options.weight) for sight in sights(surface=surface)]
-    single += [replace(base, vertices_kept=kept) for kept in VERTICES_KEPT if surface and kept < 1]
+    single += [replace(base, vertices_kept=kept) for kept in trial.vertices_kept if kept < 1]
     if options.range_exponent:
         single.append(replace(base, range_law="frame"))
     single.append(replace(base, beyond="drop"))
@@ -133,13 +139,16 @@ def survey_scene(
         found = trial.columns(plan, runs, progress=within)
         survey.change[plan] = relative_l1(found.smooth, reference.smooth)
         step()
-    # Counting alone, over many frames at once: it is too quick for a few.
-    for plan in (*rates, *(plan for plan in single if plan.range_law == "frame")):
+    # Counting alone, over many frames at once: it is too quick for a few. In turns, so that a
+    # busy machine slows all alike; the first time prepares what only this plan needs.
+    counted = (*rates, *(plan for plan in single if plan.range_law == "frame"))
+    for _, plan in product(range(_COUNTING_REPEATS), counted):
         cheap = replace(plan, visibility="facing" if surface else "none")
-        # The first time prepares what only this plan needs.
-        survey.count_ms[plan] = min(
-            trial.milliseconds(cheap, threads=1, progress=within) for _ in range(2)
-        )
+        spent_ms = trial.milliseconds(cheap, threads=1, progress=within)
+        survey.count_ms[plan] = min(survey.count_ms.get(plan, spent_ms), spent_ms)
+    for fewer, more in pairwise(rates):
+        # More moments take longer, whatever a clock says of microseconds.
+        survey.count_ms[more] = max(survey.count_ms[fewer], survey.count_ms[more])
     step()
     against = trial.columns(base, runs, progress=within)
     quick_ms = survey.count_ms[base]
@@ -149,6 +158,12 @@ def survey_scene(
         truth = against.twice() if plan.mask_reuse_m else against
         survey.change[plan] = relative_l1(found.smooth, truth.smooth)
         survey.mask_ms[plan] = max(found.milliseconds - quick_ms, 0.0)
+        if plan.vertices_kept < 1:
+            # The first time prepares what only this mesh needs.
+            again = trial.columns(plan, runs, progress=within)
+            spent_ms = min(found.milliseconds, again.milliseconds)
+            share = spent_ms / against.milliseconds if against.milliseconds > 0 else 1.0
+            survey.cost_share[plan.vertices_kept] = min(max(share, plan.vertices_kept), 1.0)
         step()
     return survey
 

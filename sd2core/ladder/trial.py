@@ -19,7 +19,7 @@ from sd2core.doppler.smoothing import smooth
 from sd2core.doppler.synthesizer import Synthesizer
 from sd2core.ladder.deviation import errors
 from sd2core.ladder.results import Errors
-from sd2core.ladder.rungs import Plan, reference_plan, sights
+from sd2core.ladder.rungs import VERTICES_KEPT, Plan, reference_plan, sights
 from sd2core.ladder.sample import Run, Sample
 from sd2core.mesh import MeshSequence
 from sd2core.progress import Progress, silent
@@ -77,6 +77,17 @@ class Trial:
         self._prepared: dict[tuple[float, int], Synthesizer] = {}
         self._references: dict[Run, Columns] = {}
         self._tried = 0
+
+    @property
+    def vertices_kept(self) -> tuple[float, ...]:
+        """Shares that the mesh can be decimated to, and 1: a few faces cannot be."""
+        if self.mesh.faces is None:
+            return (1.0,)
+        # The whole mesh first, so that what is wrong in a frame is said of it.
+        every = self._sampled(1.0).vertex_count
+        return tuple(
+            kept for kept in VERTICES_KEPT if kept == 1 or self._sampled(kept).vertex_count < every
+        )
 
     def at(self, sensor: VirtualSensor) -> Trial:
         """The same plans from another place; what does not depend on it is shared."""

@@ -105,3 +105,12 @@ def test_synth_takes_a_plan_or_its_rungs(sd2: Sd2, plate: Path, tmp_path: Path) 
     outcome = sd2("synth", plate, "--out", out, "--tolerance", "5%", "--visibility", "facing")
     assert outcome.code == 1
     assert "--visibility" in outcome.err
+
+
+def test_synth_says_which_plan_it_took(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
+    out = tmp_path / "map.npz"
+    outcome = sd2("synth", plate, "--out", out, "--tolerance", "5%")
+    assert outcome.code == 0, outcome.err
+    shown = next(line for line in outcome.out.splitlines() if line.startswith("  plan "))
+    assert DopplerMap.load(out).meta["choice"]["summary"] in shown
+    assert shown in sd2("info", out).out

@@ -7,18 +7,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ladder_scenes import ball, plate, steady, swinging, together
+import trimesh
+from ladder_scenes import ball, moving, plate, steady, swinging, together
 
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.ladder.carry_out import synthesizer_for
 from sd2core.ladder.choosing import choose
 from sd2core.ladder.deviation import relative_l1
+from sd2core.ladder.rungs import FRAME_RATE_FACTORS
 from sd2core.ladder.sample import take_sample
 from sd2core.ladder.survey import survey_scene
 from sd2core.mesh import MeshSequence
 from sd2core.progress import Cancelled
 from sd2core.sensor import VirtualSensor
+from sd2core.timebase import Timebase
 
 CAMERA = VirtualSensor()
 PAPER = PRESETS["paper"]
@@ -146,3 +149,70 @@ def test_a_survey_that_builds_on_another_finds_the_same(scene: MeshSequence) -> 
     built_on = survey_scene(scene, aside, PAPER, like=survey_scene(scene, CAMERA, PAPER))
     assert built_on.change == anew.change
     assert built_on.facts == anew.facts
+
+
+def test_an_empty_map_is_called_so() -> None:
+    """Nothing is off by infinity without a word on why."""
+    hidden = together(ball(swinging((0, 0, 3), 1.5, 0.8), fineness=2), plate((0, 0, 1), 3, 3))
+    choice = choose(hidden, CAMERA, tolerance=0.02)
+    assert choice.holds
+    assert choice.errors.l1 == 0
+    assert "empty" in choice.reasons[0].text
+    assert not any("inf" in reason.text for reason in choice.reasons)
+
+
+def test_what_cannot_be_decimated_is_not_planned_so() -> None:
+    triangle = moving(
+        trimesh.Trimesh([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0]], [[0, 1, 2]], process=False),
+        swinging((0, 0, 2), 1.0, 0.7),
+    )
+    survey = survey_scene(triangle, CAMERA, PAPER)
+    assert survey.trial.vertices_kept == (1.0,)
+    choice = choose(triangle, CAMERA, tolerance=0.5, survey=survey)
+    assert choice.plan.vertices_kept == 1
+    assert not any(reason.rung == "geometry" for reason in choice.reasons)
+
+
+def test_inside_a_body_nothing_needs_to_stand_in_between() -> None:
+    """There the facing test hides all of it; that is not what occlusion is for."""
+    around = ball(swinging((0, 0, 0.02), 0.8, 0.7), radius_m=1.0, fineness=3)
+    choice = choose(around, CAMERA, tolerance=0.02)
+    found = next(reason for reason in choice.reasons if reason.rung == "occlusion")
+    assert choice.plan.visibility == "none"
+    assert not found.modelled
+    assert found.value < 0.001
+    # Nor is anything said of masks where none is used.
+    assert not any(reason.rung in ("mask_reuse", "mask_age") for reason in choice.reasons)
+
+
+def test_a_single_map_keeps_no_mask(scene: MeshSequence) -> None:
+    """Such a plan is for a sensor that moves: alone it would be worked out whole."""
+    survey = survey_scene(scene, CAMERA, PAPER)
+    # As if working out any mask were dear, and counting free.
+    survey.mask_ms.update(dict.fromkeys(survey.mask_ms, 1e3))
+    survey.count_ms.update(dict.fromkeys(survey.count_ms, 1e-3))
+    while_moving = choose(scene, CAMERA, budget_ms=1.0, survey=survey)
+    assert while_moving.holds
+    assert while_moving.plan.mask_reuse_m > 0
+    at_rest = choose(scene, CAMERA, budget_ms=1.0, dragging=False, survey=survey)
+    assert at_rest.plan.mask_reuse_m == 0
+    assert not at_rest.holds
+
+
+def test_a_clip_too_short_to_check_apart_says_so(scene: MeshSequence) -> None:
+    few = replace(
+        scene, vertices=scene.read(0, 6), timebase=Timebase(scene.times_s[:6]), source="few"
+    )
+    assert not choose(few, CAMERA, tolerance=0.1).unseen
+    assert choose(scene, CAMERA, tolerance=0.1).unseen
+
+
+def test_more_moments_never_have_a_lower_forecast(scene: MeshSequence) -> None:
+    survey = survey_scene(scene, CAMERA, PAPER)
+    costs = [
+        survey.forecast_ms(replace(survey.base, frame_rate_factor=factor))
+        for factor in FRAME_RATE_FACTORS
+    ]
+    assert costs == sorted(costs)
+    for kept in survey.trial.vertices_kept:
+        assert kept <= survey.cost_share[kept] <= 1

@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from sd2core.doppler import PRESETS
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.options import WaveOptions
+from sd2core.ladder.results import percent
 from sd2core.ladder.rungs import (
     Plan,
     compared_plans,
@@ -85,3 +87,15 @@ def test_a_point_cloud_has_no_visibility_and_no_geometry() -> None:
 def test_without_a_range_law_there_is_none_to_choose() -> None:
     assert {plan.range_law for plan in counting_plans(range_law=False)} == {"vertex"}
     assert {plan.range_law for plan in counting_plans()} == {"vertex", "frame"}
+
+
+def test_the_reference_of_a_point_cloud_has_no_visibility() -> None:
+    assert reference_plan("histogram", surface=False).visibility == "none"
+
+
+@pytest.mark.parametrize(
+    ("share", "text"),
+    [(0.0, "0 %"), (1e-9, "<0.001 %"), (0.02, "2 %"), (0.123, "12 %"), (np.inf, "∞ %")],
+)
+def test_percentages_for_people(share: float, text: str) -> None:
+    assert percent(share) == text
