@@ -160,10 +160,16 @@ class Synthesizer:
         # Nearer than the reference a value may exceed 1.
         return f"{share} × ({options.reference_range_m:g} m / R)^{options.range_exponent:g}"
 
+    @property
+    def _bytes_per_vertex(self) -> int:
+        """Of a prepared frame: its knots, normals and areas, in single precision."""
+        areas = {"count": 0, "area": 4, "projected": 12}[self.options.weight]
+        return 12 * self.options.oversampling + 3 + areas
+
     def prepare(self, progress: Progress = silent) -> None:
         """Read and prepare as many blocks as the budget holds, before they are asked for."""
         prepared = self.prepared
-        bytes_per_block = prepared.block_frames * self.mesh.vertex_count * 15
+        bytes_per_block = prepared.block_frames * self.mesh.vertex_count * self._bytes_per_vertex
         fitting = max(1, prepared.budget.limit_bytes // bytes_per_block)
         blocks = range(min(fitting, prepared.block_count))
 
@@ -173,6 +179,14 @@ class Synthesizer:
                 block = prepared.block(index)
                 if self.mesh.faces is not None:
                     prepared.normals(block)
+                if self.options.weight == "area":
+                    prepared.areas(block)
+                elif self.options.weight == "projected":
+                    prepared.area_vectors(block)
+                if self.options.weight != "count":
+                    prepared.surface(block)
+                if self.options.range_law == "frame":
+                    prepared.middles(block)
                 ticket.advance(1)
 
             return work

@@ -33,7 +33,7 @@ def remembered(
     try:
         content = json.loads(_place(mesh, family).read_text(encoding="utf-8"))
         measurement = _from_json(content)
-    except (OSError, ValueError, KeyError, TypeError, Sd2Error):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, Sd2Error):
         # A cache: what cannot be read is measured again.
         return None
     same = (
@@ -92,6 +92,15 @@ def _result(content: dict[str, Any]) -> PlanResult:
 
 def _with_spreads(content: dict[str, Any]) -> dict[str, Any]:
     return {
-        name: Spread(**value) if isinstance(value, dict) else value
+        name: Spread(_number(value["median"]), _number(value["p95"]))
+        if isinstance(value, dict)
+        else _number(value)
         for name, value in content.items()
     }
+
+
+def _number(value: Any) -> Any:
+    """An integer stays one."""
+    if not isinstance(value, int | float):
+        raise TypeError(f"{value!r} is not a number")
+    return value

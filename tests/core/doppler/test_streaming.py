@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import tracemalloc
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -53,8 +54,6 @@ def recording(tmp_path: Path) -> tuple[MeshSequence, MeshSequence]:
 def test_a_long_recording_equals_the_one_in_memory(
     recording: tuple[MeshSequence, MeshSequence], changes: dict[str, Any], visibility: Any
 ) -> None:
-    from dataclasses import replace
-
     mesh, stored = recording
     chosen = replace(PRESETS["paper"], **changes)
     budget = 600_000  # of the 1.6 MB that its positions alone would take
@@ -304,3 +303,20 @@ def test_prepare_reads_ahead() -> None:
     maker.prepare(lambda done, total: reports.append(done))
     assert reports[-1] == maker.prepared.block_count
     assert maker.prepared.has(0)
+
+
+@pytest.mark.parametrize(
+    ("changes", "kept"),
+    [
+        ({"weight": "area"}, {"areas", "surface"}),
+        ({"weight": "projected"}, {"area vectors", "surface"}),
+        ({"range_law": "frame"}, {"middles"}),
+    ],
+    ids=["area", "projected", "range law"],
+)
+def test_preparing_leaves_nothing_to_the_first_map(changes: dict[str, Any], kept: set[str]) -> None:
+    """Else the first map from a new place would be timed with it."""
+    maker = Synthesizer(wobbling(40), replace(PRESETS["paper"], **changes))
+    maker.prepare()
+    for name in kept | {"block", "normals"}:
+        assert maker.prepared.budget.get((name, 0)) is not None, name

@@ -113,6 +113,31 @@ def test_a_file_lacks_nothing(mesh: MeshSequence, folder: Path) -> None:
     assert remembered(mesh, CAMERA, PAPER) is None
 
 
+@pytest.mark.parametrize("wrong", ["x", None, [], {"median": "x", "p95": 0.1}, {"median": 0.1}])
+def test_figures_are_numbers(mesh: MeshSequence, folder: Path, wrong: object) -> None:
+    remember(mesh, measured(mesh))
+    (path,) = folder.rglob("*.json")
+    content = json.loads(path.read_text())
+    for damaged in (
+        content | {"results": [content["results"][0] | {"cost": wrong}]},
+        content
+        | {
+            "results": [
+                content["results"][0]
+                | {"errors": content["results"][0]["errors"] | {"peak_mps": wrong}}
+            ]
+        },
+    ):
+        path.write_text(json.dumps(damaged))
+        assert remembered(mesh, CAMERA, PAPER) is None
+
+
+def test_a_thinned_mesh_counted_otherwise_is_another_clip(mesh: MeshSequence) -> None:
+    counts = np.ones(mesh.vertex_count, np.int64)
+    remember(replace(mesh, vertex_counts=counts), measured(mesh))
+    assert remembered(replace(mesh, vertex_counts=2 * counts), CAMERA, PAPER) is None
+
+
 def test_where_nothing_can_be_written_nothing_is_kept(
     mesh: MeshSequence, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
