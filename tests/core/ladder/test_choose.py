@@ -87,7 +87,8 @@ def test_a_body_at_rest_needs_nothing() -> None:
     choice = choose(ball(steady((0, 0, 3), (0, 0, 0))), CAMERA, tolerance=0.01)
     assert choice.holds
     assert choice.errors.l1 == 0
-    assert choice.plan.visibility == "none"
+    (still,) = (reason for reason in choice.reasons if reason.rung == "static")
+    assert still.value == 1
 
 
 @pytest.mark.parametrize("frames", [1, 2, 7, 39])
