@@ -177,8 +177,7 @@ class SynthesisModel(QObject):
         made = self._carriers.of(self._plan).map(self._sensor.sensor)
         in_use = self._trade.in_use
         if in_use is not None:
-            plan = in_use.plan.to_json() | {"text": str(in_use.plan)}
-            made = replace(made, meta=made.meta | {"plan": plan, "plan_error_l1": in_use.error})
+            made = replace(made, meta=made.meta | in_use.plan.provenance(in_use.error))
         made.save(path)
 
     def close(self) -> None:

@@ -241,7 +241,7 @@ def _check_wish(options: argparse.Namespace) -> None:
 def _as_chosen(
     options: argparse.Namespace, mesh: MeshSequence, sensor: VirtualSensor
 ) -> DopplerMap:
-    """The map of the plan that the scene requires; the choice goes into its provenance."""
+    """The map of the plan that the scene requires; plan and reasons go into its provenance."""
     from sd2core.ladder.carry_out import synthesizer_for
 
     base = synthesis_options(options)
@@ -250,7 +250,9 @@ def _as_chosen(
         raise Sd2Error(choice.summary, "a tolerance or budget that can be held", "Allow more of it")
     with progress_bar("Synthesising") as progress:
         doppler = synthesizer_for(choice.plan, mesh, base).map(sensor, progress=progress)
-    return replace(doppler, meta=doppler.meta | {"choice": choice.to_json()})
+    origin = choice.plan.provenance(choice.errors.l1)
+    origin["plan_reasons"] = [reason.text for reason in choice.reasons]
+    return replace(doppler, meta=doppler.meta | origin)
 
 
 def _check_fmcw(options: argparse.Namespace) -> None:

@@ -140,6 +140,10 @@ class Plan:
         """Every rung by name, for provenance."""
         return asdict(self)
 
+    def provenance(self, error_l1: float) -> dict[str, Any]:
+        """What a map says of the plan it was made by, with its measured error."""
+        return {"plan": self.to_json() | {"text": str(self)}, "plan_error_l1": error_l1}
+
     @classmethod
     def from_json(cls, content: dict[str, Any]) -> Plan:
         """A plan from :meth:`to_json`.

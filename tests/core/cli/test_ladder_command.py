@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from cli_outcome import Sd2
 
+from sd2core.ladder import Plan
 from sd2core.spectrum import DopplerMap
 
 
@@ -85,11 +86,11 @@ def test_synth_carries_the_plan_out(sd2: Sd2, plate: Path, tmp_path: Path) -> No
     outcome = sd2("synth", plate, "--out", out, "--tolerance", "5%")
     assert outcome.code == 0, outcome.err
     made = DopplerMap.load(out)
-    choice = made.meta["choice"]
-    assert choice["tolerance"] == 0.05
-    assert choice["holds"] is True
-    assert made.meta["options"]["visibility"] == choice["plan"]["visibility"]
-    assert choice["errors"]["l1"] <= 0.05
+    plan = Plan.from_json({k: v for k, v in made.meta["plan"].items() if k != "text"})
+    assert made.meta["plan"]["text"] == str(plan)
+    assert made.meta["options"]["visibility"] == plan.visibility
+    assert made.meta["plan_error_l1"] <= 0.05
+    assert made.meta["plan_reasons"]
 
 
 def test_synth_refuses_what_cannot_be_held(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
