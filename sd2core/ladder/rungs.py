@@ -97,7 +97,11 @@ class Plan:
         return " · ".join(self._words())
 
     def _words(self) -> Iterator[str]:
-        yield {"histogram": "count", "fmcw": "FMCW", "direct": "FMCW summed directly"}[self.signal]
+        if self.signal == "histogram":
+            by = {"count": "vertex", "area": "area", "projected": "projected area"}[self.weight]
+            yield f"counted by {by}"
+        else:
+            yield "FMCW" if self.signal == "fmcw" else "FMCW summed directly"
         sight = self.visibility
         yield f"depth {self.depth_resolution}" if sight == "depth" else f"visibility {sight}"
         if self.mask_stride > 1:
@@ -111,7 +115,6 @@ class Plan:
             if self.motion == "interpolated":
                 yield "motion at every chirp"
             return
-        yield {"count": "vertices", "area": "area", "projected": "projected area"}[self.weight]
         if self.range_law == "frame":
             yield "one range per frame"
         if self.frame_rate_factor > 1:

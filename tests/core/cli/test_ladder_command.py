@@ -23,7 +23,7 @@ def test_the_plan_its_error_and_the_reasons_are_printed(sd2: Sd2, plate: Path) -
     outcome = sd2("ladder", plate, "--quick", "--tolerance", "5%")
     assert outcome.code == 0, outcome.err
     lines = outcome.out.splitlines()
-    assert lines[0].startswith("count · ")
+    assert lines[0].startswith("counted by vertex · ")
     assert "ms per frame" in lines[0]
     assert any(line.startswith("  - no velocity passes 2 m/s") for line in lines)
     assert any("aliasing" in line for line in lines)
@@ -44,8 +44,8 @@ def test_the_table_is_kept_and_reused(sd2: Sd2, plate: Path, own_cache: Path) ->
 def test_the_table_names_what_it_was_measured_against(sd2: Sd2, plate: Path) -> None:
     outcome = sd2("ladder", plate, "--repeats", 1)
     assert "plate.npz on " in outcome.out
-    assert "against count · visibility exact" in outcome.out
-    assert "* count" in outcome.out
+    assert "against counted by vertex · visibility exact" in outcome.out
+    assert "* counted" in outcome.out
 
 
 def test_the_picture(sd2: Sd2, plate: Path, tmp_path: Path) -> None:

@@ -68,7 +68,7 @@ def test_what_cannot_be_had_is_refused_with_the_best_there_is(scene: MeshSequenc
     assert not choice.holds
     assert choice.plan.visibility == "exact"
     assert choice.plan.vertices_kept == 1
-    assert choice.summary.startswith("No plan holds 1e-07 %; the best is count")
+    assert choice.summary.startswith("No plan holds 1e-07 %; the best is counted")
     soon = choose(scene, CAMERA, budget_ms=1e-9)
     assert not soon.holds
     assert "No plan keeps within 1e-09 ms" in soon.summary
