@@ -253,9 +253,11 @@ def _synthesis_facts(provenance: dict[str, Any]) -> dict[str, str]:
     worst = max(range(len(beyond)), key=beyond.__getitem__)
     stride = provenance.get("mask_stride", 1)
     shared = "" if stride == 1 else f", worked out for one frame in {stride}"
-    choice = provenance.get("choice")
+    plan = provenance.get("plan")
     return {
-        "plan": "" if choice is None else choice["summary"],
+        "plan": ""
+        if plan is None
+        else f"{plan['text']}, off by {100 * provenance['plan_error_l1']:.2g} %",
         "sensor": f"at x {x:g}, y {y:g}, z {z:g} m",
         "visibility": f"{provenance['visibility']}: {fmean(visible):.1%} visible on average"
         + shared,

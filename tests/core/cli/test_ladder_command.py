@@ -113,5 +113,5 @@ def test_synth_says_which_plan_it_took(sd2: Sd2, plate: Path, tmp_path: Path) ->
     outcome = sd2("synth", plate, "--out", out, "--tolerance", "5%")
     assert outcome.code == 0, outcome.err
     shown = next(line for line in outcome.out.splitlines() if line.startswith("  plan "))
-    assert DopplerMap.load(out).meta["choice"]["summary"] in shown
+    assert DopplerMap.load(out).meta["plan"]["text"] in shown
     assert shown in sd2("info", out).out
