@@ -24,7 +24,7 @@ help:
 	@echo "make bench        the benchmarks"
 	@echo "make wheel        dist/*.whl"
 	@echo "make screenshots  the pictures in docs/"
-	@echo "make accuracy     docs/accuracy-and-speed.md, measured (some ten minutes)"
+	@echo "make accuracy     docs/accuracy-and-speed.md, measured (some five minutes)"
 	@echo "make clean        remove what the above made, .venv included"
 
 setup: system-packages $(COMPILED)

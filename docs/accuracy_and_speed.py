@@ -1,4 +1,4 @@
-"""Makes ``accuracy-and-speed.md`` and its pictures: ``make accuracy``, about ten minutes.
+"""Makes ``accuracy-and-speed.md`` and its pictures: ``make accuracy``, about five minutes.
 
 Every figure is measured when this runs. The walk is left out where the real
 recordings are not there (``SD2_SHARED_DATA``).
