@@ -20,8 +20,8 @@ from sd2core.fmcw import (
 from sd2core.io.mesh import load_mesh
 from sd2core.mesh import MeshSequence
 from sd2core.resources import resource_path
+from sd2core.scattering.facets import facet_visibility
 from sd2core.sensor import PAPER_RADAR, VelocityAxis, VirtualSensor
-from sd2core.simulate.sample import facet_visibility
 from sd2core.spectrum import DopplerMap
 from sd2core.timebase import Timebase
 
