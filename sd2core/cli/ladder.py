@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from sd2core.cli.options import (
     add_command,
     add_json,
+    add_mesh_and_sensor,
     add_mesh_reading,
-    position,
     positive_float,
     positive_int,
     share,
@@ -51,13 +51,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "  sd2 ladder walk.npz --plot trade.png --json"
         ),
     )
-    parser.add_argument("mesh", type=Path, metavar="MESH", help="a mesh, or a recording")
-    parser.add_argument(
-        "--sensor",
-        type=position,
-        metavar="X,Y,Z",
-        help="where the radar is, in metres (default: the recording's sensor, or the camera)",
-    )
+    add_mesh_and_sensor(parser)
     add_wish(parser, "2%%")
     parser.add_argument(
         "--family",

@@ -53,6 +53,17 @@ def add_axis(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_mesh_and_sensor(parser: argparse.ArgumentParser) -> None:
+    """Add what is looked at, and from where."""
+    parser.add_argument("mesh", type=Path, metavar="MESH", help="a mesh, or a recording")
+    parser.add_argument(
+        "--sensor",
+        type=position,
+        metavar="X,Y,Z",
+        help="where the radar is, in metres (default: the recording's sensor, or the camera)",
+    )
+
+
 def add_mesh_reading(parser: argparse.ArgumentParser) -> None:
     """Add what a mesh file may not say about itself."""
     parser.add_argument(

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from sd2core.cli.options import (
     add_command,
     add_json,
+    add_mesh_and_sensor,
     add_mesh_reading,
     finite_float,
     position,
@@ -48,14 +49,8 @@ def add_radar(kinds: argparse._SubParsersAction) -> None:
             "  sd2 simulate radar walk.npz like-mine --radar capture/config.json"
         ),
     )
-    parser.add_argument("mesh", type=Path, metavar="MESH", help="a mesh, or a recording")
+    add_mesh_and_sensor(parser)
     parser.add_argument("out", type=Path, metavar="OUT", help="the capture's folder to write")
-    parser.add_argument(
-        "--sensor",
-        type=position,
-        metavar="X,Y,Z",
-        help="where the radar is, in metres (default: the recording's sensor, or the camera)",
-    )
     add_radar_choice(parser)
     parser.add_argument(
         "--model",

@@ -12,10 +12,10 @@ from sd2core.cli.options import (
     add_axis,
     add_command,
     add_json,
+    add_mesh_and_sensor,
     add_mesh_reading,
     bin_list,
     not_negative_float,
-    position,
     positive_float,
     positive_int,
 )
@@ -80,15 +80,9 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "  sd2 synth walk.npz --out map.npz --model fmcw"
         ),
     )
-    parser.add_argument("mesh", type=Path, metavar="MESH", help="a mesh, or a recording")
+    add_mesh_and_sensor(parser)
     parser.add_argument(
         "--out", type=Path, required=True, metavar="FILE.npz", help="the map to write"
-    )
-    parser.add_argument(
-        "--sensor",
-        type=position,
-        metavar="X,Y,Z",
-        help="where the radar is, in metres (default: the recording's sensor, or the camera)",
     )
     parser.add_argument(
         "--preset",

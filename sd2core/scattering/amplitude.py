@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.compiled import compiled
+from sd2core.scattering.visibility import sum_cross_products
 
 NEAREST_RANGE_M = 0.1
 """The range law is a far-field law; whatever is nearer counts as at this range."""
@@ -103,18 +104,7 @@ def vertex_area_vectors_kernel(
     vertices = positions.shape[2]
     total = np.empty((vertices, 3), np.float64)
     for t in range(first, last):
-        x, y, z = positions[t, 0], positions[t, 1], positions[t, 2]
-        total[:] = 0
-        for f in range(faces.shape[0]):
-            i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
-            px, py, pz = np.float64(x[i]), np.float64(y[i]), np.float64(z[i])
-            ax, ay, az = x[j] - px, y[j] - py, z[j] - pz
-            bx, by, bz = x[k] - px, y[k] - py, z[k] - pz
-            nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-            for v in (i, j, k):
-                total[v, 0] += nx
-                total[v, 1] += ny
-                total[v, 2] += nz
+        sum_cross_products(positions[t], faces, total)
         for axis in range(3):
             for v in range(vertices):
                 vectors[t, axis, v] = np.float32(total[v, axis] / 6.0)

@@ -67,6 +67,27 @@ def encloses(faces: NDArray[np.int32]) -> bool:
 
 
 @compiled
+def sum_cross_products(
+    points: NDArray[Any],  # (3, V)
+    faces: NDArray[np.int32],
+    total: NDArray[np.float64],  # (V, 3), written
+) -> None:
+    """Around every vertex, the sum of its triangles' edge cross products: six area vectors."""
+    x, y, z = points[0], points[1], points[2]
+    total[:] = 0
+    for f in range(faces.shape[0]):
+        i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
+        px, py, pz = np.float64(x[i]), np.float64(y[i]), np.float64(z[i])
+        ax, ay, az = x[j] - px, y[j] - py, z[j] - pz
+        bx, by, bz = x[k] - px, y[k] - py, z[k] - pz
+        nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+        for v in (i, j, k):
+            total[v, 0] += nx
+            total[v, 1] += ny
+            total[v, 2] += nz
+
+
+@compiled
 def vertex_normals_kernel(
     positions: NDArray[np.float32],  # (n, 3, V)
     faces: NDArray[np.int32],
@@ -78,18 +99,7 @@ def vertex_normals_kernel(
     vertices = positions.shape[2]
     total = np.empty((vertices, 3), np.float64)
     for t in range(first, last):
-        x, y, z = positions[t, 0], positions[t, 1], positions[t, 2]
-        total[:] = 0
-        for f in range(faces.shape[0]):
-            i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
-            px, py, pz = np.float64(x[i]), np.float64(y[i]), np.float64(z[i])
-            ax, ay, az = x[j] - px, y[j] - py, z[j] - pz
-            bx, by, bz = x[k] - px, y[k] - py, z[k] - pz
-            nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-            for v in (i, j, k):
-                total[v, 0] += nx
-                total[v, 1] += ny
-                total[v, 2] += nz
+        sum_cross_products(positions[t], faces, total)
         for v in range(vertices):
             length = np.sqrt(total[v, 0] ** 2 + total[v, 1] ** 2 + total[v, 2] ** 2)
             factor = NORMAL_SCALE / length if length > 0 else 0.0
