@@ -53,8 +53,8 @@ class Errors:
         Share of a frame's energy that lies in wrong bins (total variation of the
         frame's distribution over velocity).
     frames : int
-        How many frames; those in which hardly anything moves are left out of
-        the figures of single frames.
+        How many frames, counted for each side from which a kept mask was tried. Those
+        in which hardly anything moves are left out of the figures of single frames.
     """
 
     l1: float

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 from fake_ladder import FakeLadder
+from PySide6.QtCore import QCoreApplication, QEvent
 
 from sd2core.io.mesh import save_mesh
 from sd2core.io.radar.infineon import write_capture
@@ -111,6 +112,9 @@ def empty_window(qtbot, compiled_kernels, fake):
     if window.ready:
         window.context.document.undo_stack.clear()
     window.close()
+    # Styling the next window would style all that are still there.
+    window.deleteLater()
+    QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 
 @pytest.fixture
