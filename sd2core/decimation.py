@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.mesh import MeshSequence, VertexArray
+from sd2core.mesh import MeshSequence, VertexArray, refuse_missing
 
 _FEWEST_FACES = 4
 """Of a surface that encloses anything."""
@@ -90,12 +90,7 @@ def decimate(mesh: MeshSequence, kept: float, *, frame: int | None = None) -> Me
         )
     frame = mesh.frame_count // 2 if frame is None else frame
     points = mesh.frame(frame).astype(np.float64)
-    if not np.isfinite(points).all():
-        vertex = int(np.argwhere(~np.isfinite(points))[0, 0])
-        raise Sd2Error(
-            f"{name}: vertex {vertex} of frame {frame} is {points[vertex].tolist()}",
-            "finite coordinates in metres",
-        )
+    refuse_missing(points[None], frame, mesh.source)
     simplified = _simplify(points, mesh.faces, kept)
     if simplified is None:
         note = "not decimated: fewer than four faces would be left"

@@ -192,66 +192,27 @@ class PreparedMesh:
 
     def normals(self, block: Block) -> NDArray[np.int8]:
         """Vertex normals of a block's frames, int8 (n, 3, V)."""
-
-        def make() -> tuple[NDArray[np.int8], int]:
-            points, faces = self._at_frames(block), self._faces()
-            if kernels_ready():
-                normals = np.empty(points.shape, np.int8)
-                visibility.vertex_normals_kernel(points, faces, 0, len(points), normals)
-            else:
-                normals = visibility.vertex_normals(points, faces)
-            return normals, normals.nbytes
-
-        normals: NDArray[np.int8] = self.budget.get_or_make(("normals", block.index), make)
-        return normals
+        return self._kept("normals", block, self._normals)
 
     def areas(self, block: Block) -> NDArray[np.float32]:
         """Vertex areas of a block's frames in m², float32 (n, V)."""
-
-        def make() -> tuple[NDArray[np.float32], int]:
-            areas = self._areas(block)
-            return areas, areas.nbytes
-
-        areas: NDArray[np.float32] = self.budget.get_or_make(("areas", block.index), make)
-        return areas
+        return self._kept("areas", block, self._areas)
 
     def surface(self, block: Block) -> NDArray[np.float64]:
         """Area of the whole surface in each of a block's frames in m², float64 (n,)."""
-
-        def make() -> tuple[NDArray[np.float64], int]:
-            surface = self._areas(block).sum(axis=1, dtype=np.float64)
-            return surface, surface.nbytes
-
-        surface: NDArray[np.float64] = self.budget.get_or_make(("surface", block.index), make)
-        return surface
+        # Vertex areas are kept where they are counted, and only there.
+        areas = self.areas if self.options.weight == "area" else self._areas
+        return self._kept(
+            "surface", block, lambda block: areas(block).sum(axis=1, dtype=np.float64)
+        )
 
     def middles(self, block: Block) -> NDArray[np.float64]:
         """Mean vertex of each of a block's frames, float64 (n, 3)."""
-
-        def make() -> tuple[NDArray[np.float64], int]:
-            frames = block.frames
-            heads = np.ones(self.mesh.vertex_count) if self.heads is None else self.heads
-            share = heads / heads.sum(dtype=np.float64)
-            middles = np.stack([frames.positions[knot] @ share for knot in frames.centre])
-            return middles, middles.nbytes
-
-        middles: NDArray[np.float64] = self.budget.get_or_make(("middles", block.index), make)
-        return middles
+        return self._kept("middles", block, self._middles)
 
     def area_vectors(self, block: Block) -> NDArray[np.float32]:
         """Vertex area vectors of a block's frames in m², float32 (n, 3, V)."""
-
-        def make() -> tuple[NDArray[np.float32], int]:
-            points, faces = self._at_frames(block), self._faces()
-            if kernels_ready():
-                vectors = np.empty(points.shape, np.float32)
-                amplitude.vertex_area_vectors_kernel(points, faces, 0, len(points), vectors)
-            else:
-                vectors = amplitude.vertex_area_vectors(points, faces)
-            return vectors, vectors.nbytes
-
-        vectors: NDArray[np.float32] = self.budget.get_or_make(("area vectors", block.index), make)
-        return vectors
+        return self._kept("area vectors", block, self._area_vectors)
 
     def velocities_vid2doppler(
         self, block: Block, rows: slice, sensor: NDArray[np.float64]
@@ -266,6 +227,38 @@ class PreparedMesh:
             sensor,
             self.mesh.timebase.frames_per_s,
         )
+
+    def _kept(self, what: str, block: Block, make: Callable[[Block], NDArray[Any]]) -> NDArray[Any]:
+        """Something of a block's frames, from memory or made now."""
+
+        def sized() -> tuple[NDArray[Any], int]:
+            made = make(block)
+            return made, made.nbytes
+
+        kept: NDArray[Any] = self.budget.get_or_make((what, block.index), sized)
+        return kept
+
+    def _normals(self, block: Block) -> NDArray[np.int8]:
+        points, faces = self._at_frames(block), self._faces()
+        if not kernels_ready():
+            return visibility.vertex_normals(points, faces)
+        normals = np.empty(points.shape, np.int8)
+        visibility.vertex_normals_kernel(points, faces, 0, len(points), normals)
+        return normals
+
+    def _area_vectors(self, block: Block) -> NDArray[np.float32]:
+        points, faces = self._at_frames(block), self._faces()
+        if not kernels_ready():
+            return amplitude.vertex_area_vectors(points, faces)
+        vectors = np.empty(points.shape, np.float32)
+        amplitude.vertex_area_vectors_kernel(points, faces, 0, len(points), vectors)
+        return vectors
+
+    def _middles(self, block: Block) -> NDArray[np.float64]:
+        frames = block.frames
+        heads = np.ones(self.mesh.vertex_count) if self.heads is None else self.heads
+        share = heads / heads.sum(dtype=np.float64)
+        return np.stack([frames.positions[knot] @ share for knot in frames.centre])
 
     def _areas(self, block: Block) -> NDArray[np.float32]:
         points, faces = self._at_frames(block), self._faces()

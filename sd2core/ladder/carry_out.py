@@ -16,7 +16,6 @@ def synthesizer_for(
     options: SynthesisOptions,
     *,
     like: Synthesizer | None = None,
-    threads: int | None = None,
 ) -> Synthesizer:
     """What counts a mesh as planned.
 
@@ -30,8 +29,6 @@ def synthesizer_for(
     like : Synthesizer, optional
         One made for a plan that keeps as many vertices; its decimated mesh, and
         its prepared frames where possible, are shared.
-    threads : int, optional
-        1 works in the calling thread alone.
 
     Raises
     ------
@@ -41,4 +38,4 @@ def synthesizer_for(
     if plan.family != "histogram":
         raise Sd2Error(f"The plan is {plan}", "a plan that counts vertices")
     counted = like.mesh if like is not None else decimate(mesh, plan.vertices_kept)
-    return Synthesizer(counted, plan.options(options), blocks_of=like, threads=threads)
+    return Synthesizer(counted, plan.options(options), blocks_of=like)

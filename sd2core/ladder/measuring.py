@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import time
-import tracemalloc
-from collections.abc import Sequence
 from pathlib import Path
-
-import numpy as np
 
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.ladder.choosing import checked_options
-from sd2core.ladder.deviation import spread
-from sd2core.ladder.results import Cost, Measurement, PlanResult, Spread
+from sd2core.ladder.cost import in_turns, peak_bytes
+from sd2core.ladder.results import Cost, Measurement, PlanResult
 from sd2core.ladder.rungs import Family, Plan, compared_plans, reference_plan
 from sd2core.ladder.sample import all_frames, take_sample
 from sd2core.ladder.scene import scene_fingerprint, this_machine
@@ -79,10 +75,15 @@ def measure(
         progress(2 * number, total)
         errors.append(trial.errors(plan, runs))
         memory.append(_watched(trial, plan))
-    costs = _timed(trial, plans, repeats, lambda done, of: progress(total - of + done, total))
+    costs = in_turns(
+        plans,
+        repeats,
+        lambda plan: (trial.milliseconds(plan, 1), trial.milliseconds(plan)),
+        lambda done, of: progress(total - of + done, total),
+    )
     results = [
-        PlanResult(plan, error, Cost(one, every, peak_bytes, setup_s))
-        for plan, error, (one, every), (peak_bytes, setup_s) in zip(
+        PlanResult(plan, error, Cost(one, every, most, setup_s))
+        for plan, error, (one, every), (most, setup_s) in zip(
             plans, errors, costs, memory, strict=True
         )
     ]
@@ -100,25 +101,14 @@ def measure(
 def _watched(trial: Trial, plan: Plan) -> tuple[int, float]:
     """Most bytes allocated at once from scratch, and seconds before the first frame."""
     trial.forget()
-    tracemalloc.start()
-    try:
+    setup_s = 0.0
+
+    def work() -> None:
+        nonlocal setup_s
         start = time.perf_counter()
         trial.synthesizer(plan)
         setup_s = time.perf_counter() - start
         trial.milliseconds(plan)
-        return tracemalloc.get_traced_memory()[1], setup_s + trial.decimating_s(plan)
-    finally:
-        tracemalloc.stop()
 
-
-def _timed(
-    trial: Trial, plans: Sequence[Plan], repeats: int, progress: Progress
-) -> list[tuple[Spread, Spread]]:
-    """Milliseconds per frame of every plan on one thread and on all cores."""
-    spent = np.empty((repeats, 2, len(plans)))
-    for turn in range(repeats):
-        for number, plan in enumerate(plans):
-            progress(turn * len(plans) + number, repeats * len(plans))
-            for column, threads in enumerate((1, None)):
-                spent[turn, column, number] = trial.milliseconds(plan, threads)
-    return [(spread(spent[:, 0, k]), spread(spent[:, 1, k])) for k in range(len(plans))]
+    most = peak_bytes(work)
+    return most, setup_s + trial.decimating_s(plan)

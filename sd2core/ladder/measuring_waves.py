@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-import tracemalloc
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -21,7 +21,8 @@ from sd2core.fmcw.options import WaveOptions
 from sd2core.fmcw.reference import Converged, converged_frame
 from sd2core.fmcw.spectra import frame_spectra, signal_spectra
 from sd2core.fmcw.wave import WaveScene
-from sd2core.ladder.deviation import errors, spread
+from sd2core.ladder.cost import in_turns, peak_bytes
+from sd2core.ladder.deviation import errors
 from sd2core.ladder.results import Cost, Errors, Measurement, PlanResult
 from sd2core.ladder.rungs import Plan, reference_plan, wave_plans
 from sd2core.ladder.sample import take_sample
@@ -177,16 +178,16 @@ def measure_waves(
     for number, plan in enumerate(plans):
         progress(1 + number, total)
         errors.append(trial.errors(plan, reference))
-        memory.append(_peak_bytes(trial, plan))
-    spent = np.empty((repeats, 2, len(plans)))
-    for turn in range(repeats):
-        for number, plan in enumerate(plans):
-            progress(1 + (turn + 1) * len(plans) + number, total)
-            spent[turn, :, number] = _milliseconds(trial, plan)
-    costs = [(spread(spent[:, 0, k]), spread(spent[:, 1, k])) for k in range(len(plans))]
+        memory.append(peak_bytes(partial(trial.columns, plan)))
+    costs = in_turns(
+        plans,
+        repeats,
+        lambda plan: _milliseconds(trial, plan),
+        lambda done, of: progress(total - of + done, total),
+    )
     results = [
-        PlanResult(plan, error, Cost(one, every, peak_bytes, trial.setup_s(plan)))
-        for plan, error, (one, every), peak_bytes in zip(plans, errors, costs, memory, strict=True)
+        PlanResult(plan, error, Cost(one, every, most, trial.setup_s(plan)))
+        for plan, error, (one, every), most in zip(plans, errors, costs, memory, strict=True)
     ]
     return Measurement(
         family="fmcw",
@@ -209,15 +210,6 @@ def _milliseconds(trial: WaveTrial, plan: Plan) -> tuple[float, float]:
     trial.columns(plan)
     passed_s = time.perf_counter() - start
     return 1e3 * one_s / len(trial.frames), 1e3 * passed_s / len(trial.frames)
-
-
-def _peak_bytes(trial: WaveTrial, plan: Plan) -> int:
-    tracemalloc.start()
-    try:
-        trial.columns(plan)
-        return tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
 
 
 def _convergence(found: Sequence[Converged]) -> tuple[tuple[int, float], ...]:

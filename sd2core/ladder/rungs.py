@@ -248,9 +248,9 @@ def compared_plans(
             yield replace(base, mask_reuse_m=reach_m)
 
 
-def wave_plans(weight: Weight = "count") -> Iterator[Plan]:
+def wave_plans() -> Iterator[Plan]:
     """The FMCW plans worth a look; the last one leaves nothing out but subdivision."""
-    base = Plan(signal="fmcw", weight=weight)
+    base = Plan(signal="fmcw")
     for sight in ("facing", "exact"):
         for kept in VERTICES_KEPT[:3]:
             yield replace(base, visibility=sight, vertices_kept=kept)

@@ -159,8 +159,8 @@ def _speed(mesh: MeshSequence, frame: int) -> float:
     """Mean squared speed of some vertices, in (m/s)²."""
     two = mesh.read(frame, frame + 2).astype(np.float64)
     refuse_missing(two, frame, mesh.source)
-    step = two[1, :: max(1, mesh.vertex_count // _PROBED_VERTICES)]
-    step = step - two[0, :: max(1, mesh.vertex_count // _PROBED_VERTICES)]
+    probed = two[:, :: max(1, mesh.vertex_count // _PROBED_VERTICES)]
+    step = probed[1] - probed[0]
     duration_s = mesh.times_s[frame + 1] - mesh.times_s[frame]
     return float((step**2).sum(axis=1).mean() / duration_s**2)
 

@@ -50,10 +50,9 @@ class Survey:
 
     def forecast_error(self, plan: Plan) -> float:
         """What the rungs of a plan change, added up: more than they do together."""
-        return (
-            sum(self.change[alone] for alone in self._alone(plan) if alone != self.base)
-            + (self.change[replace(self.base, frame_rate_factor=plan.frame_rate_factor)])
-        )
+        rate = replace(self.base, frame_rate_factor=plan.frame_rate_factor)
+        down = (self.change[alone] for alone in self._alone(plan) if alone != self.base)
+        return self.change[rate] + sum(down)
 
     def forecast_ms(self, plan: Plan) -> float:
         """Milliseconds per frame that a plan should take when all cores share the work."""
