@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.simulate.bodies import Body, Skeleton
+from sd2core.body.model import Body, Skeleton
 
 Singles = NDArray[np.float32]
 

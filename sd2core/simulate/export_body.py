@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.atomic import atomic_write
+from sd2core.body.model import FORMAT, INFLUENCES, VERSION, Resolution
 from sd2core.errors import Sd2Error
 from sd2core.progress import Progress, silent
-from sd2core.simulate.bodies import FORMAT, INFLUENCES, VERSION, Resolution
 from sd2core.simulate.decimate import decimate
 
 TOPOLOGIES: dict[Resolution, str] = {
@@ -44,7 +44,7 @@ def export_body(path: Path, progress: Progress = silent) -> None:
     Parameters
     ----------
     path : Path
-        The ``.npz`` to write; see :class:`sd2core.simulate.bodies.Body` for
+        The ``.npz`` to write; see :class:`sd2core.body.model.Body` for
         what it holds.
     progress : Progress
         Called after each surface; anny itself cannot be interrupted.

@@ -18,8 +18,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sd2core.simulate.bodies import Skeleton
-from sd2core.simulate.rotations import Floats, about, applied, frame, product, transposed
+from sd2core.body.model import Skeleton
+from sd2core.body.rotations import Floats, about, applied, frame, product, transposed
 
 DURATION_S = 15.0
 
@@ -33,7 +33,7 @@ class GestureSpan(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """What :meth:`sd2core.simulate.bodies.Body.pose` takes: (T, B, 3, 3) and (T, 3)."""
+    """What :meth:`sd2core.body.model.Body.pose` takes: (T, B, 3, 3) and (T, 3)."""
 
     rotations: Floats
     translation_m: Floats

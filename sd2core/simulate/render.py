@@ -13,7 +13,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.simulate.bodies import Body, vertex_normals
+from sd2core.body.camera import PinholeCamera
+from sd2core.body.model import Body, vertex_normals
 from sd2core.simulate.caption import stamp
 from sd2core.simulate.clothing import Clothes, linear, srgb
 from sd2core.simulate.raster import interpolate, lit_share, rasterise
@@ -26,8 +27,8 @@ _LIGHT_WIDTH_M = 3.2
 
 
 @dataclass(frozen=True)
-class Camera:
-    """A pinhole camera in the camera frame's origin, looking along +z.
+class Camera(PinholeCamera):
+    """A pinhole camera some way above the floor.
 
     Parameters
     ----------
@@ -38,17 +39,7 @@ class Camera:
         Height of the optical axis.
     """
 
-    width: int = 640
-    height: int = 480
-    focal_px: float = 600.0
     above_floor_m: float = 1.1
-
-    def project(self, points_m: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Pixel coordinates (..., 2) of points (..., 3) in front of the camera."""
-        return (
-            self.focal_px * points_m[..., :2] / points_m[..., 2:]
-            + np.array([self.width, self.height]) / 2.0
-        )
 
 
 @dataclass(frozen=True)

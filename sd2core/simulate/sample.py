@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.body.model import Body, Resolution
 from sd2core.compiled import worker_count, workers
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.options import Reflector, SignalOptions
@@ -25,7 +26,6 @@ from sd2core.progress import Progress, silent
 from sd2core.recording import SUFFIX, Recording, Span
 from sd2core.scattering.facets import facet_visibility
 from sd2core.sensor import PAPER_RADAR, VirtualSensor
-from sd2core.simulate.bodies import Body, Resolution
 from sd2core.simulate.encode import write_compact_mesh, write_video
 from sd2core.simulate.gestures import DURATION_S, SPANS, swipes
 from sd2core.simulate.render import Camera, Renderer

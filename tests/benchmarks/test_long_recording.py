@@ -13,9 +13,9 @@ import sys
 import numpy as np
 import pytest
 
+from sd2core.body.model import Body
 from sd2core.io.mesh import save_mesh
 from sd2core.mesh import MeshSequence
-from sd2core.simulate.bodies import Body
 from sd2core.timebase import Timebase
 
 FRAMES = 162_000

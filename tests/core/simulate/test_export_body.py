@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sd2core.body.model import Body, Resolution
 from sd2core.errors import Sd2Error
 from sd2core.resources import resource_path
 from sd2core.simulate import export_body as exporting
-from sd2core.simulate.bodies import Body, Resolution
 
 needs_anny = pytest.mark.skipif(
     importlib.util.find_spec("anny") is None,

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from sd2core.simulate.bodies import Body
+from sd2core.body.model import Body
 from sd2core.simulate.gestures import (
     DURATION_S,
     SPANS,

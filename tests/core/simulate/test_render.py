@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sd2core.simulate.bodies import Body
+from sd2core.body.model import Body
 from sd2core.simulate.caption import stamp
 from sd2core.simulate.clothing import SHIRT, TROUSERS
 from sd2core.simulate.raster import interpolate, lit_share, rasterise

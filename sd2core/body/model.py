@@ -13,9 +13,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.body.rotations import Floats, applied, product
 from sd2core.errors import Sd2Error
 from sd2core.resources import resource_path
-from sd2core.simulate.rotations import Floats, applied, product
 
 FORMAT = "sd2-body"
 VERSION = 1
