@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -18,9 +18,11 @@ from sd2core.errors import Sd2Error
 from sd2core.resources import resource_path
 
 FORMAT = "sd2-body"
-VERSION = 1
+VERSION = 2
 INFLUENCES = 8
 """Bones per vertex, at most."""
+
+_SKELETON = ("bone_names", "bone_parents", "bone_heads", "bone_tails", "bone_rotations")
 
 Resolution = Literal["low", "medium", "high"]
 
@@ -131,40 +133,21 @@ class Body:
         Sd2Error
             When the file is missing, damaged or of a later version.
         """
-        path = resource_path("body.npz") if path is None else Path(path)
-        try:
-            with path.open("rb") as stream, np.load(stream, allow_pickle=False) as data:
-                meta = json.loads(str(data["meta"]))
-                if meta.get("format") != FORMAT or meta.get("version", 0) > VERSION:
-                    raise Sd2Error(
-                        f"{path} is of format {meta.get('format')!r} version {meta.get('version')}",
-                        f"{FORMAT!r} up to version {VERSION}",
-                        "Open it with the version of SD² Studio that wrote it",
-                    )
-                return cls._from_arrays(resolution, data)
-        except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
-            raise Sd2Error(
-                f"{path} cannot be read as a body ({error})",
-                "a file written by `sd2 simulate export-body`",
-            ) from error
-
-    @classmethod
-    def _from_arrays(cls, resolution: Resolution, data: Any) -> Body:
-        skeleton = Skeleton(
-            names=tuple(str(name) for name in data["bone_names"]),
-            parents=tuple(int(parent) for parent in data["bone_parents"]),
-            heads_m=data["bone_heads"].astype(np.float64),
-            tails_m=data["bone_tails"].astype(np.float64),
-            rotations=data["bone_rotations"].astype(np.float64),
-        )
-        weights = data[f"{resolution}_weights"].astype(np.float64)
+        surface = [f"{resolution}_{part}" for part in ("vertices", "faces", "bones", "weights")]
+        vertices, faces, bones, weights = read_body_arrays(surface, path)
+        weights = weights.astype(np.float64)
         return cls(
-            vertices_m=data[f"{resolution}_vertices"].astype(np.float64),
-            faces=data[f"{resolution}_faces"].astype(np.int32),
-            bones=data[f"{resolution}_bones"].astype(np.intp),
+            vertices_m=vertices.astype(np.float64),
+            faces=faces.astype(np.int32),
+            bones=bones.astype(np.intp),
             weights=weights / weights.sum(axis=1, keepdims=True),
-            skeleton=skeleton,
+            skeleton=load_skeleton(path),
         )
+
+    @property
+    def stature_m(self) -> float:
+        """Height at rest."""
+        return float(np.ptp(self.vertices_m[:, 1]))
 
     def pose(self, rotations: Floats, translation_m: Floats | None = None) -> Floats:
         """Vertices of every frame by linear blend skinning.
@@ -197,6 +180,44 @@ class Body:
             rows = np.flatnonzero(self.weights[:, slot])
             slots.append((rows, self.bones[rows, slot], self.weights[rows, slot]))
         return slots
+
+
+def load_skeleton(path: Path | None = None) -> Skeleton:
+    """Read the bones of the bundled body (or of another export)."""
+    names, parents, heads, tails, rotations = read_body_arrays(_SKELETON, path)
+    return Skeleton(
+        names=tuple(str(name) for name in names),
+        parents=tuple(int(parent) for parent in parents),
+        heads_m=heads.astype(np.float64),
+        tails_m=tails.astype(np.float64),
+        rotations=rotations.astype(np.float64),
+    )
+
+
+def read_body_arrays(names: Sequence[str], path: Path | None = None) -> list[NDArray[Any]]:
+    """Arrays of the bundled body's file (or of another export), as they are stored.
+
+    Raises
+    ------
+    Sd2Error
+        When the file is missing, damaged, of a later version, or lacks one of them.
+    """
+    path = resource_path("body.npz") if path is None else Path(path)
+    try:
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as data:
+            meta = json.loads(str(data["meta"]))
+            if meta.get("format") != FORMAT or meta.get("version", 0) > VERSION:
+                raise Sd2Error(
+                    f"{path} is of format {meta.get('format')!r} version {meta.get('version')}",
+                    f"{FORMAT!r} up to version {VERSION}",
+                    "Open it with the version of SD² Studio that wrote it",
+                )
+            return [data[name] for name in names]
+    except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
+        raise Sd2Error(
+            f"{path} cannot be read as a body ({error})",
+            "a file written by `sd2 simulate export-body`",
+        ) from error
 
 
 def vertex_normals(vertices_m: Floats, faces: NDArray[np.int32]) -> Floats:

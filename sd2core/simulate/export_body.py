@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import warnings
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,13 @@ from sd2core.body.model import FORMAT, INFLUENCES, VERSION, Resolution
 from sd2core.errors import Sd2Error
 from sd2core.progress import Progress, silent
 from sd2core.simulate.decimate import decimate
+from sd2core.simulate.export_shapes import (
+    Sampled,
+    directions_of,
+    random_phenotypes,
+    scaled,
+    shape_directions,
+)
 
 TOPOLOGIES: dict[Resolution, str] = {
     "high": "anny-noeyes-notongue",
@@ -57,6 +65,7 @@ def export_body(path: Path, progress: Progress = silent) -> None:
     arrays: dict[str, Any] = {}
     skeleton: dict[str, Any] = {}
     floor_m = None
+    coefficients = None
     progress(0, len(TOPOLOGIES))
     for done, (resolution, topology) in enumerate(TOPOLOGIES.items(), start=1):
         model = load_anny(topology)
@@ -74,9 +83,18 @@ def export_body(path: Path, progress: Progress = silent) -> None:
                     "one skeleton for all surfaces",
                     'Install the version this was written for: pip install "sd2-studio[anny]"',
                 )
-        if resolution == "high":
-            medium = _decimated(surface, MEDIUM_VERTICES)
+        base = _sampled(rest)
+        if coefficients is None:
+            shapes, coefficients = shape_directions(base, partial(_body_of, model))
+            arrays.update(shapes)
+            medium, rows = _decimated(surface, MEDIUM_VERTICES)
             arrays.update({f"medium_{name}": array for name, array in medium.items()})
+            arrays["medium_shape"] = shapes["high_shape"][:, rows]
+        else:
+            bodies = scaled(base, (_body_of(model, one) for one in random_phenotypes()))
+            offsets = np.stack([body.vertices_m - base.vertices_m for body in bodies])
+            directions = directions_of(coefficients, offsets)
+            arrays[f"{resolution}_shape"] = directions.astype(np.float16)
         progress(done, len(TOPOLOGIES))
     meta = {
         "format": FORMAT,
@@ -108,15 +126,28 @@ def load_anny(topology: str) -> Any:
         return anny.Anny(topology=topology, skinning_method="lbs").eval()
 
 
-def rest_state(model: Any) -> dict[str, Any]:
-    """Anny's rest vertices, bone heads and bone poses for :data:`PHENOTYPE`."""
+def rest_state(model: Any, **phenotypes: float) -> dict[str, Any]:
+    """Anny's rest vertices, bone heads and bone poses for :data:`PHENOTYPE` and others."""
     import torch
 
     with torch.no_grad():
         state: dict[str, Any] = model.get_rest_model(
-            model.get_phenotype_blendshape_coefficients(**PHENOTYPE)
+            model.get_phenotype_blendshape_coefficients(**PHENOTYPE, **phenotypes)
         )
     return state
+
+
+def _sampled(rest: dict[str, Any]) -> Sampled:
+    floor_m = floor_height_m(rest)
+    vertices, heads = (
+        body_from_anny(rest[name][0].numpy(), floor_m)
+        for name in ("rest_vertices", "rest_bone_heads")
+    )
+    return Sampled(vertices, heads)
+
+
+def _body_of(model: Any, phenotypes: dict[str, float]) -> Sampled:
+    return _sampled(rest_state(model, **phenotypes))
 
 
 def floor_height_m(rest: dict[str, Any]) -> float:
@@ -155,13 +186,15 @@ def _export(
     return surface, skeleton
 
 
-def _decimated(surface: dict[str, NDArray[Any]], count: int) -> dict[str, NDArray[Any]]:
-    """The same surface with fewer of its vertices, each as it was."""
+def _decimated(
+    surface: dict[str, NDArray[Any]], count: int
+) -> tuple[dict[str, NDArray[Any]], NDArray[np.intp]]:
+    """The same surface with fewer of its vertices, each as it was, and which they are."""
     rows, faces = decimate(
         surface["vertices"].astype(np.float64), surface["faces"].astype(np.int32), count
     )
     kept = {name: surface[name][rows] for name in ("vertices", "bones", "weights")}
-    return {**kept, "faces": faces.astype(np.uint16)}
+    return {**kept, "faces": faces.astype(np.uint16)}, rows
 
 
 def _strongest(

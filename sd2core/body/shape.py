@@ -1,0 +1,131 @@
+"""Body shapes: stature, and a few directions in which bodies of one stature differ."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.body.model import Body, Resolution, Skeleton, load_skeleton, read_body_arrays
+from sd2core.errors import Sd2Error
+
+Floats = NDArray[np.float64]
+
+PHENOTYPES = ("gender", "muscle", "weight", "height", "proportions")
+"""Anny's names; each from 0 to 1, 0.5 the middle (gender: 0 male, 1 female)."""
+
+
+@dataclass(frozen=True, eq=False)
+class BodyShape:
+    """Shape of one person.
+
+    Parameters
+    ----------
+    coefficients : float64 array, shape (K,)
+        Along :class:`ShapeSpace`'s directions; all 0 is the bundled body.
+    stature_m : float
+        Standing height, without shoes.
+    """
+
+    coefficients: Floats
+    stature_m: float
+
+
+class ShapeSpace:
+    """Directions of shape of the bundled body.
+
+    Attributes
+    ----------
+    path : Path or None
+        Of the export, None for the bundled one.
+    mean, sd : float64 array, shape (K,)
+        Of the coefficients over bodies of random phenotypes.
+    heads_m : float64 array, shape (K, B, 3)
+        What one unit of each coefficient moves the bones' heads.
+    base_stature_m : float
+        Of the body whose coefficients are 0.
+    base_skeleton : Skeleton
+        Of the same.
+    """
+
+    def __init__(self, path: Path | None = None) -> None:
+        self.path = path
+        names = ("shape_heads", "shape_mean", "shape_sd", "shape_polynomial", "high_vertices")
+        self.heads_m, self.mean, self.sd, self._polynomial, vertices = (
+            array.astype(np.float64) for array in read_body_arrays(names, path)
+        )
+        self.base_stature_m = float(-vertices[:, 1].min())
+        self.base_skeleton = load_skeleton(path)
+
+    def __len__(self) -> int:
+        return len(self.mean)
+
+    def coefficients(self, **phenotypes: float) -> Floats:
+        """Coefficients (K,) of phenotypes, 0.5 where not given.
+
+        Raises
+        ------
+        Sd2Error
+            For an unknown phenotype, or one outside 0 to 1.
+        """
+        for name, value in phenotypes.items():
+            if name not in PHENOTYPES or not 0.0 <= value <= 1.0:
+                raise Sd2Error(
+                    f"phenotype {name} = {value}", f"{', '.join(PHENOTYPES)} from 0 to 1"
+                )
+        middle = phenotype_features([{}]) @ self._polynomial
+        return np.asarray((phenotype_features([phenotypes]) @ self._polynomial - middle)[0])
+
+    def random(self, rng: np.random.Generator) -> BodyShape:
+        """An adult of random phenotypes and stature (1.45 to 2.00 m)."""
+        drawn = {name: float(rng.uniform(0.0, 1.0)) for name in PHENOTYPES if name != "height"}
+        stature_m = 1.78 - 0.12 * drawn["gender"] + 0.07 * rng.standard_normal()
+        return BodyShape(self.coefficients(**drawn), float(np.clip(stature_m, 1.45, 2.0)))
+
+    def load(self, resolution: Resolution, shape: BodyShape) -> Body:
+        """The body of one shape at rest, standing on the floor.
+
+        Parameters
+        ----------
+        resolution : {"high", "medium", "low"}
+        shape : BodyShape
+
+        Returns
+        -------
+        Body
+            With the faces, weights and bones of the bundled surface.
+        """
+        if shape.coefficients.shape != self.mean.shape:
+            raise Sd2Error(
+                f"a shape of {shape.coefficients.shape} coefficients", f"{self.mean.shape} of them"
+            )
+        body = Body.load(resolution, self.path)
+        (directions,) = read_body_arrays((f"{resolution}_shape",), self.path)
+        return self.shaped(body, directions.astype(np.float64), shape)
+
+    def skeleton(self, shape: BodyShape) -> Skeleton:
+        """The bones of one body at rest."""
+        scale = shape.stature_m / self.base_stature_m
+        heads = np.tensordot(shape.coefficients, self.heads_m, 1)
+        base = self.base_skeleton
+        # Tails, which pose nothing, go with their own bone's head.
+        return replace(
+            base, heads_m=scale * (base.heads_m + heads), tails_m=scale * (base.tails_m + heads)
+        )
+
+    def shaped(self, body: Body, directions_m: Floats, shape: BodyShape) -> Body:
+        """A body moved along directions (K, V, 3) and scaled to its stature."""
+        scale = shape.stature_m / self.base_stature_m
+        vertices = body.vertices_m + np.tensordot(shape.coefficients, directions_m, 1)
+        return replace(body, vertices_m=scale * vertices, skeleton=self.skeleton(shape))
+
+
+def phenotype_features(phenotypes: Sequence[Mapping[str, float]]) -> Floats:
+    """Monomials up to the second degree of phenotypes about their middle, (N, 21)."""
+    x = np.array([[2.0 * one.get(name, 0.5) - 1.0 for name in PHENOTYPES] for one in phenotypes])
+    count = len(PHENOTYPES)
+    squares = [x[:, i] * x[:, j] for i in range(count) for j in range(i, count)]
+    return np.stack([np.ones(len(x)), *x.T, *squares], axis=1)
