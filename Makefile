@@ -27,7 +27,7 @@ help:
 	@echo "make accuracy     docs/accuracy-and-speed.md, measured (some five minutes)"
 	@echo "make clean        remove what the above made, .venv included"
 
-setup: system-packages $(COMPILED)
+setup: system-packages $(COMPILED) landmark-models
 
 .PHONY: system-packages system-packages-for-tests
 system-packages:
@@ -44,6 +44,11 @@ $(COMPILED): $(INSTALLED) $(KERNELS)
 	@echo "Compiling the kernels (half a minute, once)"
 	@$(BIN)/sd2 warm-up
 	@touch $@
+
+# Needs a connection once; `sd2 fit` fetches them as well, and says what to do without one.
+.PHONY: landmark-models
+landmark-models: $(INSTALLED)
+	@$(BIN)/sd2 fetch-models --if-missing > /dev/null || echo "(Only \`sd2 fit\` needs them.)"
 
 demo: setup
 	@scripts/demo.sh

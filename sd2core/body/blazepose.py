@@ -1,0 +1,352 @@
+"""The two networks that find a person and 39 points on them in a picture.
+
+What goes in and comes out of the networks is that of BlazePose (Bazarevsky et al., 2020);
+the files are those of :mod:`sd2core.body.landmark_models`, run by LiteRT.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+
+Pixels = NDArray[np.uint8]
+Singles = NDArray[np.float32]
+Floats = NDArray[np.float64]
+
+POINTS = 39
+"""The 33 landmarks, two that say where to look next, and four that are not used."""
+CENTRE, RIM = 33, 34
+"""The middle of the hips, and a point on the circle around the whole person."""
+CROP_PX = 256
+"""Side of what the landmark network sees."""
+
+_DETECTOR_PX = 224
+_STRIDES = (8, 16, 32, 32, 32)
+_ANCHORS_PER_CELL = 2
+_MARGIN = 1.25
+"""How much larger than the person's circle the square around it is."""
+_CELL_PX = 4
+_REFINE_CELLS = 3
+_REFINE_FROM = 0.5
+
+
+@dataclass(frozen=True)
+class Roi:
+    """A square in the picture, turned so that the person in it stands upright.
+
+    Parameters
+    ----------
+    centre_x_px, centre_y_px : float
+        Pixel coordinates; the centre of the first pixel is at 0.5.
+    size_px : float
+        Side of the square.
+    angle_rad : float
+        How far it is turned clockwise, as seen in the picture.
+    """
+
+    centre_x_px: float
+    centre_y_px: float
+    size_px: float
+    angle_rad: float = 0.0
+
+    @classmethod
+    def around(cls, centre_px: Floats, rim_px: Floats) -> Roi:
+        """The square around a person whose hips are at ``centre_px``.
+
+        ``rim_px`` lies above the head, on the circle around the person.
+        """
+        dx, dy = (float(value) for value in np.subtract(rim_px, centre_px))
+        angle = math.pi / 2.0 - math.atan2(-dy, dx)
+        return cls(
+            float(centre_px[0]),
+            float(centre_px[1]),
+            2.0 * _MARGIN * math.hypot(dx, dy),
+            math.remainder(angle, math.tau),
+        )
+
+    def matrix(self, crop_px: int = CROP_PX) -> Floats:
+        """From pixel coordinates (x, y, 1) of the crop to those of the picture, (2, 3)."""
+        scale = self.size_px / crop_px
+        c, s = scale * math.cos(self.angle_rad), scale * math.sin(self.angle_rad)
+        half = crop_px / 2.0
+        return np.array(
+            [
+                [c, -s, self.centre_x_px - (c - s) * half],
+                [s, c, self.centre_y_px - (s + c) * half],
+            ]
+        )
+
+    def cut(self, picture: Pixels, crop_px: int = CROP_PX) -> Pixels:
+        """What is in the square, (crop_px, crop_px, 3); black outside the picture."""
+        return _sampled(picture, self.matrix(crop_px), crop_px)
+
+
+@dataclass(frozen=True, eq=False)
+class Detection:
+    """A person found in a whole picture.
+
+    Parameters
+    ----------
+    roi : Roi
+        The square around the person.
+    score : float
+        0.5 to 1.
+    """
+
+    roi: Roi
+    score: float
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """What the landmark network says about one square.
+
+    Parameters
+    ----------
+    image_px : float64 array, shape (39, 2)
+        In the picture: the 33 :data:`~sd2core.body.track.LANDMARKS`, then
+        :data:`CENTRE` and :data:`RIM`, then four that are not used.
+    depth_px : float64 array, shape (33,)
+        Behind the hips, at the scale of the picture.
+    world_m : float64 array, shape (33, 3)
+        From the middle of the hips; x right, y down in the picture, z away.
+    visibility, presence : float64 array, shape (33,)
+        From 0 to 1: that the point is seen, that it is inside the picture.
+    confidence : float
+        That there is a person in the square, 0 to 1.
+    mask : float32 array, shape (256, 256)
+        That a pixel of the square shows the person, 0 to 1.
+    roi : Roi
+        The square.
+    """
+
+    image_px: Floats
+    depth_px: Floats
+    world_m: Floats
+    visibility: Floats
+    presence: Floats
+    confidence: float
+    mask: Singles
+    roi: Roi
+
+    @property
+    def next_roi(self) -> Roi:
+        """Where the person of this picture will be in the next one."""
+        return Roi.around(self.image_px[CENTRE], self.image_px[RIM])
+
+
+class PoseDetector:
+    """Finds people in a whole picture.
+
+    Parameters
+    ----------
+    path : Path
+        ``pose_detection.tflite``.
+    threads : int
+    """
+
+    def __init__(self, path: Path, threads: int = 1) -> None:
+        self._network = _Network(path, threads)
+
+    def people(self, picture: Pixels, min_score: float = 0.5) -> list[Detection]:
+        """Everybody in a picture, surest first.
+
+        Parameters
+        ----------
+        picture : uint8 array, shape (height, width, 3)
+            RGB.
+        min_score : float
+        """
+        height, width = picture.shape[:2]
+        size = float(max(width, height))
+        whole = Roi(width / 2.0, height / 2.0, size)
+        crop = whole.cut(picture, _DETECTOR_PX)
+        boxes, logits = self._network.run(crop.astype(np.float32) / np.float32(127.5) - 1)
+        scores = _sigmoid(logits[0, :, 0])
+        kept = np.flatnonzero(scores >= min_score)
+        if not kept.size:
+            return []
+        raw = boxes[0, kept].astype(np.float64) / _DETECTOR_PX  # (n, 12)
+        places = np.concatenate([raw[:, :2], raw[:, 4:8]], axis=1)
+        places += np.tile(self._anchors[kept], 3)
+        found = []
+        for rows in _same_person(places[:, :2], raw[:, 2:4], scores[kept]):
+            weights = scores[kept[rows]]
+            middle = weights @ places[rows] / weights.sum()
+            # Places are parts of the letterboxed square, whose middle is the picture's.
+            middle = (middle - 0.5) * size + np.tile([width / 2.0, height / 2.0], 3)
+            found.append(Detection(Roi.around(middle[2:4], middle[4:6]), float(weights[0])))
+        return found
+
+    @cached_property
+    def _anchors(self) -> Floats:
+        """Middle of every cell of every layer as parts of the square, (2254, 2)."""
+        layers = []
+        for stride in _STRIDES:
+            cells = _DETECTOR_PX // stride
+            y, x = np.mgrid[:cells, :cells]
+            cell = (np.stack([x, y], axis=-1).reshape(-1, 2) + 0.5) / cells
+            layers.append(cell)
+        return _joined(layers)
+
+
+class PoseLandmarker:
+    """Finds the points of one person in a square.
+
+    Not to be used by two threads at once; make one for each. It lets other
+    threads run meanwhile.
+
+    Parameters
+    ----------
+    path : Path
+        ``pose_landmark_full.tflite``.
+    threads : int
+    """
+
+    def __init__(self, path: Path, threads: int = 1) -> None:
+        self._network = _Network(path, threads)
+
+    def in_picture(self, picture: Pixels, roi: Roi) -> Pose:
+        """Points of the person in a square of a picture.
+
+        Parameters
+        ----------
+        picture : uint8 array, shape (height, width, 3)
+            RGB.
+        roi : Roi
+        """
+        return self.on_crop(roi.cut(picture), roi)
+
+    def on_crop(self, crop: Pixels, roi: Roi) -> Pose:
+        """Points of the person in a square that is cut out already.
+
+        Parameters
+        ----------
+        crop : uint8 array, shape (256, 256, 3)
+            RGB.
+        roi : Roi
+            Where in the picture it is from.
+        """
+        points, flag, mask, heat, world = self._network.run(
+            crop.astype(np.float32) * np.float32(1.0 / 255.0)
+        )
+        rows = points.reshape(POINTS, 5).astype(np.float64)
+        image = _refined(rows[:, :2], heat[0])
+        turned = roi.matrix()
+        axes = turned[:, :2] / np.hypot(*turned[:, 0])
+        metres = world.reshape(POINTS, 3)[:33].astype(np.float64)
+        metres[:, :2] = metres[:, :2] @ axes.T
+        return Pose(
+            image_px=image @ turned[:, :2].T + turned[:, 2],
+            depth_px=rows[:33, 2] * (roi.size_px / CROP_PX),
+            world_m=metres,
+            visibility=_sigmoid(rows[:33, 3]),
+            presence=_sigmoid(rows[:33, 4]),
+            confidence=float(flag[0, 0]),
+            mask=_sigmoid(mask[0, :, :, 0]).astype(np.float32),
+            roi=roi,
+        )
+
+
+class _Network:
+    """One file, run by LiteRT."""
+
+    def __init__(self, path: Path, threads: int) -> None:
+        try:
+            from ai_edge_litert.interpreter import Interpreter
+        except ImportError as error:
+            raise Sd2Error(
+                f"The landmark models cannot run here ({error})",
+                "the package ai-edge-litert, which there is for Linux, Windows and Macs with"
+                " Apple's own processors",
+                "Import a mesh that another machine made",
+            ) from error
+        self._interpreter: Any = Interpreter(str(path), num_threads=threads)
+        self._interpreter.allocate_tensors()
+        self._input = self._interpreter.get_input_details()[0]["index"]
+        # "Identity", "Identity_1", ...: in the order of their names.
+        details = sorted(self._interpreter.get_output_details(), key=lambda each: each["name"])
+        self._outputs = [each["index"] for each in details]
+
+    def run(self, picture: Singles) -> list[Singles]:
+        self._interpreter.set_tensor(self._input, picture[None])
+        self._interpreter.invoke()
+        return [self._interpreter.get_tensor(index) for index in self._outputs]
+
+
+def _sampled(picture: Pixels, matrix: Floats, crop_px: int) -> Pixels:
+    """The crop whose pixel coordinates ``matrix`` takes to the picture's."""
+    import cv2
+
+    # OpenCV counts from the centre of the first pixel, we from its corner.
+    centred = matrix.copy()
+    centred[:, 2] += matrix[:, :2] @ [0.5, 0.5] - 0.5
+    crop: Pixels = cv2.warpAffine(
+        picture,
+        centred,
+        (crop_px, crop_px),
+        flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+        borderMode=cv2.BORDER_CONSTANT,
+    )
+    return crop
+
+
+def _same_person(centres: Floats, sizes: Floats, scores: Floats) -> list[NDArray[np.intp]]:
+    """Rows of boxes that overlap the surest one of them, for every person."""
+    left = np.argsort(-scores, kind="stable")
+    people = []
+    while left.size:
+        best = left[0]
+        low = np.maximum(centres[left] - sizes[left] / 2, centres[best] - sizes[best] / 2)
+        high = np.minimum(centres[left] + sizes[left] / 2, centres[best] + sizes[best] / 2)
+        shared = np.prod(np.clip(high - low, 0.0, None), axis=1)
+        areas = np.prod(sizes[left], axis=1)
+        same = shared > 0.3 * (areas + np.prod(sizes[best]) - shared)
+        same[0] = True
+        people.append(left[same])
+        left = left[~same]
+    return people
+
+
+def _refined(points_px: Floats, heat: Singles) -> Floats:
+    """Points of the crop, moved to the mean of the heat around them.
+
+    Parameters
+    ----------
+    points_px : float64 array, shape (39, 2)
+    heat : float32 array, shape (64, 64, 39)
+        Logits.
+    """
+    cells = np.floor(points_px / _CELL_PX).astype(np.intp)
+    steps = np.arange(-_REFINE_CELLS, _REFINE_CELLS + 1)
+    columns = cells[:, 0, None, None] + steps[None, None, :]  # (39, 1, 7)
+    rows = cells[:, 1, None, None] + steps[None, :, None]  # (39, 7, 1)
+    side = heat.shape[0]
+    inside = (columns >= 0) & (columns < side) & (rows >= 0) & (rows < side)
+    logits = heat[
+        np.clip(rows, 0, side - 1), np.clip(columns, 0, side - 1), np.arange(POINTS)[:, None, None]
+    ]
+    weights = np.where(inside, _sigmoid(logits), 0.0)  # (39, 7, 7)
+    total = weights.sum(axis=(1, 2))
+    own = (cells >= 0).all(axis=1) & (cells < side).all(axis=1)
+    sure = own & (weights.max(axis=(1, 2)) >= _REFINE_FROM)
+    total = np.where(sure, total, 1.0)
+    x = (weights * columns).sum(axis=(1, 2)) / total
+    y = (weights * rows).sum(axis=(1, 2)) / total
+    return np.where(sure[:, None], np.stack([x, y], axis=1) * _CELL_PX, points_px)
+
+
+def _sigmoid(logits: NDArray[np.floating]) -> Floats:
+    return 0.5 + 0.5 * np.tanh(0.5 * logits.astype(np.float64))
+
+
+def _joined(layers: list[Floats]) -> Floats:
+    return np.concatenate([np.repeat(layer, _ANCHORS_PER_CELL, axis=0) for layer in layers])
