@@ -154,8 +154,14 @@ ACTIONS: tuple[Action, ...] = (
     ),
     Action(
         "overlay", "View", "Mesh over the video", ("M",), "Draw the mesh over the video",
-        lambda w: w.context.display.set_overlay(not w.context.display.overlay), _has_mesh,
-        lambda c: c.display.overlay,
+        lambda w: w.context.overlay.set_style(shown=not w.context.overlay.style.shown), _has_mesh,
+        lambda c: c.overlay.style.shown,
+    ),
+    Action(
+        "overlay_dots", "View", "Mesh over the video as dots", ("Shift+M",),
+        "Draw vertices over the video instead of the surface",
+        lambda w: w.context.overlay.set_style(as_dots=not w.context.overlay.style.as_dots),
+        _has_mesh, lambda c: c.overlay.style.as_dots,
     ),
     Action(
         "view_three_quarter", "View", "Scene: overview", ("Ctrl+1",),

@@ -12,6 +12,7 @@ from sd2app.models.display import DisplayModel
 from sd2app.models.document import DocumentModel
 from sd2app.models.jobs import JobsModel
 from sd2app.models.ladder import CORE, Ladder
+from sd2app.models.overlay import OverlayModel
 from sd2app.models.playback import PlaybackModel
 from sd2app.models.sensor import SensorModel
 from sd2app.models.synthesis import SynthesisModel
@@ -33,6 +34,7 @@ class Context:
     video: VideoModel
     sensor: SensorModel
     display: DisplayModel
+    overlay: OverlayModel
     span: VisibleSpanModel
     pointer: PointerModel
     synthetic: TrackModel
@@ -74,6 +76,7 @@ def build_context(parent: QObject, settings: Settings, ladder: Ladder | None = N
         video=VideoModel(playback, parent),
         sensor=sensor,
         display=DisplayModel(parent),
+        overlay=OverlayModel(settings, parent),
         span=span,
         pointer=PointerModel(parent),
         synthetic=synthetic,

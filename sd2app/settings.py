@@ -55,6 +55,23 @@ class Settings:
         paths = [path, *(known for known in self.recent if known != path)]
         self._store.setValue("recent", [str(known) for known in paths[:_RECENT]])
 
+    def flag(self, name: str, default: bool) -> bool:
+        """A yes or no; it may have been stored as text."""
+        value = self._store.value(name)
+        return default if value is None else str(value).lower() == "true"
+
+    def share(self, name: str, default: float) -> float:
+        """A number from 0 to 1."""
+        try:
+            share = float(self._store.value(name, default))
+        except (TypeError, ValueError):
+            return default
+        return share if 0 <= share <= 1 else default
+
+    def set_value(self, name: str, value: object) -> None:
+        """Remember a value."""
+        self._store.setValue(name, value)
+
     @property
     def dark(self) -> bool | None:
         """Theme the user chose, or None to follow the system."""

@@ -21,6 +21,7 @@ from sd2core.progress import Progress, silent
 from sd2core.recording_document import (
     FILE_NAME,
     VERSION,
+    CameraEntry,
     Document,
     MeshReading,
     Span,
@@ -95,6 +96,8 @@ class Recording:
     title : str
     simulated : bool
         True when no camera and no radar was there.
+    camera : CameraEntry or None
+        What is known of the camera; see :meth:`focal_px`.
     """
 
     folder: Path
@@ -108,6 +111,7 @@ class Recording:
     spans: tuple[Span, ...] = ()
     title: str = ""
     simulated: bool = False
+    camera: CameraEntry | None = None
     _read: Document = field(default_factory=Document, repr=False)
 
     @classmethod
@@ -125,6 +129,7 @@ class Recording:
         spans: tuple[Span, ...] = (),
         title: str = "",
         simulated: bool = False,
+        camera: CameraEntry | None = None,
         copy: bool = False,
         progress: Progress = silent,
     ) -> Recording:
@@ -141,6 +146,7 @@ class Recording:
             spans=tuple(spans),
             title=title,
             simulated=simulated,
+            camera=camera,
         )
         return recording.save_as(Path(folder), copy=copy, progress=progress)
 
@@ -256,6 +262,7 @@ class Recording:
         document.title = self.title
         document.simulated = self.simulated
         document.mesh_reading = self.mesh_reading
+        document.camera = self.camera
         document.radar_offset_s = _finite(self.radar_offset_s, "radar offset in seconds")
         document.spans = tuple(self.spans)
         for name in ("position_m", "azimuth_deg", "elevation_deg", "field_of_view_deg"):
@@ -265,6 +272,15 @@ class Recording:
             setattr(document, role, None if path is None else stored_path(path, self.folder))
         text = json.dumps(document.model_dump(mode="json"), indent=2, ensure_ascii=False)
         atomic_write_text(self.folder / FILE_NAME, text + "\n")
+
+    def focal_px(self, width: int, height: int) -> float | None:
+        """Focal length in pixels of pictures of this size, None where nobody said.
+
+        What is known of the camera holds before what a mesh was placed with.
+        """
+        if self.camera is not None:
+            return self.camera.focal_for(width, height)
+        return self.mesh_reading.focal_px
 
     def open_video(self, progress: Progress = silent) -> VideoReader:
         """Open the video."""
@@ -341,6 +357,7 @@ def open_recording(path: Path) -> Recording:
         spans=document.spans,
         title=document.title or folder.stem,
         simulated=document.simulated,
+        camera=document.camera,
         _read=document,
     )
 

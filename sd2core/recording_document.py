@@ -73,6 +73,33 @@ class MeshReading(BaseModel):
         return {name: value for name, value in values.items() if value is not None}
 
 
+class CameraEntry(BaseModel):
+    """The camera that took the video; where there is none, nothing is known of it.
+
+    Parameters
+    ----------
+    focal_px : float
+        Focal length in pixels of a picture of ``width`` × ``height``.
+    width, height : int or None
+        Pixels; None: those of the recording's video.
+    source : str
+        How the focal length is known: ``user``, ``metadata``, ``default`` or ``simulated``.
+    """
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+
+    focal_px: PositiveFinite
+    width: PositiveInt | None = None
+    height: PositiveInt | None = None
+    source: str = ""
+
+    def focal_for(self, width: int, height: int) -> float:
+        """Focal length in pixels of a picture of another size."""
+        if self.width is None or self.height is None:
+            return self.focal_px
+        return self.focal_px * max(width, height) / max(self.width, self.height)
+
+
 class Document(BaseModel):
     """``recording.json`` as it is written; what this version does not know is kept."""
 
@@ -83,6 +110,7 @@ class Document(BaseModel):
     title: str = ""
     simulated: bool = False
     video: StoredPath | None = None
+    camera: CameraEntry | None = None
     mesh: StoredPath | None = None
     mesh_reading: MeshReading = MeshReading()
     faces: StoredPath | None = None

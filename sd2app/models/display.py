@@ -42,7 +42,6 @@ class DisplayModel(QObject):
         self._levels = HeatmapLevels()
         self._mesh_colour: MeshColour = "velocity"
         self._as_dots = False
-        self._overlay = True
         self._dark = False
 
     @property
@@ -59,11 +58,6 @@ class DisplayModel(QObject):
     def as_dots(self) -> bool:
         """Whether vertices are drawn as dots instead of a surface."""
         return self._as_dots
-
-    @property
-    def overlay(self) -> bool:
-        """Whether the mesh is drawn over the video."""
-        return self._overlay
 
     @property
     def dark(self) -> bool:
@@ -98,12 +92,6 @@ class DisplayModel(QObject):
         """Draw vertices as dots, or the surface."""
         if as_dots != self._as_dots:
             self._as_dots = as_dots
-            self.mesh_changed.emit()
-
-    def set_overlay(self, overlay: bool) -> None:
-        """Draw the mesh over the video, or not."""
-        if overlay != self._overlay:
-            self._overlay = overlay
             self.mesh_changed.emit()
 
     def set_dark(self, dark: bool) -> None:

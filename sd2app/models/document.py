@@ -13,6 +13,7 @@ from PySide6.QtGui import QUndoStack
 from sd2app.jobs.latest import Emit, LatestRunner
 from sd2app.models.content import Content, load_content, recording_of
 from sd2app.models.jobs import Job, JobsModel
+from sd2core.body.camera import PinholeCamera
 from sd2core.mesh import MeshSequence
 from sd2core.recording import Recording, Relinked, Span
 from sd2core.sensor import VelocityAxis
@@ -23,9 +24,6 @@ if TYPE_CHECKING:
     from sd2core.fmcw.processing import Clutter
     from sd2core.io.radar import RadarCapture
     from sd2core.io.video import VideoReader
-
-FOCAL_PER_WIDTH = 600.0 / 640.0
-"""Assumed focal length when a recording states none: 56° across the picture."""
 
 
 class DocumentModel(QObject):
@@ -114,12 +112,15 @@ class DocumentModel(QObject):
         return self._content.recording.spans if self._content else ()
 
     @property
-    def focal_px(self) -> float:
-        """Focal length of the camera in pixels of the video."""
+    def camera(self) -> PinholeCamera:
+        """The camera that took the video, by default one with the usual field of view."""
         if self._content is None or self._content.video is None:
-            return FOCAL_PER_WIDTH * 640
-        stated = self._content.recording.mesh_reading.focal_px
-        return stated or FOCAL_PER_WIDTH * self._content.video.width
+            return PinholeCamera()
+        width, height = self._content.video.width, self._content.video.height
+        focal_px = self._content.recording.focal_px(width, height)
+        if focal_px is None:
+            return PinholeCamera.default(width, height)
+        return PinholeCamera(width, height, focal_px)
 
     @property
     def clutter(self) -> Clutter:

@@ -1,10 +1,10 @@
-"""Number boxes and choices that leave the keyboard and the wheel to the window."""
+"""Number boxes, choices and buttons that leave keyboard and wheel to the window."""
 
 from __future__ import annotations
 
 from PySide6.QtCore import QSignalBlocker, Qt
-from PySide6.QtGui import QKeyEvent, QWheelEvent
-from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QWidget
+from PySide6.QtGui import QAction, QKeyEvent, QWheelEvent
+from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QToolButton, QWidget
 
 
 class NumberBox(QDoubleSpinBox):
@@ -87,3 +87,21 @@ class Choice(QComboBox):
     def wheelEvent(self, event: QWheelEvent) -> None:
         """Scroll what is behind it."""
         event.ignore()
+
+
+def action_button(action: QAction, text: str) -> QToolButton:
+    """A button for an action; it keeps its short text, the menu has the full one."""
+    button = QToolButton()
+    button.setText(text)
+    button.setToolTip(action.toolTip())
+    button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+    button.setCheckable(action.isCheckable())
+    button.setEnabled(action.isEnabled())
+    button.clicked.connect(action.trigger)
+
+    def follow() -> None:
+        button.setEnabled(action.isEnabled())
+        button.setChecked(action.isChecked())
+
+    action.changed.connect(follow)
+    return button

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QSignalBlocker, Qt
-from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QToolButton, QWidget
 
 from sd2app.action_set import ActionSet
 from sd2app.models.display import DisplayModel
-from sd2app.views.inputs import Choice
+from sd2app.views.inputs import Choice, action_button
 
 _COLOURS = (
     ("velocity", "radial velocity"),
@@ -45,7 +44,7 @@ class SceneBar(QWidget):
         layout.addSpacing(8)
         layout.addWidget(QLabel("colour", self))
         layout.addWidget(self._colour)
-        layout.addWidget(_button(actions["dots"], "Dots"))
+        layout.addWidget(action_button(actions["dots"], "Dots"))
         layout.addStretch(1)
         layout.addWidget(_view_menu(actions))
         display.mesh_changed.connect(self._refresh)
@@ -66,22 +65,4 @@ def _view_menu(actions: ActionSet) -> QToolButton:
     for name in _VIEWS:
         menu.addAction(actions[name])
     button.setMenu(menu)
-    return button
-
-
-def _button(action: QAction, text: str) -> QToolButton:
-    # The button keeps its short text; the action has the full one for the menu.
-    button = QToolButton()
-    button.setText(text)
-    button.setToolTip(action.toolTip())
-    button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-    button.setCheckable(action.isCheckable())
-    button.setEnabled(action.isEnabled())
-    button.clicked.connect(action.trigger)
-
-    def follow() -> None:
-        button.setEnabled(action.isEnabled())
-        button.setChecked(action.isChecked())
-
-    action.changed.connect(follow)
     return button

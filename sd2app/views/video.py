@@ -10,9 +10,10 @@ from PySide6.QtWidgets import QWidget
 
 from sd2app.models.display import DisplayModel
 from sd2app.models.document import DocumentModel
+from sd2app.models.overlay import OverlayModel
 from sd2app.models.playback import PlaybackModel
 from sd2app.models.video import VideoModel
-from sd2app.views.mesh_overlay import blend, covered_pixels, project
+from sd2app.views.mesh_overlay import blend, shaded
 
 
 class VideoView(QWidget):
@@ -24,6 +25,7 @@ class VideoView(QWidget):
         document: DocumentModel,
         playback: PlaybackModel,
         display: DisplayModel,
+        overlay: OverlayModel,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
@@ -31,9 +33,10 @@ class VideoView(QWidget):
         self._document = document
         self._playback = playback
         self._display = display
+        self._overlay = overlay
         self.setMinimumSize(200, 150)
         video.frame_changed.connect(self.update)
-        display.mesh_changed.connect(self.update)
+        overlay.changed.connect(self.update)
         display.theme_changed.connect(self.update)
         document.changed.connect(self.update)
 
@@ -54,7 +57,7 @@ class VideoView(QWidget):
             painter.setPen(QColor(colours.muted))
             painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, self._absence())
             return
-        if self._display.overlay:
+        if self._overlay.style.shown:
             picture = self._with_mesh(picture)
         height, width = picture.shape[:2]
         picture = np.ascontiguousarray(picture)
@@ -81,8 +84,9 @@ class VideoView(QWidget):
         if not mesh.timebase.covers(time_s):
             return picture
         vertices = mesh.frame(mesh.timebase.frame_at(time_s))
-        height, width = picture.shape[:2]
-        pixels = project(vertices, self._document.focal_px, width, height)
-        faces = None if self._display.as_dots else mesh.faces
-        covered = covered_pixels(pixels, faces, width, height)
-        return blend(picture, covered, QColor(self._display.palette.overlay).getRgb()[:3])
+        style = self._overlay.style
+        light = shaded(vertices, None if style.as_dots else mesh.faces, self._document.camera)
+        colour = QColor(self._display.palette.overlay).getRgb()[:3]
+        # Dots cover little: they have to be stronger to be seen at all.
+        opacity = style.opacity**0.5 if style.as_dots else style.opacity
+        return blend(picture, light, colour, opacity)

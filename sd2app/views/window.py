@@ -144,9 +144,13 @@ class MainWindow(QMainWindow):
         from sd2app.views.timeline import Overview, SpanStrip, TimeRuler
         from sd2app.views.trade_panel import TradePanel
         from sd2app.views.video import VideoView
+        from sd2app.views.video_bar import VideoBar
 
         c = self.context
-        _fill(self._panels["video"], VideoView(c.video, c.document, c.playback, c.display))
+        video = QVBoxLayout()
+        video.addWidget(VideoBar(c.overlay, self._actions))
+        video.addWidget(VideoView(c.video, c.document, c.playback, c.display, c.overlay), 1)
+        _fill_layout(self._panels["video"], video)
         to_camera, aim = self._actions["sensor_to_camera"], self._actions["aim_sensor"]
         sensor = SensorPanel(c.sensor, c.document, c.synthesis, c.edits, to_camera, aim)
         trade = TradePanel(c.trade, c.display, self._actions["measure"])
@@ -216,6 +220,7 @@ class MainWindow(QMainWindow):
             c.playback.playing_changed,
             c.playback.loop_changed,
             c.display.mesh_changed,
+            c.overlay.changed,
             c.synthesis.completed,
             c.trade.plan_changed,
             c.trade.measured.changed,

@@ -115,6 +115,7 @@ def describe_recording(recording: Recording, parts: list[Description]) -> Descri
         "title": recording.title,
         "simulated": recording.simulated,
         "radar_offset_s": recording.radar_offset_s,
+        "camera": None if recording.camera is None else recording.camera.model_dump(mode="json"),
         "sensor_position_m": [x, y, z],
         "spans": [span.model_dump(mode="json") for span in recording.spans],
         "missing": {role: str(path) for role, path in missing.items()},
@@ -123,6 +124,7 @@ def describe_recording(recording: Recording, parts: list[Description]) -> Descri
     data |= {part.data["kind"]: part.data for part in parts}
     facts = {
         "title": recording.title + (" (simulated)" if recording.simulated else ""),
+        "camera": _camera(recording),
         "sensor": f"at x {x:g}, y {y:g}, z {z:g} m",
         "radar offset": f"{recording.radar_offset_s:g} s" if recording.radar else "",
         "spans": _labels(recording),
@@ -275,6 +277,15 @@ def limit_facts(config: RadarConfig) -> dict[str, str]:
         "radar range": f"up to R_max {config.range_max_m:.2f} m,"
         f" in steps ΔR of {config.range_resolution_m:.3f} m",
     }
+
+
+def _camera(recording: Recording) -> str:
+    camera = recording.camera
+    if camera is None:
+        return ""
+    size = f" at {camera.width} x {camera.height}" if camera.width and camera.height else ""
+    source = f" ({camera.source})" if camera.source else ""
+    return f"focal length {camera.focal_px:.0f} pixels{size}{source}"
 
 
 def _labels(recording: Recording) -> str:

@@ -16,6 +16,7 @@ from sd2core.errors import Sd2Error
 from sd2core.recording import (
     FILE_NAME,
     VERSION,
+    CameraEntry,
     MeshReading,
     Recording,
     Span,
@@ -141,7 +142,7 @@ def test_a_file_on_another_drive_is_noted(files: Path, monkeypatch: pytest.Monke
 def test_unknown_fields_survive_a_save(files: Path) -> None:
     made = make(files, spans=(Span(start_s=0, end_s=1, label="up"),))
     written = content(made)
-    written["camera"] = {"focal_px": 600}
+    written["weather"] = {"make": "north"}
     written["sensor"]["name"] = "left"
     written["spans"][0]["annotator"] = "A"
     (made.folder / FILE_NAME).write_text(json.dumps(written))
@@ -150,7 +151,7 @@ def test_unknown_fields_survive_a_save(files: Path) -> None:
     read.sensor = replace(read.sensor, position_m=(1.0, 0.0, 0.0))
     read.save()
     again = content(read)
-    assert again["camera"] == {"focal_px": 600}
+    assert again["weather"] == {"make": "north"}
     assert again["sensor"]["name"] == "left"
     assert again["sensor"]["position_m"] == [1.0, 0.0, 0.0]
     assert again["spans"][0]["annotator"] == "A"
@@ -159,7 +160,7 @@ def test_unknown_fields_survive_a_save(files: Path) -> None:
 
 def test_saved_as_another_recording_nothing_is_lost(files: Path, tmp_path: Path) -> None:
     made = make(files, title="first", spans=(Span(start_s=0, end_s=1, label="up"),))
-    written = content(made) | {"camera": {"focal_px": 600}}
+    written = content(made) | {"weather": {"make": "north"}}
     (made.folder / FILE_NAME).write_text(json.dumps(written))
     read = open_recording(made.folder)
     other = read.save_as(tmp_path / "other")
@@ -447,3 +448,35 @@ def test_a_copy_replaces_no_file_that_is_there(files: Path, tmp_path: Path) -> N
     assert (folder / "video-2-walk.mkv").is_symlink()
     assert content(made)["video"] == "video-3-walk.mkv"
     assert (folder / "video-3-walk.mkv").read_text() == "walk.mkv"
+
+
+def test_the_camera_is_kept_and_scales_with_the_picture(files: Path) -> None:
+    made = make(files, camera=CameraEntry(focal_px=900, width=1280, height=720, source="user"))
+    read = open_recording(made.folder)
+    assert read.camera == made.camera
+    assert read.focal_px(1280, 720) == 900
+    assert read.focal_px(640, 360) == 450
+    # A camera held upright: its longer side is still the longer side.
+    assert read.focal_px(720, 1280) == 900
+
+
+def test_a_recording_that_says_nothing_of_its_camera(files: Path) -> None:
+    made = make(files)
+    written = content(made)
+    del written["camera"]
+    (made.folder / FILE_NAME).write_text(json.dumps(written))
+    read = open_recording(made.folder)
+    assert read.camera is None
+    assert read.focal_px(640, 480) is None
+    read.mesh_reading = MeshReading(focal_px=700.0)
+    assert read.focal_px(640, 480) == 700
+    read.camera = CameraEntry(focal_px=650)
+    assert read.focal_px(640, 480) == 650
+
+
+@pytest.mark.parametrize("camera", [{"focal_px": 0}, {"width": 640}, {"focal_px": 5, "width": 0}])
+def test_an_impossible_camera_is_refused(files: Path, camera: dict) -> None:
+    made = make(files)
+    (made.folder / FILE_NAME).write_text(json.dumps(content(made) | {"camera": camera}))
+    with pytest.raises(Sd2Error, match="camera"):
+        open_recording(made.folder)

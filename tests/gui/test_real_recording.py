@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sd2app.views.mesh_overlay import covered_pixels, project
+from sd2app.views.mesh_overlay import shaded
 
 
 @pytest.fixture
@@ -27,9 +27,7 @@ def test_the_mesh_lies_on_the_person(walk, qtbot):
         qtbot.waitUntil(lambda frame=frame: c.video.shown_frame == frame, timeout=10_000)
         red, green, blue = (c.video.picture[:, :, k].astype(int) for k in range(3))
         pullover = (red - blue > 90) & (red - green > 20)
-        height, width = pullover.shape
-        pixels = project(c.document.mesh.frame(frame), c.document.focal_px, width, height)
-        body = covered_pixels(pixels, c.document.mesh.faces, width, height)
+        body = shaded(c.document.mesh.frame(frame), c.document.mesh.faces, c.document.camera) > 0
         # She wears the only thing of that orange. A pullover is wider than the body in it.
         assert (pullover & body).sum() > 0.7 * pullover.sum()
         assert body.sum() < 4 * pullover.sum()
