@@ -46,3 +46,39 @@ def applied(turn: Floats, point: Floats) -> Floats:
 def transposed(turn: Floats) -> Floats:
     """The inverse of rotations (..., 3, 3)."""
     return np.swapaxes(turn, -1, -2)
+
+
+def from_vector(vectors: Floats) -> Floats:
+    """Rotations (..., 3, 3) by rotation vectors (..., 3) in radians (Rodrigues)."""
+    angle = np.linalg.norm(vectors, axis=-1)[..., None, None]
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    zero = np.zeros_like(x)
+    cross = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1)
+    cross = cross.reshape(*x.shape, 3, 3)
+    # sin(a)/a and (1 - cos(a))/a², which np.sinc carries through zero.
+    first = np.sinc(angle / np.pi)
+    second = 0.5 * np.sinc(angle / (2.0 * np.pi)) ** 2
+    return np.asarray(np.eye(3) + first * cross + second * (cross @ cross))
+
+
+def to_vector(turns: Floats) -> Floats:
+    """Rotation vectors (..., 3) in radians, no longer than π, of rotations (..., 3, 3)."""
+    from scipy.spatial.transform import Rotation
+
+    vectors = Rotation.from_matrix(turns.reshape(-1, 3, 3)).as_rotvec()
+    return np.asarray(vectors.reshape(*turns.shape[:-2], 3))
+
+
+def aligning(rest: Floats, seen: Floats, weights: Floats) -> Floats:
+    """Rotations (T, 3, 3) that bring vectors at rest nearest to those seen (Kabsch).
+
+    Parameters
+    ----------
+    rest, seen : arrays, shape (T, n, 3)
+    weights : array, shape (T, n)
+    """
+    spread = np.einsum("tni,tnj,tn->tij", seen, rest, weights)
+    left, _, right = np.linalg.svd(spread)
+    flip = np.ones((len(spread), 3))
+    flip[:, 2] = np.sign(np.linalg.det(left @ right))
+    return np.asarray((left * flip[:, None]) @ right)

@@ -1,0 +1,256 @@
+"""What a pose through time must agree with, and its Gauss–Newton equations.
+
+Six kinds of residuals, each divided by its standard deviation: landmarks in the
+picture, their depth behind the middle of the trunk, the trunk's own depth, their
+velocity along the optical axis, what joints do and can do, and smoothness (the
+acceleration of every degree of freedom). Landmarks, depths and velocities far off
+count less (iteratively reweighted least squares).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from sd2core.body.banded import Normal
+from sd2core.body.initial import Pose
+from sd2core.body.rig import JOINT, JOINTS, Rig
+from sd2core.body.rotations import Floats, from_vector, to_vector, transposed
+
+_RELAXED_DEG = 35.0
+"""From the rest pose, arms held away, to hanging arms."""
+
+# Standard deviation of what people do, radians from relaxed; of shared joints per place.
+_HABIT_RAD = {
+    "root": 50.0,
+    "spine": 0.15,
+    "head": 0.2,
+    "clavicle": 0.15,
+    "shoulder": 1.2,
+    "elbow": 1.0,
+    "pronation": 0.4,
+    "wrist": 0.35,
+    "hip": 0.6,
+    "knee": 0.8,
+    "ankle": 0.3,
+}
+# What a hinge allows, radians from the rest pose.
+_LIMITS_RAD = {"elbow": (-0.65, 1.95), "knee": (-0.15, 2.2)}
+_LIMIT_SD_RAD = 0.03
+
+_FAR_PX = 3.0
+_FAR_DEPTH = 2.0
+"""Standard deviations from where on a residual counts less."""
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What was seen of one stretch of frames; everything in the camera frame.
+
+    Parameters
+    ----------
+    times_s : float64 array, shape (T,)
+    slopes, slopes_sd : float64 arrays, shapes (T, 33, 2) and (T, 33)
+        x / z and y / z of each landmark.
+    trunk : tuple of int
+        Landmarks whose mean is the middle of the trunk.
+    depth_m, depth_sd_m : float64 arrays, shape (T, 33)
+        Behind the middle of the trunk.
+    trunk_m, trunk_sd_m : float64 arrays, shape (T,)
+        Depth of the middle of the trunk.
+    velocity_mps, velocity_sd_mps : float64 arrays, shape (T, 33)
+        Change of depth, positive away.
+    """
+
+    times_s: Floats
+    slopes: Floats
+    slopes_sd: Floats
+    trunk: tuple[int, ...]
+    depth_m: Floats
+    depth_sd_m: Floats
+    trunk_m: Floats
+    trunk_sd_m: Floats
+    velocity_mps: Floats
+    velocity_sd_mps: Floats
+
+    @property
+    def points_m(self) -> Floats:
+        """Where the landmarks are according to slopes and depths, (T, 33, 3)."""
+        depth = (self.trunk_m[:, None] + self.depth_m)[..., None]
+        return np.concatenate([self.slopes * depth, depth], axis=-1)
+
+
+class Residuals(NamedTuple):
+    """Whitened residuals of a pose through time."""
+
+    picture: Floats  # (T, 33, 2)
+    depth: Floats  # (T, 33)
+    trunk: Floats  # (T, 1)
+    velocity: Floats  # (T - 1, 33)
+    habit: Floats  # (T, n), and (T, n) of the limits
+    limit: Floats
+    smooth: Floats  # (T - 2, n)
+
+
+class Objective:
+    """Sum of squares to be made least.
+
+    Parameters
+    ----------
+    rig : Rig
+    evidence : Evidence
+    acceleration_sd : float64 array, shape (T - 2, freedoms)
+        How much every degree of freedom accelerates between three frames, rad/s²
+        and m/s².
+    """
+
+    def __init__(self, rig: Rig, evidence: Evidence, acceleration_sd: Floats) -> None:
+        self.rig, self.evidence, self.acceleration_sd = rig, evidence, acceleration_sd
+        self._relaxed, self._habit_sd, self._limits = _habits(rig)
+        self._step_s = np.diff(evidence.times_s)
+
+    def residuals(self, pose: Pose) -> Residuals:
+        """Residuals of one pose through time."""
+        positions = self.rig.keypoints.positions(self.rig.transforms(*pose))
+        return self._residuals(pose, positions)
+
+    def _residuals(self, pose: Pose, positions: Floats) -> Residuals:
+        seen = self.evidence
+        depth = positions[..., 2]  # (T, 33)
+        trunk = depth[:, seen.trunk].mean(axis=1)
+        velocity, velocity_sd = self._velocity()
+        angles = self._angles(pose)
+        low, high = self._limits
+        beyond = np.minimum(angles - low, 0.0) + np.maximum(angles - high, 0.0)
+        return Residuals(
+            (positions[..., :2] / depth[..., None] - seen.slopes) / seen.slopes_sd[..., None],
+            (depth - trunk[:, None] - seen.depth_m) / seen.depth_sd_m,
+            ((trunk - seen.trunk_m) / seen.trunk_sd_m)[:, None],
+            (np.diff(depth, axis=0) / self._step_s[:, None] - velocity) / velocity_sd,
+            angles / self._habit_sd,
+            beyond / _LIMIT_SD_RAD,
+            self.accelerations(pose) / self.acceleration_sd,
+        )
+
+    def accelerations(self, pose: Pose) -> Floats:
+        """Of every degree of freedom, (T - 2, freedoms), rad/s² and m/s²."""
+        step_s = self._step_s[:, None]
+        turned = to_vector(transposed(pose.turns[:-1]) @ pose.turns[1:])  # (T - 1, J, 3)
+        rates = [turned[:, j] @ axes / step_s for j, axes in enumerate(self.rig.axes)]
+        rates.append(np.diff(pose.translation_m, axis=0) / step_s)
+        rate = np.concatenate(rates, axis=1)
+        return np.asarray(np.diff(rate, axis=0) / (0.5 * (step_s[1:] + step_s[:-1])))
+
+    def trust(self, residuals: Residuals) -> Residuals:
+        """Square roots of the weights that make far residuals count less."""
+        size = (residuals.picture**2).sum(axis=-1, keepdims=True)
+        ones = [np.ones(1)] * 3
+        return Residuals(
+            1.0 / (1.0 + size / _FAR_PX**2),
+            1.0 / np.sqrt(1.0 + (residuals.depth / _FAR_DEPTH) ** 2),
+            1.0 / np.sqrt(1.0 + (residuals.trunk / _FAR_DEPTH) ** 2),
+            1.0 / np.sqrt(1.0 + (residuals.velocity / _FAR_DEPTH) ** 2),
+            *ones,
+        )
+
+    def normal(self, pose: Pose, trust: Residuals) -> tuple[float, Normal]:
+        """Half the weighted sum of squares, and the equations of the next step."""
+        seen = self.evidence
+        transforms = self.rig.transforms(*pose)
+        positions = self.rig.keypoints.positions(transforms)
+        jacobian = self.rig.jacobian(transforms, positions)  # (T, 33, 3, n)
+        residuals = weighted(self._residuals(pose, positions), trust)
+        frames, _, _, unknowns = jacobian.shape
+        normal = Normal.zeros(frames, unknowns)
+
+        depth, along = positions[..., 2], jacobian[:, :, 2]  # (T, 33), (T, 33, n)
+        slopes = positions[..., :2] / depth[..., None]
+        shift = (jacobian[:, :, :2] - slopes[..., None] * along[:, :, None]) / depth[
+            ..., None, None
+        ]
+        shift *= (trust.picture / seen.slopes_sd[..., None])[..., None]
+        normal.add(
+            residuals.picture.reshape(frames, -1), [(0, shift.reshape(frames, -1, unknowns))]
+        )
+
+        trunk = along[:, seen.trunk].mean(axis=1, keepdims=True)  # (T, 1, n)
+        normal.add(
+            residuals.depth, [(0, (along - trunk) * (trust.depth / seen.depth_sd_m)[..., None])]
+        )
+        normal.add(
+            residuals.trunk,
+            [(0, trunk * (trust.trunk / seen.trunk_sd_m[:, None])[..., None])],
+        )
+        if frames > 1:
+            per_m = trust.velocity / (self._velocity()[1] * self._step_s[:, None])
+            normal.add(
+                residuals.velocity,
+                [(0, -along[:-1] * per_m[..., None]), (1, along[1:] * per_m[..., None])],
+            )
+        normal.add_diagonal(
+            residuals.habit, [(0, np.broadcast_to(1.0 / self._habit_sd, (frames, unknowns)))]
+        )
+        normal.add_diagonal(residuals.limit, [(0, (residuals.limit != 0.0) / _LIMIT_SD_RAD)])
+        if frames > 2:
+            first, second = self._step_s[:-1, None], self._step_s[1:, None]
+            middle = 0.5 * (first + second)
+            ahead = 1.0 / (second * middle * self.acceleration_sd)
+            behind = 1.0 / (first * middle * self.acceleration_sd)
+            normal.add_diagonal(residuals.smooth, [(0, behind), (1, -(ahead + behind)), (2, ahead)])
+        return cost(residuals), normal
+
+    def moved(self, pose: Pose, change: Floats) -> Pose:
+        """The pose after small turns and shifts (T, freedoms)."""
+        turns = np.stack(
+            [
+                pose.turns[:, number] @ from_vector(change[:, columns] @ axes.T)
+                for number, (columns, axes) in enumerate(
+                    zip(self.rig.columns, self.rig.axes, strict=True)
+                )
+            ],
+            axis=1,
+        )
+        return Pose(turns, pose.translation_m + change[:, -3:])
+
+    def _velocity(self) -> tuple[Floats, Floats]:
+        """Between frames: mean of both, and its standard deviation, (T - 1, 33)."""
+        seen = self.evidence
+        return (
+            0.5 * (seen.velocity_mps[1:] + seen.velocity_mps[:-1]),
+            0.5 * (seen.velocity_sd_mps[1:] + seen.velocity_sd_mps[:-1]),
+        )
+
+    def _angles(self, pose: Pose) -> Floats:
+        """Turn of every joint from relaxed about its axes, (T, n); 0 for the translation."""
+        vectors = to_vector(transposed(self._relaxed) @ pose.turns)
+        parts = [vectors[:, j] @ axes for j, axes in enumerate(self.rig.axes)]
+        parts.append(np.zeros((len(vectors), 3)))
+        return np.concatenate(parts, axis=1)
+
+
+def weighted(residuals: Residuals, trust: Residuals) -> Residuals:
+    """Residuals times the square roots of their weights."""
+    return Residuals(*(r * w for r, w in zip(residuals, trust, strict=True)))
+
+
+def cost(residuals: Residuals) -> float:
+    """Half the sum of squares."""
+    return 0.5 * float(sum((one**2).sum() for one in residuals))
+
+
+def _habits(rig: Rig) -> tuple[Floats, Floats, tuple[Floats, Floats]]:
+    """Relaxed rotations (J, 3, 3), spread (n,) and limits (n,) of every joint."""
+    relaxed = np.tile(np.eye(3), (len(JOINTS), 1, 1))
+    turn = np.array([0.0, 0.0, np.radians(_RELAXED_DEG)])
+    relaxed[JOINT["shoulder.L"]] = from_vector(turn)
+    relaxed[JOINT["shoulder.R"]] = from_vector(-turn)
+    spread = np.full(rig.freedoms, np.inf)
+    low, high = np.full(rig.freedoms, -np.inf), np.full(rig.freedoms, np.inf)
+    for joint, columns in zip(JOINTS, rig.columns, strict=True):
+        kind = joint.name.partition(".")[0]
+        spread[columns] = _HABIT_RAD[kind]
+        if kind in _LIMITS_RAD:
+            low[columns], high[columns] = _LIMITS_RAD[kind]
+    return relaxed, spread, (low, high)

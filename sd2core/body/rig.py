@@ -1,0 +1,188 @@
+"""The joints that a fit turns: 48 degrees of freedom of the body's 104 bones.
+
+A joint turns one bone, or several by the same rotation (the spine bends in three
+places, a forearm twists in two). Rotations are kept as matrices and changed on their
+right by small turns about the joint's own axes, so there is no gimbal lock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.body.keypoints import Keypoints
+from sd2core.body.model import Skeleton
+from sd2core.body.rotations import Floats, applied, product
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One turn of the fit.
+
+    Parameters
+    ----------
+    name : str
+    bones : tuple of str
+        Every one is turned by the joint's rotation.
+    hinge : tuple of str, optional
+        Three bones: the joint turns only about the normal of the plane that their
+        heads span at rest, bending the chain further. Without it, about all axes.
+    along : tuple of str, optional
+        Two bones: the joint turns only about the line between their heads.
+    """
+
+    name: str
+    bones: tuple[str, ...]
+    hinge: tuple[str, str, str] | None = None
+    along: tuple[str, str] | None = None
+
+
+def _both(*joints: Joint) -> Iterator[Joint]:
+    for joint in joints:
+        for side in "LR":
+            yield Joint(
+                f"{joint.name}.{side}",
+                tuple(f"{bone}.{side}" for bone in joint.bones),
+                joint.hinge and tuple(f"{bone}.{side}" for bone in joint.hinge),  # type: ignore[arg-type]
+                joint.along and tuple(f"{bone}.{side}" for bone in joint.along),  # type: ignore[arg-type]
+            )
+
+
+JOINTS = (
+    Joint("root", ("root",)),
+    Joint("spine", ("spine04", "spine03", "spine02")),
+    Joint("head", ("neck01", "neck03", "head")),
+    *_both(
+        Joint("clavicle", ("clavicle",)),
+        Joint("shoulder", ("upperarm01",)),
+        Joint("elbow", ("lowerarm01",), hinge=("upperarm01", "lowerarm01", "wrist")),
+        # Radius and ulna share the turn of the hand.
+        Joint("pronation", ("lowerarm02", "wrist"), along=("lowerarm02", "wrist")),
+        Joint("wrist", ("wrist",)),
+        Joint("hip", ("upperleg01",)),
+        Joint("knee", ("lowerleg01",), hinge=("upperleg01", "lowerleg01", "foot")),
+        Joint("ankle", ("foot",)),
+    ),
+)
+"""Parents before children."""
+
+JOINT = {joint.name: number for number, joint in enumerate(JOINTS)}
+"""Number of a joint by its name."""
+
+
+class Rig:
+    """The joints of one body, and how its keypoints follow them.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    keypoints : Keypoints
+
+    Attributes
+    ----------
+    axes : list of float64 arrays, shape (3, 1) or (3, 3)
+        What each joint may turn about, in the axes of the rest pose.
+    columns : list of slice
+        Where each joint's degrees of freedom are; the translation is last.
+    freedoms : int
+        Number of all of them, translation included.
+    """
+
+    def __init__(self, skeleton: Skeleton, keypoints: Keypoints) -> None:
+        self.skeleton = skeleton
+        self.keypoints = keypoints
+        self.axes = [_axes(joint, skeleton) for joint in JOINTS]
+        ends = np.cumsum([axes.shape[1] for axes in self.axes])
+        self.columns = [
+            slice(int(end) - axes.shape[1], int(end))
+            for end, axes in zip(ends, self.axes, strict=True)
+        ]
+        self.freedoms = int(ends[-1]) + 3
+
+    def transforms(self, turns: Floats, translation_m: Floats) -> Floats:
+        """Transforms of all bones (T, B, 3, 4).
+
+        Parameters
+        ----------
+        turns : float64 array, shape (T, J, 3, 3)
+            Rotation of each joint.
+        translation_m : float64 array, shape (T, 3)
+        """
+        return self.skeleton.transforms(self.rotations(turns), translation_m)
+
+    def rotations(self, turns: Floats) -> Floats:
+        """Rotations of all bones (T, B, 3, 3) as :meth:`Skeleton.transforms` takes them."""
+        rotations = np.tile(np.eye(3), (len(turns), len(self.skeleton), 1, 1))
+        for number, bones in enumerate(self._bones):
+            for bone in bones:
+                rotations[:, bone] = product(rotations[:, bone], turns[:, number])
+        return rotations
+
+    def jacobian(self, transforms: Floats, positions_m: Floats) -> Floats:
+        """How keypoints move with every degree of freedom, (T, 33, 3, freedoms).
+
+        A small turn by δ about a joint's axis a, made on the right of its rotation,
+        moves a point x by δ (W a) × (x − p): W is the bone's rotation in the world
+        and p its head.
+        """
+        frames = len(transforms)
+        jacobian = np.zeros((frames, positions_m.shape[1], 3, self.freedoms))
+        for number, bones in enumerate(self._bones):
+            for bone in bones:
+                rows = self._follows[bone]
+                head = applied(transforms[:, bone, :, :3], self.skeleton.heads_m[bone])
+                arms = positions_m[:, rows] - (head + transforms[:, bone, :, 3])[:, None]
+                after = self._turned_after(transforms, bone, number)  # (T, 3, n)
+                turned = np.cross(
+                    after.transpose(0, 2, 1)[:, None], arms[:, :, None], axis=-1
+                )  # (T, rows, n, 3)
+                jacobian[:, rows, :, self.columns[number]] += turned.transpose(0, 1, 3, 2)
+        for axis in range(3):
+            jacobian[:, :, axis, self.freedoms - 3 + axis] = 1.0
+        return jacobian
+
+    def _turned_after(self, transforms: Floats, bone: int, joint: int) -> Floats:
+        """World directions of the joint's axes at one bone, (T, 3, n)."""
+        # Where two joints turn one bone (pronation, then wrist), the first one's axis is
+        # that of its other bone: a twist goes along the line, which the second leaves.
+        last = self._bones[joint][0] if JOINTS[joint].along else bone
+        return np.asarray(transforms[:, last, :, :3] @ self.axes[joint])
+
+    @cached_property
+    def _bones(self) -> list[list[int]]:
+        return [[self.skeleton.index[bone] for bone in joint.bones] for joint in JOINTS]
+
+    @cached_property
+    def _follows(self) -> dict[int, NDArray[np.intp]]:
+        """For every bone that turns, the keypoints that it carries."""
+        parents = self.skeleton.parents
+
+        def carried(bone: int, by: int) -> bool:
+            while bone >= 0 and bone != by:
+                bone = parents[bone]
+            return bone == by
+
+        return {
+            by: np.array(
+                [row for row, bone in enumerate(self.keypoints.bones) if carried(int(bone), by)],
+                np.intp,
+            )
+            for bones in self._bones
+            for by in bones
+        }
+
+
+def _axes(joint: Joint, skeleton: Skeleton) -> Floats:
+    heads, index = skeleton.heads_m, skeleton.index
+    if joint.hinge is not None:
+        first, middle, last = (heads[index[bone]] for bone in joint.hinge)
+        normal = np.cross(middle - first, last - middle)
+        return np.asarray((normal / np.linalg.norm(normal))[:, None])
+    if joint.along is not None:
+        first, last = (heads[index[bone]] for bone in joint.along)
+        return np.asarray(((last - first) / np.linalg.norm(last - first))[:, None])
+    return np.eye(3)

@@ -1,0 +1,100 @@
+"""Gauss–Newton over a whole stretch of frames, in stages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from sd2core.body.initial import Pose
+from sd2core.body.objective import Evidence, Objective, Residuals, cost, weighted
+from sd2core.body.rig import Rig
+from sd2core.body.rotations import Floats
+
+_FIRST_ROTATION_RADPS2 = 60.0
+_FIRST_TRANSLATION_MPS2 = 6.0
+_LEAST_ROTATION_RADPS2 = 0.3
+_LEAST_TRANSLATION_MPS2 = 0.05
+_LIVELINESS = 1.5
+"""Standard deviation of an acceleration over what was found around it."""
+_AROUND_S = 0.15
+_ROUNDS = 4
+_STEPS = 8
+_CONVERGED = 1e-3
+
+
+class Solution(NamedTuple):
+    """A pose through time and what it was found with."""
+
+    pose: Pose
+    residuals: Residuals
+    acceleration_sd: Floats
+    costs: tuple[float, ...]
+
+
+def solve(
+    rig: Rig,
+    evidence: Evidence,
+    start: Pose,
+    tick: Callable[[], None] = lambda: None,
+) -> Solution:
+    """The pose through time that agrees best with the evidence.
+
+    The smoothness follows the motion: after each round, every degree of freedom may
+    accelerate as much as it was found to do around each moment. What is still is
+    smoothed hard, what is fast hardly.
+    """
+    frames = len(evidence.times_s)
+    sd = np.full((max(frames - 2, 0), rig.freedoms), _FIRST_ROTATION_RADPS2)
+    sd[:, -3:] = _FIRST_TRANSLATION_MPS2
+    pose, costs = start, []
+    for number in range(_ROUNDS):
+        objective = Objective(rig, evidence, sd)
+        pose, least = _descend(objective, pose, robust=number > 0, tick=tick)
+        costs.append(least)
+        if number < _ROUNDS - 1:
+            sd = _liveliness(objective.accelerations(pose), evidence.times_s)
+    return Solution(pose, objective.residuals(pose), sd, tuple(costs))
+
+
+def _descend(
+    objective: Objective, pose: Pose, *, robust: bool, tick: Callable[[], None]
+) -> tuple[Pose, float]:
+    """Levenberg–Marquardt until the cost hardly falls."""
+    damping = 1e-4
+    residuals = objective.residuals(pose)
+    plain = Residuals(*[np.ones(1)] * len(residuals))
+    now = np.inf
+    for _ in range(_STEPS):
+        tick()
+        trust = objective.trust(residuals) if robust else plain
+        now, normal = objective.normal(pose, trust)
+        for _ in range(6):
+            tried = objective.moved(pose, normal.step(damping))
+            found = objective.residuals(tried)
+            then = cost(weighted(found, trust))
+            if then <= now:
+                break
+            damping = max(damping, 1e-4) * 10.0
+        else:
+            return pose, now
+        pose, residuals = tried, found
+        damping = max(damping / 10.0, 1e-6)
+        if now - then < _CONVERGED * now:
+            break
+    return pose, now
+
+
+def _liveliness(accelerations: Floats, times_s: Floats) -> Floats:
+    """Root mean square acceleration around each moment, not below what is left at rest."""
+    if not len(accelerations):
+        return accelerations
+    reach = max(round(_AROUND_S / float(np.median(np.diff(times_s)))), 1)
+    kernel = np.hanning(2 * reach + 3)[1:-1]
+    share = np.convolve(np.ones(len(accelerations)), kernel, "same")[:, None]
+    mean = np.apply_along_axis(np.convolve, 0, accelerations**2, kernel, "same")
+    mean = mean[: len(accelerations)] / share
+    least = np.full(accelerations.shape[1], _LEAST_ROTATION_RADPS2)
+    least[-3:] = _LEAST_TRANSLATION_MPS2
+    return np.asarray(np.sqrt(_LIVELINESS**2 * mean + least**2))
