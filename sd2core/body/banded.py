@@ -78,7 +78,7 @@ class Normal:
 
         frames, unknowns = self.gradient.shape
         width = min(REACH, frames - 1) * unknowns + unknowns - 1
-        banded = np.zeros((width + 1, frames * unknowns))
+        banded = np.zeros((width + 1, frames * unknowns), order="F")  # as LAPACK takes it
         row, column = np.mgrid[:unknowns, :unknowns]
         for apart, blocks in enumerate(self.blocks[: min(REACH, frames - 1) + 1]):
             below = row - column - apart * unknowns

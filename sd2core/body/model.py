@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -56,6 +56,26 @@ class Skeleton:
 
     def __len__(self) -> int:
         return len(self.names)
+
+    def pruned(self, names: Collection[str]) -> tuple[Skeleton, NDArray[np.intp]]:
+        """Only these bones and those above them, and their numbers here."""
+        kept = set()
+        for name in names:
+            bone = self.index[name]
+            while bone >= 0:
+                kept.add(bone)
+                bone = self.parents[bone]
+        numbers = sorted(kept)
+        place = {bone: number for number, bone in enumerate(numbers)} | {-1: -1}
+        rows = np.array(numbers, np.intp)
+        pruned = Skeleton(
+            tuple(self.names[bone] for bone in numbers),
+            tuple(place[self.parents[bone]] for bone in numbers),
+            self.heads_m[rows],
+            self.tails_m[rows],
+            self.rotations[rows],
+        )
+        return pruned, rows
 
     def transforms(self, rotations: Floats, translation_m: Floats | None = None) -> Floats:
         """Where every bone takes what is fixed to it.

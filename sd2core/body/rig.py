@@ -8,7 +8,7 @@ right by small turns about the joint's own axes, so there is no gimbal lock.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -84,6 +84,10 @@ class Rig:
 
     Attributes
     ----------
+    skeleton : Skeleton
+        Only the bones that the joints turn or the keypoints follow.
+    keypoints : Keypoints
+        On these bones.
     axes : list of float64 arrays, shape (3, 1) or (3, 3)
         What each joint may turn about, in the axes of the rest pose.
     columns : list of slice
@@ -93,9 +97,14 @@ class Rig:
     """
 
     def __init__(self, skeleton: Skeleton, keypoints: Keypoints) -> None:
-        self.skeleton = skeleton
-        self.keypoints = keypoints
-        self.axes = [_axes(joint, skeleton) for joint in JOINTS]
+        needed = {bone for joint in JOINTS for bone in joint.bones}
+        needed |= {skeleton.names[bone] for bone in keypoints.bones}
+        self.skeleton, self._kept = skeleton.pruned(needed)
+        self._whole = skeleton
+        place = {int(bone): number for number, bone in enumerate(self._kept)}
+        bones = np.array([place[int(bone)] for bone in keypoints.bones], np.intp)
+        self.keypoints = replace(keypoints, bones=bones)
+        self.axes = [_axes(joint, self.skeleton) for joint in JOINTS]
         ends = np.cumsum([axes.shape[1] for axes in self.axes])
         self.columns = [
             slice(int(end) - axes.shape[1], int(end))
@@ -104,7 +113,7 @@ class Rig:
         self.freedoms = int(ends[-1]) + 3
 
     def transforms(self, turns: Floats, translation_m: Floats) -> Floats:
-        """Transforms of all bones (T, B, 3, 4).
+        """Transforms of the rig's bones (T, B, 3, 4).
 
         Parameters
         ----------
@@ -112,10 +121,15 @@ class Rig:
             Rotation of each joint.
         translation_m : float64 array, shape (T, 3)
         """
-        return self.skeleton.transforms(self.rotations(turns), translation_m)
+        return self.skeleton.transforms(self._rotations(turns), translation_m)
 
-    def rotations(self, turns: Floats) -> Floats:
-        """Rotations of all bones (T, B, 3, 3) as :meth:`Skeleton.transforms` takes them."""
+    def body_rotations(self, turns: Floats) -> Floats:
+        """Rotations of all the body's bones (T, 104, 3, 3), for :meth:`Skeleton.transforms`."""
+        rotations = np.tile(np.eye(3), (len(turns), len(self._whole), 1, 1))
+        rotations[:, self._kept] = self._rotations(turns)
+        return rotations
+
+    def _rotations(self, turns: Floats) -> Floats:
         rotations = np.tile(np.eye(3), (len(turns), len(self.skeleton), 1, 1))
         for number, bones in enumerate(self._bones):
             for bone in bones:
