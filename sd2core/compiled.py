@@ -37,7 +37,7 @@ KERNEL_MODULES = (
     "sd2core.fmcw.facet",
     "sd2core.fmcw.kernels",
     "sd2core.body.skinning",
-    "sd2core.simulate.raster",
+    "sd2core.raster",
 )
 """Every module with kernels; each has ``compile_kernels()``, which calls them once."""
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from sd2core.body.camera import PinholeCamera
 from sd2core.compiled import kernels_ready
-from sd2core.simulate.raster import rasterise
+from sd2core.raster import rasterise
 
 _NEAREST_M = 0.01
 _DARKEST = 0.35

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from sd2core.body.model import Body
+from sd2core.raster import interpolate, lit_share, rasterise
 from sd2core.simulate.caption import stamp
 from sd2core.simulate.clothing import SHIRT, TROUSERS
-from sd2core.simulate.raster import interpolate, lit_share, rasterise
 from sd2core.simulate.render import Renderer
 
 PLACE = np.array([0.05, 1.1, 2.2])
