@@ -5,18 +5,23 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from sd2core.cli.fit_truth import add_fit_truth
 from sd2core.cli.options import add_command
 from sd2core.cli.output import progress_bar
 from sd2core.cli.simulate_radar import add_radar
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``simulate sample``, ``simulate radar`` and ``simulate export-body``."""
+    """Add ``simulate`` with what it makes."""
     parser = add_command(
         commands,
         "simulate",
         "make recordings of a simulated body, or a radar's samples of any mesh",
-        examples="  sd2 simulate sample swipes.sd2\n  sd2 simulate radar walk.npz walk-radar",
+        examples=(
+            "  sd2 simulate sample swipes.sd2\n"
+            "  sd2 simulate radar walk.npz walk-radar\n"
+            "  sd2 simulate fit-truth truth"
+        ),
     )
     kinds = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     sample = add_command(
@@ -32,6 +37,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     )
     sample.add_argument("out", type=Path, metavar="OUT", help="the recording to make (NAME.sd2)")
     add_radar(kinds)
+    add_fit_truth(kinds)
     body = add_command(
         kinds,
         "export-body",

@@ -6,7 +6,8 @@ smooth line, however coarse the surface.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +25,43 @@ LIPS = (0.66, 0.42, 0.37)
 EYES = (0.24, 0.17, 0.14)
 WHITES = (0.90, 0.88, 0.86)
 
-_SLEEVE_M = 0.19
 _HEM_M = 0.93
 _SHOE_M = 0.085
+
+Colour = tuple[float, float, float]
+Pattern = Literal["plain", "stripes", "checks"]
+
+
+@dataclass(frozen=True)
+class Outfit:
+    """What the body wears; colours are sRGB from 0 to 1, lengths those of the bundled body.
+
+    Parameters
+    ----------
+    skin, hair, shirt, trousers, shoes : colours
+    pattern : {"plain", "stripes", "checks"}
+        Of the shirt.
+    second : colour
+        The pattern's other one.
+    period_m : float
+        After which the pattern repeats.
+    sleeve_m : float
+        From the shoulder along the arm: 0.03 leaves the arm bare, 0.19 is a T-shirt,
+        0.5 reaches the wrist.
+    trousers_from_m : float
+        Height of their lower end: 0 is long, 0.5 ends above the knee.
+    """
+
+    skin: Colour = SKIN
+    hair: Colour = HAIR
+    shirt: Colour = SHIRT
+    trousers: Colour = TROUSERS
+    shoes: Colour = SHOES
+    pattern: Pattern = "plain"
+    second: Colour = WHITES
+    period_m: float = 0.08
+    sleeve_m: float = 0.19
+    trousers_from_m: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,13 +73,27 @@ class Clothes:
     fields : float32 array, shape (V, 8)
         Positive inside: trousers, shirt, shoes, hair, brows, whites of the eyes,
         irises, lips; metres for the first four.
+    places_m : float32 array, shape (V, 3)
+        Of the vertices at rest: what a pattern is printed on.
+    outfit : Outfit
     """
 
     fields: Singles
+    places_m: Singles
+    outfit: Outfit = field(default_factory=Outfit)
 
     @classmethod
-    def of(cls, body: Body) -> Clothes:
-        """Dress a body of the bundled skeleton."""
+    def of(cls, body: Body, outfit: Outfit | None = None) -> Clothes:
+        """Dress the bundled body.
+
+        Parameters
+        ----------
+        body : Body
+            With the bundled shape: borders are sewn for it. A shaped body of the same
+            surface wears the same clothes, vertex by vertex.
+        outfit : Outfit, optional
+        """
+        outfit = outfit or Outfit()
         # All lengths are metres on this body's rest shape, fitted by looking at pictures.
         p = body.vertices_m
         height = -p[:, 1]
@@ -55,7 +104,7 @@ class Clothes:
         # A crew neck: a ball around the root of the neck is bare, and all above.
         collar = np.linalg.norm(p - neck - np.array([0.0, 0.004, -0.022]), axis=1) - 0.088
         neckline = np.minimum(collar, 0.3 * (0.5 - _share_of(body, ("neck02", "neck03", "head"))))
-        sleeve = np.maximum(_SLEEVE_M - _along_arm(skeleton, p), 0.25 * (0.5 - arm))
+        sleeve = np.maximum(outfit.sleeve_m - _along_arm(skeleton, p), 0.25 * (0.5 - arm))
         head = skeleton.heads_m[skeleton.index["head"]]
         z = p[:, 2] - head[2]
         above = height + head[1]
@@ -67,8 +116,10 @@ class Clothes:
         whites = 1.0 - (eye / 0.0145) ** 2 - ((eye_height + 0.0004) / 0.0043) ** 2
         eyes = 1.0 - (eye / 0.0068) ** 2 - (eye_height / 0.0062) ** 2
         lips = 1.0 - (p[:, 0] / 0.024) ** 2 - ((eye_height + 0.071) / 0.0075) ** 2
+        # Shoes end what reaches the floor.
+        legs = height - outfit.trousers_from_m if outfit.trousers_from_m > _SHOE_M else -hem
         fields = [
-            np.minimum(-hem, 0.5 - arm),
+            np.minimum(np.minimum(-hem, 0.5 - arm), legs),
             np.minimum(np.minimum(hem, neckline), sleeve),
             _SHOE_M - height,
             hair,
@@ -77,27 +128,46 @@ class Clothes:
             np.minimum(np.minimum(eyes, whites), front),
             np.minimum(lips, front),
         ]
-        return cls(np.stack(fields, axis=1).astype(np.float32))
+        return cls(np.stack(fields, axis=1).astype(np.float32), p.astype(np.float32), outfit)
 
-    def colours(self, fields: Singles) -> tuple[Singles, Singles]:
-        """Linear colour (N, 3) and gloss (N,) at interpolated fields (N, 8)."""
-        colours = np.tile(linear(SKIN), (len(fields), 1))
-        gloss = np.full(len(fields), 0.6, np.float32)
+    @property
+    def attributes(self) -> Singles:
+        """What is interpolated within triangles for :meth:`colours`, (V, K)."""
+        if self.outfit.pattern == "plain":
+            return self.fields
+        return np.concatenate([self.fields, self.places_m], axis=1)
+
+    def colours(self, attributes: Singles) -> tuple[Singles, Singles]:
+        """Linear colour (N, 3) and gloss (N,) at interpolated :attr:`attributes` (N, K)."""
+        outfit = self.outfit
+        colours = np.tile(linear(outfit.skin), (len(attributes), 1))
+        gloss = np.full(len(attributes), 0.6, np.float32)
         painted = (
             (7, LIPS, 0.8),
             (5, WHITES, 0.5),
             (6, EYES, 1.0),
-            (4, HAIR, 0.2),
-            (3, HAIR, 0.35),
-            (0, TROUSERS, 0.05),
-            (1, SHIRT, 0.08),
-            (2, SHOES, 0.4),
+            (4, outfit.hair, 0.2),
+            (3, outfit.hair, 0.35),
+            (0, outfit.trousers, 0.05),
+            (1, outfit.shirt, 0.08),
+            (2, outfit.shoes, 0.4),
         )
-        for field, colour, shine in painted:
-            inside = fields[:, field] > 0.0
+        for region, colour, shine in painted:
+            inside = attributes[:, region] > 0.0
             colours[inside] = linear(colour)
             gloss[inside] = shine
+            if region == 1 and outfit.pattern != "plain":
+                odd = inside.copy()
+                odd[inside] = self._in_second(attributes[inside, len(self.fields[0]) :])
+                colours[odd] = linear(outfit.second)
         return colours, gloss
+
+    def _in_second(self, places_m: Singles) -> NDArray[np.bool_]:
+        """Where a pattern shows its second colour, (N,)."""
+        halves = np.floor(places_m * np.float32(2.0 / self.outfit.period_m)).astype(np.int64)
+        cells = halves[:, 1] if self.outfit.pattern == "stripes" else halves.sum(axis=1)
+        odd: NDArray[np.bool_] = cells % 2 == 1
+        return odd
 
 
 def srgb(light: Singles) -> Singles:

@@ -12,6 +12,7 @@ along a little, and the chest breathes.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import astuple, dataclass
 from typing import NamedTuple
 
@@ -72,14 +73,16 @@ class ArmPose:
     torso_deg: float
 
 
-class _Move(NamedTuple):
+class Move(NamedTuple):
+    """One arm's way to a pose; a labelled one is a gesture's stroke."""
+
     start_s: float
     end_s: float
     to: ArmPose
     label: str | None = None
 
 
-_HANGING = ArmPose(-10.0, -80.0, 0.525, 0.5, 0.0, 1.0, -28.0, 5.0, 0.0)
+HANGING = ArmPose(-10.0, -80.0, 0.525, 0.5, 0.0, 1.0, -28.0, 5.0, 0.0)
 _LEFT = ArmPose(-64.0, -13.0, 0.46, 0.35, 1.0, 0.25, 20.0, -8.0, -6.0)
 _RIGHT = ArmPose(36.0, -15.0, 0.42, 0.9, 1.0, 0.0, 10.0, 12.0, 9.0)
 _UP = ArmPose(-14.0, 22.0, 0.32, 0.75, 1.0, 0.0, 45.0, -10.0, -3.0)
@@ -90,18 +93,18 @@ _UP_AGAIN = ArmPose(-10.0, 17.0, 0.33, 0.75, 1.0, 0.0, 42.0, -8.0, -3.0)
 _DOWN_AGAIN = ArmPose(-8.0, -47.0, 0.50, 0.8, 0.5, 0.6, 62.0, 20.0, 4.0)
 
 _MOVES = (
-    _Move(0.3, 1.35, _LEFT),
-    _Move(1.6, 2.8, _RIGHT, "left-to-right"),
-    _Move(3.05, 4.25, _LEFT, "right-to-left"),
-    _Move(4.45, 5.2, _UP),
-    _Move(5.45, 6.45, _DOWN, "up-to-down"),
-    _Move(6.7, 7.7, _UP, "down-to-up"),
-    _Move(7.95, 8.9, _DOWN_AGAIN, "up-to-down"),
-    _Move(9.15, 10.15, _UP_AGAIN, "down-to-up"),
-    _Move(10.35, 11.1, _LEFT_AGAIN),
-    _Move(11.35, 12.5, _RIGHT_AGAIN, "left-to-right"),
-    _Move(12.75, 13.9, _LEFT_AGAIN, "right-to-left"),
-    _Move(14.0, 14.95, _HANGING),
+    Move(0.3, 1.35, _LEFT),
+    Move(1.6, 2.8, _RIGHT, "left-to-right"),
+    Move(3.05, 4.25, _LEFT, "right-to-left"),
+    Move(4.45, 5.2, _UP),
+    Move(5.45, 6.45, _DOWN, "up-to-down"),
+    Move(6.7, 7.7, _UP, "down-to-up"),
+    Move(7.95, 8.9, _DOWN_AGAIN, "up-to-down"),
+    Move(9.15, 10.15, _UP_AGAIN, "down-to-up"),
+    Move(10.35, 11.1, _LEFT_AGAIN),
+    Move(11.35, 12.5, _RIGHT_AGAIN, "left-to-right"),
+    Move(12.75, 13.9, _LEFT_AGAIN, "right-to-left"),
+    Move(14.0, 14.95, HANGING),
 )
 
 SPANS = tuple(
@@ -127,22 +130,34 @@ def swipes(skeleton: Skeleton, times_s: ArrayLike) -> Motion:
     times_s : array_like, shape (T,)
     """
     times = np.asarray(times_s, dtype=np.float64)
-    arm = _arm_poses(times)  # (T, parameters)
+    arm = arm_poses(_MOVES, times)  # (T, parameters)
     rotations = np.tile(np.eye(3), (len(times), len(skeleton), 1, 1))
-    _turn_torso(skeleton, rotations, times, arm[:, 8])
-    _relax_fingers(skeleton, rotations)
-    _reach(skeleton, rotations, "R", arm)
-    hanging = np.tile(np.array(astuple(_HANGING)), (len(times), 1))
+    turn_torso(skeleton, rotations, times, arm[:, 8])
+    relax_fingers(skeleton, rotations)
+    reach(skeleton, rotations, "R", arm)
+    hanging = np.tile(np.array(astuple(HANGING)), (len(times), 1))
     hanging[:, 0] += 1.2 * np.sin(0.9 * times)
-    _reach(skeleton, rotations, "L", hanging)
+    reach(skeleton, rotations, "L", hanging)
     return Motion(rotations, np.zeros((len(times), 3)))
 
 
-def _arm_poses(times: Floats) -> Floats:
-    """Parameters of the arm through time: the first pose plus every move so far."""
-    before = np.array(astuple(_HANGING))
+def arm_poses(moves: Sequence[Move], times: Floats) -> Floats:
+    """Parameters of the arm through time: hanging, plus every move so far.
+
+    Parameters
+    ----------
+    moves : sequence of Move
+        One after another.
+    times : float64 array, shape (T,)
+
+    Returns
+    -------
+    float64 array, shape (T, parameters)
+        Columns are the fields of :class:`ArmPose`.
+    """
+    before = np.array(astuple(HANGING))
     poses = np.tile(before, (len(times), 1))
-    for move in _MOVES:
+    for move in moves:
         after = np.array(astuple(move.to))
         share = minimum_jerk((times - move.start_s) / (move.end_s - move.start_s))
         poses += share[:, None] * (after - before)
@@ -150,7 +165,7 @@ def _arm_poses(times: Floats) -> Floats:
     return poses
 
 
-def _turn_torso(skeleton: Skeleton, rotations: Floats, times: Floats, across_deg: Floats) -> None:
+def turn_torso(skeleton: Skeleton, rotations: Floats, times: Floats, across_deg: Floats) -> None:
     """Sway, breathing and what the torso does for the arm; the head stays on the camera."""
     index = skeleton.index
     # Degrees and Hz: quiet breaths, 16 a minute, and a slow sway of no common period.
@@ -168,7 +183,7 @@ def _turn_torso(skeleton: Skeleton, rotations: Floats, times: Floats, across_deg
     rotations[:, index["head"]] = product(about(y, -0.45 * yaw), about(x, 5.0 - pitch))
 
 
-def _relax_fingers(skeleton: Skeleton, rotations: Floats) -> None:
+def relax_fingers(skeleton: Skeleton, rotations: Floats) -> None:
     """Curl the fingers a little, each about the line of the knuckles."""
     index = skeleton.index
     for side in "LR":
@@ -184,8 +199,22 @@ def _relax_fingers(skeleton: Skeleton, rotations: Floats) -> None:
                 )
 
 
-def _reach(skeleton: Skeleton, rotations: Floats, side: str, arm: Floats) -> None:
-    """Bring one wrist to its place: shoulder, elbow and wrist rotations in closed form."""
+def reach(
+    skeleton: Skeleton, rotations: Floats, side: str, arm: Floats, scale: float = 1.0
+) -> None:
+    """Bring one wrist to its place: shoulder, elbow and wrist rotations in closed form.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    rotations : float64 array, shape (T, B, 3, 3)
+        Of the whole body; those of the arm are replaced. The body faces the camera.
+    side : {"L", "R"}
+    arm : float64 array, shape (T, parameters)
+        See :func:`arm_poses`.
+    scale : float
+        Length of this arm to that for which the poses were written.
+    """
     index, heads = skeleton.index, skeleton.heads_m
     upper, lower = index[f"upperarm01.{side}"], index[f"lowerarm01.{side}"]
     forearm, wrist = index[f"lowerarm02.{side}"], index[f"wrist.{side}"]
@@ -203,18 +232,8 @@ def _reach(skeleton: Skeleton, rotations: Floats, side: str, arm: Floats) -> Non
     )
     pole = arm[:, 3:6] * np.array([-across, 1.0, 1.0])
     upper_rest, lower_rest = heads[lower] - heads[upper], heads[wrist] - heads[lower]
-    target = shoulder + arm[:, 2:3] * towards
-    elbow = elbow_position(
-        shoulder, target, float(np.linalg.norm(upper_rest)), float(np.linalg.norm(lower_rest)), pole
-    )
-    hinge = np.cross(elbow - shoulder, target - elbow)
-    rest_hinge = np.cross(upper_rest, lower_rest)[None]
-    upper_turn = product(
-        frame(elbow - shoulder, hinge), transposed(frame(upper_rest[None], rest_hinge))
-    )
-    lower_turn = product(
-        frame(target - elbow, hinge), transposed(frame(lower_rest[None], rest_hinge))
-    )
+    target = shoulder + scale * arm[:, 2:3] * towards
+    upper_turn, lower_turn = bend(shoulder, target, upper_rest, lower_rest, pole)
     rotations[:, upper] = product(transposed(above[..., :3]), upper_turn)
     rotations[:, lower] = product(transposed(upper_turn), lower_turn)
     # The forearm's two bones share the turn of the hand, as radius and ulna do.
@@ -225,6 +244,36 @@ def _reach(skeleton: Skeleton, rotations: Floats, side: str, arm: Floats) -> Non
     knuckles = heads[index[f"finger5-1.{side}"]] - heads[index[f"finger2-1.{side}"]]
     flexion = about(across * knuckles / np.linalg.norm(knuckles), arm[:, 7])
     rotations[:, wrist] = product(half, flexion)
+
+
+def bend(
+    start: Floats, end: Floats, upper_rest: Floats, lower_rest: Floats, pole: Floats
+) -> tuple[Floats, Floats]:
+    """Turn the two bones of a limb so that it reaches from one place to another.
+
+    Parameters
+    ----------
+    start, end : array, shape (T, 3)
+    upper_rest, lower_rest : array, shape (3,)
+        The two bones at rest, which is not straight.
+    pole : array, shape (T, 3)
+        See :func:`elbow_position`.
+
+    Returns
+    -------
+    float64 arrays, shape (T, 3, 3)
+        Whole rotations of the two bones from rest.
+    """
+    elbow = elbow_position(
+        start, end, float(np.linalg.norm(upper_rest)), float(np.linalg.norm(lower_rest)), pole
+    )
+    hinge = np.cross(elbow - start, end - elbow)
+    rest_hinge = np.cross(upper_rest, lower_rest)[None]
+    upper_turn = product(
+        frame(elbow - start, hinge), transposed(frame(upper_rest[None], rest_hinge))
+    )
+    lower_turn = product(frame(end - elbow, hinge), transposed(frame(lower_rest[None], rest_hinge)))
+    return upper_turn, lower_turn
 
 
 def elbow_position(

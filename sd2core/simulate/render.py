@@ -23,7 +23,6 @@ Singles = NDArray[np.float32]
 
 _OVERSAMPLING = 2
 _LIGHT_PIXELS = 640
-_LIGHT_WIDTH_M = 3.2
 
 
 @dataclass(frozen=True)
@@ -52,6 +51,14 @@ class Studio:
         Depth of the wall behind the person.
     wall, floor, skirting : colours
     key, fill, rim : light directions (towards the light), not normalised
+    key_power, fill_power, ambient, sky : float
+        How bright: from one side, from the other, from everywhere, from above.
+    key_colour : (float, float, float)
+        Linear.
+    shadow_m, shadow_depth_m : float
+        Width of the stretch in which the key light throws shadows, and its depth.
+    noise : float
+        Standard deviation of the camera's noise at mid-grey, as a share of white.
     """
 
     wall_m: float = 3.5
@@ -61,6 +68,14 @@ class Studio:
     key: tuple[float, float, float] = (-0.70, -0.72, -0.95)
     fill: tuple[float, float, float] = (0.9, -0.2, -0.7)
     rim: tuple[float, float, float] = (0.75, -0.55, 0.75)
+    key_power: float = 1.7
+    fill_power: float = 0.30
+    ambient: float = 0.20
+    sky: float = 0.28
+    key_colour: tuple[float, float, float] = (1.0, 0.965, 0.91)
+    shadow_m: float = 3.2
+    shadow_depth_m: float = 2.2
+    noise: float = 0.0
 
 
 class Renderer:
@@ -69,27 +84,36 @@ class Renderer:
     Parameters
     ----------
     body : Body
-        Gives faces and, through its rest shape, the clothes.
+        Gives the faces.
     camera : Camera
     studio : Studio
+    clothes : Clothes, optional
+        Of this surface; by default a T-shirt and trousers sewn for the body's rest
+        shape, which must be the bundled one.
     """
 
     def __init__(
-        self, body: Body, camera: Camera | None = None, studio: Studio | None = None
+        self,
+        body: Body,
+        camera: Camera | None = None,
+        studio: Studio | None = None,
+        clothes: Clothes | None = None,
     ) -> None:
         self.body = body
         self.camera = camera or Camera()
         self.studio = studio or Studio()
-        self._clothes = Clothes.of(body)
+        self._clothes = clothes or Clothes.of(body)
         self._offsets = _disc(12, 2.6)
 
-    def frame(self, vertices_m: NDArray[np.float64]) -> NDArray[np.uint8]:
+    def frame(self, vertices_m: NDArray[np.float64], seed: int = 0) -> NDArray[np.uint8]:
         """Picture of one frame.
 
         Parameters
         ----------
         vertices_m : float64 array, shape (V, 3)
             Camera frame, all in front of the camera.
+        seed : int
+            Of the camera's noise, if the studio has any.
 
         Returns
         -------
@@ -100,7 +124,12 @@ class Renderer:
         picture = self._background(shadow)  # (H, W, 3) linear
         colours, coverage = self._person(vertices_m, shadow)
         picture = picture * (1.0 - coverage[..., None]) + colours
-        picture = stamp(srgb(_tone(picture)), "Simulated")
+        picture = srgb(_tone(picture))
+        if self.studio.noise > 0:
+            noise = np.random.default_rng(seed).standard_normal(picture.shape, dtype=np.float32)
+            # Shot noise: brighter is noisier in light, about equally so after the gamma.
+            picture = np.clip(picture + np.float32(self.studio.noise) * noise, 0.0, 1.0)
+        picture = stamp(picture, "Simulated")
         # Half a step of fixed dither, or the wall's gradient shows bands.
         return (picture * 255.0 + self._dither[..., None]).astype(np.uint8)
 
@@ -115,7 +144,8 @@ class Renderer:
         rasterise(points, nearness, self.body.faces, buffer, owner)
         rows, columns = np.nonzero(owner >= 0)
         attributes = np.concatenate(
-            [vertices_m, vertex_normals(vertices_m, self.body.faces), self._clothes.fields], axis=1
+            [vertices_m, vertex_normals(vertices_m, self.body.faces), self._clothes.attributes],
+            axis=1,
         ).astype(np.float32)
         values = np.empty((len(rows), attributes.shape[1]), np.float32)
         interpolate(points, nearness, self.body.faces, rows, columns, owner, attributes, values)
@@ -125,13 +155,13 @@ class Renderer:
         return _shrunk(colours, n), _shrunk(coverage, n)
 
     def _shade(
-        self, positions: Singles, normals: Singles, fields: Singles, shadow: Singles
+        self, positions: Singles, normals: Singles, attributes: Singles, shadow: Singles
     ) -> Singles:
-        albedo, gloss = self._clothes.colours(fields)  # linear (N, 3), (N,)
-        normals, view = _units(normals), _units(-positions)
+        albedo, gloss = self._clothes.colours(attributes)  # linear (N, 3), (N,)
+        studio, normals, view = self.studio, _units(normals), _units(-positions)
         key, fill, rim = (
             _unit(direction).astype(np.float32)
-            for direction in (self.studio.key, self.studio.fill, self.studio.rim)
+            for direction in (studio.key, studio.fill, studio.rim)
         )
         lit = np.empty(len(positions), np.float32)
         points, nearness = self._seen_by_light(positions)
@@ -141,9 +171,9 @@ class Renderer:
         fill_light = np.clip((normals @ fill + 0.3) / 1.3, 0.0, None)
         sky = 0.5 - 0.5 * normals[:, 1]
         light = (
-            1.7 * key_light[:, None] * np.array([1.0, 0.965, 0.91], np.float32)
-            + 0.30 * fill_light[:, None] * np.array([0.86, 0.93, 1.0], np.float32)
-            + (0.20 + 0.28 * sky)[:, None] * np.array([0.95, 0.98, 1.0], np.float32)
+            studio.key_power * key_light[:, None] * np.array(studio.key_colour, np.float32)
+            + studio.fill_power * fill_light[:, None] * np.array([0.86, 0.93, 1.0], np.float32)
+            + (studio.ambient + studio.sky * sky)[:, None] * np.array([0.95, 0.98, 1.0], np.float32)
         )
         facing = np.clip(_dots(normals, view), 0.0, 1.0)
         edge = (1.0 - facing) ** 3 * np.clip(normals @ rim, 0.0, 1.0)
@@ -167,11 +197,11 @@ class Renderer:
 
     def _seen_by_light(self, positions: NDArray[np.floating]) -> tuple[Singles, Singles]:
         """Pixels in the light's image, and nearness to it in metres."""
-        centre = np.array([0.0, self.camera.above_floor_m - 0.95, 2.2])
+        centre = np.array([0.0, self.camera.above_floor_m - 0.95, self.studio.shadow_depth_m])
         # Kept in its own precision: the matrix product of mixed types is slow.
         axes = self._light_axes.astype(positions.dtype)
         seen = (positions - centre.astype(positions.dtype)) @ axes.T
-        scale = _LIGHT_PIXELS / _LIGHT_WIDTH_M
+        scale = _LIGHT_PIXELS / self.studio.shadow_m
         points = seen[..., :2] * scale + _LIGHT_PIXELS / 2
         return points.astype(np.float32), seen[..., 2].astype(np.float32)
 
