@@ -30,11 +30,11 @@ from sd2core.compiled import worker_count, workers
 from sd2core.errors import Sd2Error
 from sd2core.mesh import MeshSequence
 from sd2core.progress import Progress, silent
+from sd2core.simulate.cast import PEOPLE, ROOMS
 from sd2core.simulate.clothing import Clothes
 from sd2core.simulate.encode import write_compact_mesh, write_video
 from sd2core.simulate.gestures import GestureSpan
 from sd2core.simulate.motions import Action, duration_s, perform
-from sd2core.simulate.people import PEOPLE, ROOMS
 from sd2core.simulate.render import Camera, Renderer
 from sd2core.timebase import Timebase
 
@@ -59,7 +59,7 @@ class Clip:
     name : str
     action : Action
     person, room : str
-        Of :data:`sd2core.simulate.people.PEOPLE` and ``ROOMS``.
+        Of :data:`sd2core.simulate.cast.PEOPLE` and ``ROOMS``.
     distance_m, across_m : float
         Where the person stands (at first), seen from the camera.
     camera_m : float

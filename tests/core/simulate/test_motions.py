@@ -8,9 +8,9 @@ import pytest
 from sd2core.body.keypoints import KeypointSpace
 from sd2core.body.shape import ShapeSpace
 from sd2core.body.track import LANDMARKS
+from sd2core.simulate.cast import PEOPLE
 from sd2core.simulate.fit_truth import CLIPS, Clip, Scene, clip_named, scene
 from sd2core.simulate.motions import STROKE_S, Action, duration_s
-from sd2core.simulate.people import PEOPLE
 
 RATE = 30.0
 DIRECTION = {
