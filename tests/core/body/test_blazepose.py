@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -143,6 +144,35 @@ class TestLandmarker:
         np.testing.assert_array_equal(one.image_px, two.image_px)
         assert one.mask.shape == (256, 256)
         assert one.world_m.shape == (33, 3)
+
+    def test_both_sides_of_a_mirrored_picture(
+        self, detector: PoseDetector, landmarker: PoseLandmarker, picture: NDArray[np.uint8]
+    ) -> None:
+        """What the mirror image gives is the mirror image of what the picture gives.
+
+        Nearly: where the two sides differ, the one that is looked at first counts more.
+        """
+        roi = replace(self.roi(detector, picture), angle_rad=0.2)
+        crop = roi.cut(picture)
+        other = replace(roi, centre_x_px=640 - roi.centre_x_px, angle_rad=-0.2)
+        one = landmarker.on_both_sides(crop, roi)
+        two = landmarker.on_both_sides(np.ascontiguousarray(crop[:, ::-1]), other)
+        mirrored = list(MIRRORED)
+        expected = two.image_px[mirrored] * [-1, 1] + [640, 0]
+        np.testing.assert_allclose(one.image_px[:33], expected, atol=1.0)
+        metres = two.world_m[mirrored] * [-1, 1, 1]
+        np.testing.assert_allclose(one.world_m, metres, atol=0.02)
+        np.testing.assert_allclose(one.visibility, two.visibility[mirrored], atol=0.02)
+        np.testing.assert_allclose(one.mask, two.mask[:, ::-1], atol=1e-6)
+
+    def test_the_mean_is_near_both(
+        self, detector: PoseDetector, landmarker: PoseLandmarker, picture: NDArray[np.uint8]
+    ) -> None:
+        roi = replace(self.roi(detector, picture), angle_rad=0.2)
+        crop = roi.cut(picture)
+        one, both = landmarker.on_crop(crop, roi), landmarker.on_both_sides(crop, roi)
+        assert np.hypot(*(one.image_px - both.image_px)[:33].T).max() < 0.04 * roi.size_px
+        assert np.abs(one.world_m - both.world_m).max() < 0.15
 
     def test_finds_nobody_in_the_empty_room(self, landmarker: PoseLandmarker) -> None:
         empty = np.full((480, 640, 3), 180, np.uint8)
