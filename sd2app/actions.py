@@ -60,6 +60,12 @@ MOUSE = (
 
 ACTIONS: tuple[Action, ...] = (
     Action(
+        "new_from_video", "File", "New from video…", ("Ctrl+N",),
+        "Fit a body to the person in a video and make a recording of both",
+        lambda w: w.dialogs.new_from_video(),
+        lambda c: not c.fit.busy,
+    ),
+    Action(
         "open", "File", "Open…", ("Ctrl+O",),
         "Open a video, mesh or radar capture, or several that belong together",
         lambda w: w.dialogs.open_files(),

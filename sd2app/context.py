@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from PySide6.QtCore import QObject
@@ -10,6 +11,10 @@ from sd2app.commands import Edits
 from sd2app.models.content import reference_of
 from sd2app.models.display import DisplayModel
 from sd2app.models.document import DocumentModel
+from sd2app.models.fit import COMMAND, FitModel
+from sd2app.models.fit_follower import FitFollower
+from sd2app.models.fit_offer import FitOffer
+from sd2app.models.fit_taker import FitTaker
 from sd2app.models.jobs import JobsModel
 from sd2app.models.ladder import CORE, Ladder
 from sd2app.models.overlay import OverlayModel
@@ -42,6 +47,10 @@ class Context:
     trade: TradeModel
     synthesis: SynthesisModel
     edits: Edits
+    fit: FitModel
+    fit_follower: FitFollower
+    fit_offer: FitOffer
+    fit_taker: FitTaker
 
     def reset_references(self) -> None:
         """Make the strongest bin of each map 0 dB."""
@@ -52,14 +61,23 @@ class Context:
     def close(self) -> None:
         """Stop every thread and let go of the files."""
         self.playback.pause()
+        self.fit.close()
         self.synthesis.close()
         self.trade.close()
         self.video.close()
         self.document.close()
 
 
-def build_context(parent: QObject, settings: Settings, ladder: Ladder | None = None) -> Context:
-    """Make the models and let them follow the document; the ladder is the library's by default."""
+def build_context(
+    parent: QObject,
+    settings: Settings,
+    ladder: Ladder | None = None,
+    fit_command: Sequence[str] | None = None,
+) -> Context:
+    """Make the models and let them follow the document.
+
+    The ladder is the library's and the command that fits ``sd2`` itself by default.
+    """
     jobs = JobsModel(parent)
     document = DocumentModel(jobs, parent)
     playback = PlaybackModel(parent)
@@ -68,6 +86,8 @@ def build_context(parent: QObject, settings: Settings, ladder: Ladder | None = N
     synthetic = TrackModel("Synthetic", parent)
     real = TrackModel("Real", parent)
     trade = TradeModel(jobs, settings, ladder or CORE, parent)
+    fit = FitModel(settings, parent, fit_command or COMMAND)
+    follower = FitFollower(fit, document, playback, parent)
     context = Context(
         settings=settings,
         jobs=jobs,
@@ -84,6 +104,10 @@ def build_context(parent: QObject, settings: Settings, ladder: Ladder | None = N
         trade=trade,
         synthesis=SynthesisModel(document, sensor, playback, span, synthetic, jobs, trade, parent),
         edits=Edits(document, sensor),
+        fit=fit,
+        fit_follower=follower,
+        fit_offer=FitOffer(document, fit, parent),
+        fit_taker=FitTaker(fit, follower, document, settings, parent),
     )
     document.opened.connect(lambda: _take_over(context))
     document.changed.connect(lambda: _follow_capture(context))
@@ -104,6 +128,8 @@ def _take_over(context: Context) -> None:
     context.sensor.set_sensor(content.recording.sensor)
     _follow_capture(context, new=True)
     context.synthesis.take_over()
+    # The clock of another recording begins anew, which is nobody's wish to stay.
+    context.fit_follower.set_following(True)
 
 
 def _follow_capture(context: Context, new: bool = False) -> None:

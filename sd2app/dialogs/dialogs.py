@@ -22,10 +22,13 @@ from PySide6.QtWidgets import (
 
 import sd2core
 from sd2app.actions import ACTIONS, MOUSE
+from sd2app.dialogs.new_from_video import VIDEOS, NewFromVideoDialog
+from sd2app.models.fit_setup import FitSetupModel
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
     from sd2app.context import Context
+    from sd2app.models.fit_request import FitRequest
 
 T = TypeVar("T")
 
@@ -42,6 +45,57 @@ class Dialogs:
         self._parent = parent
         self._context = context
         self._report = report
+
+    def new_from_video(self, video: Path | None = None) -> None:
+        """Ask what a fit needs, begin it, and show its video.
+
+        The video is the one that is open where it has no mesh, else it is asked for.
+        """
+        context = self._context
+        video = video or context.fit_offer.video
+        if video is None:
+            name, _ = QFileDialog.getOpenFileName(self._parent, "Video of a person", "", VIDEOS)
+            if not name:
+                return
+            video = Path(name)
+        setup = FitSetupModel(self._parent)
+        setup.choose_video(video, context.document.recording)
+        dialog = NewFromVideoDialog(setup, context.display.palette, self._parent)
+        accepted = dialog.exec() == QDialog.DialogCode.Accepted
+        request = setup.request() if accepted and setup.ready else None
+        setup.close()
+        setup.deleteLater()
+        dialog.deleteLater()
+        if request is not None:
+            self._begin_fit(request)
+
+    def _begin_fit(self, request: FitRequest) -> None:
+        context = self._context
+        if self.attempt(lambda: (context.fit.start(request), True)) is None:
+            return
+        if not context.fit_follower.on_screen and self.may_discard():
+            context.document.open([request.video])
+
+    def open_fitted(self) -> None:
+        """Open the recording that a fit has made."""
+        if self.may_discard():
+            self._context.fit_taker.open_result()
+
+    def may_stop_fit(self) -> bool:
+        """Whether a fit that is under way may end with the window."""
+        request = self._context.fit.request
+        if not self._context.fit.busy or request is None:
+            return True
+        buttons = QMessageBox.StandardButton
+        answer = QMessageBox.question(
+            self._parent,
+            "Stop the fit?",
+            f"A body is being fitted to {request.video.name}. It stops with the window and can"
+            " be continued when the program is started again.",
+            buttons.Ok | buttons.Cancel,
+            buttons.Ok,
+        )
+        return answer == buttons.Ok
 
     def open_files(self) -> None:
         """Choose files that make up a recording."""
@@ -68,7 +122,7 @@ class Dialogs:
         folder = self._ask_folder("Find missing files below")
         if folder is None:
             return
-        relinked = self._attempt(lambda: self._context.document.relink(folder))
+        relinked = self.attempt(lambda: self._context.document.relink(folder))
         if relinked is None:
             return
         for role in relinked.missing:
@@ -86,7 +140,7 @@ class Dialogs:
             return True
         if not content.saved:
             return self.save_as()
-        return self._attempt(lambda: (self._context.document.save(), True)) is not None
+        return self.attempt(lambda: (self._context.document.save(), True)) is not None
 
     def save_as(self) -> bool:
         """Ask for a new recording folder and save there."""
@@ -95,7 +149,7 @@ class Dialogs:
         )
         if not name:
             return False
-        done = self._attempt(lambda: (self._context.document.save_as(Path(name)), True))
+        done = self.attempt(lambda: (self._context.document.save_as(Path(name)), True))
         return done is not None
 
     def export_map(self) -> None:
@@ -104,7 +158,7 @@ class Dialogs:
             self._parent, "Export synthetic map", "synthetic.npz", "Doppler map (*.npz)"
         )
         if name:
-            self._attempt(lambda: self._context.synthesis.export(Path(name)))
+            self.attempt(lambda: self._context.synthesis.export(Path(name)))
 
     def may_discard(self) -> bool:
         """Whether unsaved edits are saved or given up by the user's word."""
@@ -144,7 +198,8 @@ class Dialogs:
         name = QFileDialog.getExistingDirectory(self._parent, title)
         return Path(name) if name else None
 
-    def _attempt(self, work: Callable[[], T]) -> T | None:
+    def attempt(self, work: Callable[[], T]) -> T | None:
+        """Do something; what goes wrong is reported, and None returned."""
         try:
             return work()
         except (Sd2Error, OSError) as error:

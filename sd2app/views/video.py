@@ -10,9 +10,12 @@ from PySide6.QtWidgets import QWidget
 
 from sd2app.models.display import DisplayModel
 from sd2app.models.document import DocumentModel
+from sd2app.models.fit import FitModel
+from sd2app.models.fit_follower import FitFollower
 from sd2app.models.overlay import OverlayModel
 from sd2app.models.playback import PlaybackModel
 from sd2app.models.video import VideoModel
+from sd2app.views.landmark_overlay import draw_landmarks
 from sd2app.views.mesh_overlay import blend, shaded
 
 
@@ -26,6 +29,8 @@ class VideoView(QWidget):
         playback: PlaybackModel,
         display: DisplayModel,
         overlay: OverlayModel,
+        fit: FitModel,
+        follower: FitFollower,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
@@ -34,9 +39,13 @@ class VideoView(QWidget):
         self._playback = playback
         self._display = display
         self._overlay = overlay
+        self._fit = fit
+        self._follower = follower
         self.setMinimumSize(200, 150)
         video.frame_changed.connect(self.update)
         overlay.changed.connect(self.update)
+        fit.advanced.connect(self.update)
+        fit.changed.connect(self.update)
         display.theme_changed.connect(self.update)
         document.changed.connect(self.update)
 
@@ -67,6 +76,9 @@ class VideoView(QWidget):
         box.moveCenter(QRectF(self.rect()).center())
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
         painter.drawImage(box, image)
+        landmarks = self._landmarks()
+        if landmarks is not None:
+            draw_landmarks(painter, landmarks, box, (width, height))
 
     def _absence(self) -> str:
         recording = self._document.recording
@@ -75,6 +87,14 @@ class VideoView(QWidget):
         if recording.video is None:
             return "No video in this recording"
         return "The video cannot be shown"
+
+    def _landmarks(self) -> NDArray[np.float32] | None:
+        """What the fit has found in this frame, until the mesh takes its place."""
+        if self._fit.state == "idle" or not self._follower.on_screen:
+            return None
+        if self._document.mesh is not None:
+            return None
+        return self._fit.landmarks_at(self._video.shown_frame)
 
     def _with_mesh(self, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
         mesh, reader = self._document.mesh, self._video.reader

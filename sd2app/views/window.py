@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,9 +16,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import (
     QApplication,
-    QFrame,
     QMainWindow,
-    QSplitter,
     QVBoxLayout,
     QWidget,
 )
@@ -25,6 +24,7 @@ from PySide6.QtWidgets import (
 from sd2app.jobs.latest import LatestRunner
 from sd2app.settings import Settings
 from sd2app.theme import apply_theme
+from sd2app.views.frames import fill, panel, splitter
 
 if TYPE_CHECKING:
     from sd2app.context import Context
@@ -45,10 +45,16 @@ class MainWindow(QMainWindow):
     dialogs: Dialogs
     side: SidePanel
 
-    def __init__(self, settings: Settings, ladder: Ladder | None = None) -> None:
+    def __init__(
+        self,
+        settings: Settings,
+        ladder: Ladder | None = None,
+        fit_command: Sequence[str] | None = None,
+    ) -> None:
         super().__init__()
         self._settings = settings
         self._ladder = ladder
+        self._fit_command = fit_command
         self._scene: SceneView | None = None
         self._ready = False
         self._painted = False
@@ -56,7 +62,7 @@ class MainWindow(QMainWindow):
         self.setAcceptDrops(True)
         self.setMinimumSize(960, 640)
         self.resize(1280, 800)
-        self._panels = {name: _panel(name) for name in _PANELS}
+        self._panels = {name: panel(name) for name in _PANELS}
         self._build_skeleton()
         if (geometry := settings.layout("window")) is not None:
             self.restoreGeometry(geometry)
@@ -79,17 +85,17 @@ class MainWindow(QMainWindow):
     # --- building -------------------------------------------------------------------------
 
     def _build_skeleton(self) -> None:
-        self._top = _splitter(
+        self._top = splitter(
             Qt.Orientation.Horizontal,
             [self._panels[name] for name in ("video", "scene", "sensor")],
             (360, 620, 284),
         )
-        self._bottom = _splitter(
+        self._bottom = splitter(
             Qt.Orientation.Horizontal,
             [self._panels["tracks"], self._panels["spectrum"]],
             (992, 272),
         )
-        self._rows = _splitter(Qt.Orientation.Vertical, [self._top, self._bottom], (376, 320))
+        self._rows = splitter(Qt.Orientation.Vertical, [self._top, self._bottom], (376, 320))
         self._column = QVBoxLayout()
         self._column.setContentsMargins(8, 0, 8, 0)
         self._column.setSpacing(4)
@@ -109,7 +115,7 @@ class MainWindow(QMainWindow):
         from sd2app.views.status import StatusLine
         from sd2app.views.transport import TransportBar
 
-        self.context = build_context(self, self._settings, self._ladder)
+        self.context = build_context(self, self._settings, self._ladder, self._fit_command)
         context = self.context
         context.display.set_dark(is_dark(self._settings))
         self.messages = MessageBar(self)
@@ -119,6 +125,7 @@ class MainWindow(QMainWindow):
         self._recent_menu.aboutToShow.connect(self._list_recent)
         self._fill_panels()
         self._column.insertWidget(0, self.messages)
+        self._column.insertWidget(1, self._fit_bar())
         self._column.addWidget(TransportBar(context.playback, self._actions, self))
         self._column.addWidget(
             StatusLine(context.pointer, context.jobs, context.trade, context.synthesis, self)
@@ -130,6 +137,7 @@ class MainWindow(QMainWindow):
             if (state := self._settings.layout(name)) is not None:
                 getattr(self, f"_{name}").restoreState(state)
         self._ready = True
+        context.fit.look_for_unfinished()
         # VTK last, imported in a thread: everything else is usable while it loads.
         self._importer = LatestRunner("import", self)
         self._importer.finished.connect(self._add_scene)
@@ -143,19 +151,18 @@ class MainWindow(QMainWindow):
         from sd2app.views.spectrum import Curve, SpectrumView
         from sd2app.views.timeline import Overview, SpanStrip, TimeRuler
         from sd2app.views.trade_panel import TradePanel
-        from sd2app.views.video import VideoView
         from sd2app.views.video_bar import VideoBar
 
         c = self.context
         video = QVBoxLayout()
         video.addWidget(VideoBar(c.overlay, self._actions))
-        video.addWidget(VideoView(c.video, c.document, c.playback, c.display, c.overlay), 1)
-        _fill_layout(self._panels["video"], video)
+        video.addWidget(self._video_view(), 1)
+        fill(self._panels["video"], video)
         to_camera, aim = self._actions["sensor_to_camera"], self._actions["aim_sensor"]
         sensor = SensorPanel(c.sensor, c.document, c.synthesis, c.edits, to_camera, aim)
         trade = TradePanel(c.trade, c.display, self._actions["measure"])
         self.side = SidePanel({"Sensor": sensor, "Trade": trade})
-        _fill(self._panels["sensor"], self.side)
+        fill(self._panels["sensor"], self.side)
         self._synthetic_view = HeatmapView(c.synthetic, c.span, c.playback, c.display, c.pointer)
         self._real_view = HeatmapView(
             c.real, c.span, c.playback, c.display, c.pointer, alignable=True
@@ -175,12 +182,33 @@ class MainWindow(QMainWindow):
             (self._overview, 0),
         ):
             tracks.addWidget(view, stretch)
-        _fill_layout(self._panels["tracks"], tracks)
+        fill(self._panels["tracks"], tracks)
         side = QVBoxLayout()
         curves = (Curve(c.synthetic, "synthetic"), Curve(c.real, "real"))
         side.addWidget(SpectrumView(curves, c.playback, c.display, c.pointer), 1)
         side.addWidget(LevelBar(c.display, (c.synthetic, c.real)))
-        _fill_layout(self._panels["spectrum"], side)
+        fill(self._panels["spectrum"], side)
+
+    def _video_view(self) -> QWidget:
+        from sd2app.views.video import VideoView
+
+        c = self.context
+        return VideoView(
+            c.video, c.document, c.playback, c.display, c.overlay, c.fit, c.fit_follower
+        )
+
+    def _fit_bar(self) -> QWidget:
+        from sd2app.views.fit_bar import FitBar
+
+        c = self.context
+        return FitBar(
+            c.fit,
+            c.fit_follower,
+            c.fit_offer,
+            begin=self.dialogs.new_from_video,
+            open_result=self.dialogs.open_fitted,
+            attempt=self.dialogs.attempt,
+        )
 
     def _add_scene(self) -> None:
         if not self._ready:
@@ -202,7 +230,7 @@ class MainWindow(QMainWindow):
         layout = QVBoxLayout()
         layout.addWidget(SceneBar(c.display, self._actions))
         layout.addWidget(self._scene, 1)
-        _fill_layout(self._panels["scene"], layout)
+        fill(self._panels["scene"], layout)
 
     def _connect(self) -> None:
         c = self.context
@@ -210,6 +238,7 @@ class MainWindow(QMainWindow):
         c.document.changed.connect(self._refresh)
         c.document.failed.connect(self.messages.warn)
         c.document.noted.connect(self.messages.note)
+        c.fit_taker.noted.connect(self.messages.note)
         c.synthesis.failed.connect(self.messages.warn)
         c.trade.failed.connect(self.messages.warn)
         c.trade.noted.connect(self.messages.note)
@@ -221,6 +250,7 @@ class MainWindow(QMainWindow):
             c.playback.loop_changed,
             c.display.mesh_changed,
             c.overlay.changed,
+            c.fit.state_changed,
             c.synthesis.completed,
             c.trade.plan_changed,
             c.trade.measured.changed,
@@ -248,7 +278,8 @@ class MainWindow(QMainWindow):
         self._real_view.setVisible(c.real.map is not None)
         self._overview.set_track(c.synthetic if c.synthetic.map is not None else c.real)
         self._synthetic_view.set_hint(
-            "Add a mesh to see its synthetic Doppler: File → Add to this recording…"
+            "Add a mesh to see its synthetic Doppler: File → Add to this recording…\n\n"
+            "From a video alone: File → New from video… fits a body to the person in it."
             if c.document.content is not None
             else "Drop a recording, video, mesh or radar capture here, or press Ctrl+O.\n\n"
             "Help → Open the sample recording shows what it looks like."
@@ -272,6 +303,11 @@ class MainWindow(QMainWindow):
 
     def open_paths(self, paths: list[Path]) -> None:
         """Open what was named on the command line, dropped, or chosen from the list."""
+        if len(paths) == 1 and self.context.fit.take_up(paths[0]):
+            # No recording yet: a folder in which a fit was stopped.
+            request = self.context.fit.request
+            assert request is not None
+            paths = [request.video]
         self.context.document.open(paths)
         if len(paths) == 1:
             self._settings.add_recent(paths[0].resolve())
@@ -345,7 +381,7 @@ class MainWindow(QMainWindow):
         if not self._ready:
             event.accept()
             return
-        if not self.dialogs.may_discard():
+        if not (self.dialogs.may_discard() and self.dialogs.may_stop_fit()):
             event.ignore()
             return
         self._settings.set_layout("window", self.saveGeometry())
@@ -365,39 +401,3 @@ def is_dark(settings: Settings) -> bool:
         return settings.dark
     hints = QApplication.styleHints()
     return hints.colorScheme() == Qt.ColorScheme.Dark
-
-
-def _panel(name: str) -> QFrame:
-    panel = QFrame()
-    panel.setObjectName("panel")
-    panel.setAccessibleName(name.capitalize())
-    # A click anywhere in it takes the keyboard back from a number box.
-    panel.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
-    return panel
-
-
-def _splitter(
-    orientation: Qt.Orientation, widgets: list[QWidget], sizes: tuple[int, ...]
-) -> QSplitter:
-    splitter = QSplitter(orientation)
-    splitter.setChildrenCollapsible(False)
-    splitter.setHandleWidth(8)
-    for widget in widgets:
-        splitter.addWidget(widget)
-    splitter.setSizes(list(sizes))
-    # Extra room goes to the middle of the top row and to the left of the bottom row.
-    for index, size in enumerate(sizes):
-        splitter.setStretchFactor(index, 1 if size == max(sizes) else 0)
-    return splitter
-
-
-def _fill(panel: QFrame, widget: QWidget) -> None:
-    layout = QVBoxLayout()
-    layout.addWidget(widget)
-    _fill_layout(panel, layout)
-
-
-def _fill_layout(panel: QFrame, layout: QVBoxLayout) -> None:
-    layout.setContentsMargins(1, 1, 1, 1)
-    layout.setSpacing(0)
-    panel.setLayout(layout)

@@ -1,0 +1,77 @@
+"""From a finished fit to a recording."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+from sd2app.models.fit_request import FitRequest
+from sd2core.recording import FILE_NAME, Recording, open_recording
+from sd2core.recording_document import CameraEntry
+from sd2core.relative_paths import plain_path
+
+
+def make_recording(
+    request: FitRequest, size: tuple[int, int] | None, base: Recording | None
+) -> Recording:
+    """Record video, mesh and camera.
+
+    Parameters
+    ----------
+    request : FitRequest
+        Its mesh has been written.
+    size : (int, int), optional
+        Width and height of the upright picture, where it is known.
+    base : Recording, optional
+        What is open: where it is of the same video and has no mesh, its radar, labels
+        and sensor are taken along.
+
+    Raises
+    ------
+    Sd2Error, OSError
+        When the recording cannot be written.
+    """
+    camera = camera_of(request, size)
+    if (request.folder / FILE_NAME).exists():
+        recording = open_recording(request.folder)
+        recording.mesh, recording.camera = request.mesh, camera
+        recording.save()
+    elif base is not None and awaits(base, request.video):
+        title = request.folder.stem
+        recording = replace(base, mesh=request.mesh, camera=camera, title=title)
+        recording = recording.save_as(request.folder)
+    else:
+        recording = Recording.create(
+            request.folder, video=request.video, mesh=request.mesh, camera=camera
+        )
+    request.forget()
+    return recording
+
+
+def awaits(recording: Recording, video: Path) -> bool:
+    """Whether a recording is of this video and has no mesh."""
+    if recording.video is None or recording.mesh is not None:
+        return False
+    return plain_path(recording.video) == plain_path(video)
+
+
+def camera_of(request: FitRequest, size: tuple[int, int] | None) -> CameraEntry | None:
+    """The camera that the body was fitted with, as the mesh says."""
+    stated = _stated_camera(request.mesh)
+    if stated is not None:
+        return stated
+    if request.focal_px is None:
+        return None
+    width, height = size or (None, None)
+    return CameraEntry(focal_px=request.focal_px, width=width, height=height, source="user")
+
+
+def _stated_camera(mesh: Path) -> CameraEntry | None:
+    try:
+        attributes = json.loads((mesh / "zarr.json").read_text(encoding="utf-8"))["attributes"]
+        entry = CameraEntry.model_validate(attributes["camera"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return entry if math.isfinite(entry.focal_px) else None
