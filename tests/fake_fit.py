@@ -1,7 +1,7 @@
 """Speaks as ``sd2 fit --progress-json`` does, and fits nothing.
 
 ``fake_fit.py [--frames N] [--pause-s S] [--stop-at N] [--refuse TEXT] fit VIDEO --out OUT …``;
-the mesh it writes is a folder with nothing in it, or with ``--body`` an octahedron that moves along x.
+the mesh it writes is a folder with nothing in it, or with ``--body`` an octahedron that moves.
 ``OUT.partial`` holds how many frames are done.
 """
 
