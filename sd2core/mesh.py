@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
+from sd2core.presence import Presence, checked
 from sd2core.timebase import Timebase
 
 
@@ -46,6 +48,9 @@ class MeshSequence:
         What the reader found and repaired or wants the user to know.
     vertex_counts : int64 array, shape (V,), optional
         How many vertices each stands for, after decimation; None: for itself.
+    present : bool array, shape (T,), optional
+        False where there is no person. Vertices hold the last known pose there, which
+        nothing may be concluded from. None: there is one in every frame.
     """
 
     vertices: VertexArray
@@ -54,6 +59,7 @@ class MeshSequence:
     source: str = ""
     notes: tuple[str, ...] = ()
     vertex_counts: NDArray[np.int64] | None = None
+    present: NDArray[np.bool_] | None = None
 
     def __post_init__(self) -> None:
         shape = tuple(self.vertices.shape)
@@ -76,6 +82,10 @@ class MeshSequence:
                     f"{shape[1]} numbers from 1",
                 )
             object.__setattr__(self, "vertex_counts", counts)
+        if self.present is not None:
+            present = checked(self.present, shape[0])
+            # Someone everywhere is said in one way only.
+            object.__setattr__(self, "present", None if present.all() else present)
         if self.faces is not None and not np.size(self.faces):
             object.__setattr__(self, "faces", None)
         if self.faces is None:
@@ -116,6 +126,11 @@ class MeshSequence:
     def times_s(self) -> NDArray[np.float64]:
         """Time of every frame, shape (T,)."""
         return self.timebase.times_s
+
+    @cached_property
+    def presence(self) -> Presence:
+        """In which frames there is a person."""
+        return Presence.of(self.present, self.frame_count)
 
     def read(self, start: int, stop: int) -> NDArray[Any]:
         """Vertices of frames ``start`` to ``stop`` (exclusive) in memory, (n, V, 3)."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from sd2core.atomic import atomic_write
 from sd2core.errors import Sd2Error
+from sd2core.presence import checked
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 
@@ -41,6 +42,9 @@ class DopplerMap:
         Bins that the radar cannot see because they lie beyond its v_max.
     meta : dict
         Provenance that fits into JSON: sensor, options, sources, version.
+    present : bool array, shape (frames,), optional
+        False in columns that say nothing because there was no person. None: all
+        columns say something.
     """
 
     values: NDArray[np.float32]
@@ -51,6 +55,7 @@ class DopplerMap:
     null_bins: tuple[int, ...] = ()
     unseen_bins: tuple[int, ...] = ()
     meta: dict[str, Any] = field(default_factory=dict)
+    present: NDArray[np.bool_] | None = None
 
     def __post_init__(self) -> None:
         values = np.ascontiguousarray(self.values, dtype=np.float32)
@@ -67,6 +72,9 @@ class DopplerMap:
                 raise Sd2Error(f"{name} is {bins}", f"bins from 0 to {self.axis.bins - 1}")
             object.__setattr__(self, name, bins)
         object.__setattr__(self, "values", values)
+        if self.present is not None:
+            present = checked(self.present, values.shape[1])
+            object.__setattr__(self, "present", None if present.all() else present)
 
     @property
     def times_s(self) -> NDArray[np.float64]:
@@ -90,7 +98,10 @@ class DopplerMap:
         return np.where(self.values.max(axis=0) > 0, peak, np.nan)
 
     def save(self, path: Path) -> None:
-        """Write ``values``, ``velocity_mps``, ``times_s`` and ``meta`` to one ``.npz``."""
+        """Write ``values``, ``velocity_mps``, ``times_s`` and ``meta`` to one ``.npz``.
+
+        Where there are columns without a person also ``present``.
+        """
         meta = {
             "format": "sd2-doppler-map",
             "version": FORMAT_VERSION,
@@ -101,14 +112,16 @@ class DopplerMap:
             "unseen_bins": self.unseen_bins,
             "provenance": self.meta,
         }
+        arrays: dict[str, Any] = {
+            "values": self.values,
+            "velocity_mps": self.axis.centres_mps,
+            "times_s": self.times_s,
+            "meta": json.dumps(meta),
+        }
+        if self.present is not None:
+            arrays["present"] = self.present
         with atomic_write(Path(path)) as stream:
-            np.savez_compressed(
-                stream,
-                values=self.values,
-                velocity_mps=self.axis.centres_mps,
-                times_s=self.times_s,
-                meta=json.dumps(meta),
-            )
+            np.savez_compressed(stream, **arrays)
 
     @classmethod
     def load(cls, path: Path) -> DopplerMap:
@@ -157,6 +170,7 @@ class DopplerMap:
                 null_bins=tuple(meta["null_bins"]),
                 unseen_bins=tuple(meta["unseen_bins"]),
                 meta=meta["provenance"],
+                present=arrays.get("present"),
             )
         except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
             raise Sd2Error(

@@ -12,6 +12,9 @@ from sd2core.cli.options import add_command, add_json, add_mesh_reading
 from sd2core.cli.output import print_facts, print_json, progress_bar
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from sd2core.io.radar import RadarCapture
     from sd2core.io.video import VideoReader
     from sd2core.mesh import MeshSequence
@@ -163,6 +166,7 @@ def describe_mesh(path: Path, mesh: MeshSequence) -> Description:
         "vertices": mesh.vertex_count,
         "faces": face_count,
         **_clock_data(mesh.timebase),
+        "frames_without_person": _absent(mesh.present),
         "first_frame_min_m": low,
         "first_frame_max_m": high,
         "notes": list(mesh.notes),
@@ -171,6 +175,7 @@ def describe_mesh(path: Path, mesh: MeshSequence) -> Description:
         "surface": f"{mesh.vertex_count:,} vertices, "
         + (f"{face_count:,} triangles" if face_count else "no triangles: a point cloud"),
         "time": _clock(mesh.timebase),
+        "no person": _gaps(mesh.present, mesh.timebase),
         "first frame": ", ".join(
             f"{axis} {a:.2f} to {b:.2f}" for axis, a, b in zip("xyz", low, high, strict=True)
         )
@@ -219,6 +224,7 @@ def describe_map(path: Path, doppler: DopplerMap) -> Description:
         "null_bins": list(doppler.null_bins),
         "unseen_bins": list(doppler.unseen_bins),
         **_clock_data(doppler.timebase),
+        "frames_without_person": _absent(doppler.present),
         "provenance": doppler.meta,
     }
     facts = {
@@ -226,6 +232,7 @@ def describe_map(path: Path, doppler: DopplerMap) -> Description:
         "velocity": f"{doppler.axis.bins} bins of {doppler.axis.bin_width_mps:g} m/s over"
         f" ±{doppler.axis.v_max_mps:g} m/s, approaching is positive",
         "time": _clock(doppler.timebase),
+        "no person": _gaps(doppler.present, doppler.timebase),
         "unit": doppler.unit,
         "nulled bins": _bins(doppler.axis, doppler.null_bins),
         "unseen bins": _bins(doppler.axis, doppler.unseen_bins),
@@ -286,6 +293,23 @@ def _camera(recording: Recording) -> str:
     size = f" at {camera.width} x {camera.height}" if camera.width and camera.height else ""
     source = f" ({camera.source})" if camera.source else ""
     return f"focal length {camera.focal_px:.0f} pixels{size}{source}"
+
+
+def _absent(present: NDArray[np.bool_] | None) -> int:
+    """Frames without a person."""
+    return 0 if present is None else int((~present).sum())
+
+
+def _gaps(present: NDArray[np.bool_] | None, timebase: Timebase) -> str:
+    """How much of a clip is without a person, and where first; nothing without gaps."""
+    from sd2core.presence import gaps_in_words, runs
+
+    if present is None:
+        return ""
+    gaps = runs(~present)
+    first_s = timebase.time_of(gaps[0][0])
+    share = gaps_in_words(gaps, timebase.times_s, timebase.frame_duration_s)
+    return f"in {share}, first at {first_s:.2f} s"
 
 
 def _labels(recording: Recording) -> str:

@@ -150,10 +150,15 @@ class VisibilityMasks:
         """The frames whose visibility serves these: every n-th of the clip, the nearest.
 
         Midway the later one. The last one may have more than half a stride to serve.
+        Where that frame belongs to another stretch, the end of the frame's own serves.
         """
         every = self._stride
         last = (self._prepared.mesh.frame_count - 1) // every * every
-        return np.minimum((np.asarray(frames) + every // 2) // every * every, last)
+        nearest = np.minimum((np.asarray(frames) + every // 2) // every * every, last)
+        presence = self._prepared.mesh.presence
+        if presence.whole:
+            return nearest
+        return np.clip(nearest, presence.first[frames], presence.last[frames])
 
     def _frozen(self, block: Block, rows: slice, position_m: Position) -> NDArray[np.uint8] | None:
         """The mask in which these rows are complete that was made nearest to this place.

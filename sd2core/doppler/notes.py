@@ -8,17 +8,20 @@ import numpy as np
 
 from sd2core.doppler.prepared import PreparedMesh
 from sd2core.precision import SHARE_OF_A_BIN, stored_velocity_error_mps
+from sd2core.presence import gaps_in_words, runs
 from sd2core.scattering.amplitude import NEAREST_RANGE_M
 from sd2core.sensor import VirtualSensor
 
 
-def map_notes(prepared: PreparedMesh, sensor: VirtualSensor) -> list[str]:
-    """Sentences about what single precision does to this map where it cannot be helped.
+def map_notes(prepared: PreparedMesh, sensor: VirtualSensor, start: int, stop: int) -> list[str]:
+    """Sentences about frames without a person, and what single precision does to this map.
 
     Parameters
     ----------
     prepared : PreparedMesh
     sensor : VirtualSensor
+    start, stop : int
+        Frames of the map, half-open.
 
     Returns
     -------
@@ -27,6 +30,11 @@ def map_notes(prepared: PreparedMesh, sensor: VirtualSensor) -> list[str]:
     """
     mesh, options = prepared.mesh, prepared.options
     notes = []
+    if not (measured := mesh.presence.measured[start:stop]).all():
+        share = gaps_in_words(
+            runs(~measured), mesh.times_s[start:stop], mesh.timebase.frame_duration_s
+        )
+        notes.append(f"Without a person: {share}. Those columns are empty.")
     if np.dtype(mesh.vertices.dtype) == np.float32:
         duration_s = 2.0 * mesh.timebase.frame_duration_s / options.oversampling
         error_mps = stored_velocity_error_mps(prepared.reach_m, duration_s)

@@ -123,7 +123,10 @@ class PreparedMesh:
         self._reading = threading.Lock()
         self._compatible = self.options.velocity == "vid2doppler"
         self._trajectory = Trajectory(
-            self.mesh.times_s, self.options.oversampling, self.options.trajectory_smoothing_s
+            self.mesh.times_s,
+            self.options.oversampling,
+            self.options.trajectory_smoothing_s,
+            self.mesh.presence,
         )
         self._knot_times_s = self._trajectory.knot_times_s
         # The faces a kernel gets must be plain memory: a read-only or mapped
@@ -226,6 +229,7 @@ class PreparedMesh:
             self.mesh.frame_count,
             sensor,
             self.mesh.timebase.frames_per_s,
+            self.mesh.presence,
         )
 
     def _kept(self, what: str, block: Block, make: Callable[[Block], NDArray[Any]]) -> NDArray[Any]:
@@ -287,7 +291,7 @@ class PreparedMesh:
         first = max(start * every - reach_before, 0)
         last = min((stop - 1) * every + reach_after + 1, len(self._knot_times_s))
         centre = np.arange(start, stop) * every
-        between = moments(self._knot_times_s, centre, every)
+        between = moments(self._knot_times_s, centre, every, self.mesh.presence)
         positions = self._positions(first, last, between.duration_s)
         return Block(
             index,

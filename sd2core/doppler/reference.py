@@ -88,8 +88,9 @@ def _at_frame(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Velocities (moments, V) and positions (3, V) of one frame."""
     every = options.oversampling
-    trajectory = Trajectory(mesh.times_s, every, options.trajectory_smoothing_s)
-    between = moments(trajectory.knot_times_s, np.array([frame * every]), every)
+    trajectory = Trajectory(mesh.times_s, every, options.trajectory_smoothing_s, mesh.presence)
+    centre_knot = np.array([frame * every])
+    between = moments(trajectory.knot_times_s, centre_knot, every, mesh.presence)
     before, after = between.before[0], between.after[0]
     low, high = int(before.min()), int(after.max()) + 1
     if options.velocity == "vid2doppler":
@@ -99,9 +100,11 @@ def _at_frame(
     knots = trajectory.knots(mesh.read(first, last).astype(np.float64), first, low, high)
     points = np.ascontiguousarray(knots.transpose(0, 2, 1))
     centre = points[frame * every - low]
-    if options.velocity == "vid2doppler" and mesh.frame_count > 1:
+    if options.velocity == "vid2doppler" and between.duration_s.any():
         frames, rate = mesh.frame_count, mesh.timebase.frames_per_s
-        theirs = vid2doppler.velocities(points, low, frame, frame + 1, frames, place, rate)
+        theirs = vid2doppler.velocities(
+            points, low, frame, frame + 1, frames, place, rate, mesh.presence
+        )
         return theirs, centre
     found = [
         radial_velocity(points[one - low], points[two - low], place, duration_s)

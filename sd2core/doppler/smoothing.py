@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.doppler.options import SynthesisOptions
+from sd2core.presence import Presence
 
 _REACH = 4.0
 """Where the Gaussian on time is cut, in sigmas."""
@@ -23,6 +24,7 @@ def smooth(
     start: int,
     stop: int,
     options: SynthesisOptions,
+    presence: Presence | None = None,
 ) -> NDArray[np.float64]:
     """A map's frames ``start`` to ``stop``, smoothed along velocity and time.
 
@@ -35,13 +37,15 @@ def smooth(
         Times of all frames.
     options : SynthesisOptions
         Names the widths, and the bins that are emptied again afterwards.
+    presence : Presence, optional
+        Of all frames. Nothing is smoothed from one stretch to another.
 
     Returns
     -------
     float64 array, shape (bins, stop - start)
     """
     values = velocity_kernel(options.axis.bins, options.velocity_sigma_bins) @ raw
-    values = smooth_time(values, times_s, first, start, stop, options.time_sigma_s)
+    values = smooth_time(values, times_s, first, start, stop, options.time_sigma_s, presence)
     if options.null_after_smoothing:
         values[list(options.null_bins)] = 0
     return values
@@ -78,6 +82,7 @@ def smooth_time(
     start: int,
     stop: int,
     sigma_s: float,
+    presence: Presence | None = None,
 ) -> NDArray[np.float64]:
     """Gaussian mean over real times for frames ``start`` to ``stop``.
 
@@ -89,6 +94,8 @@ def smooth_time(
     times_s : float64 array, shape (T,)
         Times of all frames, so that the result does not depend on how a
         recording is cut into stretches.
+    presence : Presence, optional
+        Of all frames. The mean is over the frame's own stretch.
 
     Returns
     -------
@@ -112,6 +119,8 @@ def smooth_time(
         distance = times_s[neighbour] - centres
         bell = np.exp(-0.5 * (distance / sigma_s) ** 2)
         bell[~inside | (np.abs(distance) > reach)] = 0
+        if presence is not None and not presence.whole:
+            bell[presence.first[neighbour] != presence.first[frames]] = 0
         total += bell * values[:, neighbour - first]
         weights += bell
     return total / weights

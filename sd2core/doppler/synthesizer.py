@@ -218,7 +218,9 @@ class Synthesizer:
             Of kind ``synthetic``. Its meta names sensor, options, source and
             version, the quality of the visibility, how many frames share a mask,
             per frame ``visible_share`` and ``beyond_share``, and in ``notes``
-            where single precision limits what the map says.
+            where single precision limits what the map says and how much of it
+            is empty. ``present`` is False in frames without a person, and in one
+            that stands alone: what moves how fast is not known there.
         """
         start, stop = frames or (0, self.mesh.frame_count)
         stretch = self.stretch(sensor, start, stop, visibility, progress)
@@ -240,8 +242,9 @@ class Synthesizer:
                 "version": __version__,
                 "visible_share": _rounded(stretch.visible_share),
                 "beyond_share": _rounded(stretch.beyond_share),
-                "notes": map_notes(self.prepared, sensor),
+                "notes": map_notes(self.prepared, sensor, start, stop),
             },
+            present=self.mesh.presence.measured[start:stop],
         )
 
     def stretch(
@@ -269,8 +272,10 @@ class Synthesizer:
             counts.histogram.T, totals, out=np.zeros(counts.histogram.T.shape), where=totals > 0
         )
         raw[list(options.null_bins)] = 0
-        values = smooth(raw, times_s, first, start, stop, options)
+        values = smooth(raw, times_s, first, start, stop, options, self.mesh.presence)
         inside = slice(start - first, stop - first)
+        nobody = ~self.mesh.presence.there[first:last]
+        counts.visible[nobody] = counts.beyond[nobody] = 0
         visible, beyond = counts.visible[inside], counts.beyond[inside]
         return Stretch(
             values.astype(np.float32),
@@ -284,7 +289,10 @@ class Synthesizer:
     def frame(
         self, sensor: VirtualSensor, index: int, visibility: Visibility | None = None
     ) -> FrameScattering:
-        """Velocity, range and visibility of every vertex of one frame."""
+        """Velocity, range and visibility of every vertex of one frame.
+
+        Without a person nothing moves and nothing is seen.
+        """
         chosen = self._choose(visibility)
         block = self._block_of(index)
         local = index - block.start
@@ -306,6 +314,8 @@ class Synthesizer:
                 frames.duration_s[local, low : high + 1].sum(),
             )
         visible, quality = self._masks.for_frame(block, local, sensor.position_m, chosen)
+        if not self.mesh.presence.there[index]:
+            visible = np.zeros_like(visible)
         return FrameScattering(
             velocity.astype(np.float32),
             np.sqrt((ray * ray).sum(axis=0)).astype(np.float32),

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from sd2core.doppler.histogram import Counting, Counts, Frames
 from sd2core.doppler.kernels import CLIP, DROP, WRAP
 from sd2core.doppler.scatterers import Scatterers
+from sd2core.presence import Presence
 
 TAPS = 5
 """Frames in its mean over time."""
@@ -33,6 +34,7 @@ def velocities(
     frame_count: int,
     sensor: NDArray[np.float64],
     frames_per_s: float,
+    presence: Presence | None = None,
 ) -> NDArray[np.float64]:
     """Velocity −(Δp·p)/|p|·fps of each vertex, then its zero-padded mean over five frames.
 
@@ -47,6 +49,9 @@ def velocities(
         Length of the recording, where the zero padding begins.
     sensor : float64 array, shape (3,)
     frames_per_s : float
+    presence : Presence, optional
+        Of all frames of the recording. Every stretch with a person in it is treated as
+        a recording of its own.
 
     Returns
     -------
@@ -56,7 +61,10 @@ def velocities(
     low, high = max(start - TAPS // 2, 0), min(stop + TAPS // 2, frame_count)
     instant = np.zeros((stop - start + TAPS - 1, positions.shape[2]))
     place = sensor[:, None]
+    first_of = None if presence is None or presence.whole else presence.first
     for frame in range(max(low, 1), high):
+        if first_of is not None and first_of[frame] == frame:
+            continue
         now = positions[frame - first].astype(np.float64)
         step = now - positions[frame - first - 1]
         ray = now - place
@@ -64,8 +72,13 @@ def velocities(
         approach = -(step * ray).sum(axis=0) * frames_per_s
         np.divide(approach, distance, out=instant[frame - start + TAPS // 2], where=distance > 0)
     mean = np.zeros((stop - start, positions.shape[2]))
+    frames = np.arange(start, stop)
     for tap in range(TAPS):
-        mean += instant[tap : tap + stop - start]
+        add = instant[tap : tap + stop - start]
+        if first_of is not None:
+            near = np.clip(frames + tap - TAPS // 2, 0, frame_count - 1)
+            add = add * (first_of[near] == first_of[frames])[:, None]
+        mean += add
     mean /= TAPS
     return mean
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -47,7 +47,7 @@ def digitise(
     peak : float
         Largest magnitude in it.
     power : float
-        Mean square of the moving scene's part.
+        Mean square of the moving scene's part, over the frames that have one.
     config : RadarConfig
     options : SignalOptions
     samples : uint16 array
@@ -95,11 +95,13 @@ def simulated_capture(
     options: SignalOptions,
     levels: dict[str, float],
     how: dict[str, Any] | None = None,
+    nobody: Sequence[tuple[int, int]] = (),
 ) -> RadarCapture:
     """The samples with what is needed to read them, and how they were computed.
 
     ``times_s`` are the middles of the frames on the scene's clock, ``levels`` what
-    :func:`digitise` returned, ``how`` further entries about the simulation.
+    :func:`digitise` returned, ``how`` further entries about the simulation, ``nobody``
+    half-open runs of frames in which nothing echoes because there is no person.
     """
     return RadarCapture(
         samples=samples,
@@ -120,6 +122,7 @@ def simulated_capture(
                 "first_frame_s": float(times_s[0]),
                 "frame_time": "middle of the burst of chirps",
                 **levels,
+                **({"without_person": [list(gap) for gap in nobody]} if nobody else {}),
                 "version": sd2core.__version__,
             }
         },

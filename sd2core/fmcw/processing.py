@@ -25,6 +25,7 @@ import sd2core
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.chain import Chain, Clutter, ProcessingOptions, Window
 from sd2core.io.radar.capture import RadarCapture
+from sd2core.presence import gaps_in_words, runs
 from sd2core.progress import Progress, silent
 from sd2core.sensor import RadarConfig, VelocityAxis
 from sd2core.spectrum import DopplerMap
@@ -87,7 +88,8 @@ def doppler_map(
     Returns
     -------
     DopplerMap
-        Of kind ``real`` or ``simulated``. Bins wholly beyond the radar's v_max
+        Of kind ``real`` or ``simulated``; of a simulation ``present`` says in which
+        frames there was a person, besides noise. Bins wholly beyond the radar's v_max
         are ``unseen_bins`` and zero. What lies beyond a narrower axis is left
         out; ``meta["beyond_share"]`` says how much, ``meta["notes"]`` what else
         to know.
@@ -127,9 +129,14 @@ def doppler_map(
             "options": asdict(options),
             "range_gates_m": [float(value) for value in chain.range_m],
             "beyond_share": beyond,
-            "notes": [*capture.notes, *_notes(config, axis, unseen, beyond, chain.clipped_share)],
+            "notes": [
+                *capture.notes,
+                *_without_person(capture),
+                *_notes(config, axis, unseen, beyond, chain.clipped_share),
+            ],
             "version": sd2core.__version__,
         },
+        present=capture.present,
     )
 
 
@@ -211,6 +218,15 @@ def _unseen(config: RadarConfig, axis: VelocityAxis) -> tuple[int, ...]:
     nearest = np.abs(axis.centres_mps) - 0.5 * axis.bin_width_mps
     beyond = nearest >= config.v_max_mps * (1 - 1e-9)
     return tuple(int(index) for index in np.flatnonzero(beyond))
+
+
+def _without_person(capture: RadarCapture) -> list[str]:
+    if capture.present is None:
+        return []
+    share = gaps_in_words(
+        runs(~capture.present), capture.timebase.times_s, capture.config.frame_repetition_s
+    )
+    return [f"Without a person: {share}. Nothing of one echoes there."]
 
 
 def _notes(

@@ -119,6 +119,8 @@ def subdivided(corners: NDArray[np.float64], cuts: int) -> NDArray[np.float64]:
 
 def _cut(scene: WaveScene, time_s: float, cuts: int, go_on: GoOn | None) -> NDArray[np.float64]:
     """Beat signal with every facet in 4^cuts pieces, (receivers, chirps, samples)."""
+    if not scene.scene.there(time_s):
+        return scene.silence()
     visible = scene.scene.visible(time_s)
     rows = []
     for (position, velocity), chirps in scene.bursts(time_s):

@@ -155,8 +155,19 @@ class MeshScene:
         steps = np.arange(int(span_s / step_s + 1e-6) + 1, dtype=np.float64)
         return timebase.start_s + steps * step_s
 
+    def there(self, time_s: float) -> bool:
+        """Whether there is somebody whose motion is known: in the mesh frames on both sides."""
+        presence = self.mesh.presence
+        return presence.whole or bool(presence.measured[list(self._around(time_s))].all())
+
     def at(self, time_s: float) -> Scatterers:
-        """Facets at an instant, moving with the central difference over two mesh frames."""
+        """Facets at an instant, moving with the central difference over two mesh frames.
+
+        None where there is nobody.
+        """
+        if not self.there(time_s):
+            nothing = np.zeros((0, 3))
+            return Scatterers(nothing, nothing, np.zeros(0, np.complex128))
         position, velocity = self.moving(time_s)
         visible = self.visible(time_s)
         return facet_scatterers(position, velocity, self._faces, self.sensor, self.config, visible)
@@ -164,7 +175,7 @@ class MeshScene:
     def moving(self, time_s: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Vertices at an instant and their velocity, (V, 3) each; from any thread."""
         half_s = self.mesh.timebase.frame_duration_s
-        first, last = float(self.mesh.times_s[0]), float(self.mesh.times_s[-1])
+        first, last = (float(self.mesh.times_s[frame]) for frame in self._stretch(time_s))
         before, after = max(time_s - half_s, first), min(time_s + half_s, last)
         position = self._vertices(time_s)
         velocity = np.zeros_like(position)
@@ -176,21 +187,25 @@ class MeshScene:
         """Facets that nothing hides, (F,); None when that was not looked at."""
         if self.visibility is None:
             return None
-        return np.asarray(self.visibility[self.mesh.timebase.nearest_frame(time_s)])
+        first, last = self._stretch(time_s)
+        frame = min(max(self.mesh.timebase.nearest_frame(time_s), first), last)
+        return np.asarray(self.visibility[frame])
 
     def between(self, times_s: NDArray[np.float64]) -> Iterator[tuple[NDArray[np.float64], ...]]:
         """Vertices and velocity at every time on a smooth path through the mesh's frames.
 
         Cubic Hermite with the central differences of the frames (Catmull-Rom);
-        still before the first and after the last frame.
+        still before the first and after the last frame of the stretch with a person in
+        it that the middle of the times lies in.
         """
         times = self.mesh.times_s
         if len(times) == 1:
             still = self._frame(0)
             yield from ((still, np.zeros_like(still)) for _ in times_s)
             return
-        for time_s in np.clip(times_s, times[0], times[-1]):
-            left = int(np.clip(np.searchsorted(times, time_s) - 1, 0, len(times) - 2))
+        first, last = self._stretch(0.5 * float(times_s[0] + times_s[-1]))
+        for time_s in np.clip(times_s, times[first], times[last]):
+            left = int(np.clip(np.searchsorted(times, time_s) - 1, first, last - 1))
             step_s = times[left + 1] - times[left]
             u = (time_s - times[left]) / step_s
             a, b = self._frame(left), self._frame(left + 1)
@@ -203,25 +218,35 @@ class MeshScene:
 
     def _slope(self, index: int) -> NDArray[np.float64]:
         """Central difference of the frames around one, one-sided at the ends."""
-        low, high = max(index - 1, 0), min(index + 1, self.mesh.frame_count - 1)
-        times = self.mesh.times_s
+        presence, times = self.mesh.presence, self.mesh.times_s
+        low, high = max(index - 1, presence.first[index]), min(index + 1, presence.last[index])
         slope: NDArray[np.float64] = (self._frame(high) - self._frame(low)) / (
             times[high] - times[low]
         )
         return slope
 
-    def _vertices(self, time_s: float) -> NDArray[np.float64]:
+    def _stretch(self, time_s: float) -> tuple[int, int]:
+        """First and last mesh frame of the stretch that an instant lies in."""
+        presence, frame = self.mesh.presence, next(iter(self._around(time_s)))
+        return int(presence.first[frame]), int(presence.last[frame])
+
+    def _around(self, time_s: float) -> dict[int, float]:
+        """Mesh frames that an instant lies between, and their shares in it; one or two."""
         times = self.mesh.times_s
-        right = int(np.clip(np.searchsorted(times, time_s), 1, max(len(times) - 1, 1)))
         if len(times) == 1:
-            return self._frame(0)
+            return {0: 1.0}
+        right = int(np.clip(np.searchsorted(times, time_s), 1, len(times) - 1))
         share = float(
             np.clip((time_s - times[right - 1]) / (times[right] - times[right - 1]), 0, 1)
         )
         # Within rounding of a frame's time that frame is meant.
         if share < 1e-6 or share > 1 - 1e-6:
-            return self._frame(right - 1 if share < 0.5 else right)
-        return (1.0 - share) * self._frame(right - 1) + share * self._frame(right)
+            return {right - 1 if share < 0.5 else right: 1.0}
+        return {right - 1: 1.0 - share, right: share}
+
+    def _vertices(self, time_s: float) -> NDArray[np.float64]:
+        parts = [share * self._frame(frame) for frame, share in self._around(time_s).items()]
+        return parts[0] if len(parts) == 1 else parts[0] + parts[1]
 
     def _frame(self, index: int) -> NDArray[np.float64]:
         with self._reading:

@@ -23,6 +23,7 @@ from sd2core.fmcw.options import SignalOptions
 from sd2core.fmcw.scene import MeshScene, Scatterers, point_scatterers
 from sd2core.io.radar.capture import RadarCapture
 from sd2core.mesh import MeshSequence
+from sd2core.presence import runs
 from sd2core.progress import Progress, silent
 from sd2core.sensor import (
     SPEED_OF_LIGHT_MPS,
@@ -67,10 +68,12 @@ def simulate_capture(
     """
     sensor = sensor or VirtualSensor()
     scene = MeshScene(mesh, config, sensor, visibility)
+    times_s = scene.frame_times_s()
     return capture_scene(
         scene.at,
-        scene.frame_times_s(),
+        times_s,
         config,
+        there=np.array([scene.there(time_s) for time_s in times_s.tolist()]),
         sensor=sensor,
         options=options,
         source=mesh.source,
@@ -83,6 +86,7 @@ def capture_scene(
     times_s: NDArray[np.float64],
     config: RadarConfig,
     *,
+    there: NDArray[np.bool_] | None = None,
     sensor: VirtualSensor | None = None,
     options: SignalOptions | None = None,
     source: str = "",
@@ -96,6 +100,8 @@ def capture_scene(
         Time in seconds → :class:`~sd2core.fmcw.scene.Scatterers`.
     times_s : float64 array, shape (frames,)
         Middle of every frame's burst of chirps, increasing.
+    there : bool array, shape (frames,), optional
+        False where there is no person; the signal-to-noise ratio is that of the others.
 
     Other parameters and the result are those of :func:`simulate_capture`.
     """
@@ -107,13 +113,21 @@ def capture_scene(
     for frame, time_s in enumerate(times_s):
         progress(frame, frames)
         signal[frame] = echo(scatterers_at(float(time_s)), config, sensor)
-    power = float(np.mean(signal**2))
+    there = np.ones(frames, bool) if there is None else there
+    power = float(np.mean(signal[there] ** 2)) if there.any() else 0.0
     signal += _static(options, config, sensor)
     samples = np.empty(shape, np.uint16)
     levels = digitise(signal, float(np.abs(signal).max()), power, config, options, samples)
     progress(frames, frames)
     return simulated_capture(
-        samples, config, times_s, source, sensor=sensor, options=options, levels=levels
+        samples,
+        config,
+        times_s,
+        source,
+        sensor=sensor,
+        options=options,
+        levels=levels,
+        nobody=runs(~there),
     )
 
 

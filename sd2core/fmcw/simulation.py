@@ -21,6 +21,7 @@ from sd2core.fmcw.options import SignalOptions, WaveOptions
 from sd2core.fmcw.wave import WaveScene
 from sd2core.io.radar.capture import RadarCapture
 from sd2core.mesh import MeshSequence
+from sd2core.presence import runs
 from sd2core.progress import Cancelled, Progress, silent
 from sd2core.sensor import RadarConfig, VirtualSensor
 
@@ -84,10 +85,12 @@ def simulate_radar(
     # The gain is known when the last frame is. Single precision rounds the strongest sample
     # by a 2^9th of a count of 16 bits.
     signal = store(shape, np.float32, memory_bytes)
+    there = np.array([scene.scene.there(time_s) for time_s in times_s.tolist()])
     power, peak = _fill(scene, times_s, scene.static(options.reflectors), signal, progress)
     samples = store(shape, np.uint16, memory_bytes)
+    mean_power = float(power[there].mean()) if there.any() else 0.0
     levels = digitise(
-        signal, peak, power, config, options, samples, lambda: progress(frames, frames)
+        signal, peak, mean_power, config, options, samples, lambda: progress(frames, frames)
     )
     progress(frames, frames)
     return simulated_capture(
@@ -102,6 +105,7 @@ def simulate_radar(
             "visibility": "facing" if isinstance(visibility, str) else "exact",
             "wave": asdict(wave),
         },
+        nobody=runs(~there),
     )
 
 
@@ -111,10 +115,10 @@ def _fill(
     static: NDArray[np.float64],
     signal: NDArray[np.float32],
     progress: Progress,
-) -> tuple[float, float]:
-    """Beat signals of all frames, each on a thread of its own; mean square and peak.
+) -> tuple[NDArray[np.float64], float]:
+    """Beat signals of all frames, each on a thread of its own; mean squares and peak.
 
-    The mean square is that without what stands still.
+    The mean square of a frame is that without what stands still.
     """
     frames = len(times_s)
     power, peak = np.empty(frames), np.empty(frames)
@@ -153,4 +157,4 @@ def _fill(
             future.cancel()
         wait(running)
         raise
-    return float(power.mean()), float(peak.max())
+    return power, float(peak.max())

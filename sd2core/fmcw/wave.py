@@ -63,13 +63,23 @@ class WaveScene:
             self._random = np.exp(2j * np.pi * turns)
 
     def frame(self, time_s: float, go_on: GoOn | None = None) -> NDArray[np.float64]:
-        """Beat signal of the frame around a time, (receivers, chirps, samples)."""
+        """Beat signal of the frame around a time, (receivers, chirps, samples).
+
+        Nothing where there is nobody.
+        """
+        if not self.scene.there(time_s):
+            return self.silence()
         visible = self.scene.visible(time_s)
         rows = [
             self._signal(position, velocity, visible, chirps, go_on)
             for (position, velocity), chirps in self.bursts(time_s)
         ]
         return rows[0] if len(rows) == 1 else np.concatenate(rows, axis=1)
+
+    def silence(self) -> NDArray[np.float64]:
+        """Beat signal of a frame in which nothing echoes."""
+        config = self.config
+        return np.zeros((config.receivers, config.chirps_per_frame, config.samples_per_chirp))
 
     def bursts(self, time_s: float) -> Iterator[tuple[tuple[NDArray[np.float64], ...], int]]:
         """Vertices and their velocity, and for how many chirps of a frame these hold."""
@@ -104,8 +114,7 @@ class WaveScene:
 
     def static(self, reflectors: tuple[Reflector, ...]) -> NDArray[np.float64]:
         """Beat signal of points that stand still, (receivers, chirps, samples)."""
-        config = self.config
-        found = np.zeros((config.receivers, config.chirps_per_frame, config.samples_per_chirp))
+        found = self.silence()
         if reflectors:
             for receiver, pairs in enumerate(self.paths):
                 parts = [self._points(reflectors, out, back) for out, back in pairs]

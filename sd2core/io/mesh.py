@@ -18,7 +18,7 @@ from sd2core.io.mesh_arrays import (
     write_npz,
     write_zarr,
 )
-from sd2core.io.mesh_checks import check_mesh, drop_empty_frames
+from sd2core.io.mesh_checks import check_mesh, mark_empty_frames
 from sd2core.io.mesh_files import SURFACE_SUFFIXES, read_faces, read_mesh_files
 from sd2core.io.mesh_models import read_model_output
 from sd2core.mesh import MeshSequence
@@ -95,7 +95,8 @@ def load_mesh(
     if faces is not None:
         raw.faces = read_faces(Path(faces))
     _as_vertices(raw, source)
-    times_s = drop_empty_frames(raw, _times(raw, frames_per_s, source), source)
+    times_s = _times(raw, frames_per_s, source)
+    mark_empty_frames(raw, source)
     _place(raw, 1.0 if scale is None else scale, distance_m or 0.0)
     check_mesh(raw, times_s, source, check_size=scale is None)
     try:
@@ -103,7 +104,9 @@ def load_mesh(
     except Sd2Error as error:
         raise Sd2Error(f"{source}: {error.found}", error.expected, error.remedy) from error
     notes = tuple(raw.notes)
-    return MeshSequence(raw.vertices, raw.faces, timebase, source, notes, raw.vertex_counts)
+    return MeshSequence(
+        raw.vertices, raw.faces, timebase, source, notes, raw.vertex_counts, raw.present
+    )
 
 
 def save_mesh(mesh: MeshSequence, path: Path | str, progress: Progress = silent) -> None:

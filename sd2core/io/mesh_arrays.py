@@ -22,6 +22,8 @@ FACE_NAMES = ("faces", "triangles")
 TIME_NAMES = ("times_s", "times")
 RATE_NAMES = ("frames_per_s", "fps")
 COUNT_NAMES = ("vertex_counts",)
+PRESENCE_NAMES = ("present",)
+_SMALL_NAMES = FACE_NAMES + TIME_NAMES + RATE_NAMES + COUNT_NAMES + PRESENCE_NAMES
 
 _CHUNK_BYTES = 2 * 2**20
 _LARGEST_CHUNK_BYTES = 64 * 2**20
@@ -38,6 +40,7 @@ class RawMesh:
     frames_per_s: float | None = None
     notes: list[str] = field(default_factory=list)
     vertex_counts: NDArray[np.int64] | None = None  # (V,), how many each stands for
+    present: NDArray[np.bool_] | None = None  # (T,), False without a person
     frame_numbers: NDArray[np.int64] | None = None  # (T,), of the video, when some are missing
 
 
@@ -134,7 +137,7 @@ def read_npz(path: Path) -> RawMesh:
     """Read ``vertices`` and, where present, ``faces``, ``times_s`` and ``fps``."""
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-            wanted = VERTEX_NAMES + FACE_NAMES + TIME_NAMES + RATE_NAMES + COUNT_NAMES
+            wanted = VERTEX_NAMES + _SMALL_NAMES
             arrays = {name: archive[name] for name in archive.files if name in wanted}
             names = list(archive.files)
     except PermissionError as error:
@@ -167,6 +170,7 @@ def named_arrays(arrays: dict[str, Any], names: list[str], source: str) -> RawMe
         times_s=None if times is None else np.asarray(times, dtype=np.float64),
         frames_per_s=None if rate is None else float(np.asarray(rate).reshape(-1)[0]),
         vertex_counts=_first(arrays, COUNT_NAMES),
+        present=_first(arrays, PRESENCE_NAMES),
     )
 
 
@@ -179,8 +183,7 @@ def read_zarr(path: Path) -> RawMesh:
         store = ZipStore(path, mode="r") if path.is_file() else str(path)
         group = zarr.open_group(store, mode="r")
         names = sorted(group.array_keys())
-        wanted = FACE_NAMES + TIME_NAMES + RATE_NAMES + COUNT_NAMES
-        arrays: dict[str, Any] = {name: group[name][...] for name in names if name in wanted}
+        arrays: dict[str, Any] = {name: group[name][...] for name in names if name in _SMALL_NAMES}
         arrays.update({name: group[name] for name in names if name in VERTEX_NAMES})
     except (OSError, ValueError, KeyError, zipfile.BadZipFile, RuntimeError) as error:
         raise Sd2Error(
@@ -213,14 +216,9 @@ def write_npz(mesh: MeshSequence, path: Path, progress: Progress = silent) -> No
             for start in range(0, mesh.frame_count, step):
                 progress(start, mesh.frame_count)
                 member.write(_block(mesh, start, step).astype(dtype, copy=False).tobytes())
-        if mesh.faces is not None:
-            with archive.open(_member("faces"), "w") as member:
-                np.lib.format.write_array(member, mesh.faces, allow_pickle=False)
-        with archive.open(_member("times_s"), "w") as member:
-            np.lib.format.write_array(member, mesh.times_s, allow_pickle=False)
-        if mesh.vertex_counts is not None:
-            with archive.open(_member("vertex_counts"), "w") as member:
-                np.lib.format.write_array(member, mesh.vertex_counts, allow_pickle=False)
+        for name, array in small_arrays(mesh).items():
+            with archive.open(_member(name), "w") as member:
+                np.lib.format.write_array(member, array, allow_pickle=False)
     progress(mesh.frame_count, mesh.frame_count)
 
 
@@ -252,11 +250,8 @@ def write_zarr(mesh: MeshSequence, path: Path, progress: Progress = silent) -> N
             progress(start, mesh.frame_count)
             block = _block(mesh, start, step)
             vertices[start : start + len(block)] = block
-        if mesh.faces is not None and len(mesh.faces):
-            group.create_array("faces", data=np.ascontiguousarray(mesh.faces))
-        group.create_array("times_s", data=np.array(mesh.times_s))
-        if mesh.vertex_counts is not None:
-            group.create_array("vertex_counts", data=mesh.vertex_counts)
+        for name, array in small_arrays(mesh).items():
+            group.create_array(name, data=array)
         if zipped:
             with atomic_write(path) as stream:
                 _zip_folder(folder, stream)
@@ -265,6 +260,17 @@ def write_zarr(mesh: MeshSequence, path: Path, progress: Progress = silent) -> N
     finally:
         shutil.rmtree(workspace, ignore_errors=True)
     progress(mesh.frame_count, mesh.frame_count)
+
+
+def small_arrays(mesh: MeshSequence) -> dict[str, NDArray[Any]]:
+    """Everything of a mesh but its vertices, under the names that files have for it."""
+    arrays: dict[str, NDArray[Any] | None] = {
+        "faces": mesh.faces,
+        "times_s": mesh.times_s,
+        "vertex_counts": mesh.vertex_counts,
+        "present": mesh.present,
+    }
+    return {name: np.array(array) for name, array in arrays.items() if array is not None}
 
 
 def _block(mesh: MeshSequence, start: int, step: int) -> NDArray[Any]:

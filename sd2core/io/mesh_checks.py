@@ -11,6 +11,7 @@ from sd2core.errors import Sd2Error
 from sd2core.io.mesh_arrays import RawMesh, StoredVertices
 from sd2core.mesh import place_in_words
 from sd2core.precision import ROUNDING, SHARE_OF_A_BIN, stored_velocity_error_mps
+from sd2core.presence import checked
 from sd2core.sensor import VelocityAxis
 
 _SAMPLE_FRAMES = 5
@@ -22,28 +23,30 @@ _MIXED_SHARE = 0.01
 _SMPL_VERTICES = 6890
 
 
-def drop_empty_frames(
-    raw: RawMesh, times_s: NDArray[np.float64], source: str
-) -> NDArray[np.float64]:
-    """Leave out frames without a single finite vertex; refuse other gaps.
+def mark_empty_frames(raw: RawMesh, source: str) -> None:
+    """Mark frames without a single finite vertex as frames without a person; refuse other gaps.
 
-    Trackers write such frames where they lost the person. Vertices that stay
-    on disk are not touched here: they are checked as they are read.
-
-    Returns
-    -------
-    float64 array
-        The times of the frames that are left.
+    Trackers write such frames where they lost the person. They hold the last known
+    pose (before the first known one, that). Vertices that stay on disk are not touched
+    here: they are checked as they are read.
     """
+    frames = int(raw.vertices.shape[0])
+    if raw.present is not None:
+        try:
+            raw.present = checked(raw.present, frames)
+        except Sd2Error as error:
+            raise Sd2Error(f"{source}: {error.found}", error.expected) from error
     if isinstance(raw.vertices, StoredVertices):
-        return times_s
+        return
     vertices: NDArray[Any] = np.asarray(raw.vertices)
     finite = np.isfinite(vertices).all(axis=2)  # (T, V)
     whole = finite.all(axis=1)
     if whole.all():
-        return times_s
-    empty = ~finite.any(axis=1)
-    if empty.all():
+        return
+    there = np.ones(frames, bool) if raw.present is None else raw.present
+    # Where the file says that there is nobody, its vertices say nothing.
+    empty = ~finite.any(axis=1) | (~there & ~whole)
+    if not whole.any() and empty.all():
         raise Sd2Error(
             f"{source}: no frame holds a finite vertex (all NaN or infinite)",
             "coordinates in metres",
@@ -57,16 +60,18 @@ def drop_empty_frames(
             f"{source}: vertex {bad[0]} of frame {frame} is at"
             f" {place_in_words(vertices[frame, bad[0]])} ({bad.size:,} vertices of that frame are"
             f" NaN or infinite, {partial.size:,} frames in all)",
-            "finite coordinates in metres; only frames that are wholly NaN can be left out",
+            "finite coordinates in metres; only frames that are wholly NaN can be left empty",
             "Fill those vertices where the file is written",
         )
-    gone = np.flatnonzero(empty)
-    raw.vertices = vertices[~empty]
-    raw.notes.append(
-        f"{gone.size:,} frames hold no body (all NaN), the first is frame {gone[0]}; they are left "
-        "out, and motion runs evenly across the gap."
-    )
-    return times_s[~empty]
+    known = np.maximum.accumulate(np.where(empty, -1, np.arange(frames)))
+    raw.vertices = vertices[np.where(known < 0, np.argmin(empty), known)]
+    unsaid = np.flatnonzero(empty & there)
+    if unsaid.size:
+        raw.notes.append(
+            f"{unsaid.size:,} frames hold no body (all NaN), the first is frame {unsaid[0]}; they"
+            " are taken as frames without a person."
+        )
+    raw.present = there & ~empty
 
 
 def check_mesh(raw: RawMesh, times_s: NDArray[np.float64], source: str, check_size: bool) -> None:

@@ -165,7 +165,9 @@ def measure_waves(
         for run in runs
         for number in range(per_run)
     }
-    trial = WaveTrial(mesh, sensor, options, tuple(sorted(middles)))
+    # Of frames without a person there is nothing to compare.
+    seen = {frame for frame in middles if mesh.presence.measured[frame]} or middles
+    trial = WaveTrial(mesh, sensor, options, tuple(sorted(seen)))
     plans = [
         plan
         for plan in wave_plans()

@@ -56,6 +56,9 @@ def look_at(trial: Trial, progress: Progress = silent) -> SceneFacts:
         before = None
         for frame in range(run.start, run.stop):
             progress(frame - run.start, run.stop - run.start)
+            if not synthesizer.mesh.presence.measured[frame]:
+                before = None
+                continue
             seen = synthesizer.frame(trial.sensor, frame, "none")
             place = np.floor((seen.velocity_mps / axis.v_max_mps + 1) * 0.5 * axis.bins)
             outside = np.abs(seen.velocity_mps) > axis.v_max_mps
@@ -70,8 +73,8 @@ def look_at(trial: Trial, progress: Progress = silent) -> SceneFacts:
             before = seen.velocity_mps
     return SceneFacts(
         still_share=1.0 - float(live.mean()),
-        beyond_share=float(np.mean(beyond)),
-        range_spread=float(np.median(spreads)),
+        beyond_share=float(np.mean(beyond)) if beyond else 0.0,
+        range_spread=float(np.median(spreads)) if spreads else 0.0,
         motion_bins=float(np.mean(changes)) if changes else 0.0,
         empty=not trial.reference(trial.sample.chosen_on).raw.any(),
     )

@@ -23,6 +23,8 @@ _FEWEST_MARGIN = 5
 _SMOOTHING_REACH = 5.0
 _PROBED_VERTICES = 500
 _SHORTEST_RUN = 5
+_FEWEST_STARTS = 2
+"""One to choose on and one to check on."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +85,7 @@ class Sample:
             mesh,
             vertices=np.concatenate(stretches),
             timebase=Timebase(mesh.times_s[self.frames]),
+            present=mesh.presence.there[self.frames],
         )
 
 
@@ -115,7 +118,10 @@ def take_sample(mesh: MeshSequence, options: SynthesisOptions, runs: int = 6) ->
     if frames < 2 * length:
         return _whole(frames)
     starts = np.unique(np.linspace(0, frames - length, _CANDIDATES).astype(int) // every * every)
-    starts = _apart(starts, length)
+    there = mesh.presence.there
+    with_person = [bool(there[start : start + length].all()) for start in starts.tolist()]
+    peopled = _apart(starts[with_person], length)
+    starts = peopled if len(peopled) >= _FEWEST_STARTS else _apart(starts, length)
     speed = np.array([_speed(mesh, int(start) + length // 2) for start in starts])
     order = starts[np.argsort(-speed, kind="stable")]
     # From the liveliest down to those of middling liveliness.
@@ -156,7 +162,9 @@ def _apart(starts: NDArray[np.intp], length: int) -> NDArray[np.intp]:
 
 
 def _speed(mesh: MeshSequence, frame: int) -> float:
-    """Mean squared speed of some vertices, in (m/s)²."""
+    """Mean squared speed of some vertices, in (m/s)²; 0 where there is nobody."""
+    if not mesh.presence.there[frame : frame + 2].all():
+        return 0.0
     two = mesh.read(frame, frame + 2).astype(np.float64)
     refuse_missing(two, frame, mesh.source)
     probed = two[:, :: max(1, mesh.vertex_count // _PROBED_VERTICES)]

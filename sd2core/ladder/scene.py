@@ -22,13 +22,15 @@ _PROCESSORS = Path("/proc/cpuinfo")
 
 
 def clip_fingerprint(mesh: MeshSequence) -> str:
-    """Of a moving mesh: its faces, counts and times, and three of its frames."""
+    """Of a moving mesh: its faces, counts, times and gaps, and three of its frames."""
     digest = hashlib.sha256(repr((mesh.vertex_count, mesh.frame_count)).encode())
     if mesh.faces is not None:
         digest.update(mesh.faces.tobytes())
     if mesh.vertex_counts is not None:
         digest.update(mesh.vertex_counts.tobytes())
     digest.update(np.ascontiguousarray(mesh.times_s).tobytes())
+    if mesh.present is not None:
+        digest.update(mesh.present.tobytes())
     for frame in (0, mesh.frame_count // 2, mesh.frame_count - 1):
         digest.update(np.ascontiguousarray(mesh.frame(frame)).tobytes())
     return digest.hexdigest()[:16]

@@ -230,8 +230,10 @@ class Trial:
         )
 
     def _smoothed(self, raw: NDArray[np.float64], run: Run) -> NDArray[np.float64]:
-        times_s = self._sampled(1.0).times_s[run.start : run.stop]
-        return smooth(raw, times_s, 0, 0, len(times_s), self.options)
+        mesh = self._sampled(1.0)
+        times_s = mesh.times_s[run.start : run.stop]
+        presence = mesh.presence.between(run.start, run.stop)
+        return smooth(raw, times_s, 0, 0, len(times_s), self.options, presence)
 
     def _aside(self) -> VirtualSensor:
         self._tried += 1

@@ -16,7 +16,7 @@ from sd2core.sensor import VirtualSensor
 def facet_visibility(
     mesh: MeshSequence, sensor: VirtualSensor, progress: Progress = silent
 ) -> NDArray[np.bool_]:
-    """Visible facets of every frame, (T, F).
+    """Visible facets of every frame, (T, F); none where there is no person.
 
     Raises
     ------
@@ -29,7 +29,8 @@ def facet_visibility(
     visible = np.zeros((mesh.frame_count, len(faces)), dtype=np.bool_)
 
     def fill(frame: int) -> None:
-        visible[frame] = visible_facets(mesh.frame(frame), faces, sensor.position_m)
+        if mesh.presence.there[frame]:
+            visible[frame] = visible_facets(mesh.frame(frame), faces, sensor.position_m)
 
     for done, _ in enumerate(workers().map(fill, range(mesh.frame_count))):
         progress(done, mesh.frame_count)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
+from sd2core.presence import Presence
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -38,11 +39,15 @@ class Trajectory:
         Sigma of a zero-phase Gaussian; 0 leaves the path alone. A straight line
         is fitted under the Gaussian, so uniform motion stays as it is, up to
         both ends of the recording.
+    presence : Presence, optional
+        Of the frames. Every stretch with a person in it has a path of its own; knots
+        without a person are at the frame before.
     """
 
     frame_times_s: NDArray[np.float64]
     oversampling: int = 1
     smoothing_s: float = 0.0
+    presence: Presence | None = None
 
     def __post_init__(self) -> None:
         if self.oversampling < 1:
@@ -101,13 +106,14 @@ class Trajectory:
     def _weights(self, frames: slice, first_knot: int, last_knot: int) -> csr_array:
         from scipy.sparse import csr_array
 
-        times = self.frame_times_s
         rows = []
         for knot, time_s in enumerate(self.knot_times_s[first_knot:last_knot], first_knot):
+            begin, end = self._stretch(knot)
+            times, frame = self.frame_times_s[begin:end], knot // self.oversampling - begin
             row = line_weights(times, time_s, self.smoothing_s) if self.smoothing_s > 0 else None
             if row is None:
-                row = cubic_weights(times, time_s, knot // self.oversampling)
-            rows.append(row)
+                row = cubic_weights(times, time_s, frame)
+            rows.append((row[0] + begin, row[1]))
         counts = [len(weight) for _, weight in rows]
         columns = np.concatenate([np.arange(len(w)) + start for start, w in rows]) - frames.start
         return csr_array(
@@ -118,6 +124,15 @@ class Trajectory:
             ),
             shape=(len(rows), frames.stop - frames.start),
         )
+
+    def _stretch(self, knot: int) -> tuple[int, int]:
+        """Frames of the path that a knot lies on, half-open."""
+        if self.presence is None or self.presence.whole:
+            return 0, len(self.frame_times_s)
+        frame, between = divmod(knot, self.oversampling)
+        begin, last = int(self.presence.first[frame]), int(self.presence.last[frame])
+        # Past the end of a stretch there is no path.
+        return (frame, frame + 1) if between and frame == last else (begin, last + 1)
 
 
 def line_weights(

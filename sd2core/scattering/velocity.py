@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sd2core.presence import Presence
+
 
 def radial_velocity(
     before: NDArray[Any], after: NDArray[Any], sensor: ArrayLike, duration_s: ArrayLike
@@ -69,13 +71,18 @@ class Stencil:
     duration_s: NDArray[np.float64]
 
 
-def moments(times_s: NDArray[np.float64], centres: NDArray[np.int64], oversampling: int) -> Stencil:
+def moments(
+    times_s: NDArray[np.float64],
+    centres: NDArray[np.int64],
+    oversampling: int,
+    presence: Presence | None = None,
+) -> Stencil:
     """Between which knots the velocities of each frame are measured, on real times.
 
     The moments of a frame are spread evenly and symmetrically around it. An odd
     number are knots, each measured between its neighbours (one-sided at the two
-    ends of the clip); an even number lie midway between two knots, which they
-    are measured between.
+    ends of the clip, and of each stretch with a person in it); an even number lie
+    midway between two knots, which they are measured between.
 
     Parameters
     ----------
@@ -84,19 +91,26 @@ def moments(times_s: NDArray[np.float64], centres: NDArray[np.int64], oversampli
         Knot of each frame.
     oversampling : int
         Knots per frame.
+    presence : Presence, optional
+        Of the frames.
 
     Returns
     -------
     Stencil
-        Of shape (n, oversampling). Where a moment lies outside the clip both
-        knots are its end, with a duration of 0.
+        Of shape (n, oversampling). Where a moment lies outside the clip, or outside the
+        frame's stretch, both knots are its end, with a duration of 0.
     """
     half, odd = oversampling // 2, oversampling % 2
-    end = len(times_s) - 1
+    begin = np.zeros((len(centres), 1), np.int64)
+    end = np.full((len(centres), 1), len(times_s) - 1)
+    if presence is not None and not presence.whole:
+        frames = centres // oversampling
+        begin = (presence.first[frames] * oversampling)[:, None]
+        end = (presence.last[frames] * oversampling)[:, None]
     first = centres[:, None] + np.arange(-half, half + odd)
     last = first + 1 - odd
-    within = (first >= 0) & (last <= end)
-    before = np.clip(np.where(within, first - odd, first), 0, end)
-    after = np.clip(np.where(within, last + odd, last), 0, end)
+    within = (first >= begin) & (last <= end)
+    before = np.clip(np.where(within, first - odd, first), begin, end)
+    after = np.clip(np.where(within, last + odd, last), begin, end)
     duration_s = np.where(within, times_s[after] - times_s[before], 0.0)
     return Stencil(before, after, duration_s)

@@ -61,6 +61,26 @@ class RadarCapture:
         """Number of frames."""
         return int(self.samples.shape[0])
 
+    @property
+    def present(self) -> NDArray[np.bool_] | None:
+        """Of a simulation: False in frames without a person, (frames,); None when not said."""
+        found = self.meta.get("simulation")
+        gaps = found.get("without_person") if self.simulated and isinstance(found, dict) else None
+        if not isinstance(gaps, list):
+            return None
+        present = np.ones(self.frame_count, bool)
+        for gap in gaps:
+            match gap:
+                case [int(start), int(stop)] if 0 <= start < stop <= self.frame_count:
+                    present[start:stop] = False
+                case _:
+                    raise Sd2Error(
+                        f"{self.source}: without_person in meta.json holds {gap!r}",
+                        f"pairs of frames, the first and the one after the last, up to"
+                        f" {self.frame_count}",
+                    )
+        return present
+
     def read(self, start: int, stop: int) -> NDArray[np.float32]:
         """Frames ``start`` to ``stop`` (exclusive) relative to full scale.
 

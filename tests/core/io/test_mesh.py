@@ -13,11 +13,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from sd2core.decimation import decimate
 from sd2core.errors import Sd2Error
 from sd2core.io import mesh_arrays
 from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.mesh import MeshSequence
 from sd2core.progress import Cancelled
+from sd2core.simulate.encode import write_compact_mesh
 from sd2core.timebase import Timebase
 
 SUFFIXES = [".npz", ".zarr", ".zarr.zip"]
@@ -46,6 +48,51 @@ def one_note(mesh: MeshSequence, text: str) -> None:
 
 
 # -- round trips ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_frames_without_a_person_come_back(tmp_path: Path, suffix: str) -> None:
+    vertices, faces = body()
+    present = np.array([True, False, False, True, True, False])
+    mesh = MeshSequence(vertices, faces, Timebase(times(6)), present=present)
+    save_mesh(mesh, tmp_path / f"m{suffix}")
+    read = load_mesh(tmp_path / f"m{suffix}")
+    np.testing.assert_array_equal(read.present, present)
+    # As any other mesh where there is somebody in every frame.
+    save_mesh(MeshSequence(vertices, faces, Timebase(times(6))), tmp_path / f"whole{suffix}")
+    assert load_mesh(tmp_path / f"whole{suffix}").present is None
+
+
+def test_the_compact_form_keeps_everything(tmp_path: Path) -> None:
+    vertices, faces = body()
+    present = np.array([True, False, False, True, True, False])
+    mesh = decimate(MeshSequence(vertices, faces, Timebase(times(6)), present=present), 0.5)
+    write_compact_mesh(mesh, tmp_path / "m.zarr")
+    read = load_mesh(tmp_path / "m.zarr")
+    np.testing.assert_array_equal(read.present, present)
+    np.testing.assert_array_equal(read.vertex_counts, mesh.vertex_counts)
+
+
+def test_what_a_file_says_of_empty_frames_may_be_numbers_but_must_fit(tmp_path: Path) -> None:
+    vertices, faces = body()
+    vertices[1, 3] = np.nan  # where nobody is, vertices say nothing
+    given: dict[str, Any] = {"vertices": vertices, "faces": faces, "times_s": times(6)}
+    path = write(tmp_path / "m.npz", **given, present=np.array([1, 0, 1, 1, 1, 1]))
+    mesh = load_mesh(path)
+    assert mesh.presence.gaps == ((1, 2),)
+    assert mesh.notes == ()
+    np.testing.assert_array_equal(mesh.frame(1), vertices[0])
+    write(path, **given, present=np.ones(5, bool))
+    with pytest.raises(Sd2Error, match=r"m\.npz: present is of type bool and shape \(5,\)"):
+        load_mesh(path)
+
+
+def test_before_the_first_known_pose_stands_that_one(tmp_path: Path) -> None:
+    vertices, faces = body()
+    vertices[:2] = np.nan
+    mesh = load_mesh(write(tmp_path / "m.npz", vertices=vertices, faces=faces, times_s=times(6)))
+    assert mesh.presence.gaps == ((0, 2),)
+    np.testing.assert_array_equal(mesh.read(0, 3), vertices[[2, 2, 2]])
 
 
 @given(
@@ -345,14 +392,16 @@ def test_a_damaged_byte_inside_an_npz_is_noticed(tmp_path: Path) -> None:
         load_mesh(path)
 
 
-def test_frames_without_a_body_are_left_out(tmp_path: Path) -> None:
+def test_frames_without_a_body_are_frames_without_a_person(tmp_path: Path) -> None:
     vertices, faces = body()
     vertices[[2, 3]] = np.nan
     path = write(tmp_path / "m.npz", vertices=vertices, faces=faces, times_s=times(6))
     mesh = load_mesh(path)
     one_note(mesh, "2 frames hold no body.*first is frame 2")
-    np.testing.assert_allclose(mesh.times_s, times(6)[[0, 1, 4, 5]])
-    np.testing.assert_array_equal(mesh.read(0, 4), vertices[[0, 1, 4, 5]])
+    np.testing.assert_allclose(mesh.times_s, times(6))
+    assert mesh.present is not None
+    assert mesh.present.tolist() == [True, True, False, False, True, True]
+    np.testing.assert_array_equal(mesh.read(0, 6), vertices[[0, 1, 1, 1, 4, 5]])
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,9 +12,12 @@ from hypothesis import strategies as st
 from ladder_scenes import ball, steady
 
 from sd2core.doppler import PRESETS
+from sd2core.ladder import choose
 from sd2core.ladder.rungs import MASK_STRIDES
 from sd2core.ladder.sample import KEPT, Sample, take_sample
+from sd2core.ladder.scene import clip_fingerprint
 from sd2core.mesh import MeshSequence
+from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 
 PAPER = PRESETS["paper"]
@@ -76,3 +80,44 @@ def test_the_liveliest_frames_are_among_them() -> None:
 def test_one_frame_is_chosen_and_checked_on() -> None:
     _, sample = sampled(1)
     assert sample.chosen_on == sample.checked_on
+
+
+def test_runs_lie_where_somebody_is_and_keep_the_gaps() -> None:
+    frames = 450
+    mesh = clip(frames)
+    present = np.ones(frames, bool)
+    present[100:300] = False
+    gone = replace(mesh, present=present)
+    sample = take_sample(gone, PAPER)
+    for run in sample.runs:
+        assert present[run.frames.start : run.frames.stop].all()
+    small = sample.of(gone)
+    np.testing.assert_array_equal(small.presence.there, present[sample.frames])
+
+
+def test_a_short_clip_with_a_gap_is_sampled_whole_with_its_gap() -> None:
+    mesh = ball(steady((0.0, 0.0, 3.0), (0.0, 0.0, -1.0)), fineness=2, frames=24)
+    present = np.ones(24, bool)
+    present[7:13] = False
+    gone = replace(mesh, present=present)
+    small = take_sample(gone, PAPER).of(gone)
+    np.testing.assert_array_equal(small.present, present)
+
+
+def test_plans_are_compared_on_clips_with_gaps() -> None:
+    mesh = ball(steady((0.0, 0.0, 3.0), (0.0, 0.0, -1.0)), fineness=2, frames=24)
+    present = np.ones(24, bool)
+    present[7:13] = False
+    choice = choose(replace(mesh, present=present), VirtualSensor(), tolerance=0.05)
+    assert choice.holds
+    assert choice.errors.l1 <= 0.05
+    nobody = choose(replace(mesh, present=present & False), VirtualSensor(), tolerance=0.05)
+    assert nobody.holds
+
+
+def test_another_gap_makes_another_scene() -> None:
+    mesh = clip(20)
+    one, two = np.ones(20, bool), np.ones(20, bool)
+    one[3], two[4] = False, False
+    names = {clip_fingerprint(replace(mesh, present=which)) for which in (None, one, two)}
+    assert len(names) == 3

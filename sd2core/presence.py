@@ -1,0 +1,117 @@
+"""In which frames of a clip there is somebody, and which of them belong together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sd2core.errors import Sd2Error
+
+
+@dataclass(frozen=True, eq=False)
+class Presence:
+    """Frames with a person, in stretches that are parted by frames without.
+
+    What is known of a motion ends where the person does. So every stretch is treated
+    as a clip of its own: no velocity is measured and nothing is smoothed from one to
+    another (docs/decisions/0021).
+
+    Parameters
+    ----------
+    there : bool array, shape (T,)
+        Frames with a person.
+    first, last : int64 array, shape (T,)
+        First and last frame of the stretch that each frame belongs to. A frame without
+        a person stands alone.
+    """
+
+    there: NDArray[np.bool_]
+    first: NDArray[np.int64]
+    last: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, there: ArrayLike | None, frames: int) -> Presence:
+        """Of a mask (frames,); None means everywhere."""
+        mask = np.ones(frames, bool) if there is None else checked(there, frames)
+        numbers = np.arange(frames)
+        # A stretch begins at every frame that does not go on from the one before.
+        begins = np.ones(frames, bool)
+        begins[1:] = ~(mask[1:] & mask[:-1])
+        ends = np.ones(frames, bool)
+        ends[:-1] = begins[1:]
+        first = np.maximum.accumulate(np.where(begins, numbers, 0))
+        last = np.minimum.accumulate(np.where(ends, numbers, frames)[::-1])[::-1]
+        return cls(mask, first, last)
+
+    def __len__(self) -> int:
+        return len(self.there)
+
+    @cached_property
+    def whole(self) -> bool:
+        """Whether the person is there in every frame."""
+        return bool(self.there.all())
+
+    @cached_property
+    def measured(self) -> NDArray[np.bool_]:
+        """Frames whose motion can be known, (T,): with another of their stretch beside them.
+
+        In a clip without gaps all of them, be it one frame long.
+        """
+        return self.there if self.whole else self.there & (self.last > self.first)
+
+    @cached_property
+    def gaps(self) -> tuple[tuple[int, int], ...]:
+        """Half-open runs of frames without a person."""
+        return runs(~self.there)
+
+    def between(self, start: int, stop: int) -> Presence:
+        """Frames ``start`` to ``stop`` as a clip of their own."""
+        return Presence.of(self.there[start:stop], stop - start)
+
+
+def runs(mask: NDArray[np.bool_]) -> tuple[tuple[int, int], ...]:
+    """Half-open runs of frames that are marked."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    return tuple(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def checked(there: ArrayLike, frames: int) -> NDArray[np.bool_]:
+    """A mask as a bool array of its own.
+
+    Raises
+    ------
+    Sd2Error
+        When it has not one truth value (or 0 and 1) per frame.
+    """
+    mask = np.array(there)
+    if mask.shape != (frames,) or not (
+        mask.dtype.kind == "b" or (mask.dtype.kind in "iu" and np.isin(mask, (0, 1)).all())
+    ):
+        raise Sd2Error(
+            f"present is of type {mask.dtype} and shape {mask.shape}",
+            f"{frames} truth values, one per frame",
+        )
+    return mask.astype(np.bool_)
+
+
+def gaps_in_words(
+    gaps: Sequence[tuple[int, int]], times_s: NDArray[np.float64], frame_duration_s: float
+) -> str:
+    """How much is missing: ``34 of 450 frames (1.13 s)``.
+
+    Parameters
+    ----------
+    gaps : sequence of (int, int)
+        Half-open runs of frames.
+    times_s : float64 array, shape (T,)
+    frame_duration_s : float
+        Of the last frame.
+    """
+    ends_s = np.append(times_s, times_s[-1] + frame_duration_s)
+    frames = sum(stop - start for start, stop in gaps)
+    missing_s = sum(float(ends_s[stop] - ends_s[start]) for start, stop in gaps)
+    return f"{frames:,} of {len(times_s):,} frames ({missing_s:.2f} s)"

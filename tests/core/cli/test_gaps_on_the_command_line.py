@@ -1,0 +1,50 @@
+"""Frames without a person, from a mesh file to what ``sd2`` says of its maps."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cli_outcome import Sd2
+
+from sd2core.spectrum import DopplerMap
+
+
+@pytest.fixture
+def holed(plate: Path) -> Path:
+    with np.load(plate) as data:
+        arrays = dict(data)
+    arrays["vertices"][5:8] = np.nan
+    np.savez(plate, **arrays)
+    return plate
+
+
+def test_info_says_where_nobody_is(sd2: Sd2, holed: Path) -> None:
+    assert "in 3 of 12 frames (0.10 s), first at 0.17 s" in sd2("info", holed).out
+    data = json.loads(sd2("info", holed, "--json").out)
+    assert data["frames_without_person"] == 3
+
+
+def test_info_is_silent_where_somebody_is_throughout(sd2: Sd2, plate: Path) -> None:
+    assert "no person" not in sd2("info", plate).out
+    assert json.loads(sd2("info", plate, "--json").out)["frames_without_person"] == 0
+
+
+@pytest.mark.parametrize("model", ["histogram", "fmcw"])
+def test_synth_says_that_those_columns_are_empty(
+    sd2: Sd2, holed: Path, tmp_path: Path, model: str
+) -> None:
+    out = tmp_path / "map.npz"
+    said = sd2("synth", holed, "--out", out, "--model", model)
+    assert (said.code, said.err.count("Traceback")) == (0, 0)
+    assert "Without a person: 3 of " in said.out
+    doppler = DopplerMap.load(out)
+    assert doppler.present is not None
+    absent = np.flatnonzero(~doppler.present)
+    assert ((doppler.times_s[absent] > 4 / 30) & (doppler.times_s[absent] < 8 / 30)).all()
+    power = doppler.values.sum(axis=0)
+    # A radar's noise goes on without anybody.
+    assert power[absent].max() <= (0.0 if model == "histogram" else 0.05 * power.max())
+    assert json.loads(sd2("info", out, "--json").out)["frames_without_person"] == len(absent)
