@@ -5,7 +5,17 @@ from __future__ import annotations
 import argparse
 
 from sd2core import __version__
-from sd2core.cli import fetch_models, importing, info, ladder, radar, simulate, synth, warm_up
+from sd2core.cli import (
+    compare_meshes,
+    fetch_models,
+    importing,
+    info,
+    ladder,
+    radar,
+    simulate,
+    synth,
+    warm_up,
+)
 
 _DESCRIPTION = """\
 SD² Studio turns a video of a person into mmWave-radar Doppler: what a radar
@@ -36,6 +46,17 @@ def build_parser() -> tuple[argparse.ArgumentParser, argparse._SubParsersAction]
     )
     parser.add_argument("--version", action="version", version=f"SD² Studio {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for group in (info, importing, synth, radar, ladder, simulate, warm_up, fetch_models):
+    groups = (
+        info,
+        importing,
+        synth,
+        radar,
+        ladder,
+        compare_meshes,
+        simulate,
+        warm_up,
+        fetch_models,
+    )
+    for group in groups:
         group.add_commands(commands)
     return parser, commands

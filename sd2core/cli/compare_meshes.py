@@ -1,0 +1,177 @@
+"""``sd2 compare-meshes``: meshes of one video side by side."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sd2core.cli.options import add_command, add_json, add_mesh_reading, position
+from sd2core.cli.output import print_json, progress_bar
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    from sd2core.compare.meshes import Comparison
+    from sd2core.mesh import MeshSequence
+
+_PICKLES = {".pkl", ".pickle", ".joblib"}
+_OWN_NAMES = {"mesh.zarr", "mesh.npz"}
+
+
+def add_commands(commands: argparse._SubParsersAction) -> None:
+    """Add ``compare-meshes``."""
+    parser = add_command(
+        commands,
+        "compare-meshes",
+        "compare meshes of one video: joints, velocities along the line of sight, Doppler maps",
+        handler=_compare,
+        description=(
+            "Every mesh is measured against the first (or --reference): mean distance of the\n"
+            "joints, velocity of hands, elbows and torso along the line of sight, jitter, and\n"
+            "the Doppler map that each gives. Any file that `sd2 info` knows as a mesh will do;\n"
+            "one of them at least has to be made by `sd2 fit`, whose joints are known. Joints\n"
+            "of other surfaces follow the vertices nearest to them. Options on how to read a\n"
+            "mesh hold for those that are not made by SD² Studio."
+        ),
+        examples=(
+            "  sd2 compare-meshes fitted.zarr vibe_output.pkl --image-size 640x480\n"
+            "  sd2 compare-meshes truth.zarr ours.zarr wham.pkl --labels truth,ours,WHAM \\\n"
+            "      --figure compared.svg"
+        ),
+    )
+    parser.add_argument(
+        "meshes", type=Path, nargs="+", metavar="MESH", help="two meshes or more, in one frame"
+    )
+    parser.add_argument("--labels", metavar="NAMES", help="what to call them, separated by commas")
+    parser.add_argument(
+        "--reference", metavar="NAME", help="label of the mesh that is right (default: the first)"
+    )
+    parser.add_argument(
+        "--sensor",
+        type=position,
+        metavar="X,Y,Z",
+        help="where the radar is, in metres (default: at the camera)",
+    )
+    parser.add_argument(
+        "--align",
+        choices=("none", "root"),
+        default="none",
+        help=(
+            "measure joint distances where they are (default), or from the pelvis; velocities"
+            " and maps are never aligned"
+        ),
+    )
+    parser.add_argument(
+        "--figure", type=Path, metavar="FILE", help="draw maps and curves (.png, .svg or .pdf)"
+    )
+    add_mesh_reading(parser)
+    add_json(parser)
+
+
+def _compare(options: argparse.Namespace) -> None:
+    from sd2core.cli.reading import check_output
+    from sd2core.compare.figure import SUFFIXES, save_comparison
+    from sd2core.compare.meshes import compare_meshes
+    from sd2core.sensor import VirtualSensor
+
+    if options.figure is not None:
+        suffix = options.figure.suffix.lower()
+        check_output(options.figure, suffix if suffix in SUFFIXES else SUFFIXES[0])
+    labels = _labels(options)
+    reference = 0
+    if options.reference is not None:
+        if options.reference not in labels:
+            raise Sd2Error(f"The reference is {options.reference!r}", f"one of {', '.join(labels)}")
+        reference = labels.index(options.reference)
+    sensor = VirtualSensor() if options.sensor is None else VirtualSensor(options.sensor)
+    meshes = [_load(path, options) for path in options.meshes]
+    with progress_bar("Comparing") as progress:
+        comparison = compare_meshes(
+            meshes,
+            labels,
+            reference=reference,
+            sensor=sensor,
+            alignment=options.align,
+            progress=progress,
+        )
+    if options.figure is not None:
+        save_comparison(comparison, options.figure)
+    if options.json:
+        print_json(comparison.as_dict())
+        return
+    for line in table(comparison):
+        print(line)
+
+
+def table(comparison: Comparison) -> list[str]:
+    """Lines of text: one per mesh, then the notes."""
+    from sd2core.compare.joints import JOINTS
+
+    where = "where they are" if comparison.alignment == "none" else "from the pelvis"
+    place = ", ".join(f"{value:g}" for value in comparison.sensor.position_m)
+    times = comparison.times_s
+    head = ("", "joints", "hands", "elbows", "torso", "jitter", "Doppler")
+    units = ("", "cm", "m/s (r)", "m/s (r)", "m/s (r)", "m/s³", "L1")
+    rows: list[Sequence[str]] = [head, units]
+    for number, one in enumerate(comparison.differences):
+        is_reference = number == comparison.reference
+        cells = [one.label, "reference" if is_reference else f"{100 * one.distance_m.mean():.1f}"]
+        for group in ("hands", "elbows", "torso"):
+            velocity = one.group(one.velocity_rms_mps, group)
+            same = one.group(one.correlation, group)
+            cells.append("" if is_reference else f"{velocity:.3f} ({same:.2f})")
+        cells.append(f"{one.jitter_mps3.mean():.0f}")
+        cells.append("" if is_reference else f"{one.map_l1:.3f}")
+        rows.append(cells)
+    widths = [max(len(row[column]) for row in rows) for column in range(len(head))]
+    lines = [
+        f"{len(times)} common frames, {times[0]:.2f} to {times[-1]:.2f} s; sensor at ({place}) m;"
+        f" {len(JOINTS)} joints compared {where}"
+    ]
+    for row in rows:
+        cells = [
+            cell.ljust(width) if column == 0 else cell.rjust(width)
+            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ]
+        lines.append("  ".join(cells).rstrip())
+    lines += [f"note: {note}" for note in comparison.notes]
+    return lines
+
+
+def _labels(options: argparse.Namespace) -> list[str]:
+    if options.labels is not None:
+        labels = [name.strip() for name in options.labels.split(",")]
+        if len(labels) != len(options.meshes):
+            raise Sd2Error(f"{len(labels)} labels for {len(options.meshes)} meshes", "one for each")
+    else:
+        labels = [
+            path.parent.name if path.name in _OWN_NAMES and path.parent.name else path.stem
+            for path in options.meshes
+        ]
+        labels = [
+            label if labels.count(label) == 1 else str(path)
+            for label, path in zip(labels, options.meshes, strict=True)
+        ]
+    if len(set(labels)) != len(labels) or not all(labels):
+        raise Sd2Error(f"The labels are {', '.join(labels)}", "different ones", "Give --labels")
+    return labels
+
+
+def _load(path: Path, options: argparse.Namespace) -> MeshSequence:
+    """Read one mesh; what is said about reading holds for those that are not ours."""
+    from sd2core.cli.reading import mesh_reading
+    from sd2core.compare.joints import own_resolution
+    from sd2core.io.mesh import load_mesh
+    from sd2core.recording import is_recording, open_recording
+
+    if is_recording(path):
+        return open_recording(path).load_mesh()
+    told: dict[str, Any] = mesh_reading(options).options() | {"faces": options.faces}
+    if path.suffix.lower() in _PICKLES:
+        return load_mesh(path, **told)
+    mesh = load_mesh(path)
+    general = {name: told[name] for name in ("frames_per_s", "scale", "faces") if told.get(name)}
+    if general and own_resolution(mesh) is None:
+        return load_mesh(path, **general)
+    return mesh

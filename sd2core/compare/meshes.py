@@ -1,0 +1,261 @@
+"""Two or more meshes of one video side by side, one of them the reference."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.compare.joints import (
+    GROUPS,
+    JOINTS,
+    JointPatches,
+    carried_over,
+    own_patches,
+    own_resolution,
+    rows_of,
+)
+from sd2core.compare.maps import map_l1, maps_alike
+from sd2core.compare.measures import correlation, jitter, line_of_sight_velocity, rms
+from sd2core.compare.times import at_times, common_times
+from sd2core.errors import Sd2Error
+from sd2core.mesh import MeshSequence
+from sd2core.progress import Progress, silent
+from sd2core.sensor import VirtualSensor
+from sd2core.spectrum import DopplerMap
+
+Floats = NDArray[np.float64]
+Alignment = Literal["none", "root"]
+
+
+@dataclass(frozen=True, eq=False)
+class Difference:
+    """How far one mesh is from the reference.
+
+    Parameters
+    ----------
+    label : str
+    distance_m : float64 array, shape (J,)
+        Mean distance of each joint over time, after the alignment.
+    velocity_rms_mps : float64 array, shape (J,)
+        Of the difference of the velocities along the line of sight.
+    correlation : float64 array, shape (J,)
+        Of those velocities; NaN where one does not change.
+    jitter_mps3 : float64 array, shape (J,)
+        Of this mesh by itself: RMS third difference, see
+        :func:`sd2core.compare.measures.jitter`.
+    map_l1 : float
+        Relative difference of the smoothed Doppler maps.
+    """
+
+    label: str
+    distance_m: Floats
+    velocity_rms_mps: Floats
+    correlation: Floats
+    jitter_mps3: Floats
+    map_l1: float
+
+    def group(self, values: Floats, name: str) -> float:
+        """Mean of one of the arrays over a group of :data:`GROUPS` (RMS of velocities)."""
+        chosen = values[rows_of(GROUPS[name])]
+        return rms(chosen) if values is self.velocity_rms_mps else float(np.mean(chosen))
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """What :func:`compare_meshes` found.
+
+    Parameters
+    ----------
+    labels : tuple of str
+    reference : int
+        Number of the mesh that the others are measured against.
+    times_s : float64 array, shape (T,)
+        Common to all.
+    sensor : VirtualSensor
+    alignment : {"none", "root"}
+        Whether joint distances are those of the places, or of the places from the
+        pelvis. Velocities and maps are never aligned.
+    joints_m : tuple of float64 arrays, shape (T, J, 3)
+        Of every mesh, not aligned.
+    velocity_mps : tuple of float64 arrays, shape (T, J)
+        Along the line of sight, positive when approaching.
+    maps : tuple of DopplerMap
+    differences : tuple of Difference
+        Of every mesh, the reference included.
+    notes : tuple of str
+        What was interpolated, carried over or left out.
+    """
+
+    labels: tuple[str, ...]
+    reference: int
+    times_s: Floats
+    sensor: VirtualSensor
+    alignment: Alignment
+    joints_m: tuple[Floats, ...]
+    velocity_mps: tuple[Floats, ...]
+    maps: tuple[DopplerMap, ...]
+    differences: tuple[Difference, ...]
+    notes: tuple[str, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything but the curves and maps, for JSON."""
+        return {
+            "reference": self.labels[self.reference],
+            "alignment": self.alignment,
+            "sensor_m": list(self.sensor.position_m),
+            "frames": len(self.times_s),
+            "start_s": float(self.times_s[0]),
+            "end_s": float(self.times_s[-1]),
+            "joints": list(JOINTS),
+            "meshes": [
+                {
+                    "label": one.label,
+                    "joint_distance_m": one.distance_m.tolist(),
+                    "velocity_rms_mps": one.velocity_rms_mps.tolist(),
+                    "velocity_correlation": one.correlation.tolist(),
+                    "jitter_mps3": one.jitter_mps3.tolist(),
+                    "map_l1": one.map_l1,
+                }
+                for one in self.differences
+            ],
+            "notes": list(self.notes),
+        }
+
+
+def compare_meshes(
+    meshes: Sequence[MeshSequence],
+    labels: Sequence[str],
+    *,
+    reference: int = 0,
+    sensor: VirtualSensor | None = None,
+    alignment: Alignment = "none",
+    progress: Progress = silent,
+) -> Comparison:
+    """Compare meshes of one person in one video.
+
+    Parameters
+    ----------
+    meshes : sequence of MeshSequence
+        In one camera frame. Of one or more topologies; at least one of them ours,
+        or all of one topology that is not: then there are no joints to compare and
+        an error says so.
+    labels : sequence of str
+        One per mesh.
+    reference : int
+        Which of them the others are measured against.
+    sensor : VirtualSensor, optional
+        By default at the camera.
+    alignment : {"none", "root"}
+        Of joint distances; see :class:`Comparison`.
+    progress : Progress
+        Counts frames of the Doppler maps.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    Sd2Error
+        When they have no time in common, none of them is a surface of ours, or two
+        are too far apart to be of the same person.
+    """
+    if len(meshes) < 2 or len(labels) != len(meshes):
+        raise Sd2Error(f"{len(meshes)} meshes and {len(labels)} labels", "two meshes at least")
+    if not 0 <= reference < len(meshes):
+        raise Sd2Error(f"reference is {reference}", f"0 to {len(meshes) - 1}")
+    sensor = sensor or VirtualSensor()
+    times_s = common_times(meshes, reference)
+    notes: list[str] = []
+    placed = []
+    for mesh, label in zip(meshes, labels, strict=True):
+        moved, interpolated = at_times(mesh, times_s)
+        if interpolated:
+            notes.append(f"{label}: interpolated to the frame times of {labels[reference]}.")
+        elif len(times_s) < mesh.frame_count:
+            notes.append(f"{label}: {len(times_s)} of {mesh.frame_count} frames are compared.")
+        placed.append(moved)
+    patches = _patches(placed, labels, notes)
+    joints = tuple(
+        one.positions(np.asarray(mesh.vertices)) for one, mesh in zip(patches, placed, strict=True)
+    )
+    velocity = tuple(line_of_sight_velocity(one, times_s, sensor.position_m) for one in joints)
+    if len({mesh.vertex_count for mesh in placed}) > 1:
+        notes.append(
+            "The surfaces have different vertices: part of the difference of the maps is where a "
+            "surface is denser, not how it moves."
+        )
+    if any(mesh.faces is None for mesh in placed):
+        notes.append("A mesh has no faces: all vertices count in the maps, hidden ones too.")
+    maps = maps_alike(placed, sensor, progress)
+    differences = tuple(
+        Difference(
+            label,
+            _distances(joints[number], joints[reference], alignment),
+            np.sqrt(((velocity[number] - velocity[reference]) ** 2).mean(axis=0)),
+            np.array(
+                [
+                    correlation(velocity[number][:, joint], velocity[reference][:, joint])
+                    for joint in range(len(JOINTS))
+                ]
+            ),
+            jitter(joints[number], times_s),
+            map_l1(maps[number], maps[reference]),
+        )
+        for number, label in enumerate(labels)
+    )
+    return Comparison(
+        tuple(labels),
+        reference,
+        times_s,
+        sensor,
+        alignment,
+        joints,
+        velocity,
+        maps,
+        differences,
+        tuple(notes),
+    )
+
+
+def _patches(
+    meshes: Sequence[MeshSequence], labels: Sequence[str], notes: list[str]
+) -> list[JointPatches]:
+    """Patches of every mesh: our own, or carried over from the first that is ours."""
+    resolutions = [own_resolution(mesh) for mesh in meshes]
+    ours = next((number for number, one in enumerate(resolutions) if one is not None), None)
+    if ours is None:
+        raise Sd2Error(
+            "None of the meshes is a surface of SD² Studio, so their joints are not known",
+            "one of them at least made by `sd2 fit` from the same video",
+            "Fit the video too, and compare the others with that mesh",
+        )
+    own = resolutions[ours]
+    assert own is not None
+    patches = []
+    for mesh, label, resolution in zip(meshes, labels, resolutions, strict=True):
+        if resolution is not None:
+            patches.append(own_patches(resolution))
+            continue
+        carried = carried_over(
+            own_patches(own), np.asarray(meshes[ours].vertices), np.asarray(mesh.vertices)
+        )
+        notes.append(
+            f"{label}: its {mesh.vertex_count} vertices are not those of a surface of ours; each"
+            f" joint follows the vertices nearest to its patch on {labels[ours]} in frame"
+            f" {carried.frame}, {carried.distance_m * 100:.1f} cm away on average."
+        )
+        patches.append(carried.patches)
+    return patches
+
+
+def _distances(joints_m: Floats, reference_m: Floats, alignment: Alignment) -> Floats:
+    apart = joints_m - reference_m
+    if alignment == "root":
+        (root,) = rows_of(("pelvis",))
+        apart = apart - apart[:, root : root + 1]
+    return np.asarray(np.linalg.norm(apart, axis=-1).mean(axis=0))
