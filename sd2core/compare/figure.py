@@ -77,7 +77,11 @@ def draw_comparison(comparison: Comparison) -> Figure:
                 right = joint.endswith(".R")
                 axes.plot(
                     comparison.times_s,
-                    comparison.velocity_mps[number][:, rows_of((joint,))[0]],
+                    np.where(
+                        comparison.measured,
+                        comparison.velocity_mps[number][:, rows_of((joint,))[0]],
+                        np.nan,
+                    ),
                     color=colour,
                     linewidth=1.3 if number == comparison.reference else 1.0,
                     linestyle="--" if right or joint == "pelvis" else "-",

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sd2core.presence import Presence
 from sd2core.scattering.velocity import moments, radial_velocity
 
 Floats = NDArray[np.float64]
@@ -20,7 +21,10 @@ EDGE_FRAMES = 5
 
 
 def line_of_sight_velocity(
-    positions_m: NDArray[Any], times_s: Floats, sensor_m: ArrayLike = (0.0, 0.0, 0.0)
+    positions_m: NDArray[Any],
+    times_s: Floats,
+    sensor_m: ArrayLike = (0.0, 0.0, 0.0),
+    presence: Presence | None = None,
 ) -> Floats:
     """Velocity towards a sensor.
 
@@ -30,13 +34,15 @@ def line_of_sight_velocity(
         T of 2 at least.
     times_s : float64 array, shape (T,)
     sensor_m : array_like, shape (3,)
+    presence : Presence, optional
+        Nothing is measured from one stretch with a person to another.
 
     Returns
     -------
     float64 array, shape (T, N)
-        m/s, positive when approaching.
+        m/s, positive when approaching; 0 where nothing can be measured.
     """
-    stencil = moments(times_s, np.arange(len(times_s)), 1)
+    stencil = moments(times_s, np.arange(len(times_s)), 1, presence)
     paths = np.ascontiguousarray(np.swapaxes(positions_m, 1, 2), dtype=np.float64)  # (T, 3, N)
     velocity: Floats = radial_velocity(
         paths[stencil.before[:, 0]], paths[stencil.after[:, 0]], sensor_m, stencil.duration_s
@@ -72,13 +78,15 @@ def speed_mps(positions_m: NDArray[Any], times_s: Floats) -> Floats:
     return np.asarray(np.linalg.norm(step, axis=-1) / stencil.duration_s)
 
 
-def jitter(positions_m: NDArray[Any], times_s: Floats) -> Floats:
+def jitter(positions_m: NDArray[Any], times_s: Floats, presence: Presence | None = None) -> Floats:
     """RMS over time of the third difference of the path, per joint.
 
     Parameters
     ----------
     positions_m : float array, shape (T, N, 3)
     times_s : float64 array, shape (T,)
+    presence : Presence, optional
+        No difference reaches from one stretch with a person to another.
 
     Returns
     -------
@@ -86,9 +94,11 @@ def jitter(positions_m: NDArray[Any], times_s: Floats) -> Floats:
         Metres per frame cubed, times the cube of the typical frame rate: m/s³ of
         evenly timed frames. 0 for fewer than four frames.
     """
-    if len(positions_m) < 4:
-        return np.zeros(positions_m.shape[1])
     third = np.diff(positions_m, 3, axis=0) / np.median(np.diff(times_s)) ** 3
+    if presence is not None:
+        third = third[(presence.first[3:] == presence.first[:-3]) & presence.there[3:]]
+    if not len(third):
+        return np.zeros(positions_m.shape[1])
     return np.asarray(np.sqrt((third**2).sum(axis=-1).mean(axis=0)))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -23,6 +23,7 @@ from sd2core.compare.measures import correlation, jitter, line_of_sight_velocity
 from sd2core.compare.times import at_times, common_times
 from sd2core.errors import Sd2Error
 from sd2core.mesh import MeshSequence
+from sd2core.presence import Presence
 from sd2core.progress import Progress, silent
 from sd2core.sensor import VirtualSensor
 from sd2core.spectrum import DopplerMap
@@ -83,6 +84,8 @@ class Comparison:
         Of every mesh, not aligned.
     velocity_mps : tuple of float64 arrays, shape (T, J)
         Along the line of sight, positive when approaching.
+    measured : bool array, shape (T,)
+        Frames that count: those in which every mesh has a person.
     maps : tuple of DopplerMap
     differences : tuple of Difference
         Of every mesh, the reference included.
@@ -97,6 +100,7 @@ class Comparison:
     alignment: Alignment
     joints_m: tuple[Floats, ...]
     velocity_mps: tuple[Floats, ...]
+    measured: NDArray[np.bool_]
     maps: tuple[DopplerMap, ...]
     differences: tuple[Difference, ...]
     notes: tuple[str, ...]
@@ -183,7 +187,24 @@ def compare_meshes(
     joints = tuple(
         one.positions(np.asarray(mesh.vertices)) for one, mesh in zip(patches, placed, strict=True)
     )
-    velocity = tuple(line_of_sight_velocity(one, times_s, sensor.position_m) for one in joints)
+    presence = Presence.of(
+        np.logical_and.reduce([mesh.presence.there for mesh in placed]), len(times_s)
+    )
+    measured = presence.measured
+    if not presence.whole:
+        placed = [replace(mesh, present=presence.there) for mesh in placed]
+        notes.append(
+            f"{int((~measured).sum())} of {len(times_s)} frames are left out: not every mesh has a"
+            " person there."
+        )
+    if measured.sum() < 2:
+        raise Sd2Error(
+            "The meshes have no two neighbouring frames in common with a person in all of them",
+            "meshes of the same person",
+        )
+    velocity = tuple(
+        line_of_sight_velocity(one, times_s, sensor.position_m, presence) for one in joints
+    )
     if len({mesh.vertex_count for mesh in placed}) > 1:
         notes.append(
             "The surfaces have different vertices: part of the difference of the maps is where a "
@@ -195,15 +216,17 @@ def compare_meshes(
     differences = tuple(
         Difference(
             label,
-            _distances(joints[number], joints[reference], alignment),
-            np.sqrt(((velocity[number] - velocity[reference]) ** 2).mean(axis=0)),
+            _distances(joints[number][measured], joints[reference][measured], alignment),
+            np.sqrt(((velocity[number] - velocity[reference])[measured] ** 2).mean(axis=0)),
             np.array(
                 [
-                    correlation(velocity[number][:, joint], velocity[reference][:, joint])
+                    correlation(
+                        velocity[number][measured, joint], velocity[reference][measured, joint]
+                    )
                     for joint in range(len(JOINTS))
                 ]
             ),
-            jitter(joints[number], times_s),
+            jitter(joints[number], times_s, presence),
             map_l1(maps[number], maps[reference]),
         )
         for number, label in enumerate(labels)
@@ -216,6 +239,7 @@ def compare_meshes(
         alignment,
         joints,
         velocity,
+        measured,
         maps,
         differences,
         tuple(notes),

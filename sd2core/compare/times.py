@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,25 +55,37 @@ def at_times(mesh: MeshSequence, times_s: NDArray[np.float64]) -> tuple[MeshSequ
     bool
         Whether anything was interpolated: by the cubic through two frames with
         the tangents of their neighbours.
+
+    Notes
+    -----
+    The vertices of frames without a person mean nothing, nor do those interpolated
+    next to them; the mesh that is returned says which these are.
     """
     own = mesh.times_s
     nearest = np.abs(own[:, None] - times_s[None, :]).argmin(axis=0)
     if np.abs(own[nearest] - times_s).max() <= _SAME_S:
         start, stop = int(nearest[0]), int(nearest[-1]) + 1
         vertices = mesh.read(start, stop)[nearest - start]
-        return _replaced(mesh, vertices, times_s), False
+        there = None if mesh.present is None else mesh.present[nearest]
+        return _replaced(mesh, vertices, times_s, there), False
     frames = np.clip(np.searchsorted(own, times_s, side="right") - 1, 0, len(own) - 2)
+    # Between two frames there is a person where both of them have one.
+    there = mesh.presence.there[frames] & mesh.presence.there[frames + 1]
     vertices = np.empty((len(times_s), mesh.vertex_count, 3), np.float64)
     for row, (time_s, frame) in enumerate(zip(times_s, frames, strict=True)):
-        first, weights = cubic_weights(own, float(np.clip(time_s, own[0], own[-1])), int(frame))
-        stretch = mesh.read(first, first + len(weights)).astype(np.float64)
+        # Only frames of the same stretch: past its end a person is somewhere else.
+        begin, end = int(mesh.presence.first[frame]), int(mesh.presence.last[frame]) + 1
+        inside = float(np.clip(time_s, own[begin], own[end - 1]))
+        first, weights = cubic_weights(own[begin:end], inside, int(frame) - begin)
+        stretch = mesh.read(begin + first, begin + first + len(weights)).astype(np.float64)
         vertices[row] = np.tensordot(weights, stretch, 1)
-    return _replaced(mesh, vertices, times_s), True
+    return _replaced(mesh, vertices, times_s, there), True
 
 
 def _replaced(
-    mesh: MeshSequence, vertices: NDArray[np.floating], times_s: NDArray[np.float64]
+    mesh: MeshSequence,
+    vertices: NDArray[np.floating],
+    times_s: NDArray[np.float64],
+    present: NDArray[np.bool_] | None,
 ) -> MeshSequence:
-    return MeshSequence(
-        vertices, mesh.faces, Timebase(times_s), mesh.source, mesh.notes, mesh.vertex_counts
-    )
+    return replace(mesh, vertices=vertices, timebase=Timebase(times_s), present=present)

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -106,6 +107,24 @@ def test_only_common_times_are_compared(mesh: MeshSequence) -> None:
     assert found.notes == ("a: 18 of 24 frames are compared.",)
     with pytest.raises(Sd2Error, match="0 frames in common"):
         common_times([mesh, MeshSequence(mesh.vertices, mesh.faces, Timebase(TIMES + 9.0))])
+
+
+def test_frames_without_a_person_do_not_count(mesh: MeshSequence) -> None:
+    vertices = np.asarray(mesh.vertices).copy()
+    vertices[10:14] = vertices[9]
+    vertices[14:] += np.array([0.0, 0.0, 0.5])  # the person came back elsewhere
+    there = np.ones(len(TIMES), bool)
+    there[10:14] = False
+    gap = replace(mesh, vertices=vertices, present=there)
+    found = compare_meshes([mesh, gap], ["a", "b"], alignment="root")
+    assert (found.measured == there).all()
+    assert found.differences[1].distance_m.max() < 1e-9
+    # Seen from half a metre further off, nothing else.
+    assert found.differences[1].velocity_rms_mps.max() < 0.1
+    assert np.abs(found.maps[0].values[:, 11:13]).max() == 0.0
+    assert any("4 of 24 frames are left out" in note for note in found.notes)
+    moved, _ = at_times(gap, np.array([0.1, 0.3167, 0.40, 0.45, 0.5]))
+    assert moved.presence.there.tolist() == [True, False, False, False, True]
 
 
 def test_frames_at_the_same_times_are_not_touched(mesh: MeshSequence) -> None:
