@@ -103,6 +103,7 @@ def decimate(mesh: MeshSequence, kept: float, *, frame: int | None = None) -> Me
         vertices=_Columns(mesh.vertices, columns),
         faces=faces,
         vertex_counts=counts,
+        uncertainty=None if mesh.uncertainty is None else mesh.uncertainty.of_vertices(columns),
         source=f"{mesh.source}, {done}" if mesh.source else done,
         notes=(*mesh.notes, done),
     )

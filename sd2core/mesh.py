@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.presence import Presence, checked
 from sd2core.timebase import Timebase
+from sd2core.uncertainty import VelocityUncertainty
 
 
 class VertexArray(Protocol):
@@ -51,6 +52,8 @@ class MeshSequence:
     present : bool array, shape (T,), optional
         False where there is no person. Vertices hold the last known pose there, which
         nothing may be concluded from. None: there is one in every frame.
+    uncertainty : VelocityUncertainty, optional
+        How well velocities are known; None: nothing is said of it.
     """
 
     vertices: VertexArray
@@ -60,6 +63,7 @@ class MeshSequence:
     notes: tuple[str, ...] = ()
     vertex_counts: NDArray[np.int64] | None = None
     present: NDArray[np.bool_] | None = None
+    uncertainty: VelocityUncertainty | None = None
 
     def __post_init__(self) -> None:
         shape = tuple(self.vertices.shape)
@@ -86,6 +90,14 @@ class MeshSequence:
             present = checked(self.present, shape[0])
             # Someone everywhere is said in one way only.
             object.__setattr__(self, "present", None if present.all() else present)
+        if (known := self.uncertainty) is not None:
+            given = known.frame_count, len(known.vertex_limb)
+            if given != shape[:2]:
+                raise Sd2Error(
+                    f"{self.source or 'The mesh'}: its uncertainty is of {given[0]} frames and"
+                    f" {given[1]} vertices",
+                    f"those of the mesh, {shape[0]} and {shape[1]}",
+                )
         if self.faces is not None and not np.size(self.faces):
             object.__setattr__(self, "faces", None)
         if self.faces is None:

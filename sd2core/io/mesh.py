@@ -18,7 +18,7 @@ from sd2core.io.mesh_arrays import (
     write_npz,
     write_zarr,
 )
-from sd2core.io.mesh_checks import check_mesh, mark_empty_frames
+from sd2core.io.mesh_checks import check_mesh, mark_empty_frames, uncertainty_of
 from sd2core.io.mesh_files import SURFACE_SUFFIXES, read_faces, read_mesh_files
 from sd2core.io.mesh_models import read_model_output
 from sd2core.mesh import MeshSequence
@@ -103,9 +103,19 @@ def load_mesh(
         timebase = Timebase(times_s)
     except Sd2Error as error:
         raise Sd2Error(f"{source}: {error.found}", error.expected, error.remedy) from error
+    known = uncertainty_of(raw, source)
+    if known is not None:
+        known = known.times(_velocity_factor(raw.times_s, times_s, scale))
     notes = tuple(raw.notes)
     return MeshSequence(
-        raw.vertices, raw.faces, timebase, source, notes, raw.vertex_counts, raw.present
+        raw.vertices,
+        raw.faces,
+        timebase,
+        source,
+        notes,
+        raw.vertex_counts,
+        raw.present,
+        known,
     )
 
 
@@ -199,6 +209,15 @@ def _place(raw: RawMesh, scale: float, distance_m: float) -> None:
     if distance_m:
         vertices = vertices + shift_m.astype(vertices.dtype)
     raw.vertices = vertices
+
+
+def _velocity_factor(
+    given_s: NDArray[np.float64] | None, times_s: NDArray[np.float64], scale: float | None
+) -> float:
+    """How much faster everything is than the file has it."""
+    factor = 1.0 if scale is None else scale
+    step_s = 0.0 if given_s is None or len(times_s) < 2 else float(np.median(np.diff(given_s)))
+    return factor * step_s / float(np.median(np.diff(times_s))) if step_s > 0 else factor
 
 
 def _times(raw: RawMesh, frames_per_s: float | None, source: str) -> NDArray[np.float64]:

@@ -23,7 +23,21 @@ TIME_NAMES = ("times_s", "times")
 RATE_NAMES = ("frames_per_s", "fps")
 COUNT_NAMES = ("vertex_counts",)
 PRESENCE_NAMES = ("present",)
-_SMALL_NAMES = FACE_NAMES + TIME_NAMES + RATE_NAMES + COUNT_NAMES + PRESENCE_NAMES
+LIMB_NAMES = ("limbs",)
+UNCERTAINTY_NAMES = (
+    "vertex_limb",
+    "limb_velocity_sigma_mps",
+    "limb_velocity_sigma_across_mps",
+)
+_SMALL_NAMES = (
+    FACE_NAMES
+    + TIME_NAMES
+    + RATE_NAMES
+    + COUNT_NAMES
+    + PRESENCE_NAMES
+    + LIMB_NAMES
+    + UNCERTAINTY_NAMES
+)
 
 _CHUNK_BYTES = 2 * 2**20
 _LARGEST_CHUNK_BYTES = 64 * 2**20
@@ -41,6 +55,8 @@ class RawMesh:
     notes: list[str] = field(default_factory=list)
     vertex_counts: NDArray[np.int64] | None = None  # (V,), how many each stands for
     present: NDArray[np.bool_] | None = None  # (T,), False without a person
+    limbs: tuple[str, ...] = ()  # names, in the order in which arrays number them
+    uncertainty: tuple[NDArray[Any], ...] | None = None  # as UNCERTAINTY_NAMES has them
     frame_numbers: NDArray[np.int64] | None = None  # (T,), of the video, when some are missing
 
 
@@ -164,6 +180,13 @@ def named_arrays(arrays: dict[str, Any], names: list[str], source: str) -> RawMe
         )
     times = _first(arrays, TIME_NAMES)
     rate = _first(arrays, RATE_NAMES)
+    held = [name for name in UNCERTAINTY_NAMES if name in arrays]
+    if held and len(held) < len(UNCERTAINTY_NAMES):
+        raise Sd2Error(
+            f"{source} holds {' and '.join(held)}",
+            f"{', '.join(UNCERTAINTY_NAMES)}: all of them, or none",
+        )
+    limbs = _first(arrays, LIMB_NAMES)
     return RawMesh(
         vertices=vertices,
         faces=_first(arrays, FACE_NAMES),
@@ -171,6 +194,8 @@ def named_arrays(arrays: dict[str, Any], names: list[str], source: str) -> RawMe
         frames_per_s=None if rate is None else float(np.asarray(rate).reshape(-1)[0]),
         vertex_counts=_first(arrays, COUNT_NAMES),
         present=_first(arrays, PRESENCE_NAMES),
+        limbs=() if limbs is None else tuple(map(str, np.atleast_1d(limbs))),
+        uncertainty=tuple(arrays[name] for name in held) if held else None,
     )
 
 
@@ -185,6 +210,8 @@ def read_zarr(path: Path) -> RawMesh:
         names = sorted(group.array_keys())
         arrays: dict[str, Any] = {name: group[name][...] for name in names if name in _SMALL_NAMES}
         arrays.update({name: group[name] for name in names if name in VERTEX_NAMES})
+        if "limbs" in group.attrs:
+            arrays["limbs"] = group.attrs["limbs"]
     except (OSError, ValueError, KeyError, zipfile.BadZipFile, RuntimeError) as error:
         raise Sd2Error(
             f"{path} cannot be read as a Zarr group ({error})",
@@ -216,7 +243,8 @@ def write_npz(mesh: MeshSequence, path: Path, progress: Progress = silent) -> No
             for start in range(0, mesh.frame_count, step):
                 progress(start, mesh.frame_count)
                 member.write(_block(mesh, start, step).astype(dtype, copy=False).tobytes())
-        for name, array in small_arrays(mesh).items():
+        texts = {} if mesh.uncertainty is None else {"limbs": np.array(mesh.uncertainty.limbs)}
+        for name, array in (small_arrays(mesh) | texts).items():
             with archive.open(_member(name), "w") as member:
                 np.lib.format.write_array(member, array, allow_pickle=False)
     progress(mesh.frame_count, mesh.frame_count)
@@ -250,8 +278,7 @@ def write_zarr(mesh: MeshSequence, path: Path, progress: Progress = silent) -> N
             progress(start, mesh.frame_count)
             block = _block(mesh, start, step)
             vertices[start : start + len(block)] = block
-        for name, array in small_arrays(mesh).items():
-            group.create_array(name, data=array)
+        write_small(mesh, group)
         if zipped:
             with atomic_write(path) as stream:
                 _zip_folder(folder, stream)
@@ -263,14 +290,25 @@ def write_zarr(mesh: MeshSequence, path: Path, progress: Progress = silent) -> N
 
 
 def small_arrays(mesh: MeshSequence) -> dict[str, NDArray[Any]]:
-    """Everything of a mesh but its vertices, under the names that files have for it."""
+    """The numbers of a mesh but its vertices, under the names that files have for them."""
     arrays: dict[str, NDArray[Any] | None] = {
         "faces": mesh.faces,
         "times_s": mesh.times_s,
         "vertex_counts": mesh.vertex_counts,
         "present": mesh.present,
     }
+    if (known := mesh.uncertainty) is not None:
+        values = (known.vertex_limb, known.along_mps, known.across_mps)
+        arrays |= dict(zip(UNCERTAINTY_NAMES, values, strict=True))
     return {name: np.array(array) for name, array in arrays.items() if array is not None}
+
+
+def write_small(mesh: MeshSequence, group: Any) -> None:
+    """Write everything of a mesh but its vertices into a Zarr group."""
+    for name, array in small_arrays(mesh).items():
+        group.create_array(name, data=array)
+    if mesh.uncertainty is not None:
+        group.attrs["limbs"] = list(mesh.uncertainty.limbs)
 
 
 def _block(mesh: MeshSequence, start: int, step: int) -> NDArray[Any]:

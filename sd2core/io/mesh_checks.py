@@ -13,6 +13,7 @@ from sd2core.mesh import place_in_words
 from sd2core.precision import ROUNDING, SHARE_OF_A_BIN, stored_velocity_error_mps
 from sd2core.presence import checked
 from sd2core.sensor import VelocityAxis
+from sd2core.uncertainty import VelocityUncertainty
 
 _SAMPLE_FRAMES = 5
 _LARGEST_BODY_M = 10.0
@@ -72,6 +73,18 @@ def mark_empty_frames(raw: RawMesh, source: str) -> None:
             " are taken as frames without a person."
         )
     raw.present = there & ~empty
+
+
+def uncertainty_of(raw: RawMesh, source: str) -> VelocityUncertainty | None:
+    """What the file says of how well velocities are known."""
+    if raw.uncertainty is None:
+        return None
+    vertex_limb, along, across = raw.uncertainty
+    limbs = raw.limbs or tuple(f"limb {number}" for number in range(np.shape(along)[-1]))
+    try:
+        return VelocityUncertainty(limbs, vertex_limb, along, across)
+    except Sd2Error as error:
+        raise Sd2Error(f"{source}: {error.found}", error.expected) from error
 
 
 def check_mesh(raw: RawMesh, times_s: NDArray[np.float64], source: str, check_size: bool) -> None:

@@ -86,6 +86,9 @@ class Sample:
             vertices=np.concatenate(stretches),
             timebase=Timebase(mesh.times_s[self.frames]),
             present=mesh.presence.there[self.frames],
+            uncertainty=None
+            if mesh.uncertainty is None
+            else mesh.uncertainty.of_frames(self.frames),
         )
 
 

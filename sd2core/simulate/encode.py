@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.io.mesh_arrays import small_arrays
+from sd2core.io.mesh_arrays import write_small
 from sd2core.mesh import MeshSequence
 
 _CHUNK_FRAMES = 150
@@ -91,5 +91,4 @@ def write_compact_mesh(mesh: MeshSequence, path: Path) -> None:
     for start in range(0, mesh.frame_count, _CHUNK_FRAMES):
         stop = min(start + _CHUNK_FRAMES, mesh.frame_count)
         stored[start:stop] = mesh.read(start, stop)
-    for name, array in small_arrays(mesh).items():
-        group.create_array(name, data=array)
+    write_small(mesh, group)
