@@ -63,6 +63,11 @@ class ActionSet:
             self._actions["play"].setText("Pause" if playing else "Play")
             self._set_icon("play", "pause" if playing else "play")
 
+    def refresh_one(self, name: str) -> None:
+        """Follow the models with one action, which changes with every frame."""
+        row = next(row for row in ACTIONS if row.id == name)
+        self._actions[name].setEnabled(row.enabled(self._context))
+
     def restyle(self) -> None:
         """Draw the icons in the colour of the theme."""
         for row in ACTIONS:

@@ -40,11 +40,12 @@ class FrameReader:
         self._torso: tuple[int, Vector] | None = None
 
     def index(self) -> int | None:
-        """Frame of the mesh on screen."""
+        """Frame of the mesh on screen, None where there is no person."""
         mesh, time_s = self._document.mesh, self._playback.time_s
         if mesh is None or not mesh.timebase.covers(time_s):
             return None
-        return mesh.timebase.frame_at(time_s)
+        frame = mesh.timebase.frame_at(time_s)
+        return frame if mesh.presence.there[frame] else None
 
     def torso_m(self) -> Vector | None:
         """Median vertex: inside the torso whatever the limbs do."""

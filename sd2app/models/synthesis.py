@@ -364,6 +364,7 @@ class SynthesisModel(QObject):
             kind="synthetic",
             unit=self._unit,
             null_bins=options.null_bins,
+            present=mesh.presence.measured,
         )
 
     def _say_quality(self) -> None:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.models.display import HeatmapLevels
+from sd2core.presence import runs
 from sd2core.spectrum import DopplerMap
 
 
@@ -69,6 +70,16 @@ class TrackModel(QObject):
     def status(self) -> str:
         """A few words on what the map is worth, e.g. ``exact``."""
         return self._status
+
+    @property
+    def gaps_s(self) -> tuple[tuple[float, float], ...]:
+        """Stretches without a person, half-open on the recording's clock."""
+        if self._map is None or self._map.present is None:
+            return ()
+        ends_s = np.append(self._map.times_s, self._map.timebase.end_s) + self._offset_s
+        return tuple(
+            (float(ends_s[start]), float(ends_s[stop])) for start, stop in runs(~self._map.present)
+        )
 
     @property
     def strongest_db(self) -> float:
@@ -133,7 +144,9 @@ class TrackModel(QObject):
             return None
         value = self._map.values[index, frame]
         note = ""
-        if index in self._map.null_bins:
+        if self._map.present is not None and not self._map.present[frame]:
+            note = "no person"
+        elif index in self._map.null_bins:
             note = "nulled bin"
         elif index in self._map.unseen_bins:
             note = "beyond the radar's v_max"

@@ -116,6 +116,7 @@ class HeatmapView(MapWidget):
         plot = self.plot_rect()
         self.paint_map(painter, plot, self._span.start_s, self._span.end_s)
         self._paint_marked_bins(painter, plot)
+        self.paint_gaps(painter, plot, self.scale)
         self._paint_axis(painter, plot)
         self._paint_cursors(painter, plot)
 
@@ -146,10 +147,13 @@ class HeatmapView(MapWidget):
     def _status(self) -> str:
         """What the map is worth, and why nothing shows where nothing shows."""
         strongest_db, lowest_db = self._track.strongest_db, self._display.levels.low_db
-        if self._track.covered is not None or not -math.inf < strongest_db < lowest_db:
-            return self._track.status
-        hint = f"strongest bin {strongest_db:.0f} dB, below the scale: R sets 0 dB here"
-        return f"{self._track.status} · {hint}".replace("-", "−")
+        parts = [self._track.status]
+        if gaps_s := self._track.gaps_s:
+            parts.append(f"no person in {sum(end - start for start, end in gaps_s):.2f} s")
+        if self._track.covered is None and -math.inf < strongest_db < lowest_db:
+            level = f"{strongest_db:.0f}".replace("-", "−")
+            parts.append(f"strongest bin {level} dB, below the scale: R sets 0 dB here")
+        return " · ".join(filter(None, parts))
 
     def _paint_marked_bins(self, painter: QPainter, plot: QRectF) -> None:
         doppler_map = self._track.map

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QPointF, QRectF
-from PySide6.QtGui import QColor, QImage, QPainter, QPen, QResizeEvent
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QBrush, QColor, QImage, QPainter, QPen, QResizeEvent
 from PySide6.QtWidgets import QWidget
 
 from sd2app.models.display import DisplayModel
 from sd2app.models.tracks import TrackModel
 from sd2app.views.heatmap_image import heatmap_image
+from sd2app.views.time_axis import TimeScale
+
+_NOBODY = "no person"
 
 
 class MapWidget(QWidget):
@@ -46,6 +49,32 @@ class MapWidget(QWidget):
                 QColor(self._display.palette.well).rgb(),
             )
         painter.drawImage(plot, self._image)
+
+    def paint_gaps(self, painter: QPainter, plot: QRectF, scale: TimeScale) -> None:
+        """Where there was no person nothing was measured: hatched, not the colour of nothing."""
+        colours = self._display.palette
+        painter.save()
+        painter.setClipRect(plot)
+        for start_s, end_s in self._track.gaps_s:
+            left, right = scale.x_of(start_s), scale.x_of(end_s)
+            # The narrowest is still seen.
+            box = QRectF(left, plot.top(), max(right - left, 1.0), plot.height())
+            if not box.intersects(plot):
+                continue
+            painter.fillRect(box, QColor(colours.well))
+            painter.fillRect(box, QBrush(QColor(colours.hatch), Qt.BrushStyle.FDiagPattern))
+            self._name_gap(painter, box & plot)
+        painter.restore()
+
+    def _name_gap(self, painter: QPainter, box: QRectF) -> None:
+        size = painter.fontMetrics().size(Qt.TextFlag.TextSingleLine, _NOBODY)
+        if box.width() < size.width() + 24 or box.height() < 2 * size.height():
+            return
+        label = QRectF(0, 0, size.width() + 12, size.height() + 6)
+        label.moveCenter(box.center())
+        painter.fillRect(label, QColor(self._display.palette.well))
+        painter.setPen(QColor(self._display.palette.muted))
+        painter.drawText(label, Qt.AlignmentFlag.AlignCenter, _NOBODY)
 
 
 def paint_cursor(painter: QPainter, plot: QRectF, x_px: float) -> None:

@@ -13,6 +13,7 @@ from sd2app.models.display import DisplayModel
 from sd2app.models.playback import PlaybackModel
 from sd2app.models.tracks import PointerModel, TrackModel
 from sd2app.views.time_axis import signed_text, ticks
+from sd2core.spectrum import DopplerMap
 
 _LEFT_PX, _TOP_PX, _RIGHT_PX, _BOTTOM_PX = 48, 50, 12, 40
 
@@ -140,7 +141,7 @@ class SpectrumView(QWidget):
         doppler_map = curve.track.map
         assert doppler_map is not None
         frame = curve.track.frame_at(self._playback.time_s)
-        if frame is None:
+        if frame is None or _nobody_in(doppler_map, frame):
             return
         shades = curve.track.shade(doppler_map.values[:, frame], self._display.levels)
         points = QPolygonF()
@@ -165,12 +166,19 @@ class SpectrumView(QWidget):
         x = 8.0
         for curve in shown:
             text = curve.track.title.lower()
+            frame, doppler_map = curve.track.frame_at(self._playback.time_s), curve.track.map
+            if frame is not None and doppler_map is not None and _nobody_in(doppler_map, frame):
+                text += ": no person"
             painter.setPen(QPen(QColor(getattr(self._display.palette, curve.colour)), 2))
             painter.drawLine(QPointF(x, 34), QPointF(x + 13, 34))
             width = painter.fontMetrics().horizontalAdvance(text)
             painter.setPen(QColor(self._display.palette.muted))
             painter.drawText(QRectF(x + 18, 24, width + 2, 20), Qt.AlignmentFlag.AlignVCenter, text)
             x += width + 30
+
+
+def _nobody_in(doppler_map: DopplerMap, frame: int) -> bool:
+    return doppler_map.present is not None and not doppler_map.present[frame]
 
 
 def _y_of(plot: QRectF, velocity_mps: float, v_max_mps: float) -> float:

@@ -183,6 +183,7 @@ class Overview(MapWidget):
         )
         if self._track.map is not None:
             self.paint_map(painter, plot, *self._span.extent_s)
+            self.paint_gaps(painter, plot, scale)
         self._paint_labels(painter, plot, scale)
         left, right = scale.x_of(self._span.start_s), scale.x_of(self._span.end_s)
         veil = QColor(colours.panel)

@@ -103,7 +103,10 @@ class VideoView(QWidget):
         time_s = reader.timebase.time_of(self._video.shown_frame)
         if not mesh.timebase.covers(time_s):
             return picture
-        vertices = mesh.frame(mesh.timebase.frame_at(time_s))
+        frame = mesh.timebase.frame_at(time_s)
+        if not mesh.presence.there[frame]:
+            return picture
+        vertices = mesh.frame(frame)
         style = self._overlay.style
         light = shaded(vertices, None if style.as_dots else mesh.faces, self._document.camera)
         colour = QColor(self._display.palette.overlay).getRgb()[:3]

@@ -256,6 +256,8 @@ class MainWindow(QMainWindow):
             c.trade.measured.changed,
         ):
             signal.connect(self._refresh)
+        # Without a person in the frame there is nothing to aim at.
+        c.synthesis.target_changed.connect(lambda: self._actions.refresh_one("aim_sensor"))
         c.display.theme_changed.connect(self._restyle)
         c.display.theme_changed.connect(self._refresh)
         for track in (c.synthetic, c.real):

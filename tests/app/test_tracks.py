@@ -82,3 +82,13 @@ def test_what_lies_outside_or_is_not_computed_is_left_empty():
     _, filled = shade_columns(track, HeatmapLevels(), 0.0, 2.0, 20)
     assert np.flatnonzero(filled).tolist() == [5, 6, 7, 8, 9]
     assert track.read(1.2, 0.5) is None
+
+
+def test_columns_without_a_person_are_stretches_on_the_recordings_clock():
+    present = np.array([1, 1, 0, 0, 1, 0], bool)
+    track = track_of(np.ones((2, 6)), present=present)
+    track.set_offset(1.0)
+    np.testing.assert_allclose(track.gaps_s, [(1.2, 1.4), (1.5, 1.6)])
+    assert track.read(1.25, 1.0).note == "no person"
+    assert track.read(1.45, 1.0).note == ""
+    assert track_of(np.ones((2, 6))).gaps_s == ()

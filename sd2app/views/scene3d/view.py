@@ -247,10 +247,11 @@ class SceneView(QWidget):
 
     def _fetch(self, mesh: MeshSequence) -> None:
         time_s = self._playback.time_s
-        there = mesh.timebase.covers(time_s)
-        self.scene.show_mesh(there)
-        self.overlay.message = "" if there else "No mesh at this time"
         frame = mesh.timebase.frame_at(time_s)
+        covered, someone = mesh.timebase.covers(time_s), bool(mesh.presence.there[frame])
+        self.scene.show_mesh(covered and someone)
+        why = "No person at this time" if covered else "No mesh at this time"
+        self.overlay.message = "" if covered and someone else why
         if frame != self._frame:
             self._frame = frame
             self.scene.set_vertices(mesh.frame(frame))
