@@ -32,6 +32,7 @@ CLOSE_UP = 0.9
 """The second look at a frame takes a smaller square than the first."""
 
 _DETECTOR_PX = 224
+_FOUND = 0.5
 _STRIDES = (8, 16, 32, 32, 32)
 _ANCHORS_PER_CELL = 2
 _MARGIN = 1.25
@@ -165,24 +166,19 @@ class PoseDetector:
     def __init__(self, path: Path, threads: int = 1) -> None:
         self._network = _Network(path, threads)
 
-    def people(self, picture: Pixels, min_score: float = 0.5) -> list[Detection]:
-        """Everybody in a picture, surest first.
+    def people(self, picture: Pixels) -> list[Detection]:
+        """Everybody in a picture (height, width, 3), RGB; surest first."""
+        return self.look(picture)[0]
 
-        Parameters
-        ----------
-        picture : uint8 array, shape (height, width, 3)
-            RGB.
-        min_score : float
-        """
+    def look(self, picture: Pixels) -> tuple[list[Detection], float]:
+        """Everybody in a picture, and how sure the surest place is of showing a person."""
         height, width = picture.shape[:2]
         size = float(max(width, height))
         whole = Roi(width / 2.0, height / 2.0, size)
         crop = whole.cut(picture, _DETECTOR_PX)
         boxes, logits = self._network.run(crop.astype(np.float32) / np.float32(127.5) - 1)
         scores = _sigmoid(logits[0, :, 0])
-        kept = np.flatnonzero(scores >= min_score)
-        if not kept.size:
-            return []
+        kept = np.flatnonzero(scores >= _FOUND)
         raw = boxes[0, kept].astype(np.float64) / _DETECTOR_PX  # (n, 12)
         places = np.concatenate([raw[:, :2], raw[:, 4:8]], axis=1)
         places += np.tile(self._anchors[kept], 3)
@@ -193,7 +189,7 @@ class PoseDetector:
             # Places are parts of the letterboxed square, whose middle is the picture's.
             middle = (middle - 0.5) * size + np.tile([width / 2.0, height / 2.0], 3)
             found.append(Detection(Roi.around(middle[2:4], middle[4:6]), float(weights[0])))
-        return found
+        return found, float(scores.max())
 
     @cached_property
     def _anchors(self) -> Floats:

@@ -1,0 +1,191 @@
+"""Which of the people in a video is meant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sd2core.body.blazepose import Pixels, PoseDetector, PoseLandmarker, Roi
+from sd2core.errors import Sd2Error
+from sd2core.io.video import VideoReader
+from sd2core.progress import Progress, silent
+
+FOUND = 0.5
+"""Confidence from which on there is a person."""
+
+_SURVEYED = 12
+_STEP_S = 0.5
+_EVERY_FRAME_S = 20.0
+
+
+@dataclass(frozen=True)
+class Rectangle:
+    """Where the user says the person is.
+
+    Parameters
+    ----------
+    x_px, y_px : float
+        Upper left corner, in pixels of the upright picture.
+    width_px, height_px : float
+    frame : int
+        In which frame.
+    """
+
+    x_px: float
+    y_px: float
+    width_px: float
+    height_px: float
+    frame: int = 0
+
+
+@dataclass(frozen=True)
+class Start:
+    """The person in one frame, from which they are followed both ways.
+
+    Parameters
+    ----------
+    frame : int
+    roi : Roi
+    """
+
+    frame: int
+    roi: Roi
+
+
+def choose(
+    video: VideoReader,
+    detector: PoseDetector,
+    landmarker: PoseLandmarker,
+    progress: Progress = silent,
+) -> Start:
+    """The most prominent person: large, near the middle, surely a person.
+
+    Parameters
+    ----------
+    video : VideoReader
+    detector : PoseDetector
+    landmarker : PoseLandmarker
+    progress : callable
+
+    Raises
+    ------
+    Sd2Error
+        When no person is found in the whole video.
+    """
+    best_score = 0.0
+    looked: set[int] = set()
+    for frames in _rounds(video):
+        new = [frame for frame in frames if frame not in looked]
+        looked.update(new)
+        best, best_rank = None, 0.0
+        for number, frame in enumerate(new):
+            progress(number, len(new))
+            picture = video.read(frame)
+            people, score = detector.look(picture)
+            best_score = max(best_score, score)
+            for found in people:
+                rank = found.score * _prominence(found.roi, video.width, video.height)
+                if rank <= best_rank:
+                    continue
+                pose = landmarker.in_picture(picture, found.roi)
+                if pose.confidence >= FOUND:
+                    best, best_rank = Start(frame, pose.next_roi), rank
+        if best is not None:
+            return best
+    raise Sd2Error(
+        f"No person was found in {video.path} (in the best of {len(looked)} frames the model is"
+        f" {100 * best_score:.0f} % sure)",
+        "a video of a person, seen at 50 % or more",
+        "Where there is one, say where: --person X,Y,WIDTH,HEIGHT@FRAME",
+    )
+
+
+def _rounds(video: VideoReader) -> list[list[int]]:
+    """Frames to look at, ever more of them."""
+    frames, duration_s = len(video), float(video.timebase.times_s[-1])
+    few = np.unique(np.linspace(0, frames - 1, min(frames, _SURVEYED)).round().astype(int))
+    step_s = 0.0 if duration_s <= _EVERY_FRAME_S else _STEP_S
+    times = video.timebase.times_s
+    many, last = [], -np.inf
+    for frame in range(frames):
+        if times[frame] - last >= step_s:
+            many.append(frame)
+            last = float(times[frame])
+    return [few.tolist(), many]
+
+
+def _prominence(roi: Roi, width: int, height: int) -> float:
+    off = abs(roi.centre_x_px / width - 0.5)
+    return min(roi.size_px / min(width, height), 2.0) * (1.0 - min(off, 0.8))
+
+
+def chosen_by(
+    rectangle: Rectangle, video: VideoReader, detector: PoseDetector, landmarker: PoseLandmarker
+) -> Start:
+    """The person in a rectangle of one frame.
+
+    Raises
+    ------
+    Sd2Error
+        When there is no such frame, the rectangle is outside the picture, or there is
+        no person in it.
+    """
+    if not 0 <= rectangle.frame < len(video):
+        raise Sd2Error(
+            f"The rectangle is in frame {rectangle.frame}",
+            f"a frame from 0 to {len(video) - 1}",
+        )
+    x, y, w, h = rectangle.x_px, rectangle.y_px, rectangle.width_px, rectangle.height_px
+    inside = w > 0 and h > 0 and x < video.width and y < video.height and x + w > 0 and y + h > 0
+    if not inside:
+        raise Sd2Error(
+            f"The rectangle {x:g},{y:g},{w:g},{h:g} is not in the picture",
+            f"x, y, width and height in pixels of {video.width} × {video.height}",
+        )
+    picture = video.read(rectangle.frame)
+    best = 0.0
+    for roi in _squares(rectangle, picture, detector):
+        pose = landmarker.in_picture(picture, roi)
+        centre = pose.next_roi
+        if pose.confidence >= FOUND and _within(centre, rectangle):
+            return Start(rectangle.frame, pose.next_roi)
+        best = max(best, pose.confidence)
+    raise Sd2Error(
+        f"No person was found in the rectangle of frame {rectangle.frame} (the model is"
+        f" {100 * best:.0f} % sure)",
+        "a rectangle around one person, head to feet",
+        "Draw it in another frame, where the person is seen whole",
+    )
+
+
+def _squares(rectangle: Rectangle, picture: Pixels, detector: PoseDetector) -> list[Roi]:
+    """Where to look for the person: as detected in the picture, in the rectangle, or all of it."""
+    x = rectangle.x_px + rectangle.width_px / 2
+    y = rectangle.y_px + rectangle.height_px / 2
+    size = max(rectangle.width_px, rectangle.height_px)
+    around = Roi(x, y, 1.25 * size)
+    squares = [found.roi for found in detector.people(picture)]
+    # A small person shows only in a part of the picture made larger.
+    part = Roi(x, y, 1.6 * size)
+    detail = 512
+    matrix = part.matrix(detail)
+    for found in detector.people(part.cut(picture, detail)):
+        centre = matrix @ [found.roi.centre_x_px, found.roi.centre_y_px, 1.0]
+        scale = part.size_px / detail
+        squares.append(Roi(centre[0], centre[1], scale * found.roi.size_px, found.roi.angle_rad))
+    squares = [roi for roi in squares if _within(roi, rectangle)]
+    squares.sort(
+        key=lambda roi: (
+            np.hypot(roi.centre_x_px - x, roi.centre_y_px - y) / size
+            + abs(np.log(roi.size_px / around.size_px))
+        )
+    )
+    return [*squares, around]
+
+
+def _within(roi: Roi, rectangle: Rectangle) -> bool:
+    """Whether the hips are in the rectangle, or nearly."""
+    dx = abs(roi.centre_x_px - rectangle.x_px - rectangle.width_px / 2)
+    dy = abs(roi.centre_y_px - rectangle.y_px - rectangle.height_px / 2)
+    return bool(dx < 0.6 * rectangle.width_px and dy < 0.7 * rectangle.height_px)

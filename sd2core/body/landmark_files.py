@@ -1,0 +1,112 @@
+"""Landmarks on disk: a whole track for exchange, and what a stopped search goes on from."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.atomic import atomic_write
+from sd2core.body.track import LandmarkTrack
+from sd2core.errors import Sd2Error
+from sd2core.timebase import Timebase
+
+FORMAT = "sd2-landmarks"
+VERSION = 1
+
+_ARRAYS = (
+    "image_px",
+    "depth_px",
+    "world_m",
+    "visibility",
+    "confidence",
+    "present",
+    "bridged",
+    "silhouette_frames",
+    "silhouettes",
+)
+
+
+def save_track(track: LandmarkTrack, path: Path | str) -> None:
+    """Write landmarks to one file (.npz), in one step."""
+    meta = {
+        "format": FORMAT,
+        "version": VERSION,
+        "width": track.width,
+        "height": track.height,
+        "notes": list(track.notes),
+    }
+    arrays = {name: getattr(track, name) for name in _ARRAYS}
+    write_arrays(Path(path), arrays | {"times_s": track.timebase.times_s}, meta)
+
+
+def load_track(path: Path | str) -> LandmarkTrack:
+    """Read what :func:`save_track` wrote.
+
+    Raises
+    ------
+    Sd2Error
+        When it is missing, damaged, something else, or of a later version.
+    """
+    path = Path(path)
+    arrays, meta = read_arrays(path)
+    if meta.get("format") != FORMAT or not 1 <= meta.get("version", 0) <= VERSION:
+        raise Sd2Error(
+            f"{path} is of format {meta.get('format')!r} version {meta.get('version')}",
+            f"{FORMAT!r} up to version {VERSION}",
+        )
+    try:
+        frames = len(arrays["times_s"])
+        track = LandmarkTrack(
+            timebase=Timebase(arrays["times_s"]),
+            width=int(meta["width"]),
+            height=int(meta["height"]),
+            notes=tuple(str(note) for note in meta["notes"]),
+            **{name: arrays[name] for name in _ARRAYS},
+        )
+        shapes = {name: getattr(track, name).shape for name in _ARRAYS[:7]}
+    except (KeyError, TypeError, ValueError) as error:
+        raise _unreadable(path, error) from error
+    expected: dict[str, tuple[int, ...]]
+    expected = {"image_px": (frames, 33, 2), "world_m": (frames, 33, 3)}
+    expected |= dict.fromkeys(("depth_px", "visibility"), (frames, 33))
+    for name, shape in shapes.items():
+        if shape != expected.get(name, (frames,)):
+            raise _unreadable(path, f"{name} has shape {shape}")
+    return track
+
+
+def write_arrays(
+    path: Path, arrays: Mapping[str, NDArray[Any]], meta: Mapping[str, object]
+) -> None:
+    """Replace a file by arrays and a description, in one step."""
+    with atomic_write(path) as stream:
+        text = json.dumps(meta, ensure_ascii=False)
+        named: dict[str, Any] = {"meta": np.array(text), **arrays}
+        np.savez_compressed(stream, **named)
+
+
+def read_arrays(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+    """Read what :func:`write_arrays` wrote; no pickle is executed."""
+    if not path.is_file():
+        raise Sd2Error(f"{path} does not exist", "a file of landmarks (.npz)")
+    try:
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as data:
+            arrays = {name: data[name] for name in data.files}
+        meta = json.loads(str(arrays.pop("meta")))
+        if not isinstance(meta, dict):
+            raise TypeError("no description")
+    except (OSError, KeyError, ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        raise _unreadable(path, error) from error
+    return arrays, meta
+
+
+def _unreadable(path: Path, why: object) -> Sd2Error:
+    return Sd2Error(
+        f"{path} cannot be read as landmarks ({why})", "a file written by SD² Studio (.npz)"
+    )

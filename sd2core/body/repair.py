@@ -1,0 +1,367 @@
+"""What the landmark model gets wrong, found and mended: swapped sides, outliers, gaps.
+
+Pure functions of arrays. Limits are in seconds and metres, so that they mean the same at
+every frame rate and size of picture.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.body.track import LANDMARKS, MIRRORED
+
+Floats = NDArray[np.float64]
+Singles = NDArray[np.float32]
+
+ARMS = tuple(range(13, 23))
+LEGS = tuple(range(25, 33))
+TRUNK = tuple(number for number in range(33) if number not in ARMS + LEGS)
+_PARTS = {"head and trunk": TRUNK, "the arms": ARMS, "the legs": LEGS}
+_PARTNERS = np.array(MIRRORED)
+
+MAX_ACCELERATION_MPS2 = 250.0
+"""Of any landmark; a swipe of 0.8 m in 0.25 s reaches 74 m/s²."""
+_SPIKE_S = 0.1
+_SCALE_S = 0.5
+_NOISE_M = 0.06
+_SIGMAS = 6.0
+_ROUNDS = 5
+_SWITCH_M = 0.10
+_BRIDGED_VISIBILITY = 0.25
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What was found in each frame; T frames.
+
+    Parameters
+    ----------
+    times_s : float64 array, shape (T,)
+    present : bool array, shape (T,)
+    bridged : bool array, shape (T,)
+    image_px : float32 array, shape (T, 33, 2)
+    depth_px : float32 array, shape (T, 33)
+    world_m : float32 array, shape (T, 33, 3)
+    visibility : float32 array, shape (T, 33)
+        The last four: NaN, or for visibility 0, where nothing was found.
+    """
+
+    times_s: Floats
+    present: NDArray[np.bool_]
+    bridged: NDArray[np.bool_]
+    image_px: Singles
+    depth_px: Singles
+    world_m: Singles
+    visibility: Singles
+
+    def picked(self, order: NDArray[np.intp], frames: NDArray[np.bool_]) -> Found:
+        """The landmarks of some frames in another order (33,)."""
+        changed = {}
+        for name in ("image_px", "depth_px", "world_m", "visibility"):
+            values = getattr(self, name).copy()
+            values[frames] = values[frames][:, order]
+            changed[name] = values
+        return replace(self, **changed)
+
+
+def repaired(found: Found, max_gap_s: float) -> tuple[Found, tuple[str, ...]]:
+    """Everything mended, and sentences about it.
+
+    Parameters
+    ----------
+    found : Found
+    max_gap_s : float
+        The longest gap that is bridged, from the last frame before to the first after.
+    """
+    notes = []
+    found, swaps = unswapped(found)
+    for part, frames in swaps.items():
+        if frames.any():
+            notes.append(f"Left and right of {part} swapped back in {_count(int(frames.sum()))}.")
+    found, replaced = without_outliers(found)
+    if replaced.any():
+        notes.append(
+            "Replaced from the frames around them:"
+            f" {_count(int(replaced.sum()), 'outlying landmark')} in"
+            f" {_count(int(replaced.any(axis=1).sum()))}."
+        )
+    found = bridged(found, max_gap_s)
+    if found.bridged.any():
+        notes.append(
+            f"Interpolated, in gaps of up to {max_gap_s:g} s without the person:"
+            f" {_count(int(found.bridged.sum()))}."
+        )
+    missing = int((~found.present).sum())
+    if missing:
+        notes.append(f"Left empty, without the person: {_count(missing)}.")
+    return found, tuple(notes)
+
+
+def _count(number: int, what: str = "frame") -> str:
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
+
+
+# -- Left and right ------------------------------------------------------------------------------
+
+
+def unswapped(found: Found) -> tuple[Found, dict[str, NDArray[np.bool_]]]:
+    """Undo swaps of left and right: of head and trunk, of the arms, of the legs, or of all.
+
+    A swap is undone where that makes the motion smoother (the sum of accelerations over
+    the whole clip is the least, by dynamic programming over both sides of each frame);
+    which of the two is right is what most frames say.
+
+    Returns
+    -------
+    Found
+    dict of str to bool array, shape (T,)
+        Per part, the frames that were changed.
+    """
+    swaps: dict[str, NDArray[np.bool_]] = {}
+    rows = np.flatnonzero(found.present)
+    times = found.times_s[rows]
+    for part, members in _PARTS.items():
+        swapped = np.zeros(len(found.times_s), bool)
+        if len(rows) >= 3:
+            scale = metre_px(found)[rows, None]
+            cost = np.zeros((2, 2, 2, len(rows) - 2))
+            for landmark in members:
+                sides = [_place_m(found, rows, scale, each) for each in _pair(landmark)]
+                cost += _bends(times, np.stack(sides))
+            switch = np.abs(np.diff(np.indices((2, 2, 2)), axis=0)).sum(axis=0)  # (a, b, c)
+            cost += 0.5 * len(members) * _SWITCH_M**2 * switch[..., None]
+            swapped[rows] = _smoothest(cost)
+        order = np.arange(len(LANDMARKS))
+        order[list(members)] = _PARTNERS[list(members)]
+        found = found.picked(order, swapped)
+        swaps[part] = swapped
+    return found, swaps
+
+
+def _pair(landmark: int) -> tuple[int, int]:
+    return landmark, MIRRORED[landmark]
+
+
+def _place_m(found: Found, rows: NDArray[np.intp], scale: Floats, landmark: int) -> Floats:
+    """Picture and model's own place of one landmark side by side, in metres, (N, 5)."""
+    picture = found.image_px[rows, landmark] / scale
+    return np.concatenate([picture, found.world_m[rows, landmark]], axis=1, dtype=np.float64)
+
+
+def _bends(times_s: Floats, sides: Floats) -> Floats:
+    """How far the middle of three frames is from the line between the others, squared.
+
+    Parameters
+    ----------
+    times_s : float64 array, shape (N,)
+    sides : float64 array, shape (2, N, d)
+        The landmark, and the one on the other side.
+
+    Returns
+    -------
+    float64 array, shape (2, 2, 2, N - 2)
+        In m², for each choice of side in the three frames.
+    """
+    before, middle, after = times_s[:-2], times_s[1:-1], times_s[2:]
+    share = ((middle - before) / (after - before))[:, None]
+    bends = np.empty((2, 2, 2, len(middle)))
+    for a, b, c in np.ndindex(2, 2, 2):
+        line = (1.0 - share) * sides[a, :-2] + share * sides[c, 2:]
+        # Limited: a jump that no choice of side avoids must not count for more.
+        bends[a, b, c] = np.minimum(np.square(sides[b, 1:-1] - line).sum(axis=1), 0.25)
+    return bends
+
+
+def _smoothest(cost: Floats) -> NDArray[np.bool_]:
+    """The cheapest choices (N,) for costs (2, 2, 2, N - 2) of three in succession."""
+    steps = cost.shape[3]
+    # What most frames say, where motion says nothing.
+    tie = 1e-9
+    total = np.array([[0.0, tie], [tie, 2 * tie]])  # (earlier, later)
+    choice = np.empty((steps, 2, 2), np.int8)
+    for step in range(steps):
+        options = total[:, :, None] + cost[:, :, :, step]  # (a, b, c)
+        choice[step] = options.argmin(axis=0)
+        total = options.min(axis=0)
+        total[:, 1] += tie
+    best = int(total.argmin())
+    states = np.empty(steps + 2, bool)
+    b, c = divmod(best, 2)
+    states[-2:] = b, c
+    for step in range(steps - 1, -1, -1):
+        a = int(choice[step, b, c])
+        states[step] = a
+        b, c = a, b
+    if states.mean() > 0.5:
+        states = ~states
+    return states
+
+
+def metre_px(found: Found) -> Floats:
+    """How many pixels a metre across the person takes, (T,): a median over half a second."""
+    from scipy.ndimage import median_filter
+
+    image, world = (
+        np.sqrt(places.var(axis=1, dtype=np.float64).sum(axis=1))
+        for places in (found.image_px, found.world_m[..., :2])
+    )
+    with np.errstate(invalid="ignore", divide="ignore"):
+        scale = image / world
+    good = np.isfinite(scale) & (scale > 0)
+    middle = float(np.median(scale[good])) if good.any() else 1.0
+    scale[~good] = middle
+    step_s = float(np.median(np.diff(found.times_s))) if len(scale) > 1 else _SCALE_S
+    # One landmark that jumps away makes that frame's picture look larger.
+    window = max(round(_SCALE_S / step_s), 5)
+    return np.asarray(median_filter(scale, size=window, mode="nearest"))
+
+
+# -- Outliers ------------------------------------------------------------------------------------
+
+
+def without_outliers(found: Found) -> tuple[Found, NDArray[np.bool_]]:
+    """Replace landmarks that jump away and back within a tenth of a second.
+
+    A run of frames is replaced by the cubic through two frames before and after it
+    where every frame of it is farther from that curve, and from the line between the two
+    nearest, than any limb can get and return
+    (:data:`MAX_ACCELERATION_MPS2`), than six standard deviations of the noise, and than
+    the way from the frame before to the frame after.
+
+    Returns
+    -------
+    Found
+    bool array, shape (T, 33)
+        What was replaced.
+    """
+    replaced = np.zeros(found.visibility.shape, bool)
+    changed = {name: getattr(found, name).copy() for name in ("image_px", "depth_px", "world_m")}
+    rows = np.flatnonzero(found.present)
+    if len(rows) < 5:
+        return found, replaced
+    times, scale = found.times_s[rows], metre_px(found)[rows, None]
+    for landmark in range(len(LANDMARKS)):
+        place = _place_m(found, rows, scale, landmark)
+        seen = spikes(times, place[:, :2])
+        deep = spikes(times, place[:, 2:])
+        replaced[rows, landmark] = seen | deep
+        for name, wrong in (
+            ("image_px", seen),
+            ("depth_px", seen | deep),
+            ("world_m", seen | deep),
+        ):
+            if wrong.any():
+                values = changed[name][rows, landmark]
+                changed[name][rows, landmark] = _filled(times, values, wrong)
+    return replace(found, **changed), replaced
+
+
+def spikes(times_s: Floats, places_m: Floats) -> NDArray[np.bool_]:
+    """Which of the places (T, d) of one point are outliers, (T,)."""
+    from scipy.ndimage import median_filter
+
+    frames = len(times_s)
+    wrong = np.zeros(frames, bool)
+    if frames < 5:
+        return wrong
+    step_s = float(np.median(np.diff(times_s)))
+    longest = max(int(_SPIKE_S / step_s + 0.01), 1)
+    current = places_m
+    window = (2 * max(round(0.5 * _SCALE_S / step_s), 2) + 1, 1)
+    away = np.linalg.norm(places_m - median_filter(places_m, window, mode="nearest"), axis=1)
+    for length in range(min(longest, frames - 4), 0, -1):
+        for _ in range(_ROUNDS):
+            found = _outlying_runs(times_s, current, away, length) & ~wrong
+            if not found.any():
+                break
+            wrong |= found
+            current = _filled(times_s, places_m, wrong)
+    return wrong
+
+
+def _outlying_runs(
+    times_s: Floats, places_m: Floats, away_m: Floats, length: int
+) -> NDArray[np.bool_]:
+    """Frames of runs of one length that stand out, the clearest of those near one another."""
+    starts = np.arange(2, len(times_s) - length - 1)
+    support = starts[:, None] + [-2, -1, length, length + 1]  # (S, 4)
+    inner = starts[:, None] + np.arange(length)  # (S, L)
+    around_s = times_s[support[:, 2]] - times_s[support[:, 1]]
+    before, after = places_m[support[:, 1], None], places_m[support[:, 2], None]
+    share = ((times_s[inner] - times_s[support[:, 1, None]]) / around_s[:, None])[..., None]
+    curve = np.einsum("slk,skd->sld", _cubic(times_s[support], times_s[inner]), places_m[support])
+    # A curve through an outlier bends far; the line between the nearest two does not.
+    line = before + share * (after - before)
+    off = np.minimum(
+        *(np.linalg.norm(places_m[inner] - each, axis=2) for each in (curve, line))
+    )  # (S, L)
+    limit = np.maximum(MAX_ACCELERATION_MPS2 * around_s**2 / 8.0, _NOISE_M)
+    limit = np.maximum(limit, _SIGMAS * 1.4826 * float(np.median(off)))
+    limit = np.maximum(limit, np.linalg.norm(after - before, axis=2)[:, 0])
+    least = off.min(axis=1)
+    # Of two outliers and a good frame between them, the latter is where most are.
+    rank = least + away_m[inner].min(axis=1)
+    surely = np.flatnonzero(least > limit)
+    found = np.zeros(len(times_s), bool)
+    for start in surely[np.argsort(-rank[surely], kind="stable")]:
+        run = inner[start]
+        # What overlaps a clearer one was its shadow.
+        if not found[max(run[0] - 2, 0) : run[-1] + 3].any():
+            found[run] = True
+    return found
+
+
+def _cubic(support: Floats, at: Floats) -> Floats:
+    """Lagrange weights (S, L, 4) of values at ``support`` (S, 4) for times ``at`` (S, L)."""
+    weights = np.ones((*at.shape, 4))
+    for k in range(4):
+        for other in range(4):
+            if other != k:
+                weights[:, :, k] *= (at - support[:, other, None]) / (
+                    support[:, k, None] - support[:, other, None]
+                )
+    return weights
+
+
+def _filled(times_s: Floats, values: Floats, wrong: NDArray[np.bool_]) -> Floats:
+    """Values (T, ...) with the wrong ones put on the cubic through two right ones either side."""
+    right = np.flatnonzero(~wrong)
+    filled = values.copy()
+    for frame in np.flatnonzero(wrong):
+        after = int(np.searchsorted(right, frame))
+        support = right[np.clip(after - 2, 0, max(len(right) - 4, 0)) :][:4]
+        if len(support) < 4:
+            continue
+        weights = _cubic(times_s[support][None], times_s[[frame]][None])[0, 0]
+        filled[frame] = np.tensordot(weights, values[support], 1)
+    return filled
+
+
+# -- Gaps ----------------------------------------------------------------------------------------
+
+
+def bridged(found: Found, max_gap_s: float) -> Found:
+    """Interpolate across gaps of up to ``max_gap_s``; longer ones stay empty.
+
+    By a curve that does not overshoot (monotone piecewise cubic).
+    """
+    rows = np.flatnonzero(found.present)
+    fill = np.zeros(len(found.times_s), bool)
+    for before, after in itertools.pairwise(rows):
+        if after - before > 1 and found.times_s[after] - found.times_s[before] <= max_gap_s + 1e-9:
+            fill[before + 1 : after] = True
+    if not fill.any():
+        return found
+    from scipy.interpolate import PchipInterpolator
+
+    times, changed = found.times_s, {}
+    for name in ("image_px", "depth_px", "world_m", "visibility"):
+        values = getattr(found, name).copy()
+        values[fill] = PchipInterpolator(times[rows], values[rows], axis=0)(times[fill])
+        changed[name] = values
+    changed["visibility"][fill] *= _BRIDGED_VISIBILITY
+    return replace(found, present=found.present | fill, bridged=found.bridged | fill, **changed)
