@@ -9,12 +9,12 @@ count less (iteratively reweighted least squares).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from sd2core.body.banded import Normal
+from sd2core.body.evidence import Evidence
 from sd2core.body.initial import Pose
 from sd2core.body.rig import JOINT, JOINTS, Rig
 from sd2core.body.rotations import Floats, from_vector, to_vector, transposed
@@ -43,43 +43,6 @@ _LIMIT_SD_RAD = 0.03
 _FAR_PX = 3.0
 _FAR_DEPTH = 2.0
 """Standard deviations from where on a residual counts less."""
-
-
-@dataclass(frozen=True, eq=False)
-class Evidence:
-    """What was seen of one stretch of frames; everything in the camera frame.
-
-    Parameters
-    ----------
-    times_s : float64 array, shape (T,)
-    slopes, slopes_sd : float64 arrays, shapes (T, 33, 2) and (T, 33)
-        x / z and y / z of each landmark.
-    trunk : tuple of int
-        Landmarks whose mean is the middle of the trunk.
-    depth_m, depth_sd_m : float64 arrays, shape (T, 33)
-        Behind the middle of the trunk.
-    trunk_m, trunk_sd_m : float64 arrays, shape (T,)
-        Depth of the middle of the trunk.
-    velocity_mps, velocity_sd_mps : float64 arrays, shape (T, 33)
-        Change of depth, positive away.
-    """
-
-    times_s: Floats
-    slopes: Floats
-    slopes_sd: Floats
-    trunk: tuple[int, ...]
-    depth_m: Floats
-    depth_sd_m: Floats
-    trunk_m: Floats
-    trunk_sd_m: Floats
-    velocity_mps: Floats
-    velocity_sd_mps: Floats
-
-    @property
-    def points_m(self) -> Floats:
-        """Where the landmarks are according to slopes and depths, (T, 33, 3)."""
-        depth = (self.trunk_m[:, None] + self.depth_m)[..., None]
-        return np.concatenate([self.slopes * depth, depth], axis=-1)
 
 
 class Residuals(NamedTuple):

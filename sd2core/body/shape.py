@@ -102,9 +102,12 @@ class ShapeSpace:
             raise Sd2Error(
                 f"a shape of {shape.coefficients.shape} coefficients", f"{self.mean.shape} of them"
             )
-        body = Body.load(resolution, self.path)
+        return self.shaped(Body.load(resolution, self.path), self.directions_m(resolution), shape)
+
+    def directions_m(self, resolution: Resolution) -> Floats:
+        """What one unit of each coefficient moves the vertices, (K, V, 3)."""
         (directions,) = read_body_arrays((f"{resolution}_shape",), self.path)
-        return self.shaped(body, directions.astype(np.float64), shape)
+        return np.asarray(directions.astype(np.float64))
 
     def skeleton(self, shape: BodyShape) -> Skeleton:
         """The bones of one body at rest."""

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
+from sd2core.body.evidence import Evidence
 from sd2core.body.initial import Pose
-from sd2core.body.objective import Evidence, Objective, Residuals, cost, weighted
+from sd2core.body.objective import Objective, Residuals, cost, weighted
 from sd2core.body.rig import Rig
 from sd2core.body.rotations import Floats
 
@@ -19,7 +22,7 @@ _LEAST_TRANSLATION_MPS2 = 0.05
 _LIVELINESS = 1.5
 """Standard deviation of an acceleration over what was found around it."""
 _AROUND_S = 0.15
-_ROUNDS = 4
+ROUNDS = 4
 _STEPS = 8
 _CONVERGED = 1e-3
 
@@ -37,25 +40,43 @@ def solve(
     rig: Rig,
     evidence: Evidence,
     start: Pose,
-    tick: Callable[[], None] = lambda: None,
+    tick: Callable[[int], None] = lambda done: None,
 ) -> Solution:
     """The pose through time that agrees best with the evidence.
 
     The smoothness follows the motion: after each round, every degree of freedom may
     accelerate as much as it was found to do around each moment. What is still is
     smoothed hard, what is fast hardly.
+
+    Parameters
+    ----------
+    rig : Rig
+    evidence : Evidence
+        Of consecutive frames.
+    start : Pose
+    tick : callable
+        Called often with the number of rounds done, of :data:`ROUNDS`; it may raise.
     """
     frames = len(evidence.times_s)
     sd = np.full((max(frames - 2, 0), rig.freedoms), _FIRST_ROTATION_RADPS2)
     sd[:, -3:] = _FIRST_TRANSLATION_MPS2
     pose, costs = start, []
-    for number in range(_ROUNDS):
+    for number in range(ROUNDS):
         objective = Objective(rig, evidence, sd)
-        pose, least = _descend(objective, pose, robust=number > 0, tick=tick)
+        pose, least = _descend(objective, pose, robust=number > 0, tick=partial(tick, number))
         costs.append(least)
-        if number < _ROUNDS - 1:
+        if number < ROUNDS - 1:
             sd = _liveliness(objective.accelerations(pose), evidence.times_s)
     return Solution(pose, objective.residuals(pose), sd, tuple(costs))
+
+
+def solve_stills(rig: Rig, evidence: Evidence, start: Pose) -> Pose:
+    """The pose of each frame for itself, whatever the frames around it."""
+    apart = replace(evidence, velocity_sd_mps=np.full_like(evidence.velocity_sd_mps, np.inf))
+    sd = np.full((max(len(evidence.times_s) - 2, 0), rig.freedoms), np.inf)
+    objective = Objective(rig, apart, sd)
+    pose, _ = _descend(objective, start, robust=False, tick=lambda: None)
+    return _descend(objective, pose, robust=True, tick=lambda: None)[0]
 
 
 def _descend(
@@ -88,13 +109,14 @@ def _descend(
 
 def _liveliness(accelerations: Floats, times_s: Floats) -> Floats:
     """Root mean square acceleration around each moment, not below what is left at rest."""
+    from scipy.ndimage import correlate1d
+
     if not len(accelerations):
         return accelerations
     reach = max(round(_AROUND_S / float(np.median(np.diff(times_s)))), 1)
     kernel = np.hanning(2 * reach + 3)[1:-1]
-    share = np.convolve(np.ones(len(accelerations)), kernel, "same")[:, None]
-    mean = np.apply_along_axis(np.convolve, 0, accelerations**2, kernel, "same")
-    mean = mean[: len(accelerations)] / share
+    share = correlate1d(np.ones(len(accelerations)), kernel, mode="constant")[:, None]
+    mean = correlate1d(accelerations**2, kernel, axis=0, mode="constant") / share
     least = np.full(accelerations.shape[1], _LEAST_ROTATION_RADPS2)
     least[-3:] = _LEAST_TRANSLATION_MPS2
     return np.asarray(np.sqrt(_LIVELINESS**2 * mean + least**2))

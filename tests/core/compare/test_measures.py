@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from sd2core.body.camera import PinholeCamera
+from sd2core.body.silhouette import overlap, silhouette
 from sd2core.compare.measures import (
     correlation,
     coverage,
@@ -16,7 +17,6 @@ from sd2core.compare.measures import (
     rms,
     speed_mps,
 )
-from sd2core.compare.silhouette import overlap, silhouette
 
 TIMES = np.arange(40) / 30.0
 

@@ -1,0 +1,94 @@
+"""What a fit goes by: landmarks in the picture, and their depth as the lifter tells it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.body.camera import PinholeCamera
+from sd2core.body.lifted import CENTRE, LiftedTrack
+from sd2core.body.rotations import Floats
+from sd2core.body.track import LandmarkTrack
+
+_PICTURE_SD = 0.006
+"""Of a landmark that is well visible, in apparent statures: 3 pixels of 480."""
+_LEAST_VISIBILITY = 0.05
+_DEPTH_CAUTION = 2.0
+"""Depths of neighbouring frames err alike, so each tells less than it seems to."""
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What was seen of one stretch of frames; everything in the camera frame.
+
+    Parameters
+    ----------
+    times_s : float64 array, shape (T,)
+    slopes, slopes_sd : float64 arrays, shapes (T, 33, 2) and (T, 33)
+        x / z and y / z of each landmark.
+    trunk : tuple of int
+        Landmarks whose mean is the middle of the trunk.
+    depth_m, depth_sd_m : float64 arrays, shape (T, 33)
+        Behind the middle of the trunk.
+    trunk_m, trunk_sd_m : float64 arrays, shape (T,)
+        Depth of the middle of the trunk.
+    velocity_mps, velocity_sd_mps : float64 arrays, shape (T, 33)
+        Change of depth, positive away.
+    """
+
+    times_s: Floats
+    slopes: Floats
+    slopes_sd: Floats
+    trunk: tuple[int, ...]
+    depth_m: Floats
+    depth_sd_m: Floats
+    trunk_m: Floats
+    trunk_sd_m: Floats
+    velocity_mps: Floats
+    velocity_sd_mps: Floats
+
+    @property
+    def points_m(self) -> Floats:
+        """Where the landmarks are according to slopes and depths, (T, 33, 3)."""
+        depth = (self.trunk_m[:, None] + self.depth_m)[..., None]
+        return np.concatenate([self.slopes * depth, depth], axis=-1)
+
+    def __getitem__(self, frames: slice | NDArray[np.intp]) -> Evidence:
+        """Only some frames."""
+        parts = {
+            field.name: getattr(self, field.name)[frames]
+            for field in fields(self)
+            if field.name != "trunk"
+        }
+        return Evidence(trunk=self.trunk, **parts)
+
+
+def evidence_of(
+    track: LandmarkTrack, lifted: LiftedTrack, camera: PinholeCamera, stature_m: float
+) -> Evidence:
+    """Landmarks and their depths in metres and seconds.
+
+    Parameters
+    ----------
+    track, lifted
+        Of the same frames; NaN in empty ones.
+    camera : PinholeCamera
+    stature_m : float
+        Gives everything its scale.
+    """
+    visibility = np.clip(track.visibility.astype(np.float64), _LEAST_VISIBILITY, 1.0)
+    depth_m = stature_m * lifted.centre_depth
+    return Evidence(
+        times_s=np.array(track.timebase.times_s),
+        slopes=camera.slopes(track.image_px.astype(np.float64)),
+        slopes_sd=_PICTURE_SD * (stature_m / depth_m)[:, None] / visibility,
+        trunk=CENTRE,
+        depth_m=stature_m * lifted.depth,
+        depth_sd_m=_DEPTH_CAUTION * stature_m * lifted.depth_sigma,
+        trunk_m=depth_m,
+        trunk_sd_m=_DEPTH_CAUTION * stature_m * lifted.centre_sigma,
+        velocity_mps=stature_m * lifted.velocity,
+        velocity_sd_mps=stature_m * lifted.velocity_sigma,
+    )

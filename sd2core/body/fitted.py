@@ -1,0 +1,118 @@
+"""What a fit finds: a person's shape and motion, and the moving surface they make."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.body.initial import Pose
+from sd2core.body.keypoints import KeypointSpace
+from sd2core.body.limbs import LIMB_LANDMARKS, LIMBS, vertex_limbs
+from sd2core.body.model import Body, Resolution
+from sd2core.body.rig import Rig
+from sd2core.body.rotations import Floats
+from sd2core.body.shape import BodyShape, ShapeSpace
+from sd2core.body.skinning import pose_vertices
+from sd2core.body.track import LANDMARKS
+from sd2core.mesh import MeshSequence
+from sd2core.timebase import Timebase
+from sd2core.uncertainty import VelocityUncertainty
+
+
+@dataclass(frozen=True, eq=False)
+class BodyFit:
+    """A person's shape and motion.
+
+    Parameters
+    ----------
+    timebase : Timebase
+    shape : BodyShape
+    turns : float64 array, shape (T, J, 3, 3)
+        Rotation of every joint of :data:`sd2core.body.rig.JOINTS`; the nearest known
+        one in empty frames.
+    translation_m : float64 array, shape (T, 3)
+    present : bool array, shape (T,)
+        False in empty frames.
+    keypoints_m : float64 array, shape (T, 33, 3)
+        The fitted body's landmarks in the camera frame.
+    residual_m : float64 array, shape (T, 33)
+        How far from them the lifted landmarks are; NaN in empty frames.
+    along_sd_mps, across_sd_mps : float64 arrays, shape (T, 33)
+        Standard deviation of each landmark's velocity along the line of sight, and in
+        any direction at right angles to it; 0 in empty frames.
+    source : str
+        For provenance.
+    """
+
+    timebase: Timebase
+    shape: BodyShape
+    turns: Floats
+    translation_m: Floats
+    present: NDArray[np.bool_]
+    keypoints_m: Floats
+    residual_m: Floats
+    along_sd_mps: Floats
+    across_sd_mps: Floats
+    source: str = ""
+
+    def __len__(self) -> int:
+        return len(self.timebase)
+
+    def mesh(self, resolution: Resolution = "high") -> MeshSequence:
+        """The moving surface; vertices are posed where they are read.
+
+        Parameters
+        ----------
+        resolution : {"high", "medium", "low"}
+            13,348, 5,000 or 1,229 vertices.
+        """
+        space = ShapeSpace()
+        body = space.load(resolution, self.shape)
+        rig = Rig(body.skeleton, KeypointSpace(space).of(self.shape))
+        vertices = FittedVertices(body, rig, Pose(self.turns, self.translation_m))
+        return MeshSequence(
+            vertices,
+            body.faces,
+            self.timebase,
+            self.source,
+            present=self.present.copy(),
+            uncertainty=VelocityUncertainty(
+                LIMBS,
+                vertex_limbs(body),
+                _of_limbs(self.along_sd_mps),
+                _of_limbs(self.across_sd_mps),
+            ),
+        )
+
+    @property
+    def quality(self) -> Floats:
+        """From 0 (no person) to 1 (landmarks on the body) in every frame, (T,)."""
+        residual = np.nan_to_num(self.residual_m, nan=np.inf)
+        return np.asarray(np.exp(-np.median(residual, axis=1) / 0.05))
+
+
+class FittedVertices:
+    """Vertices (T, V, 3) of a body in a pose, float32, made when they are asked for."""
+
+    def __init__(self, body: Body, rig: Rig, pose: Pose) -> None:
+        self._body, self._rig, self._pose = body, rig, pose
+        self.shape = (len(pose.turns), len(body.vertices_m), 3)
+        self.dtype = np.dtype(np.float32)
+
+    def __getitem__(self, key: Any) -> NDArray[np.float32]:
+        frames, rest = (key[0], key[1:]) if isinstance(key, tuple) else (key, ())
+        rows = np.arange(self.shape[0])[frames]
+        several = np.atleast_1d(rows)
+        rotations = self._rig.body_rotations(self._pose.turns[several])
+        transforms = self._body.skeleton.transforms(rotations, self._pose.translation_m[several])
+        vertices = pose_vertices(self._body, transforms)
+        return vertices[(slice(None) if rows.ndim else 0, *rest)]
+
+
+def _of_limbs(landmarks: Floats) -> NDArray[np.float32]:
+    """Mean over the landmarks of each limb, (T, L)."""
+    rows = [[LANDMARKS.index(name) for name in LIMB_LANDMARKS[limb]] for limb in LIMBS]
+    return np.stack([landmarks[:, row].mean(axis=1) for row in rows], axis=1).astype(np.float32)

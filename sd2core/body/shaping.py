@@ -1,0 +1,137 @@
+"""The shape of the person in a clip: bone lengths from landmarks, girth from outlines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.body.camera import PinholeCamera
+from sd2core.body.keypoints import KeypointSpace
+from sd2core.body.model import Body
+from sd2core.body.rotations import Floats
+from sd2core.body.shape import BodyShape, ShapeSpace
+from sd2core.body.silhouette import overlap, silhouette
+from sd2core.body.skinning import pose_vertices
+from sd2core.body.track import LANDMARKS
+
+Transforms = Callable[[BodyShape], Floats]
+
+_AT = {name: row for row, name in enumerate(LANDMARKS)}
+_SEGMENTS = (
+    ("shoulder.L", "shoulder.R", 0.03),
+    ("hip.L", "hip.R", 0.03),
+    *((f"shoulder.{side}", f"hip.{side}", 0.04) for side in "LR"),
+    *((f"shoulder.{side}", f"elbow.{side}", 0.02) for side in "LR"),
+    *((f"elbow.{side}", f"wrist.{side}", 0.02) for side in "LR"),
+    *((f"hip.{side}", f"knee.{side}", 0.03) for side in "LR"),
+    *((f"knee.{side}", f"ankle.{side}", 0.03) for side in "LR"),
+)
+"""Landmarks, and how well their distance is known from a clip, in metres."""
+
+_SEEN = 0.5
+"""Trust from where on a landmark counts."""
+_ENOUGH_FRAMES = 3
+_OUTLINE_WEIGHT = 60.0
+"""Worth of a whole overlap against half a squared standard deviation of shape."""
+_TRIALS = 90
+
+
+def shape_of_lengths(
+    space: ShapeSpace, keypoints: KeypointSpace, seen_m: Floats, trust: Floats, stature_m: float
+) -> tuple[BodyShape, Floats]:
+    """The likeliest shape of these distances between landmarks.
+
+    Parameters
+    ----------
+    seen_m : float64 array, shape (T, 33, 3)
+    trust : float64 array, shape (T, 33)
+        From 0 to 1; what is below a half is left out.
+    stature_m : float
+
+    Returns
+    -------
+    shape : BodyShape
+    spread : float64 array, shape (K, K)
+        Covariance of its coefficients.
+    """
+    rows, lengths, sds = [], [], []
+    for first, second, sd_m in _SEGMENTS:
+        pair = _AT[first], _AT[second]
+        seen = trust[:, pair].min(axis=1) > _SEEN
+        if seen.sum() < min(_ENOUGH_FRAMES, len(seen)):
+            continue
+        along = seen_m[seen][:, pair[1]] - seen_m[seen][:, pair[0]]
+        rows.append(pair)
+        lengths.append(float(np.median(np.linalg.norm(along, axis=1))))
+        sds.append(sd_m)
+    if not rows:
+        return BodyShape(space.mean.copy(), stature_m), np.diag(space.sd**2)
+    pairs, sd = np.array(rows), np.array(sds)
+    coefficients = space.mean.copy()
+    for _ in range(5):
+        shape = BodyShape(coefficients, stature_m)
+        rest = keypoints.of(shape).rest_m
+        along = rest[pairs[:, 1]] - rest[pairs[:, 0]]
+        now = np.linalg.norm(along, axis=1)
+        scale = stature_m / space.base_stature_m
+        moves = scale * (
+            keypoints.directions_m[:, pairs[:, 1]] - keypoints.directions_m[:, pairs[:, 0]]
+        )  # (K, n, 3)
+        slope = (moves * (along / now[:, None])).sum(axis=-1).T  # (n, K)
+        precision = (slope.T / sd**2) @ slope + np.diag(1.0 / space.sd**2)
+        pull = (slope.T / sd**2) @ (np.array(lengths) - now) + (
+            space.mean - coefficients
+        ) / space.sd**2
+        coefficients = coefficients + np.linalg.solve(precision, pull)
+    return BodyShape(coefficients, stature_m), np.linalg.inv(precision)
+
+
+def shape_of_outlines(
+    space: ShapeSpace,
+    start: BodyShape,
+    spread: Floats,
+    transforms_of: Transforms,
+    camera: PinholeCamera,
+    outlines: Sequence[NDArray[np.bool_]],
+) -> BodyShape:
+    """The shape whose outlines overlap best with those seen, near one that fits the bones.
+
+    Parameters
+    ----------
+    start, spread
+        Of :func:`shape_of_lengths`.
+    transforms_of : callable
+        Poses of the frames with outlines for a shape, (n, B, 3, 4).
+    camera : PinholeCamera
+    outlines : sequence of n bool arrays, shape (h, w)
+    """
+    from scipy.optimize import minimize
+
+    sizes, directions = np.linalg.eigh(spread)
+    basis = directions * np.sqrt(sizes)  # columns of one standard deviation each
+    surface = Body.load("low", space.path)
+    moves = space.directions_m("low")
+
+    def shaped(steps: Floats) -> BodyShape:
+        return BodyShape(start.coefficients + basis @ steps, start.stature_m)
+
+    def loss(steps: Floats) -> float:
+        shape = shaped(steps)
+        body = space.shaped(surface, moves, shape)
+        vertices = pose_vertices(body, transforms_of(shape))
+        shares = [
+            overlap(silhouette(frame, body.faces, camera, seen.shape[::-1]), seen)
+            for frame, seen in zip(vertices, outlines, strict=True)
+        ]
+        return float(_OUTLINE_WEIGHT * (1.0 - np.mean(shares)) + 0.5 * (steps**2).sum())
+
+    found = minimize(
+        loss,
+        np.zeros(len(space)),
+        method="Powell",
+        options={"maxfev": _TRIALS, "xtol": 0.05, "ftol": 1e-3},
+        bounds=[(-2.5, 2.5)] * len(space),
+    )
+    return shaped(found.x)

@@ -1,0 +1,287 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sd2core.body import fit as fitting
+from sd2core.body.camera import PinholeCamera
+from sd2core.body.fit import fit_body, stretches
+from sd2core.body.fitted import BodyFit
+from sd2core.body.keypoints import KeypointSpace
+from sd2core.body.lifted import CENTRE, LiftedTrack, lifted_by_world
+from sd2core.body.shape import BodyShape, ShapeSpace
+from sd2core.body.silhouette import overlap, silhouette
+from sd2core.body.skinning import pose_vertices
+from sd2core.body.track import LANDMARKS, LandmarkTrack
+from sd2core.errors import Sd2Error
+from sd2core.progress import Cancelled
+from sd2core.simulate.gestures import swipes
+from sd2core.timebase import Timebase
+
+SPACE = ShapeSpace()
+CAMERA = PinholeCamera()
+OUTLINE = (160, 120)
+
+
+class Known:
+    """A lifter that knows the truth, but for slow errors and noise."""
+
+    def __init__(self, keypoints_m: np.ndarray, times_s: np.ndarray, stature_m: float) -> None:
+        rng = np.random.default_rng(4)
+        depth = keypoints_m[..., 2]
+        centre = depth[:, CENTRE].mean(axis=1)
+        velocity = np.gradient(depth, times_s, axis=0) if len(times_s) > 1 else 0.0 * depth
+        self.lifted = LiftedTrack(
+            timebase=Timebase(times_s),
+            centre_depth=(centre + 0.02) / stature_m,
+            centre_sigma=np.full(len(depth), 0.03) / stature_m,
+            depth=(depth - centre[:, None] + 0.02 * rng.standard_normal(33)) / stature_m,
+            depth_sigma=np.full(depth.shape, 0.03) / stature_m,
+            velocity=(velocity + 0.1 * rng.standard_normal(depth.shape)) / stature_m,
+            velocity_sigma=np.full(depth.shape, 0.1) / stature_m,
+        )
+
+    def __call__(self, track: LandmarkTrack, camera: PinholeCamera) -> LiftedTrack:
+        return self.lifted
+
+
+class Scene:
+    """A person of random shape who swipes, and the landmarks of a perfect model."""
+
+    def __init__(self, frames: int, start_s: float = 1.2, frames_per_s: float = 30.0) -> None:
+        self.shape = SPACE.random(np.random.default_rng(7))
+        times_s = start_s + np.arange(frames) / frames_per_s
+        motion = swipes(SPACE.base_skeleton, times_s)
+        place = np.array([0.05, 1.1, 2.4])
+        transforms = SPACE.skeleton(self.shape).transforms(
+            motion.rotations, motion.translation_m + place
+        )
+        self.keypoints_m = KeypointSpace(SPACE).of(self.shape).positions(transforms)
+        body = SPACE.load("low", self.shape)
+        self.vertices_m = pose_vertices(body, transforms)
+        self.faces = body.faces
+        noise = np.random.default_rng(1).standard_normal((frames, 33, 2))
+        outlined = np.unique(np.linspace(0, frames - 1, 4).astype(int))
+        self.track = LandmarkTrack(
+            timebase=Timebase(times_s),
+            width=CAMERA.width,
+            height=CAMERA.height,
+            image_px=(CAMERA.project(self.keypoints_m) + noise).astype(np.float32),
+            depth_px=np.zeros((frames, 33), np.float32),
+            world_m=np.zeros((frames, 33, 3), np.float32),
+            visibility=np.ones((frames, 33), np.float32),
+            confidence=np.ones(frames, np.float32),
+            present=np.ones(frames, bool),
+            bridged=np.zeros(frames, bool),
+            silhouette_frames=outlined,
+            silhouettes=np.stack(
+                [
+                    255 * silhouette(self.vertices_m[k], self.faces, CAMERA, OUTLINE)
+                    for k in outlined
+                ]
+            ).astype(np.uint8),
+        )
+        self.lift = Known(self.keypoints_m, times_s, self.shape.stature_m)
+
+    def fit(self, **options: object) -> BodyFit:
+        return fit_body(
+            self.track, CAMERA, stature_m=self.shape.stature_m, lift=self.lift, **options
+        )
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return Scene(60)
+
+
+@pytest.fixture(scope="module")
+def fitted(scene: Scene) -> BodyFit:
+    return scene.fit()
+
+
+def velocity(keypoints_m: np.ndarray, times_s: np.ndarray) -> np.ndarray:
+    return np.gradient(np.linalg.norm(keypoints_m, axis=-1), times_s, axis=0)
+
+
+def test_body_lies_on_its_landmarks(scene: Scene, fitted: BodyFit) -> None:
+    away = np.linalg.norm(fitted.keypoints_m - scene.keypoints_m, axis=-1)
+    assert away.mean() < 0.03
+    in_picture = CAMERA.project(fitted.keypoints_m) - CAMERA.project(scene.keypoints_m)
+    assert np.linalg.norm(in_picture, axis=-1).mean() < 2.0
+    assert (fitted.quality > 0.5).all()
+
+
+def test_line_of_sight_velocity_of_the_swiping_hand(scene: Scene, fitted: BodyFit) -> None:
+    true, found = (
+        velocity(k, scene.track.timebase.times_s) for k in (scene.keypoints_m, fitted.keypoints_m)
+    )
+    hand = LANDMARKS.index("index.R")
+    assert np.corrcoef(true[:, hand], found[:, hand])[0, 1] > 0.97
+    assert np.sqrt(((true - found)[:, hand] ** 2).mean()) < 0.08
+    middle = np.sqrt(((true - found)[5:-5] ** 2).mean())
+    for ends in (slice(0, 5), slice(-5, None)):
+        assert np.sqrt(((true - found)[ends] ** 2).mean()) < 2.0 * middle
+
+
+def test_surface_has_the_outline(scene: Scene, fitted: BodyFit) -> None:
+    vertices = fitted.mesh("low").read(0, 60)
+    assert vertices.dtype == np.float32
+    shares = [
+        overlap(
+            silhouette(vertices[k], scene.faces, CAMERA, OUTLINE),
+            silhouette(scene.vertices_m[k], scene.faces, CAMERA, OUTLINE),
+        )
+        for k in (0, 30, 59)
+    ]
+    assert min(shares) > 0.9
+
+
+def test_outlines_tell_a_heavy_person_from_a_light_one() -> None:
+    heavy = Scene(8)
+    girths = {}
+    for weight in (0.05, 0.95):
+        shape = BodyShape(SPACE.coefficients(weight=weight), heavy.shape.stature_m)
+        body = SPACE.load("low", shape)
+        found = {}
+        scene = Scene(8)
+        motion = swipes(SPACE.base_skeleton, scene.track.timebase.times_s)
+        transforms = SPACE.skeleton(shape).transforms(
+            motion.rotations, motion.translation_m + np.array([0.05, 1.1, 2.4])
+        )
+        vertices = pose_vertices(body, transforms)
+        keypoints_m = KeypointSpace(SPACE).of(shape).positions(transforms)
+        masks = [
+            255 * silhouette(vertices[k], body.faces, CAMERA, OUTLINE)
+            for k in scene.track.silhouette_frames
+        ]
+        scene.track.silhouettes[:] = masks
+        scene.track.image_px[:] = CAMERA.project(keypoints_m)
+        scene.lift = Known(keypoints_m, scene.track.timebase.times_s, shape.stature_m)
+        found = scene.fit().mesh("low").frame(0)
+        girths[weight] = silhouette(found, body.faces, CAMERA, OUTLINE).sum()
+        true = silhouette(vertices[0], body.faces, CAMERA, OUTLINE)
+        assert overlap(silhouette(found, body.faces, CAMERA, OUTLINE), true) > 0.88
+    assert girths[0.95] > 1.05 * girths[0.05]
+
+
+def test_empty_frames_hold_the_nearest_pose_and_are_marked(scene: Scene) -> None:
+    gap = slice(20, 40)
+    track = Scene(60).track
+    track.present[gap] = False
+    track.image_px[gap] = np.nan
+    track.visibility[gap] = 0.0
+    found = fit_body(track, CAMERA, stature_m=scene.shape.stature_m, lift=scene.lift)
+    assert not found.present[gap].any()
+    assert found.present.sum() == 40
+    assert np.isfinite(found.turns).all()
+    np.testing.assert_array_equal(found.keypoints_m[25], found.keypoints_m[19])
+    np.testing.assert_array_equal(found.keypoints_m[35], found.keypoints_m[40])
+    assert np.isnan(found.residual_m[gap]).all()
+    assert (found.quality[gap] == 0).all()
+    away = np.linalg.norm(found.keypoints_m - scene.keypoints_m, axis=-1)
+    assert away[track.present].mean() < 0.03
+
+
+@pytest.mark.parametrize("frames", [1, 2, 3])
+def test_the_shortest_clips(frames: int) -> None:
+    scene = Scene(frames)
+    found = scene.fit()
+    away = np.linalg.norm(found.keypoints_m - scene.keypoints_m, axis=-1)
+    assert away.mean() < 0.04
+
+
+def test_windows_join_without_a_step(scene: Scene, fitted: BodyFit, monkeypatch) -> None:
+    monkeypatch.setattr(fitting, "_WINDOW_FRAMES", 30)
+    monkeypatch.setattr(fitting, "_OVERLAP_FRAMES", 12)
+    found = scene.fit()
+    away = np.linalg.norm(found.keypoints_m - fitted.keypoints_m, axis=-1)
+    assert away.mean() < 0.01
+    rough, smooth = (np.abs(np.diff(one.keypoints_m, n=3, axis=0)).max() for one in (found, fitted))
+    assert rough < 3.0 * smooth
+
+
+@pytest.mark.parametrize("frames", [59, 600, 601, 1500])
+def test_windows_cover_a_stretch(frames: int) -> None:
+    covered = np.zeros(frames + 7, int)
+    end = 7
+    for start, stop, shared in fitting._windows(7, 7 + frames):
+        assert start + shared == end
+        covered[start + shared : stop] += 1
+        end = stop
+    assert (covered[7:] == 1).all()
+    assert (covered[:7] == 0).all()
+
+
+def test_a_stopped_fit_goes_on(scene: Scene, fitted: BodyFit, tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr(fitting, "_WINDOW_FRAMES", 30)
+    monkeypatch.setattr(fitting, "_OVERLAP_FRAMES", 12)
+    whole = scene.fit()
+
+    def stop_late(done: int, total: int) -> None:
+        if done > total // 2:
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        scene.fit(workspace=tmp_path, progress=stop_late)
+    assert list(tmp_path.glob("pose-*.npz"))
+    calls = []
+    real = fitting.solve
+    monkeypatch.setattr(fitting, "solve", lambda *a: calls.append(1) or real(*a))
+    resumed = scene.fit(workspace=tmp_path)
+    assert len(calls) < len(list(fitting._windows(0, 60)))
+    np.testing.assert_array_equal(resumed.turns, whole.turns)
+    # What another clip left there is not used, nor what is damaged.
+    file = next(iter(tmp_path.glob("pose-*.npz")))
+    file.write_bytes(b"PK damaged")
+    again = scene.fit(workspace=tmp_path)
+    np.testing.assert_array_equal(again.turns, whole.turns)
+
+
+def test_stature_sets_the_scale(scene: Scene, fitted: BodyFit) -> None:
+    half = fit_body(scene.track, CAMERA, stature_m=0.5 * scene.shape.stature_m, lift=scene.lift)
+    np.testing.assert_allclose(half.keypoints_m, 0.5 * fitted.keypoints_m, atol=0.03)
+
+
+def test_impossible_stature_and_nobody_are_refused(scene: Scene) -> None:
+    with pytest.raises(Sd2Error, match="body height of 172"):
+        fit_body(scene.track, CAMERA, stature_m=172.0, lift=scene.lift)
+    empty = Scene(3)
+    empty.track.present[:] = False
+    with pytest.raises(Sd2Error, match="No frame of the video shows a person"):
+        empty.fit()
+
+
+@pytest.mark.parametrize("resolution", ["low", "medium", "high"])
+def test_mesh_is_read_in_any_stretch(fitted: BodyFit, resolution) -> None:
+    mesh = fitted.mesh(resolution)
+    assert mesh.vertices.shape == (60, mesh.vertex_count, 3)
+    whole = mesh.read(10, 14)
+    np.testing.assert_array_equal(mesh.frame(12), whole[2])
+    np.testing.assert_array_equal(mesh.vertices[12], whole[2])
+    np.testing.assert_array_equal(mesh.vertices[10:14, :5], whole[:, :5])
+    np.testing.assert_array_equal(mesh.vertices[[13, 10]], whole[[3, 0]])
+
+
+def test_depth_by_world_coordinates(scene: Scene) -> None:
+    """A landmark model that is right but for scale and place gives the true depths."""
+    track = Scene(20).track
+    true = scene.keypoints_m[:20]
+    track.world_m[:] = 0.9 * (true - true[:, CENTRE[2:]].mean(axis=1, keepdims=True))
+    track.image_px[:] = CAMERA.project(true)
+    lifted = lifted_by_world(track, CAMERA)
+    stature_m = scene.shape.stature_m
+    centre = true[:, CENTRE, 2].mean(axis=1)
+    # The torso's length in statures differs from person to person.
+    factor = np.median(lifted.depth * stature_m / (true[..., 2] - centre[:, None]))
+    assert factor == pytest.approx(1.0, abs=0.05)
+    np.testing.assert_allclose(
+        lifted.depth * stature_m, factor * (true[..., 2] - centre[:, None]), atol=1e-6
+    )
+    np.testing.assert_allclose(lifted.centre_depth * stature_m, factor * centre, rtol=0.05)
+
+
+def test_stretches() -> None:
+    assert stretches(np.array([True, True, False, True])) == [(0, 2), (3, 4)]
+    assert stretches(np.zeros(3, bool)) == []
