@@ -16,7 +16,9 @@ from sd2app.models.overlay import OverlayModel
 from sd2app.models.playback import PlaybackModel
 from sd2app.models.video import VideoModel
 from sd2app.views.landmark_overlay import draw_landmarks
-from sd2app.views.mesh_overlay import blend, shaded
+from sd2app.views.mesh_overlay import blend
+from sd2core.compiled import kernels_ready
+from sd2core.figures.surface import shaded
 
 
 class VideoView(QWidget):
@@ -108,7 +110,9 @@ class VideoView(QWidget):
             return picture
         vertices = mesh.frame(frame)
         style = self._overlay.style
-        light = shaded(vertices, None if style.as_dots else mesh.faces, self._document.camera)
+        # Dots while the kernels are being compiled.
+        dots = style.as_dots or not kernels_ready()
+        light = shaded(vertices, None if dots else mesh.faces, self._document.camera)
         colour = QColor(self._display.palette.overlay).getRgb()[:3]
         # Dots cover little: they have to be stronger to be seen at all.
         opacity = style.opacity**0.5 if style.as_dots else style.opacity

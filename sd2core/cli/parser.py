@@ -13,6 +13,7 @@ from sd2core.cli import (
     ladder,
     radar,
     simulate,
+    strip,
     synth,
     warm_up,
 )
@@ -53,6 +54,7 @@ def build_parser() -> tuple[argparse.ArgumentParser, argparse._SubParsersAction]
         radar,
         ladder,
         compare_meshes,
+        strip,
         simulate,
         warm_up,
         fetch_models,

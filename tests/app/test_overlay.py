@@ -8,8 +8,9 @@ import trimesh
 
 from sd2app.models.overlay import OverlayModel, OverlayStyle
 from sd2app.settings import Settings
-from sd2app.views.mesh_overlay import blend, shaded
+from sd2app.views.mesh_overlay import blend
 from sd2core.body.camera import PinholeCamera
+from sd2core.figures.surface import shaded
 
 CAMERA = PinholeCamera(160, 120, 150.0)
 

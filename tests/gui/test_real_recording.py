@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sd2app.views.mesh_overlay import shaded
+from sd2core.figures.surface import shaded
 
 
 @pytest.fixture

@@ -10,24 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2app.palette import Palette
+from sd2core.figures.colours import Rgb, colour_table, looked_up, rgb, velocity_colours
 
 MeshColour = Literal["velocity", "range", "visibility", "plain"]
-Rgb = NDArray[np.uint8]
-"""Colours, shape (..., 3)."""
-
-# Both ends differ in hue and lightness for every kind of colour vision; the
-# colour rises quickly from the grey middle because a body mostly moves slowly.
-_DIVERGING = (
-    (0.00, "#123f86"),
-    (0.15, "#2065b8"),
-    (0.32, "#5a9ede"),
-    (0.43, "#aacbea"),
-    (0.50, "#e8e6e3"),
-    (0.57, "#f1bd9e"),
-    (0.68, "#e2794f"),
-    (0.85, "#c0391f"),
-    (1.00, "#84170d"),
-)
 # Near is bright, far is dark, as seen from the sensor; viridis (CC0), its ends cut.
 _SEQUENTIAL = (
     (0.000, "#f2e51d"),
@@ -42,11 +27,6 @@ _SEQUENTIAL = (
 )
 
 
-def rgb(colour: str) -> NDArray[np.uint8]:
-    """``#rrggbb`` as three bytes."""
-    return np.frombuffer(bytes.fromhex(colour.removeprefix("#")), np.uint8)
-
-
 def fractions(colour: str) -> tuple[float, float, float]:
     """``#rrggbb`` as three numbers from 0 to 1, as VTK wants them."""
     red, green, blue = (int(value) / 255.0 for value in rgb(colour))
@@ -59,17 +39,7 @@ def mixed(colour: str, other: str, share: float) -> str:
     return "#" + np.rint(blend).astype(np.uint8).tobytes().hex()
 
 
-def _table(anchors: tuple[tuple[float, str], ...]) -> Rgb:
-    positions = [position for position, _ in anchors]
-    colours = np.array([rgb(colour) for _, colour in anchors], float)  # (anchors, 3)
-    grid = np.linspace(0.0, 1.0, 256)
-    channels = [np.interp(grid, positions, colours[:, channel]) for channel in range(3)]
-    return np.rint(np.stack(channels, axis=1)).astype(np.uint8)
-
-
-DIVERGING = _table(_DIVERGING)
-"""Receding to approaching, shape (256, 3)."""
-SEQUENTIAL = _table(_SEQUENTIAL)
+SEQUENTIAL = colour_table(_SEQUENTIAL)
 """Near to far, shape (256, 3)."""
 
 
@@ -108,20 +78,9 @@ class SceneColours:
         )
 
 
-def velocity_colours(velocity_mps: NDArray[np.floating], v_max_mps: float) -> Rgb:
-    """Diverging colours of radial velocities, fixed at ±``v_max_mps``; (V, 3)."""
-    return _looked_up(DIVERGING, velocity_mps, -v_max_mps, v_max_mps)
-
-
 def range_colours(range_m: NDArray[np.floating], limits_m: tuple[float, float]) -> Rgb:
     """Sequential colours of ranges between two limits; (V, 3)."""
-    return _looked_up(SEQUENTIAL, range_m, *limits_m)
-
-
-def _looked_up(table: Rgb, values: NDArray[np.floating], low: float, high: float) -> Rgb:
-    share = (np.asarray(values, np.float32) - low) * (256.0 / (high - low))
-    index = np.nan_to_num(np.clip(share, 0.0, 255.0), nan=0.0).astype(np.uint8)
-    return table[index]
+    return looked_up(SEQUENTIAL, range_m, *limits_m)
 
 
 def range_limits(nearest_m: float, farthest_m: float) -> tuple[float, float]:

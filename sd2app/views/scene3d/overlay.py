@@ -9,9 +9,10 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QImage, QPainter, QPaintEvent, QPen, QPixmap
 from PySide6.QtWidgets import QWidget
 
-from sd2app.views.scene3d.colours import DIVERGING, SEQUENTIAL, SceneColours, nice_step
+from sd2app.views.scene3d.colours import SEQUENTIAL, SceneColours, nice_step
 from sd2app.views.scene3d.navigation import Navigator
 from sd2app.views.scene3d.scene import Scene
+from sd2core.figures.colours import DIVERGING
 
 HINT = "Drag moves the sensor  ·  Shift: up and down  ·  Ctrl: nearer and farther"
 _VELOCITY_TITLE = "Radial velocity, m/s"

@@ -15,7 +15,8 @@ from vtkmodules.vtkFiltersSources import vtkSphereSource
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkRenderer
 
 from sd2app.views.scene3d import shapes, surface
-from sd2app.views.scene3d.colours import SceneColours, fractions, mixed, rgb
+from sd2app.views.scene3d.colours import SceneColours, fractions, mixed
+from sd2core.figures.colours import rgb
 from sd2core.sensor import VirtualSensor
 
 

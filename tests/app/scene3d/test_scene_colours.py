@@ -9,16 +9,14 @@ from hypothesis import strategies as st
 
 from sd2app.palette import palette_for
 from sd2app.views.scene3d.colours import (
-    DIVERGING,
     SEQUENTIAL,
     SceneColours,
     mesh_colours,
     nice_step,
     range_colours,
     range_limits,
-    rgb,
-    velocity_colours,
 )
+from sd2core.figures.colours import DIVERGING, rgb, velocity_colours
 
 LIGHT = SceneColours.of(palette_for(False), False)
 

@@ -1,0 +1,182 @@
+"""``sd2 strip``: a figure of several frames side by side."""
+
+from __future__ import annotations
+
+import argparse
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sd2core.cli.options import (
+    add_command,
+    add_mesh_reading,
+    position,
+    positive_float,
+    positive_int,
+)
+from sd2core.cli.output import progress_bar
+
+if TYPE_CHECKING:
+    from sd2core.figures.strip_source import StripSource
+    from sd2core.recording import Recording
+
+_DEFAULT_COUNT = 8
+
+
+def add_commands(commands: argparse._SubParsersAction) -> None:
+    """Add ``strip``."""
+    parser = add_command(
+        commands,
+        "strip",
+        "draw frames side by side: the video above its mesh",
+        handler=_strip,
+        description=(
+            "Every column is a moment, with its time and frame number. Colours of velocity are\n"
+            "towards the sensor: red approaches, blue recedes. In SVG and PDF text is text;\n"
+            "pictures and meshes are pictures in it."
+        ),
+        examples=(
+            "  sd2 strip walk.sd2 --out strip.png\n"
+            "  sd2 strip walk.mkv walk.npz --out strip.svg --frames 20:80:10 --dots\n"
+            "  sd2 strip walk.sd2 --out fit.png --rows overlay --colour plain --count 5"
+        ),
+    )
+    parser.add_argument(
+        "paths",
+        nargs="+",
+        type=Path,
+        metavar="PATH",
+        help="a recording, or a video, a mesh, or both",
+    )
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="FILE", help="FILE.png, FILE.svg or FILE.pdf"
+    )
+    chosen = parser.add_mutually_exclusive_group()
+    chosen.add_argument(
+        "--frames",
+        metavar="LIST",
+        help="frames such as 0,15,30, or ranges FROM:TO:STEP such as 0:90:15, TO not included",
+    )
+    chosen.add_argument(
+        "--count",
+        type=positive_int,
+        metavar="N",
+        help=f"that many frames, spread evenly (default: {_DEFAULT_COUNT})",
+    )
+    parser.add_argument(
+        "--rows",
+        metavar="LIST",
+        help="some of video, mesh and overlay (the mesh over the video), in this order"
+        " (default: video,mesh, as far as they are there)",
+    )
+    parser.add_argument("--dots", action="store_true", help="draw vertices instead of the surface")
+    parser.add_argument(
+        "--colour",
+        choices=("velocity", "plain"),
+        default="velocity",
+        help="what the colour of the mesh means (default: velocity)",
+    )
+    parser.add_argument(
+        "--v-max",
+        type=positive_float,
+        default=2.0,
+        metavar="V",
+        help="velocity in m/s at which the colours end (default: 2)",
+    )
+    parser.add_argument(
+        "--whole", action="store_true", help="show the whole picture, not what is around the body"
+    )
+    parser.add_argument(
+        "--columns",
+        type=positive_int,
+        default=10,
+        metavar="N",
+        help="pictures side by side; more go below (default: 10)",
+    )
+    parser.add_argument(
+        "--sensor",
+        type=position,
+        metavar="X,Y,Z",
+        help="where the radar is, in metres (default: the recording's sensor, or the camera)",
+    )
+    add_mesh_reading(parser)
+
+
+def _strip(options: argparse.Namespace) -> None:
+    from sd2core.figures.frames import parse_frames, spread_frames
+    from sd2core.figures.strip import check_figure, plot_strip, save_strip
+    from sd2core.figures.strip_source import StripOptions
+
+    check_figure(options.out)
+    with ExitStack() as stack:
+        source = _source(options, stack)
+        rows: Any = options.rows.replace(" ", "").split(",") if options.rows else _rows(source)
+        how = StripOptions(
+            rows=tuple(rows),
+            as_dots=options.dots,
+            colour=options.colour,
+            v_max_mps=options.v_max,
+            whole=options.whole,
+            columns=options.columns,
+        )
+        total = len(source.clock)
+        if options.frames:
+            frames = parse_frames(options.frames, total)
+        else:
+            frames = spread_frames(options.count or _DEFAULT_COUNT, total)
+        with progress_bar("Drawing") as progress:
+            figure = plot_strip(source, frames, how, progress)
+        save_strip(figure, options.out, source, frames, how)
+    print(f"{options.out}: {len(frames)} frames")
+
+
+def _rows(source: StripSource) -> list[str]:
+    there = {"video": source.video, "mesh": source.mesh}
+    return [row for row, part in there.items() if part is not None]
+
+
+def _source(options: argparse.Namespace, stack: ExitStack) -> StripSource:
+    from dataclasses import replace
+
+    from sd2core.errors import Sd2Error
+    from sd2core.figures.strip_source import StripSource
+
+    recording = _recording(options)
+    video = mesh = None
+    if recording.video is not None:
+        with progress_bar("Reading the video") as progress:
+            video = stack.enter_context(recording.open_video(progress))
+    if recording.mesh is not None:
+        with progress_bar("Reading the mesh") as progress:
+            mesh = recording.load_mesh(progress)
+    if video is None and mesh is None:
+        raise Sd2Error(f"{options.paths[0]} has neither video nor mesh", "one of them, or both")
+    source = StripSource.of(recording, video, mesh, str(options.paths[0]))
+    if options.sensor is not None:
+        source = replace(source, sensor=replace(source.sensor, position_m=options.sensor))
+    return source
+
+
+def _recording(options: argparse.Namespace) -> Recording:
+    from sd2core.cli.reading import mesh_reading, recording_as_told, refuse_in_vain
+    from sd2core.errors import Sd2Error
+    from sd2core.io.kinds import kind_of
+    from sd2core.recording import Recording
+
+    kinds = {kind_of(path): path for path in options.paths}
+    if "recording" in kinds and len(options.paths) == 1:
+        return recording_as_told(kinds["recording"], options)
+    if kinds.keys() - {"video", "mesh"} or len(kinds) < len(options.paths):
+        raise Sd2Error(
+            f"A strip of {', '.join(map(str, options.paths))}",
+            "a recording alone, or a video, a mesh, or one of each",
+        )
+    mesh = kinds.get("mesh")
+    refuse_in_vain(options, options.paths[0], mesh, but=("focal_px",))
+    return Recording(
+        Path(),
+        video=kinds.get("video"),
+        mesh=mesh,
+        faces=options.faces,
+        mesh_reading=mesh_reading(options),
+    )

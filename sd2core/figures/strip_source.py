@@ -1,0 +1,130 @@
+"""What a strip of frames is drawn of, and how it is to look."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal, get_args
+
+from sd2core.body.camera import PinholeCamera
+from sd2core.errors import Sd2Error
+from sd2core.mesh import MeshSequence
+from sd2core.sensor import VirtualSensor
+from sd2core.timebase import Timebase
+
+if TYPE_CHECKING:
+    from sd2core.io.video import VideoReader
+    from sd2core.recording import Recording
+
+Row = Literal["video", "mesh", "overlay"]
+ROWS: tuple[Row, ...] = get_args(Row)
+Colour = Literal["plain", "velocity"]
+MOST_FRAMES = 100
+
+
+@dataclass(frozen=True)
+class StripOptions:
+    """What a strip shows.
+
+    Parameters
+    ----------
+    rows : tuple of str
+        Of ``video``, ``mesh`` and ``overlay`` (the mesh over the video), in this order.
+    as_dots : bool
+        Vertices instead of the surface.
+    colour : str
+        ``plain``, or by radial ``velocity`` towards the sensor.
+    v_max_mps : float
+        Where the colours of velocity end.
+    whole : bool
+        The whole picture instead of what is around the body.
+    columns : int
+        Pictures side by side; more frames go below.
+    """
+
+    rows: tuple[Row, ...] = ("video", "mesh")
+    as_dots: bool = False
+    colour: Colour = "velocity"
+    v_max_mps: float = 2.0
+    whole: bool = False
+    columns: int = 10
+
+    def __post_init__(self) -> None:
+        unknown = [row for row in self.rows if row not in ROWS]
+        if unknown or not self.rows or len(set(self.rows)) < len(self.rows):
+            raise Sd2Error(
+                f"The rows are {', '.join(self.rows) or 'none'}", f"of {', '.join(ROWS)}"
+            )
+        if not (self.v_max_mps > 0 and self.columns > 0):
+            raise Sd2Error(
+                f"v_max is {self.v_max_mps}, columns are {self.columns}", "positive numbers"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class StripSource:
+    """What is drawn.
+
+    Parameters
+    ----------
+    video : VideoReader or None
+    mesh : MeshSequence or None
+    camera : PinholeCamera
+        Sees both.
+    sensor : VirtualSensor
+        Velocities are towards it.
+    simulated : bool
+        Whether no camera was there.
+    name : str
+        Of the recording or file, for provenance.
+    """
+
+    video: VideoReader | None
+    mesh: MeshSequence | None
+    camera: PinholeCamera
+    sensor: VirtualSensor = field(default_factory=VirtualSensor)
+    simulated: bool = False
+    name: str = ""
+
+    @classmethod
+    def of(
+        cls,
+        recording: Recording,
+        video: VideoReader | None,
+        mesh: MeshSequence | None,
+        name: str,
+    ) -> StripSource:
+        """What a recording holds, its parts opened by the caller."""
+        width, height = (video.width, video.height) if video is not None else (640, 480)
+        focal_px = recording.focal_px(width, height)
+        camera = PinholeCamera.default(width, height)
+        if focal_px is not None:
+            camera = PinholeCamera(width, height, focal_px)
+        return cls(video, mesh, camera, recording.sensor, recording.simulated, name)
+
+    @property
+    def clock(self) -> Timebase:
+        """Frames are counted on the video's clock, or the mesh's where there is no video."""
+        part = self.video or self.mesh
+        assert part is not None
+        return part.timebase
+
+    def mesh_frame(self, time_s: float) -> int | None:
+        """Frame of the mesh at a time, None where it has none."""
+        if self.mesh is None or not self.mesh.timebase.covers(time_s):
+            return None
+        return self.mesh.timebase.frame_at(time_s)
+
+
+def check_strip(source: StripSource, frames: Sequence[int], options: StripOptions) -> None:
+    """Refuse what cannot be drawn."""
+    if not frames or len(frames) > MOST_FRAMES:
+        raise Sd2Error(f"A strip of {len(frames)} frames", f"1 to {MOST_FRAMES} frames")
+    for frame in frames:
+        if not 0 <= frame < len(source.clock):
+            raise Sd2Error(f"There is no frame {frame}", f"frames 0 to {len(source.clock) - 1}")
+    for row in options.rows:
+        if row != "mesh" and source.video is None:
+            raise Sd2Error(f"{source.name} has no video", f"a video, for the row {row}")
+        if row != "video" and source.mesh is None:
+            raise Sd2Error(f"{source.name} has no mesh", f"a mesh, for the row {row}")

@@ -1,0 +1,182 @@
+"""A mesh as a camera sees it: which triangle each pixel shows, and how bright it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.body.camera import PinholeCamera
+from sd2core.raster import interpolate, rasterise
+from sd2core.scattering.visibility import sum_cross_products
+
+NEAREST_M = 0.01
+_DARKEST = 0.35
+"""Lightness of a surface that is seen from its edge."""
+_DOTS_ACROSS = 210
+"""Sides of a dot that make up the longer side of the picture."""
+_CELL_PER_DOT = 2.2
+"""One dot in a cell of this many dots' sides: where vertices crowd, the person stays visible."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Part of a camera's picture, enlarged.
+
+    Parameters
+    ----------
+    left, top : float
+        Corner in pixels of the camera's picture.
+    width, height : int
+        Of the enlarged part.
+    zoom : float
+        Its pixels per pixel of the picture.
+    """
+
+    left: float
+    top: float
+    width: int
+    height: int
+    zoom: float = 1.0
+
+    @classmethod
+    def whole(cls, camera: PinholeCamera) -> Frame:
+        """All of the picture as it is."""
+        return cls(0.0, 0.0, camera.width, camera.height)
+
+    def place(self, pixels: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Where pixels (..., 2) of the picture are in the part."""
+        return (np.asarray(pixels, np.float64) - (self.left, self.top)) * self.zoom
+
+
+def projected(
+    vertices_m: NDArray[np.floating], camera: PinholeCamera
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Pixels (V, 2) and depths (V,) of vertices; NaN behind the camera and where unknown."""
+    points = np.asarray(vertices_m, np.float64)
+    depth = np.where(points[:, 2] > NEAREST_M, points[:, 2], np.nan)
+    return camera.focal_px * points[:, :2] / depth[:, None] + camera.centre_px, depth
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """Which triangle each pixel shows.
+
+    Parameters
+    ----------
+    owner : int32 array, shape (height, width)
+        Number of the triangle, minus one beside the mesh.
+    points : float32 array, shape (V, 2)
+        Pixel coordinates of the vertices.
+    nearness : float32 array, shape (V,)
+        1 / depth; 0 where that is not known.
+    faces : int32 array, shape (F, 3)
+    """
+
+    owner: NDArray[np.int32]
+    points: NDArray[np.float32]
+    nearness: NDArray[np.float32]
+    faces: NDArray[np.int32]
+
+    @property
+    def shown(self) -> NDArray[np.bool_]:
+        """Pixels that the mesh covers, (height, width)."""
+        covered: NDArray[np.bool_] = self.owner >= 0
+        return covered
+
+    def interpolated(self, attributes: NDArray[np.floating]) -> NDArray[np.float32]:
+        """Attributes (V, K) of the vertices at the pixels that are covered, (N, K)."""
+        rows, columns = np.nonzero(self.shown)
+        values = np.zeros((len(rows), attributes.shape[1]), np.float32)
+        given = np.ascontiguousarray(attributes, np.float32)
+        interpolate(
+            self.points, self.nearness, self.faces, rows, columns, self.owner, given, values
+        )
+        return values
+
+
+def seen(
+    vertices_m: NDArray[np.floating],
+    faces: NDArray[np.int32],
+    camera: PinholeCamera,
+    frame: Frame | None = None,
+) -> Seen:
+    """Look at a mesh.
+
+    Parameters
+    ----------
+    vertices_m : float array, shape (V, 3)
+        Metres in the camera's frame; triangles with an unknown corner are left out.
+    faces : int32 array, shape (F, 3)
+        Counter-clockwise seen from outside.
+    camera : PinholeCamera
+    frame : Frame, optional
+        The whole picture by default.
+    """
+    frame = frame or Frame.whole(camera)
+    pixels, depth = projected(vertices_m, camera)
+    known = np.isfinite(depth)
+    ahead = np.ascontiguousarray(faces[known[faces].all(axis=1)])
+    owner = np.full((frame.height, frame.width), -1, np.int32)
+    points = np.where(known[:, None], frame.place(pixels), 0.0).astype(np.float32)
+    nearness = np.where(known, 1.0 / np.where(known, depth, 1.0), 0.0).astype(np.float32)
+    rasterise(points, nearness, ahead, np.zeros(owner.shape, np.float32), owner)
+    return Seen(owner, points, nearness, ahead)
+
+
+def lightness(vertices_m: NDArray[np.floating], faces: NDArray[np.int32]) -> NDArray[np.float32]:
+    """How squarely the camera sees the surface at each vertex, (V,): a third edge-on, 1 square on.
+
+    Area-weighted normals: smooth where the surface is.
+    """
+    points = np.ascontiguousarray(np.asarray(vertices_m, np.float64).T)
+    normal = np.empty((points.shape[1], 3), np.float64)
+    sum_cross_products(points, faces, normal)
+    lengths = np.linalg.norm(normal, axis=1) * np.linalg.norm(points, axis=0)
+    cosine = np.abs(np.einsum("vi,iv->v", normal, points)) / np.maximum(lengths, 1e-30)
+    return (_DARKEST + (1.0 - _DARKEST) * cosine).astype(np.float32)
+
+
+def shaded(
+    vertices_m: NDArray[np.floating], faces: NDArray[np.int32] | None, camera: PinholeCamera
+) -> NDArray[np.float32]:
+    """What a lamp at the camera makes of a mesh.
+
+    Parameters
+    ----------
+    vertices_m : float array, shape (V, 3)
+        Metres in the camera's frame.
+    faces : int32 array, shape (F, 3), or None
+        None: dots.
+    camera : PinholeCamera
+
+    Returns
+    -------
+    float32 array, shape (height, width)
+        0 beside the mesh; on it from a third (edge-on) to 1 (square on, and dots).
+    """
+    if faces is None:
+        return dotted(vertices_m, camera)
+    view = seen(vertices_m, faces, camera)
+    light = np.zeros(view.owner.shape, np.float32)
+    light[view.shown] = view.interpolated(lightness(vertices_m, faces)[:, None])[:, 0]
+    return light
+
+
+def dotted(vertices_m: NDArray[np.floating], camera: PinholeCamera) -> NDArray[np.float32]:
+    """The nearest vertex of every cell as a square of ones, (height, width)."""
+    pixels, depth = projected(vertices_m, camera)
+    size = max(round(max(camera.width, camera.height) / _DOTS_ACROSS), 1)
+    light = np.zeros((camera.height, camera.width), np.float32)
+    with np.errstate(invalid="ignore"):
+        inside = ((pixels >= 0) & (pixels < (camera.width, camera.height))).all(axis=1)
+    pixels = pixels[inside][np.argsort(depth[inside], kind="stable")]
+    cells = np.floor(pixels / (_CELL_PER_DOT * size)).astype(np.int64)
+    _, first = np.unique(cells, axis=0, return_index=True)
+    corner = np.floor(pixels[first] - (size - 1) / 2).astype(np.int64)
+    for offset in np.ndindex(size, size):
+        columns, rows = (corner + offset).T
+        columns = np.clip(columns, 0, camera.width - 1)
+        light[np.clip(rows, 0, camera.height - 1), columns] = 1.0
+    return light
