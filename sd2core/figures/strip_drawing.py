@@ -14,7 +14,7 @@ from sd2core.figures.colours import rgb, velocity_colours
 from sd2core.figures.strip_source import Row, StripOptions, StripSource
 from sd2core.figures.surface import Frame, lightness, projected, seen
 from sd2core.mesh import MeshSequence
-from sd2core.scattering.velocity import radial_velocity
+from sd2core.scattering.velocity import moments, radial_velocity
 from sd2core.sensor import VirtualSensor
 
 if TYPE_CHECKING:
@@ -45,11 +45,9 @@ class Body:
         """The mesh at a frame of the strip's clock, None where there is none."""
         mesh = source.mesh
         number = source.mesh_frame(source.clock.time_of(frame))
-        if mesh is None or number is None:
+        if mesh is None or number is None or not mesh.presence.there[number]:
             return None
         vertices = np.asarray(mesh.frame(number), np.float64)
-        if not np.isfinite(vertices).any():
-            return None  # nobody was found in it
         colours = np.tile(rgb(_PLAIN), (len(vertices), 1))
         if options.colour == "velocity":
             colours = velocity_colours(_velocity(mesh, number, source.sensor), options.v_max_mps)
@@ -57,11 +55,12 @@ class Body:
 
 
 def _velocity(mesh: MeshSequence, frame: int, sensor: VirtualSensor) -> NDArray[np.float64]:
-    """Radial velocity of every vertex between the frames before and after."""
-    before, after = max(frame - 1, 0), min(frame + 1, mesh.frame_count - 1)
+    """Radial velocity of every vertex between the frames before and after, as the map has it."""
+    stencil = moments(mesh.times_s, np.array([frame]), 1, mesh.presence)
+    before, after = int(stencil.before[0, 0]), int(stencil.after[0, 0])
     a, b = (np.asarray(mesh.frame(k), np.float64).T for k in (before, after))  # (3, V)
     velocity: NDArray[np.float64] = radial_velocity(
-        a, b, sensor.position_m, mesh.times_s[after] - mesh.times_s[before]
+        a, b, sensor.position_m, stencil.duration_s[0, 0]
     )
     return velocity
 
