@@ -1,0 +1,101 @@
+"""How well a fitted mesh lies on the person of a real video, whose motion nobody knows."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from sd2core.body.camera import PinholeCamera
+from sd2core.body.track import LANDMARKS, LandmarkTrack
+from sd2core.compare.joints import JOINTS, own_patches, own_resolution
+from sd2core.compare.silhouette import overlap, silhouette
+from sd2core.errors import Sd2Error
+from sd2core.mesh import MeshSequence
+
+_SEEN = 0.5
+"""Visibility from which a landmark is compared, and sureness from which a pixel is a person."""
+
+_BOTH = tuple(name for name in LANDMARKS if name in JOINTS)
+"""Landmarks that are joints: shoulders, elbows, wrists, hips, knees, ankles."""
+
+
+@dataclass(frozen=True)
+class RealScore:
+    """One video.
+
+    Parameters
+    ----------
+    name : str
+    overlap : float
+        Mean over frames of the intersection over union of the mesh's silhouette and
+        the landmark model's mask, within the picture.
+    overlap_least : float
+    reprojection_px, reprojection_m : float
+        Mean distance of joints from their landmarks in the picture, and the same at
+        the joint's depth. Landmarks that are hidden or outside the picture are left out.
+    landmarks : int
+        That were compared.
+    """
+
+    name: str
+    overlap: float
+    overlap_least: float
+    reprojection_px: float
+    reprojection_m: float
+    landmarks: int
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return asdict(self)
+
+
+def score_real(
+    name: str, mesh: MeshSequence, track: LandmarkTrack, camera: PinholeCamera
+) -> RealScore:
+    """Measure a mesh against what the landmark model saw.
+
+    Parameters
+    ----------
+    name : str
+    mesh : MeshSequence
+        With a surface of ours, frame by frame of the track.
+    track : LandmarkTrack
+        With silhouettes.
+    camera : PinholeCamera
+
+    Raises
+    ------
+    Sd2Error
+        When the two have different frames, or the surface is none of ours.
+    """
+    resolution = own_resolution(mesh)
+    if resolution is None or mesh.faces is None or mesh.frame_count != len(track):
+        raise Sd2Error(
+            f"{name}: a mesh of {mesh.vertex_count} vertices and {mesh.frame_count} frames",
+            f"one made by `sd2 fit` from this video of {len(track)} frames",
+        )
+    frames = [int(frame) for frame in track.silhouette_frames if track.present[frame]]
+    masks = dict(zip(track.silhouette_frames.tolist(), track.silhouettes, strict=True))
+    overlaps = []
+    for frame in frames:
+        seen = masks[frame] >= 255 * _SEEN
+        height, width = seen.shape
+        drawn = silhouette(mesh.frame(frame), mesh.faces, camera, (width, height))
+        overlaps.append(overlap(drawn, seen))
+    joints = own_patches(resolution).of(mesh)[:, [JOINTS.index(one) for one in _BOTH]]
+    rows = [LANDMARKS.index(one) for one in _BOTH]
+    pixels = track.image_px[:, rows].astype(np.float64)
+    inside = ((pixels >= 0) & (pixels <= (track.width, track.height))).all(axis=-1)
+    there = track.present[:, None] & (track.visibility[:, rows] >= _SEEN) & inside
+    away_px = np.linalg.norm(camera.project(joints[there]) - pixels[there], axis=-1)
+    away_m = away_px * joints[there][:, 2] / camera.focal_px
+    return RealScore(
+        name,
+        float(np.nanmean(overlaps)) if overlaps else float("nan"),
+        float(np.nanmin(overlaps)) if overlaps else float("nan"),
+        float(away_px.mean()) if away_px.size else float("nan"),
+        float(away_m.mean()) if away_m.size else float("nan"),
+        int(there.sum()),
+    )
