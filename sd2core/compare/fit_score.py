@@ -146,7 +146,6 @@ def score_clip(
     truth: Truth,
     fitted: MeshSequence,
     *,
-    sigma_mps: NDArray[np.floating] | None = None,
     seconds: float | None = None,
     progress: Progress = silent,
 ) -> ClipScore:
@@ -156,10 +155,8 @@ def score_clip(
     ----------
     truth : Truth
     fitted : MeshSequence
-        Of this clip's video, in the camera frame, with a surface of ours.
-    sigma_mps : float array, shape (T, V), optional
-        Standard deviation of each vertex' velocity along the line of sight, on the
-        fitted mesh's own frames.
+        Of this clip's video, in the camera frame, with a surface of ours. Where it says
+        how well its velocities are known, that is measured too.
     seconds : float, optional
         That the whole fit took.
     progress : Progress
@@ -232,7 +229,7 @@ def score_clip(
         edge=np.array([rms(one[edge & measured]) for one in errors]),
         middle=np.array([rms(one[~edge & measured]) for one in errors]),
         overlap=_overlap(pair[0], pair[1], truth),
-        sigma=_sigma(fitted, sigma_mps, patches[1], times_s, errors[0], measured),
+        sigma=_sigma(pair[1], patches[1], errors[0], measured),
         seconds_per_frame=None if seconds is None else seconds / len(fitted.timebase),
         notes=tuple(notes),
     )
@@ -268,20 +265,13 @@ def _overlap(true: MeshSequence, fitted: MeshSequence, truth: Truth) -> float:
 
 
 def _sigma(
-    fitted: MeshSequence,
-    sigma_mps: NDArray[np.floating] | None,
-    patches: JointPatches,
-    times_s: Floats,
-    errors: Floats,
-    measured: NDArray[np.bool_],
+    fitted: MeshSequence, patches: JointPatches, errors: Floats, measured: NDArray[np.bool_]
 ) -> Pair | None:
     """Standard deviations of the joints, as the vertices of their patches have them."""
-    if sigma_mps is None:
+    known = fitted.uncertainty
+    if known is None:
         return None
-    frames = np.abs(fitted.times_s[:, None] - times_s[None, :]).argmin(axis=0)
     sigma = np.stack(
-        [np.mean(sigma_mps[frames][:, rows], axis=1, dtype=np.float64) for rows in patches.rows],
-        axis=1,
-    )
-    known = measured[:, None] & np.isfinite(sigma)
-    return Pair(sigma[known], errors[known])
+        [known.along_mps[:, known.vertex_limb[rows]].mean(axis=1) for rows in patches.rows], axis=1
+    ).astype(np.float64)
+    return Pair(sigma[measured].ravel(), errors[measured].ravel())

@@ -57,6 +57,8 @@ def rms(values: NDArray[Any]) -> float:
 
 def correlation(values: NDArray[Any], truth: NDArray[Any]) -> float:
     """Pearson's correlation over all elements; 1 for equals, NaN where either is constant."""
+    if not np.size(values):
+        return float("nan")
     a, b = (np.asarray(one, np.float64).ravel() for one in (values, truth))
     if np.array_equal(a, b):
         return 1.0

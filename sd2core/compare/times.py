@@ -67,7 +67,7 @@ def at_times(mesh: MeshSequence, times_s: NDArray[np.float64]) -> tuple[MeshSequ
         start, stop = int(nearest[0]), int(nearest[-1]) + 1
         vertices = mesh.read(start, stop)[nearest - start]
         there = None if mesh.present is None else mesh.present[nearest]
-        return _replaced(mesh, vertices, times_s, there), False
+        return _replaced(mesh, vertices, times_s, there, nearest), False
     frames = np.clip(np.searchsorted(own, times_s, side="right") - 1, 0, len(own) - 2)
     # Between two frames there is a person where both of them have one.
     there = mesh.presence.there[frames] & mesh.presence.there[frames + 1]
@@ -79,7 +79,7 @@ def at_times(mesh: MeshSequence, times_s: NDArray[np.float64]) -> tuple[MeshSequ
         first, weights = cubic_weights(own[begin:end], inside, int(frame) - begin)
         stretch = mesh.read(begin + first, begin + first + len(weights)).astype(np.float64)
         vertices[row] = np.tensordot(weights, stretch, 1)
-    return _replaced(mesh, vertices, times_s, there), True
+    return _replaced(mesh, vertices, times_s, there, nearest), True
 
 
 def _replaced(
@@ -87,5 +87,9 @@ def _replaced(
     vertices: NDArray[np.floating],
     times_s: NDArray[np.float64],
     present: NDArray[np.bool_] | None,
+    nearest: NDArray[np.intp],
 ) -> MeshSequence:
-    return replace(mesh, vertices=vertices, timebase=Timebase(times_s), present=present)
+    known = None if mesh.uncertainty is None else mesh.uncertainty.of_frames(nearest)
+    return replace(
+        mesh, vertices=vertices, timebase=Timebase(times_s), present=present, uncertainty=known
+    )

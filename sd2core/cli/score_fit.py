@@ -1,0 +1,149 @@
+"""``sd2 score-fit``: how good fits are where the motion is known."""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import time
+from contextlib import nullcontext
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+from sd2core.cli.options import add_command, add_json
+from sd2core.cli.output import print_json, progress_bar
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    from sd2core.compare.fit_score import ClipScore
+    from sd2core.compare.truth import Truth
+
+_SUFFIXES = (".zarr", ".npz")
+
+
+def add_commands(commands: argparse._SubParsersAction) -> None:
+    """Add ``score-fit``."""
+    parser = add_command(
+        commands,
+        "score-fit",
+        "fit simulated videos whose motion is known, and measure how good that is",
+        handler=_score,
+        description=(
+            "Runs `sd2 fit` on every clip of a folder that `sd2 simulate fit-truth` made, or\n"
+            "takes meshes that are fitted already, and prints the table of docs/fitting.md:\n"
+            "velocities of hands and elbows along the line of sight, peak speeds, false motion\n"
+            "of who stands still, Doppler maps, ends of clips, uncertainty, time.\n"
+            "The fit is told the camera's focal length, and the person's height unless\n"
+            "--stature unknown."
+        ),
+        examples=(
+            "  sd2 score-fit truth\n"
+            "  sd2 score-fit truth --keep fitted --markdown table.md\n"
+            "  sd2 score-fit truth --meshes fitted --json"
+        ),
+    )
+    parser.add_argument("truth", type=Path, metavar="TRUTH", help="a folder of clips, or one clip")
+    parser.add_argument(
+        "--clips", metavar="NAMES", help="only these, separated by commas (default: all)"
+    )
+    source = parser.add_mutually_exclusive_group()
+    source.add_argument(
+        "--meshes",
+        type=Path,
+        metavar="FOLDER",
+        help="measure NAME.zarr, NAME.npz or NAME/mesh.zarr of this folder instead of fitting",
+    )
+    source.add_argument(
+        "--keep", type=Path, metavar="FOLDER", help="keep what is fitted as NAME.zarr in FOLDER"
+    )
+    parser.add_argument(
+        "--stature",
+        choices=("known", "unknown"),
+        default="known",
+        help="whether the fit is told how tall the person is (default: known)",
+    )
+    parser.add_argument(
+        "--markdown", type=Path, metavar="FILE", help="also write the tables as Markdown"
+    )
+    add_json(parser)
+
+
+def _score(options: argparse.Namespace) -> None:
+    from sd2core.atomic import atomic_write_text
+    from sd2core.cli.reading import check_output
+    from sd2core.compare.fit_report import as_dict
+    from sd2core.compare.fit_words import as_markdown, as_text
+    from sd2core.compare.truth import read_truth, truth_folders
+
+    if options.markdown is not None:
+        check_output(options.markdown, ".md")
+    truths = [read_truth(folder) for folder in truth_folders(options.truth)]
+    if options.clips is not None:
+        names = options.clips.split(",")
+        known = {truth.name: truth for truth in truths}
+        for name in names:
+            if name not in known:
+                raise Sd2Error(f"There is no clip {name!r}", ", ".join(known))
+        truths = [known[name] for name in names]
+    scores = _scores(truths, options)
+    if options.markdown is not None:
+        atomic_write_text(options.markdown, as_markdown(scores))
+    if options.json:
+        print_json(as_dict(scores))
+    else:
+        print(as_text(scores))
+
+
+def _scores(truths: list[Truth], options: argparse.Namespace) -> list[ClipScore]:
+    from sd2core.compare.fit_score import score_clip
+    from sd2core.io.mesh import load_mesh
+
+    if options.keep is not None:
+        options.keep.mkdir(exist_ok=True)
+    scores = []
+    with TemporaryDirectory() if options.keep is None else nullcontext(options.keep) as folder:
+        for truth in truths:
+            seconds = None
+            if options.meshes is not None:
+                path = _mesh_in(options.meshes, truth.name)
+            else:
+                path = Path(folder) / f"{truth.name}.zarr"
+                seconds = _fit(truth, path, options.stature == "known")
+            with progress_bar(f"Measuring {truth.name}") as progress:
+                scores.append(
+                    score_clip(truth, load_mesh(path), seconds=seconds, progress=progress)
+                )
+    return scores
+
+
+def _mesh_in(folder: Path, name: str) -> Path:
+    places = [folder / f"{name}{suffix}" for suffix in _SUFFIXES]
+    places += [folder / name / f"mesh{suffix}" for suffix in _SUFFIXES]
+    for path in places:
+        if path.exists():
+            return path
+    raise Sd2Error(
+        f"{folder} holds no mesh of the clip {name!r}",
+        f"{name}.zarr, {name}.npz or {name}/mesh.zarr",
+    )
+
+
+def _fit(truth: Truth, out: Path, stature_known: bool) -> float:
+    """Fit one clip in a process of its own, as a user does; seconds with its start."""
+    if out.exists():
+        raise Sd2Error(
+            f"{out} exists",
+            "a folder without meshes of these clips",
+            f"Measure it with --meshes {out.parent}, or delete it first",
+        )
+    command = [sys.executable, "-m", "sd2core.cli", "fit", str(truth.video), "--out", str(out)]
+    command += ["--focal-px", f"{truth.camera.focal_px:g}"]
+    if stature_known:
+        command += ["--stature-m", f"{truth.stature_m:g}"]
+    started = time.perf_counter()
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        said = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}"]
+        raise Sd2Error(f"{truth.name} could not be fitted: {said[0].removeprefix('sd2: ')}")
+    return time.perf_counter() - started

@@ -1,0 +1,116 @@
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from cli_outcome import Sd2
+
+from sd2core.body.model import Body
+from sd2core.compare.truth import FORMAT, VERSION
+from sd2core.io.mesh import save_mesh
+from sd2core.mesh import MeshSequence
+from sd2core.timebase import Timebase
+
+
+@pytest.fixture
+def truth(tmp_path: Path) -> Path:
+    """One clip, in which the coarse body stands still."""
+    folder = tmp_path / "truth" / "still"
+    folder.mkdir(parents=True)
+    body = Body.load("low")
+    vertices = np.repeat((body.vertices_m + np.array([0.0, 1.0, 2.5]))[None], 14, axis=0)
+    times = Timebase(np.arange(14) / 30.0)
+    save_mesh(MeshSequence(vertices.astype(np.float32), body.faces, times), folder / "mesh.zarr")
+    meta = {
+        "format": FORMAT,
+        "version": VERSION,
+        "clip": {"name": "still", "action": {"kind": "still", "speed": "normal", "hand": "R"}},
+        "camera": {"width": 640, "height": 480, "focal_px": 600.0},
+        "stature_m": 1.76,
+        "spans": [],
+    }
+    (folder / "truth.json").write_text(json.dumps(meta))
+    return folder.parent
+
+
+def test_fitted_meshes_are_measured(sd2: Sd2, truth: Path, tmp_path: Path) -> None:
+    outcome = sd2(
+        "score-fit", truth, "--meshes", truth, "--markdown", tmp_path / "table.md", "--json"
+    )
+    assert outcome.code == 0
+    found = json.loads(outcome.out)
+    (clip,) = found["clips"]
+    assert (clip["clip"], clip["vertex_velocity_rms_mps"]) == ("still", 0.0)
+    assert "| still |" in (tmp_path / "table.md").read_text("utf-8")
+
+
+@pytest.mark.parametrize("stature", ["known", "unknown"])
+def test_clips_are_fitted_with_what_is_known(
+    sd2: Sd2, truth: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stature: str
+) -> None:
+    asked: list[list[str]] = []
+
+    def fit(command: list[str], **_: Any) -> subprocess.CompletedProcess[str]:
+        asked.append(command)
+        from sd2core.io.mesh import load_mesh
+
+        save_mesh(
+            load_mesh(truth / "still" / "mesh.zarr"), Path(command[command.index("--out") + 1])
+        )
+        return subprocess.CompletedProcess(command, 0, "", "")
+
+    monkeypatch.setattr(subprocess, "run", fit)
+    kept = tmp_path / "kept"
+    outcome = sd2("score-fit", truth, "--keep", kept, "--stature", stature)
+    assert outcome.code == 0
+    assert "who stands still" in outcome.out
+    (command,) = asked
+    assert command[:4] == [sys.executable, "-m", "sd2core.cli", "fit"]
+    assert command[4] == str(truth / "still" / "video.mp4")
+    assert command[command.index("--focal-px") + 1] == "600"
+    assert ("--stature-m" in command) == (stature == "known")
+    assert (kept / "still.zarr").is_dir()
+    again = sd2("score-fit", truth, "--keep", kept)
+    assert again.code == 1
+    assert "still.zarr exists" in again.err
+
+
+def test_a_fit_that_fails_says_why(sd2: Sd2, truth: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fit(command: list[str], **_: Any) -> subprocess.CompletedProcess[str]:
+        return subprocess.CompletedProcess(command, 1, "", "sd2: There is nobody in the video.\n")
+
+    monkeypatch.setattr(subprocess, "run", fit)
+    outcome = sd2("score-fit", truth)
+    assert outcome.code == 1
+    assert "still could not be fitted: There is nobody in the video" in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "found"),
+    [
+        (("--clips", "dance", "--meshes", "."), "no clip 'dance'"),
+        (("--meshes", "elsewhere"), "holds no mesh of the clip 'still'"),
+        (("--markdown", "table.txt"), "ends in .md"),
+    ],
+)
+def test_what_cannot_be_scored_is_explained(
+    sd2: Sd2, truth: Path, arguments: tuple[str, ...], found: str
+) -> None:
+    outcome = sd2("score-fit", truth, *arguments)
+    assert outcome.code == 1
+    assert found in outcome.err
+
+
+def test_the_module_runs_the_librarys_commands() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "sd2core.cli", "simulate", "fit-truth", "--list"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert "walk-aside" in done.stdout
