@@ -8,7 +8,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.compare.joints import JOINTS, JointPatches, own_patches, own_resolution
+from sd2core.body.silhouette import overlap, silhouette
+from sd2core.compare.joints import (
+    JOINTS,
+    JointPatches,
+    medium_in_high,
+    own_patches,
+    own_resolution,
+)
 from sd2core.compare.maps import map_l1, maps_alike
 from sd2core.compare.measures import (
     EDGE_FRAMES,
@@ -18,7 +25,6 @@ from sd2core.compare.measures import (
     rms,
     speed_mps,
 )
-from sd2core.compare.silhouette import overlap, silhouette
 from sd2core.compare.times import at_times, common_times
 from sd2core.compare.truth import Stroke, Truth
 from sd2core.errors import Sd2Error
@@ -173,7 +179,10 @@ def score_clip(
     """
     true = truth.mesh()
     times_s = common_times([true, fitted])
-    pair = [at_times(true, times_s)[0], at_times(fitted, times_s)[0]]
+    pair = [
+        _with_vertices_of(at_times(one, times_s)[0], other)
+        for one, other in ((true, fitted), (fitted, true))
+    ]
     presence = pair[1].presence
     if not presence.measured.any():
         raise Sd2Error(f"{truth.name}: the fitted mesh has no person", "the person of the clip")
@@ -244,6 +253,15 @@ def _patches(mesh: MeshSequence, name: str) -> JointPatches:
             "Measure others with `sd2 compare-meshes`",
         )
     return own_patches(resolution)
+
+
+def _with_vertices_of(mesh: MeshSequence, other: MeshSequence) -> MeshSequence:
+    """The finest surface with the medium one's vertices, where the other has those."""
+    if (own_resolution(mesh), own_resolution(other)) != ("high", "medium"):
+        return mesh
+    rows = medium_in_high()
+    known = None if mesh.uncertainty is None else mesh.uncertainty.of_vertices(rows)
+    return replace(mesh, vertices=mesh.vertices[:, rows], faces=other.faces, uncertainty=known)
 
 
 def _vertex_velocity(mesh: MeshSequence, presence: Presence) -> float:

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from sd2core.body.camera import PinholeCamera
+from sd2core.body.silhouette import overlap, silhouette
 from sd2core.body.track import LANDMARKS, LandmarkTrack
 from sd2core.compare.joints import JOINTS, own_patches, own_resolution
-from sd2core.compare.silhouette import overlap, silhouette
 from sd2core.errors import Sd2Error
 from sd2core.mesh import MeshSequence
 

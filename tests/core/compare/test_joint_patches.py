@@ -9,6 +9,7 @@ from sd2core.compare.joints import (
     GROUPS,
     JOINTS,
     carried_over,
+    medium_in_high,
     own_patches,
     own_resolution,
     rows_of,
@@ -71,6 +72,13 @@ def test_patches_follow_the_joints(resolution: Resolution) -> None:
             joints[:, JOINTS.index(joint)] - heads[:, body.skeleton.index[bone]], axis=1
         )
         assert away.max() < 0.02, joint
+
+
+def test_the_medium_surface_is_part_of_the_finest() -> None:
+    rows = medium_in_high()
+    np.testing.assert_array_equal(
+        Body.load("high").vertices_m[rows], Body.load("medium").vertices_m
+    )
 
 
 def test_no_patch_hangs_on_few_vertices() -> None:

@@ -7,10 +7,10 @@ import pytest
 from known_clip import TIMES, waving
 
 from sd2core.body.camera import PinholeCamera
+from sd2core.body.silhouette import silhouette
 from sd2core.body.track import LANDMARKS, LandmarkTrack
 from sd2core.compare.joints import JOINTS, own_patches
 from sd2core.compare.real_score import score_real
-from sd2core.compare.silhouette import silhouette
 from sd2core.errors import Sd2Error
 from sd2core.mesh import MeshSequence
 from sd2core.timebase import Timebase
