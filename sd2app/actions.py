@@ -107,6 +107,12 @@ ACTIONS: tuple[Action, ...] = (
         lambda c: c.synthesis.complete,
     ),
     Action(
+        "export_strip", "File", "Export strip of frames…", ("Ctrl+Shift+E",),
+        "Write frames side by side, the video above its mesh (.png, .svg, .pdf)",
+        lambda w: w.dialogs.export_strip(),
+        lambda c: c.document.video is not None or _has_mesh(c),
+    ),
+    Action(
         "quit", "File", "Quit", ("Ctrl+Q",), "Close the window", lambda w: w.close_window(),
         separator_before=True,
     ),

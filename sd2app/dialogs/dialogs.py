@@ -23,7 +23,9 @@ from PySide6.QtWidgets import (
 import sd2core
 from sd2app.actions import ACTIONS, MOUSE
 from sd2app.dialogs.new_from_video import VIDEOS, NewFromVideoDialog
+from sd2app.dialogs.strip import StripDialog
 from sd2app.models.fit_setup import FitSetupModel
+from sd2app.models.strip import StripModel
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
@@ -159,6 +161,19 @@ class Dialogs:
         )
         if name:
             self.attempt(lambda: self._context.synthesis.export(Path(name)))
+
+    def export_strip(self) -> None:
+        """Choose frames and write them side by side."""
+        content = self._context.document.content
+        if content is None:
+            return
+        model = StripModel(content, self._context.playback.time_s, self._parent)
+        palette = self._context.display.palette
+        dialog = StripDialog(model, palette, content.recording.title, self._parent)
+        dialog.exec()
+        model.close()
+        model.deleteLater()
+        dialog.deleteLater()
 
     def may_discard(self) -> bool:
         """Whether unsaved edits are saved or given up by the user's word."""
