@@ -7,6 +7,10 @@ the files are those of :mod:`sd2core.body.landmark_models`, run by LiteRT.
 from __future__ import annotations
 
 import math
+import os
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -41,6 +45,7 @@ _CELL_PX = 4
 _REFINE_CELLS = 3
 _REFINE_FROM = 0.5
 _DISAGREEMENT = 0.04
+_CHATTER = threading.Lock()
 _MIRRORED = list(MIRRORED)
 
 
@@ -304,8 +309,9 @@ class _Network:
                 " Apple's own processors",
                 "Import a mesh that another machine made",
             ) from error
-        self._interpreter: Any = Interpreter(str(path), num_threads=threads)
-        self._interpreter.allocate_tensors()
+        with _without_chatter():
+            self._interpreter: Any = Interpreter(str(path), num_threads=threads)
+            self._interpreter.allocate_tensors()
         self._input = self._interpreter.get_input_details()[0]["index"]
         # "Identity", "Identity_1", ...: in the order of their names.
         details = sorted(self._interpreter.get_output_details(), key=lambda each: each["name"])
@@ -315,6 +321,25 @@ class _Network:
         self._interpreter.set_tensor(self._input, picture[None])
         self._interpreter.invoke()
         return [self._interpreter.get_tensor(index) for index in self._outputs]
+
+
+@contextmanager
+def _without_chatter() -> Iterator[None]:
+    """Keep LiteRT, which cannot be told to, from writing to standard error as it starts."""
+    with _CHATTER:
+        try:
+            kept = os.dup(2)
+        except OSError:  # closed
+            yield
+            return
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        try:
+            os.dup2(nowhere, 2)
+            yield
+        finally:
+            os.dup2(kept, 2)
+            os.close(kept)
+            os.close(nowhere)
 
 
 def _sampled(picture: Pixels, matrix: Floats, crop_px: int) -> Pixels:

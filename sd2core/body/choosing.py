@@ -97,7 +97,7 @@ def choose(
         f"No person was found in {video.path} (in the best of {len(looked)} frames the model is"
         f" {100 * best_score:.0f} % sure)",
         "a video of a person, seen at 50 % or more",
-        "Where there is one, say where: --person X,Y,WIDTH,HEIGHT@FRAME",
+        "Where there is one, say where: --person X,Y,WIDTH,HEIGHT --person-frame FRAME",
     )
 
 

@@ -209,7 +209,7 @@ def _track(video: VideoReader, stretches: list[Stretch], max_gap_s: float) -> La
         raise Sd2Error(
             f"Nobody could be followed through {video.path}",
             "a person who is seen in some frames in succession",
-            "Say where the person is: --person X,Y,WIDTH,HEIGHT@FRAME",
+            "Say where the person is: --person X,Y,WIDTH,HEIGHT --person-frame FRAME",
         )
     found = Found(
         times_s=video.timebase.times_s,

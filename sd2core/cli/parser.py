@@ -8,6 +8,7 @@ from sd2core import __version__
 from sd2core.cli import (
     compare_meshes,
     fetch_models,
+    fit,
     importing,
     info,
     ladder,
@@ -29,6 +30,7 @@ examples:
   sd2 demo                                    look at the bundled sample recording
   sd2 open walk.sd2                           look at a recording, a video or a mesh
   sd2 info walk.npz                           what is in a file
+  sd2 fit walk.mp4 --out walk.zarr            a moving mesh from a video of a person
   sd2 import walk.sd2 --video walk.mkv --mesh walk.npz
   sd2 synth walk.npz --out map.npz --sensor 0,0,1
   sd2 radar capture/ --out real.npz
@@ -51,6 +53,7 @@ def build_parser() -> tuple[argparse.ArgumentParser, argparse._SubParsersAction]
     groups = (
         info,
         importing,
+        fit,
         synth,
         radar,
         ladder,

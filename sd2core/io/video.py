@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -52,6 +52,7 @@ class VideoReader:
         self._entry = 0  # where decoding began
         self._gave_earlier = False
         self._container, self._stream = open_stream(path)
+        self._metadata = {**self._container.metadata, **self._stream.metadata}
         try:
             self._begin(0)
             first = self._find(0)
@@ -70,6 +71,11 @@ class VideoReader:
             self._notes.append(
                 f"Pixels are not square (ratio {aspect}); the picture is shown as stored."
             )
+
+    @property
+    def metadata(self) -> Mapping[str, str]:
+        """What the file says of itself: names and texts of the container, then of the stream."""
+        return self._metadata
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -1,0 +1,340 @@
+"""A video to a mesh, from end to end, so that it can be stopped at any moment and go on."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import zipfile
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core import __version__
+from sd2core.atomic import atomic_write_text
+from sd2core.body.camera import PinholeCamera
+from sd2core.body.camera_metadata import Source, camera_of
+from sd2core.body.choosing import Rectangle
+from sd2core.body.fit import DEFAULT_STATURE_M, fit_body
+from sd2core.body.fitted import BodyFit
+from sd2core.body.landmark_files import save_track
+from sd2core.body.landmark_models import landmark_models
+from sd2core.body.landmarks import DEFAULT_MAX_GAP_S, OnFrame, find_landmarks
+from sd2core.body.model import Resolution
+from sd2core.body.track import LandmarkTrack
+from sd2core.errors import Sd2Error
+from sd2core.io.mesh import save_mesh
+from sd2core.io.video import VideoReader, open_video
+from sd2core.progress import Progress
+
+Stage = Literal["models", "find", "refine", "fit", "write"]
+
+STAGES: tuple[Stage, ...] = ("find", "refine", "fit", "write")
+"""What is done to every video, in order; ``models`` comes before, where they are missing."""
+
+PARTIAL = ".partial"
+_MARKER = "sd2-fit.json"
+_LANDMARKS = "landmarks"
+
+
+@dataclass(frozen=True)
+class FitChoices:
+    """What the user may say about a video.
+
+    Parameters
+    ----------
+    person : Rectangle, optional
+        Around the person in one frame; the most prominent one by default.
+    focal_px, field_of_view_deg : float, optional
+        Of the camera; see :func:`~sd2core.body.camera_metadata.camera_of`.
+    stature_m : float, optional
+        How tall the person is.
+    max_gap_s : float
+        The longest gap without the person that is bridged.
+    resolution : {"low", "medium", "high"}
+        Of the mesh: 1,229, 5,000 or 13,348 vertices.
+    """
+
+    person: Rectangle | None = None
+    focal_px: float | None = None
+    field_of_view_deg: float | None = None
+    stature_m: float | None = None
+    max_gap_s: float = DEFAULT_MAX_GAP_S
+    resolution: Resolution = "medium"
+
+
+@dataclass(frozen=True)
+class FitReport:
+    """Where what is done is reported; every callback may raise ``Cancelled``.
+
+    Parameters
+    ----------
+    progress_of : callable
+        Gives the progress callback of a stage that begins.
+    started : callable
+        Called with the open video, and whether a stopped run is continued.
+    on_frame : callable
+        Called with a stage and what it found in a frame: its number, points in
+        pixels (33, 2) and visibility (33,).
+    """
+
+    progress_of: Callable[[Stage], Progress]
+    started: Callable[[VideoReader, bool], None]
+    on_frame: Callable[[Stage, int, NDArray[np.float32], NDArray[np.float32]], None]
+
+
+@dataclass(frozen=True, eq=False)
+class FittedVideo:
+    """What was made.
+
+    Parameters
+    ----------
+    fit : BodyFit
+    track : LandmarkTrack
+    camera : PinholeCamera
+    camera_source : {"user", "metadata", "default"}
+    notes : tuple of str
+        Sentences on the video and what was repaired.
+    """
+
+    fit: BodyFit
+    track: LandmarkTrack
+    camera: PinholeCamera
+    camera_source: Source
+    notes: tuple[str, ...]
+
+
+def fit_video(
+    path: Path,
+    out: Path,
+    choices: FitChoices,
+    report: FitReport,
+    *,
+    models: Path | None = None,
+    landmarks_out: Path | None = None,
+    restart: bool = False,
+) -> FittedVideo:
+    """Fit a body to the person in a video and write it as a mesh.
+
+    What is done is kept in ``OUT.partial`` until the mesh is complete; the same call
+    goes on from there, however the one before was ended.
+
+    Parameters
+    ----------
+    path : Path
+        The video.
+    out : Path
+        The mesh to be written (.zarr or .npz); an earlier mesh is replaced.
+    choices : FitChoices
+    report : FitReport
+    models : Path, optional
+        The folder of the landmark models.
+    landmarks_out : Path, optional
+        Where the landmarks are to be kept (.npz).
+    restart : bool
+        Begin anew.
+
+    Raises
+    ------
+    Sd2Error
+        When something is wrong with the video, the choices or the output.
+    """
+    partial = _partial(out, restart)
+    found_models = landmark_models(models, report.progress_of("models"))
+    with open_video(path) as video:
+        camera, camera_source = camera_of(video, choices.focal_px, choices.field_of_view_deg)
+        resumed = (partial / _LANDMARKS).is_dir()
+        _begin(partial)
+        report.started(video, resumed)
+        stages = _Stages(report)
+        track = find_landmarks(
+            video,
+            found_models,
+            person=choices.person,
+            max_gap_s=choices.max_gap_s,
+            progress=stages.progress,
+            on_stage=stages.begin,
+            on_frame=stages.on_frame,
+            workspace=partial / _LANDMARKS,
+        )
+        notes = (*video.notes, *track.notes)
+    fit = fit_body(
+        track,
+        camera,
+        stature_m=choices.stature_m,
+        workspace=_fit_folder(partial, track, choices, camera),
+        progress=report.progress_of("fit"),
+    )
+    _write(fit, out, partial, choices.resolution, report.progress_of("write"))
+    made = FittedVideo(fit, track, camera, camera_source, notes)
+    _describe(partial / _new(out), provenance(made, path, choices))
+    if landmarks_out is not None:
+        save_track(track, landmarks_out)
+    _take_place(partial, out)
+    return made
+
+
+def provenance(made: FittedVideo, path: Path, choices: FitChoices) -> dict[str, Any]:
+    """What a mesh file says about where it is from."""
+    stature_m = choices.stature_m
+    return {
+        "made_by": f"SD² Studio {__version__}, sd2 fit",
+        "video": path.name,
+        "camera": {
+            "width": made.camera.width,
+            "height": made.camera.height,
+            "focal_px": made.camera.focal_px,
+            "source": made.camera_source,
+        },
+        "stature_m": DEFAULT_STATURE_M if stature_m is None else stature_m,
+        "stature_source": "default" if stature_m is None else "user",
+        "max_gap_s": choices.max_gap_s,
+        "notes": list(made.notes),
+    }
+
+
+class _Stages:
+    """Gives what the landmarks report to the stage they are in."""
+
+    def __init__(self, report: FitReport) -> None:
+        self._report = report
+        self._stage: Stage = "find"
+        self._progress: Progress = report.progress_of("find")
+
+    def begin(self, stage: str) -> None:
+        if stage == "refine":
+            self._stage = "refine"
+            self._progress = self._report.progress_of("refine")
+
+    def progress(self, done: int, total: int) -> None:
+        self._progress(done, total)
+
+    @property
+    def on_frame(self) -> OnFrame:
+        return lambda frame, points, seen: self._report.on_frame(self._stage, frame, points, seen)
+
+
+# -- The folder of a fit under way --------------------------------------------------------------
+
+
+def check_fit_output(out: Path) -> None:
+    """Refuse a mesh's name that cannot be written, or that is something else, before the work.
+
+    Raises
+    ------
+    Sd2Error
+    """
+    from sd2core.io.kinds import kind_of
+
+    if out.suffix.lower() not in (".zarr", ".npz"):
+        raise Sd2Error(
+            f"The mesh is to be written as {out.name}", "a name that ends in .zarr or .npz"
+        )
+    if not out.absolute().parent.is_dir():
+        raise Sd2Error(
+            f"The folder {out.absolute().parent} does not exist", "an existing folder for the mesh"
+        )
+    if out.exists() and (out.is_dir() or out.stat().st_size):
+        kind = kind_of(out)
+        if kind != "mesh":
+            raise Sd2Error(
+                f"{out} exists and is a {kind}",
+                "a new name, or a mesh to replace",
+                "Choose another name, or delete it first",
+            )
+    partial = out.with_name(out.name + PARTIAL)
+    if partial.exists() and not _is_ours(partial):
+        raise Sd2Error(
+            f"{partial} exists and is not what a stopped fit has left",
+            "that name free for the work",
+            "Choose another name, or move it away",
+        )
+
+
+def _partial(out: Path, restart: bool) -> Path:
+    check_fit_output(out)
+    partial = out.with_name(out.name + PARTIAL)
+    if restart and partial.exists():
+        shutil.rmtree(partial)
+    return partial
+
+
+def _is_ours(partial: Path) -> bool:
+    return partial.is_dir() and ((partial / _MARKER).is_file() or not any(partial.iterdir()))
+
+
+def _begin(partial: Path) -> None:
+    partial.mkdir(exist_ok=True)
+    text = json.dumps({"format": "sd2-fit-partial", "version": 1, "made_by": __version__})
+    atomic_write_text(partial / _MARKER, text + "\n")
+
+
+def _fit_folder(
+    partial: Path, track: LandmarkTrack, choices: FitChoices, camera: PinholeCamera
+) -> Path:
+    """Where the fit of these landmarks with these choices keeps what it has done."""
+    about = {
+        "choices": asdict(choices) | {"resolution": None},
+        "camera": asdict(camera),
+        "version": __version__,
+        "landmarks": hashlib.sha256(
+            b"".join(
+                np.ascontiguousarray(each).tobytes()
+                for each in (track.image_px, track.world_m, track.visibility, track.silhouettes)
+            )
+        ).hexdigest(),
+    }
+    key = hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()[:16]
+    folder = partial / f"fit-{key}"
+    folder.mkdir(exist_ok=True)
+    return folder
+
+
+def _new(out: Path) -> str:
+    return "mesh" + out.suffix.lower()
+
+
+def _write(
+    fit: BodyFit, out: Path, partial: Path, resolution: Resolution, progress: Progress
+) -> None:
+    new = partial / _new(out)
+    if new.is_dir():
+        shutil.rmtree(new)
+    save_mesh(fit.mesh(resolution), new, progress)
+
+
+def _describe(mesh: Path, about: Mapping[str, Any]) -> None:
+    """Write where a mesh is from into its file."""
+    if mesh.is_dir():
+        import zarr
+
+        zarr.open_group(str(mesh), mode="r+").attrs["fit"] = dict(about)
+        return
+    with (
+        zipfile.ZipFile(mesh, "a", zipfile.ZIP_DEFLATED) as archive,
+        archive.open("fit.npy", "w") as member,
+    ):
+        text = np.array(json.dumps(about, ensure_ascii=False))
+        np.lib.format.write_array(member, text, allow_pickle=False)
+
+
+def _take_place(partial: Path, out: Path) -> None:
+    """Give the complete mesh its name; one of that name makes way."""
+    new = partial / _new(out)
+    if new.is_dir():
+        if out.exists():
+            replaced = partial / "replaced"
+            if replaced.exists():
+                shutil.rmtree(replaced)
+            os.rename(out, replaced)
+        os.rename(new, out)
+    else:
+        with new.open("rb") as stream:
+            os.fsync(stream.fileno())
+        os.replace(new, out)
+    shutil.rmtree(partial, ignore_errors=True)

@@ -1,0 +1,256 @@
+"""``sd2 fit``: a video of a person to a moving mesh."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sd2core.cli.fit_lines import FitLines
+from sd2core.cli.options import (
+    add_command,
+    add_json,
+    not_negative_float,
+    positive_float,
+)
+from sd2core.cli.output import print_facts, print_json, progress_bar
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    from sd2core.body.fit_video import FitChoices, FitReport, FittedVideo
+    from sd2core.progress import Progress
+
+_BARS = {
+    "models": ("Fetching the landmark models", "B"),
+    "find": ("Finding the person", "frame"),
+    "refine": ("Looking again", "frame"),
+    "fit": ("Fitting the body", "step"),
+    "write": ("Writing the mesh", "frame"),
+}
+
+
+def add_commands(commands: argparse._SubParsersAction) -> None:
+    """Add ``fit``."""
+    parser = add_command(
+        commands,
+        "fit",
+        "make a moving mesh from a video of a person",
+        handler=_fit,
+        description=(
+            "Finds the person, 33 landmarks in every frame, and the body and motion that fit\n"
+            "them. The size of everything follows from the person's height: say it with\n"
+            "--stature-m where you know it, every velocity is proportional to it. At first use\n"
+            "the landmark models are fetched (36 MB, see `sd2 fetch-models`).\n\n"
+            "It can be stopped at any moment: what is done stays in OUT.partial, and the same\n"
+            "command goes on from there."
+        ),
+        examples=(
+            "  sd2 fit walk.mp4 --out walk.zarr --stature-m 1.78\n"
+            "  sd2 fit two.mp4 --out left.zarr --person 40,60,180,400 --person-frame 12\n"
+            "  sd2 fit walk.mp4 --out walk.npz --field-of-view 68 --resolution low"
+        ),
+    )
+    parser.add_argument("video", type=Path, metavar="VIDEO", help="any video that FFmpeg reads")
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="MESH", help="the mesh to write (.zarr or .npz)"
+    )
+    parser.add_argument(
+        "--person",
+        type=_rectangle,
+        metavar="X,Y,W,H",
+        help="a rectangle around the person, in pixels (default: who is seen best)",
+    )
+    parser.add_argument(
+        "--person-frame",
+        type=_frame,
+        metavar="N",
+        help="the frame of that rectangle, counted from 0 (default: 0)",
+    )
+    parser.add_argument(
+        "--stature-m",
+        type=positive_float,
+        metavar="M",
+        help="how tall the person is, in metres (default: 1.72)",
+    )
+    parser.add_argument(
+        "--focal-px",
+        type=positive_float,
+        metavar="F",
+        help="focal length in pixels (default: as the file says, or 56° across the longer side)",
+    )
+    parser.add_argument(
+        "--field-of-view",
+        type=positive_float,
+        metavar="DEG",
+        help="instead of it, the angle across the longer side of the picture",
+    )
+    parser.add_argument(
+        "--max-gap-s",
+        type=not_negative_float,
+        metavar="S",
+        help="bridge gaps without the person up to this long; longer ones stay empty"
+        " (default: 0.5)",
+    )
+    parser.add_argument(
+        "--resolution",
+        choices=("low", "medium", "high"),
+        default="medium",
+        help="1,229, 5,000 or 13,348 vertices (default: medium)",
+    )
+    parser.add_argument(
+        "--models", type=Path, metavar="FOLDER", help="a folder with the landmark models"
+    )
+    parser.add_argument(
+        "--landmarks", type=Path, metavar="FILE", help="keep the landmarks as well (.npz)"
+    )
+    parser.add_argument(
+        "--restart", action="store_true", help="begin anew, not where a stopped run ended"
+    )
+    kind = parser.add_mutually_exclusive_group()
+    add_json(kind)  # type: ignore[arg-type]
+    kind.add_argument(
+        "--progress-json",
+        action="store_true",
+        help="print what is done as JSON lines, for other programs (docs/formats.md)",
+    )
+
+
+def _rectangle(text: str) -> tuple[float, float, float, float]:
+    try:
+        x, y, width, height = (float(part) for part in text.split(","))
+    except ValueError:
+        x = y = width = height = 0.0
+    if not (0.0 < width < 1e6 and 0.0 < height < 1e6 and abs(x) < 1e6 and abs(y) < 1e6):
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not X,Y,WIDTH,HEIGHT in pixels, e.g. 40,60,180,400"
+        )
+    return x, y, width, height
+
+
+def _frame(text: str) -> int:
+    if not text.isascii() or not text.isdigit():
+        raise argparse.ArgumentTypeError(f"{text!r} is not a frame number, counted from 0")
+    return int(text)
+
+
+def _fit(options: argparse.Namespace) -> None:
+    lines = FitLines(options.video, options.out) if options.progress_json else None
+    if lines is None:
+        _make(options, None)
+        return
+    try:
+        _make(options, lines)
+    except Exception as error:
+        lines.error(error)
+        raise
+
+
+def _make(options: argparse.Namespace, lines: FitLines | None) -> None:
+    if options.person_frame is not None and options.person is None:
+        raise Sd2Error("--person-frame is given without --person", "the rectangle in that frame")
+    if options.landmarks is not None:
+        from sd2core.cli.reading import check_output
+
+        check_output(options.landmarks, ".npz")
+    from sd2core.body.fit_video import check_fit_output, fit_video
+
+    check_fit_output(options.out)
+    begun_s = time.perf_counter()
+    with ExitStack() as stack:
+        report = _bars(stack) if lines is None else lines.report()
+        made = fit_video(
+            options.video,
+            options.out,
+            _choices(options),
+            report,
+            models=options.models,
+            landmarks_out=options.landmarks,
+            restart=options.restart,
+        )
+    seconds = time.perf_counter() - begun_s
+    if lines is not None:
+        lines.done(made, seconds)
+    elif options.json:
+        print_json(_summary(options, made, seconds))
+    else:
+        _print(options, made, seconds)
+
+
+def _choices(options: argparse.Namespace) -> FitChoices:
+    from sd2core.body.choosing import Rectangle
+    from sd2core.body.fit_video import FitChoices
+    from sd2core.body.landmarks import DEFAULT_MAX_GAP_S
+
+    person = None
+    if options.person is not None:
+        x, y, width, height = options.person
+        person = Rectangle(x, y, width, height, options.person_frame or 0)
+    return FitChoices(
+        person=person,
+        focal_px=options.focal_px,
+        field_of_view_deg=options.field_of_view,
+        stature_m=options.stature_m,
+        max_gap_s=DEFAULT_MAX_GAP_S if options.max_gap_s is None else options.max_gap_s,
+        resolution=options.resolution,
+    )
+
+
+def _bars(stack: ExitStack) -> FitReport:
+    """One bar after the other on standard error."""
+    from sd2core.body.fit_video import FitReport, Stage
+
+    current = stack.enter_context(ExitStack())
+
+    def progress_of(stage: Stage) -> Progress:
+        current.close()
+        return current.enter_context(progress_bar(*_BARS[stage]))
+
+    def started(video: Any, resumed: bool) -> None:
+        if resumed and sys.stderr.isatty():
+            print("Going on where a stopped run ended", file=sys.stderr)
+
+    return FitReport(progress_of, started, lambda *_: None)
+
+
+def _summary(options: argparse.Namespace, made: FittedVideo, seconds: float) -> dict[str, Any]:
+    import numpy as np
+
+    from sd2core.body.fit_video import provenance
+
+    about = provenance(made, options.video, _choices(options))
+    track = made.track
+    return about | {
+        "out": str(options.out),
+        "frames": len(track),
+        "frames_per_s": track.timebase.frames_per_s,
+        "present": int(track.present.sum()),
+        "bridged": int(track.bridged.sum()),
+        "residual_m": float(np.nanmean(made.fit.residual_m)),
+        "quality": float(made.fit.quality[track.present].mean()),
+        "seconds": seconds,
+    }
+
+
+def _print(options: argparse.Namespace, made: FittedVideo, seconds: float) -> None:
+    about = _summary(options, made, seconds)
+    camera, sources = about["camera"], {"user": "as given", "metadata": "as the file says"}
+    frames, present, bridged = about["frames"], about["present"], about["bridged"]
+    print_facts(
+        f"Made {options.out}",
+        {
+            "frames": f"{frames}, {present} with the person"
+            + (f" ({bridged} of them interpolated)" if bridged else ""),
+            "to the landmarks": f"{100 * about['residual_m']:.1f} cm on average",
+            "focal length": f"{camera['focal_px']:.0f} px,"
+            f" {sources.get(camera['source'], 'by default (56° across the longer side)')}",
+            "stature": f"{about['stature_m']:g} m"
+            + (", by default: every velocity is proportional to it"
+               if about["stature_source"] == "default" else ", as given"),
+            "took": f"{seconds:.0f} s, {seconds / frames:.2f} s per frame",
+        },
+    )  # fmt: skip
+    for note in made.notes:
+        print(f"  {note}")
