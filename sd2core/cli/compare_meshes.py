@@ -36,8 +36,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         ),
         examples=(
             "  sd2 compare-meshes fitted.zarr vibe_output.pkl --image-size 640x480\n"
-            "  sd2 compare-meshes truth.zarr ours.zarr wham.pkl --labels truth,ours,WHAM \\\n"
-            "      --figure compared.svg"
+            "  sd2 compare-meshes ours.zarr wham.pkl --labels ours,WHAM --figure both.svg"
         ),
     )
     parser.add_argument(

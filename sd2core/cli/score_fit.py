@@ -9,7 +9,7 @@ import time
 from contextlib import nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from sd2core.cli.options import add_command, add_json
 from sd2core.cli.output import print_json, progress_bar
@@ -17,6 +17,7 @@ from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
     from sd2core.compare.fit_score import ClipScore
+    from sd2core.compare.real_score import RealScore
     from sd2core.compare.truth import Truth
 
 _SUFFIXES = (".zarr", ".npz")
@@ -40,7 +41,8 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         examples=(
             "  sd2 score-fit truth\n"
             "  sd2 score-fit truth --keep fitted --markdown table.md\n"
-            "  sd2 score-fit truth --meshes fitted --json"
+            "  sd2 score-fit truth --meshes fitted --json\n"
+            "  sd2 score-fit truth --clips still --real walk.mkv help.mkv"
         ),
     )
     parser.add_argument("truth", type=Path, metavar="TRUTH", help="a folder of clips, or one clip")
@@ -56,6 +58,17 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     )
     source.add_argument(
         "--keep", type=Path, metavar="FOLDER", help="keep what is fitted as NAME.zarr in FOLDER"
+    )
+    parser.add_argument(
+        "--real",
+        type=Path,
+        nargs="+",
+        default=[],
+        metavar="VIDEO",
+        help=(
+            "also fit these videos, whose motion nobody knows, and measure whether the body lies"
+            " on the person that the landmark model sees"
+        ),
     )
     parser.add_argument(
         "--stature",
@@ -86,35 +99,60 @@ def _score(options: argparse.Namespace) -> None:
             if name not in known:
                 raise Sd2Error(f"There is no clip {name!r}", ", ".join(known))
         truths = [known[name] for name in names]
-    scores = _scores(truths, options)
+    if options.keep is not None:
+        options.keep.mkdir(exist_ok=True)
+    with TemporaryDirectory() if options.keep is None else nullcontext(options.keep) as folder:
+        source = _Source(options.meshes, Path(folder), options.stature == "known")
+        scores = [_scored(truth, source) for truth in truths]
+        real = [_scored_real(video, source) for video in options.real]
     if options.markdown is not None:
-        atomic_write_text(options.markdown, as_markdown(scores))
+        atomic_write_text(options.markdown, as_markdown(scores, real))
     if options.json:
-        print_json(as_dict(scores))
+        print_json(as_dict(scores, real))
     else:
-        print(as_text(scores))
+        print(as_text(scores, real))
 
 
-def _scores(truths: list[Truth], options: argparse.Namespace) -> list[ClipScore]:
+class _Source(NamedTuple):
+    """Where fitted meshes come from: a folder of them, or a fit into another."""
+
+    meshes: Path | None
+    folder: Path
+    stature_known: bool
+
+    def fitted(self, name: str, video: Path, known: list[str]) -> tuple[Path, float | None]:
+        """Path of the mesh, and the seconds its fit took if it was made now."""
+        if self.meshes is not None:
+            return _mesh_in(self.meshes, name), None
+        path = self.folder / f"{name}.zarr"
+        return path, _fit(name, video, path, known)
+
+
+def _scored(truth: Truth, source: _Source) -> ClipScore:
     from sd2core.compare.fit_score import score_clip
     from sd2core.io.mesh import load_mesh
 
-    if options.keep is not None:
-        options.keep.mkdir(exist_ok=True)
-    scores = []
-    with TemporaryDirectory() if options.keep is None else nullcontext(options.keep) as folder:
-        for truth in truths:
-            seconds = None
-            if options.meshes is not None:
-                path = _mesh_in(options.meshes, truth.name)
-            else:
-                path = Path(folder) / f"{truth.name}.zarr"
-                seconds = _fit(truth, path, options.stature == "known")
-            with progress_bar(f"Measuring {truth.name}") as progress:
-                scores.append(
-                    score_clip(truth, load_mesh(path), seconds=seconds, progress=progress)
-                )
-    return scores
+    known = ["--focal-px", f"{truth.camera.focal_px:g}"]
+    if source.stature_known:
+        known += ["--stature-m", f"{truth.stature_m:g}"]
+    path, seconds = source.fitted(truth.name, truth.video, known)
+    with progress_bar(f"Measuring {truth.name}") as progress:
+        return score_clip(truth, load_mesh(path), seconds=seconds, progress=progress)
+
+
+def _scored_real(video: Path, source: _Source) -> RealScore:
+    from sd2core.body.camera import PinholeCamera
+    from sd2core.body.landmark_models import landmark_models
+    from sd2core.body.landmarks import find_landmarks
+    from sd2core.compare.real_score import score_real
+    from sd2core.io.mesh import load_mesh
+    from sd2core.io.video import open_video
+
+    path, _ = source.fitted(video.stem, video, [])
+    with progress_bar(f"Looking at {video.name}") as progress, open_video(video) as reader:
+        track = find_landmarks(reader, landmark_models(), silhouettes=None, progress=progress)
+    camera = PinholeCamera.default(track.width, track.height)
+    return score_real(video.stem, load_mesh(path), track, camera)
 
 
 def _mesh_in(folder: Path, name: str) -> Path:
@@ -129,21 +167,18 @@ def _mesh_in(folder: Path, name: str) -> Path:
     )
 
 
-def _fit(truth: Truth, out: Path, stature_known: bool) -> float:
-    """Fit one clip in a process of its own, as a user does; seconds with its start."""
+def _fit(name: str, video: Path, out: Path, known: list[str]) -> float:
+    """Fit one video in a process of its own, as a user does; seconds with its start."""
     if out.exists():
         raise Sd2Error(
             f"{out} exists",
             "a folder without meshes of these clips",
             f"Measure it with --meshes {out.parent}, or delete it first",
         )
-    command = [sys.executable, "-m", "sd2core.cli", "fit", str(truth.video), "--out", str(out)]
-    command += ["--focal-px", f"{truth.camera.focal_px:g}"]
-    if stature_known:
-        command += ["--stature-m", f"{truth.stature_m:g}"]
+    command = [sys.executable, "-m", "sd2core.cli", "fit", str(video), "--out", str(out), *known]
     started = time.perf_counter()
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
         said = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}"]
-        raise Sd2Error(f"{truth.name} could not be fitted: {said[0].removeprefix('sd2: ')}")
+        raise Sd2Error(f"{name} could not be fitted: {said[0].removeprefix('sd2: ')}")
     return time.perf_counter() - started

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -88,6 +89,42 @@ def test_a_fit_that_fails_says_why(sd2: Sd2, truth: Path, monkeypatch: pytest.Mo
     outcome = sd2("score-fit", truth)
     assert outcome.code == 1
     assert "still could not be fitted: There is nobody in the video" in outcome.err
+
+
+def test_real_videos_are_looked_at_too(
+    sd2: Sd2, truth: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The landmark model's part is played by the mesh itself."""
+    from sd2core.body.camera import PinholeCamera
+    from sd2core.body.silhouette import silhouette
+    from sd2core.body.track import LandmarkTrack
+    from sd2core.simulate.encode import write_video
+
+    meshes = tmp_path / "meshes"
+    meshes.mkdir()
+    for name in ("still", "walk"):
+        shutil.copytree(truth / "still" / "mesh.zarr", meshes / f"{name}.zarr")
+    video = tmp_path / "walk.mp4"
+    write_video(video, np.zeros((14, 480, 640, 3), np.uint8), 30, (640, 480))
+    body = Body.load("low")
+    mask = silhouette(body.vertices_m + np.array([0.0, 1.0, 2.5]), body.faces, PinholeCamera())
+
+    def look(reader: Any, models: Any, *, silhouettes: Any, progress: Any) -> LandmarkTrack:
+        assert silhouettes is None
+        none = np.zeros((14, 33), np.float32)
+        masks = np.repeat(255 * mask[None].astype(np.uint8), 14, axis=0)
+        return LandmarkTrack(
+            *(reader.timebase, 640, 480, np.zeros((14, 33, 2), np.float32), none),
+            *(np.zeros((14, 33, 3), np.float32), none, none[:, 0] + 1, np.ones(14, bool)),
+            *(np.zeros(14, bool), np.arange(14), masks),
+        )
+
+    monkeypatch.setattr("sd2core.body.landmark_models.landmark_models", lambda: None)
+    monkeypatch.setattr("sd2core.body.landmarks.find_landmarks", look)
+    outcome = sd2("score-fit", truth, "--meshes", meshes, "--real", video, "--json")
+    assert outcome.code == 0
+    (real,) = json.loads(outcome.out)["real"]
+    assert (real["name"], real["overlap"], real["landmarks"]) == ("walk", 1.0, 0)
 
 
 @pytest.mark.parametrize(
