@@ -23,6 +23,31 @@ FORMAT_VERSION = 1
 
 
 @dataclass(frozen=True, eq=False)
+class CellUncertainty:
+    """How well the values of a map are known.
+
+    Parameters
+    ----------
+    expected : float32 array, shape (bins, frames)
+        Mean of what the map may be: its values, smeared by how badly velocities are
+        known.
+    sd : float32 array, shape (bins, frames)
+        Standard deviation of every value.
+    """
+
+    expected: NDArray[np.float32]
+    sd: NDArray[np.float32]
+
+    def __post_init__(self) -> None:
+        for name in ("expected", "sd"):
+            object.__setattr__(self, name, np.ascontiguousarray(getattr(self, name), np.float32))
+        if self.expected.shape != self.sd.shape:
+            raise Sd2Error(
+                f"expected is of shape {self.expected.shape}, sd of {self.sd.shape}", "the same"
+            )
+
+
+@dataclass(frozen=True, eq=False)
 class DopplerMap:
     """Doppler energy on a velocity axis over time.
 
@@ -45,6 +70,8 @@ class DopplerMap:
     present : bool array, shape (frames,), optional
         False in columns that say nothing because there was no person. None: all
         columns say something.
+    uncertainty : CellUncertainty, optional
+        Where the mesh says how well its velocities are known, and one asked for it.
     """
 
     values: NDArray[np.float32]
@@ -56,6 +83,7 @@ class DopplerMap:
     unseen_bins: tuple[int, ...] = ()
     meta: dict[str, Any] = field(default_factory=dict)
     present: NDArray[np.bool_] | None = None
+    uncertainty: CellUncertainty | None = None
 
     def __post_init__(self) -> None:
         values = np.ascontiguousarray(self.values, dtype=np.float32)
@@ -75,6 +103,12 @@ class DopplerMap:
         if self.present is not None:
             present = checked(self.present, values.shape[1])
             object.__setattr__(self, "present", None if present.all() else present)
+        if self.uncertainty is not None and self.uncertainty.sd.shape != values.shape:
+            raise Sd2Error(
+                f"The map is of shape {values.shape}, its uncertainty of"
+                f" {self.uncertainty.sd.shape}",
+                "the same",
+            )
 
     @property
     def times_s(self) -> NDArray[np.float64]:
@@ -100,7 +134,8 @@ class DopplerMap:
     def save(self, path: Path) -> None:
         """Write ``values``, ``velocity_mps``, ``times_s`` and ``meta`` to one ``.npz``.
 
-        Where there are columns without a person also ``present``.
+        Where there are columns without a person also ``present``; where it is known how
+        uncertain values are, ``expected`` and ``sd``.
         """
         meta = {
             "format": "sd2-doppler-map",
@@ -120,6 +155,8 @@ class DopplerMap:
         }
         if self.present is not None:
             arrays["present"] = self.present
+        if self.uncertainty is not None:
+            arrays |= {"expected": self.uncertainty.expected, "sd": self.uncertainty.sd}
         with atomic_write(Path(path)) as stream:
             np.savez_compressed(stream, **arrays)
 
@@ -171,6 +208,9 @@ class DopplerMap:
                 unseen_bins=tuple(meta["unseen_bins"]),
                 meta=meta["provenance"],
                 present=arrays.get("present"),
+                uncertainty=CellUncertainty(arrays["expected"], arrays["sd"])
+                if {"expected", "sd"} <= arrays.keys()
+                else None,
             )
         except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
             raise Sd2Error(

@@ -35,6 +35,10 @@ class Description:
     parts: list[Description] = field(default_factory=list)
 
 
+FAINT = 0.01
+"""Values below this share of a map's largest say little, and how well they are known less."""
+
+
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``info``."""
     parser = add_command(
@@ -171,11 +175,14 @@ def describe_mesh(path: Path, mesh: MeshSequence) -> Description:
         "first_frame_max_m": high,
         "notes": list(mesh.notes),
     }
+    if mesh.uncertainty is not None:
+        data["limbs"] = list(mesh.uncertainty.limbs)
     facts = {
         "surface": f"{mesh.vertex_count:,} vertices, "
         + (f"{face_count:,} triangles" if face_count else "no triangles: a point cloud"),
         "time": _clock(mesh.timebase),
         "no person": _gaps(mesh.present, mesh.timebase),
+        "velocities": _known_to(mesh),
         "first frame": ", ".join(
             f"{axis} {a:.2f} to {b:.2f}" for axis, a, b in zip("xyz", low, high, strict=True)
         )
@@ -225,6 +232,7 @@ def describe_map(path: Path, doppler: DopplerMap) -> Description:
         "unseen_bins": list(doppler.unseen_bins),
         **_clock_data(doppler.timebase),
         "frames_without_person": _absent(doppler.present),
+        "uncertainty": None if doppler.uncertainty is None else _deviation(doppler),
         "provenance": doppler.meta,
     }
     facts = {
@@ -235,6 +243,10 @@ def describe_map(path: Path, doppler: DopplerMap) -> Description:
         "no person": _gaps(doppler.present, doppler.timebase),
         "unit": doppler.unit,
         "nulled bins": _bins(doppler.axis, doppler.null_bins),
+        "known to": ""
+        if doppler.uncertainty is None
+        else f"±{_deviation(doppler):.0%} of a value (one standard deviation; the median of the"
+        " cells that are not faint)",
         "unseen bins": _bins(doppler.axis, doppler.unseen_bins),
         **_synthesis_facts(doppler.meta),
     }
@@ -293,6 +305,30 @@ def _camera(recording: Recording) -> str:
     size = f" at {camera.width} x {camera.height}" if camera.width and camera.height else ""
     source = f" ({camera.source})" if camera.source else ""
     return f"focal length {camera.focal_px:.0f} pixels{size}{source}"
+
+
+def _known_to(mesh: MeshSequence) -> str:
+    """How well velocities are known along the camera's line of sight: best and worst limb."""
+    known = mesh.uncertainty
+    if known is None:
+        return ""
+    typical = (known.along_mps[mesh.presence.there] ** 2).mean(axis=0) ** 0.5
+    best, worst = int(typical.argmin()), int(typical.argmax())
+    return (
+        f"along the camera's line of sight known to ±{typical[best]:.2f} m/s"
+        f" ({known.limbs[best]}) to ±{typical[worst]:.2f} m/s ({known.limbs[worst]})"
+    )
+
+
+def _deviation(doppler: DopplerMap) -> float:
+    """Standard deviation of a value relative to it; the median of the cells that count."""
+    import numpy as np
+
+    assert doppler.uncertainty is not None
+    counted = doppler.values > FAINT * doppler.values.max(initial=0.0)
+    if not counted.any():
+        return 0.0
+    return float(np.median(doppler.uncertainty.sd[counted] / doppler.values[counted]))
 
 
 def _absent(present: NDArray[np.bool_] | None) -> int:

@@ -24,7 +24,7 @@ from sd2core.cli.simulate_radar import add_radar_choice, chosen_radar, simulated
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
-    from sd2core.doppler import SynthesisOptions
+    from sd2core.doppler import SynthesisOptions, Synthesizer
     from sd2core.mesh import MeshSequence
     from sd2core.sensor import VelocityAxis, VirtualSensor
     from sd2core.spectrum import DopplerMap
@@ -77,7 +77,8 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "  sd2 synth points.npz --out map.npz --visibility none --null-bins none\n"
             "  sd2 synth walk.npz --out map.npz --preset vid2doppler\n"
             "  sd2 synth walk.npz --out map.npz --tolerance 2%    (as quick as this allows)\n"
-            "  sd2 synth walk.npz --out map.npz --model fmcw"
+            "  sd2 synth walk.npz --out map.npz --model fmcw\n"
+            "  sd2 synth walk.zarr --out map.npz --uncertainty    (of a mesh from sd2 fit)"
         ),
     )
     add_mesh_and_sensor(parser)
@@ -184,6 +185,12 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         metavar="S",
         help="smooth the map along time (sigma in seconds)",
     )
+    parser.add_argument(
+        "--uncertainty",
+        action="store_true",
+        help="add to the map how well its values are known (arrays sd and expected), which a mesh"
+        " from sd2 fit says",
+    )
     add_mesh_reading(parser)
     add_json(parser)
 
@@ -205,14 +212,18 @@ def _synth(options: argparse.Namespace) -> None:
     mesh, sensor = mesh_and_sensor(options)
     if not wish:
         mesh = decimate(mesh, options.vertices_kept or 1.0)
+    if options.uncertainty and mesh.uncertainty is None:
+        raise Sd2Error(
+            f"--uncertainty is given, but {mesh.source} does not say how well its velocities are"
+            " known",
+            "a mesh that was fitted to a video with `sd2 fit`",
+        )
     if options.model == "fmcw":
         doppler = _by_fmcw(options, mesh, sensor)
     elif wish:
         doppler = _as_chosen(options, mesh, sensor)
     else:
-        synthesizer = Synthesizer(mesh, synthesis_options(options))
-        with progress_bar("Synthesising") as progress:
-            doppler = synthesizer.map(sensor, progress=progress)
+        doppler = _counted(options, Synthesizer(mesh, synthesis_options(options)), sensor)
     doppler.save(options.out)
     description = describe_map(options.out, doppler)
     description.notes = mesh.notes + description.notes
@@ -242,17 +253,29 @@ def _as_chosen(
     choice = chosen(mesh, sensor, base, options.tolerance, options.budget_ms, dragging=False)
     if not choice.holds:
         raise Sd2Error(choice.summary, "a tolerance or budget that can be held", "Allow more of it")
-    with progress_bar("Synthesising") as progress:
-        doppler = synthesizer_for(choice.plan, mesh, base).map(sensor, progress=progress)
+    doppler = _counted(options, synthesizer_for(choice.plan, mesh, base), sensor)
     origin = choice.plan.provenance(choice.errors.l1)
     origin["plan_reasons"] = [reason.text for reason in choice.reasons]
     return replace(doppler, meta=doppler.meta | origin)
+
+
+def _counted(
+    options: argparse.Namespace, synthesizer: Synthesizer, sensor: VirtualSensor
+) -> DopplerMap:
+    with progress_bar("Synthesising") as progress:
+        doppler = synthesizer.map(sensor, progress=progress)
+    if not options.uncertainty:
+        return doppler
+    with progress_bar("Finding how well it is known") as progress:
+        return replace(doppler, uncertainty=synthesizer.uncertainty(sensor, progress=progress))
 
 
 def _check_fmcw(options: argparse.Namespace) -> None:
     given = [name for name in _COUNTING_ONLY if getattr(options, name) is not None]
     if options.preset != "paper":
         given.append("preset")
+    if options.uncertainty:
+        given.append("uncertainty")
     if given:
         raise Sd2Error(
             f"--{given[0].replace('_', '-')} is given with --model fmcw",

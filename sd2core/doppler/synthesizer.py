@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from itertools import pairwise
 
 import numpy as np
@@ -19,6 +19,7 @@ from sd2core.doppler.notes import map_notes
 from sd2core.doppler.options import PRESETS, SynthesisOptions
 from sd2core.doppler.parallel import Ticket, run_jobs
 from sd2core.doppler.prepared import Block, ByteBudget, PreparedMesh
+from sd2core.doppler.results import FrameScattering, Stretch
 from sd2core.doppler.scatterers import Scatterers
 from sd2core.doppler.smoothing import frames_within_reach, smooth
 from sd2core.errors import Sd2Error
@@ -27,64 +28,13 @@ from sd2core.progress import Progress, silent
 from sd2core.scattering.amplitude import range_weight
 from sd2core.scattering.velocity import radial_velocity
 from sd2core.sensor import VirtualSensor
-from sd2core.spectrum import DopplerMap
+from sd2core.spectrum import CellUncertainty, DopplerMap
 from sd2core.timebase import Timebase
 
 _MEMORY_BUDGET_BYTES = 512 << 20
 _FAST_FRAMES = 64
 _EXACT_FRAMES = 4
 _EXACT_JOB_FRAMES = 8
-
-
-@dataclass(frozen=True, eq=False)
-class Stretch:
-    """A stretch of a synthetic Doppler map.
-
-    Parameters
-    ----------
-    values : float32 array, shape (bins, n)
-    raw : float64 array, shape (bins, n)
-        The same before any smoothing, with nulled bins emptied.
-    visible_share : float32 array, shape (n,)
-        Share of all vertices that the sensor sees; of a decimated mesh, of the
-        vertices that the kept ones stand for. Vertices that cannot change
-        the map (in nulled bins) are judged by the facing test.
-    beyond_share : float32 array, shape (n,)
-        Share of those whose velocity lies beyond the axis.
-    quality : {"none", "facing", "depth", "frozen", "exact"}
-        The weakest visibility that was used: ``frozen`` falls back to facing
-        where no depth or exact visibility is kept.
-    processor_s : float
-        Processor time that visibility and counting took, all threads together.
-    """
-
-    values: NDArray[np.float32]
-    raw: NDArray[np.float64]
-    visible_share: NDArray[np.float32]
-    beyond_share: NDArray[np.float32]
-    quality: Quality
-    processor_s: float = 0.0
-
-
-@dataclass(frozen=True, eq=False)
-class FrameScattering:
-    """What a sensor gets back from one frame.
-
-    Parameters
-    ----------
-    velocity_mps : float32 array, shape (V,)
-        Radial velocity, positive when approaching.
-    range_m : float32 array, shape (V,)
-        Distance from the sensor.
-    visible : bool array, shape (V,)
-    quality : {"none", "facing", "depth", "frozen", "exact"}
-        How ``visible`` was found.
-    """
-
-    velocity_mps: NDArray[np.float32]
-    range_m: NDArray[np.float32]
-    visible: NDArray[np.bool_]
-    quality: Quality
 
 
 class Synthesizer:
@@ -137,14 +87,14 @@ class Synthesizer:
         if shared is None or shared.mesh is not mesh:
             shared = PreparedMesh(mesh, options, ByteBudget(memory_budget_bytes))
         self.prepared: PreparedMesh = shared
-        self._counting = Counting(
+        self.counting = Counting(
             options.axis.bins,
             options.axis.v_max_mps,
             {"drop": DROP, "wrap": WRAP, "clip": CLIP}[options.beyond],
             options.range_exponent if options.range_law == "vertex" else 0.0,
             options.reference_range_m,
         )
-        self._masks = VisibilityMasks(self.prepared, self._counting)
+        self._masks = VisibilityMasks(self.prepared, self.counting)
 
     @property
     def unit(self) -> str:
@@ -323,6 +273,36 @@ class Synthesizer:
             quality,
         )
 
+    def uncertainty(
+        self,
+        sensor: VirtualSensor,
+        *,
+        visibility: Visibility | None = None,
+        frames: tuple[int, int] | None = None,
+        progress: Progress = silent,
+    ) -> CellUncertainty:
+        """How well the cells of :meth:`map` are known, as far as the mesh's velocities are.
+
+        Model and limits are those of :mod:`sd2core.doppler.uncertainty`.
+
+        Parameters
+        ----------
+        sensor, visibility, frames, progress
+            As for :meth:`map`.
+
+        Raises
+        ------
+        Sd2Error
+            When the mesh does not say how well its velocities are known.
+        """
+        from sd2core.doppler.uncertainty import cell_uncertainty
+
+        start, stop = frames or (0, self.mesh.frame_count)
+        if not 0 <= start < stop <= self.mesh.frame_count:
+            raise IndexError(f"frames {start} to {stop} of {self.mesh.frame_count}")
+        chosen = self._choose(visibility)
+        return cell_uncertainty(self, sensor, start, stop, chosen, progress, self._threads)
+
     def cached_mask(
         self,
         sensor: VirtualSensor,
@@ -339,7 +319,7 @@ class Synthesizer:
         """
         stop = self.mesh.frame_count if stop is None else stop
         parts = []
-        for index, low, high in self._blocks_between(start, stop):
+        for index, low, high in self.blocks_between(start, stop):
             base = index * self.prepared.block_frames
             rows = slice(low - base, high - base)
             mask = self._masks.kept(index, rows, sensor.position_m, visibility)
@@ -370,7 +350,7 @@ class Synthesizer:
         if not kernels_ready():
             compile_in_background()
         counts = Counts.empty(stop - start, self.options.axis.bins)
-        totals = np.full(stop - start, float(self.mesh.represented_count))
+        totals = np.empty(stop - start)
         qualities: set[Quality] = set()
         quick = visibility not in ("depth", "exact") and kernels_ready()
 
@@ -392,7 +372,7 @@ class Synthesizer:
             return work
 
         jobs = []
-        for index, low, high in self._blocks_between(start, stop):
+        for index, low, high in self.blocks_between(start, stop):
             # A block that must be read first is one job: its readers would wait.
             size = _FAST_FRAMES if quick else _EXACT_JOB_FRAMES
             pieces = -(-(high - low) // size) if self.prepared.has(index) else 1
@@ -416,9 +396,42 @@ class Synthesizer:
     ) -> Quality:
         """Count some of a block's frames; returns the visibility that was used."""
         place = self.prepared.sensor(position_m)
+        totals[:] = self.totals(block, rows)
+        scatterers, quality = self.scatterers(block, rows, position_m, visibility)
+        frames = block.frames.rows(rows)
+        if self.options.velocity == "vid2doppler":
+            velocity = self.prepared.velocities_vid2doppler(block, rows, place)
+            edges_mps = self.options.axis.edges_mps
+            vid2doppler.count(frames, velocity, edges_mps, place, self.counting, scatterers, into)
+        else:
+            count = histogram.count if kernels_ready() else histogram.count_plain
+            count(frames, place, self.counting, scatterers, into)
+        if self.options.range_law == "frame":
+            into.histogram[:] *= self.frame_law(block, rows, position_m)[:, None]
+        return quality
+
+    def totals(self, block: Block, rows: slice) -> NDArray[np.float64]:
+        """What the counts of some of a block's frames are shares of, (n,)."""
+        if self.options.weight != "count":
+            return self.prepared.surface(block)[rows]
+        return np.full(rows.stop - rows.start, float(self.mesh.represented_count))
+
+    def frame_law(self, block: Block, rows: slice, position_m: Position) -> NDArray[np.float64]:
+        """The range law where it is one number for each of some of a block's frames, (n,)."""
+        options = self.options
+        if options.range_law != "frame":
+            return np.ones(rows.stop - rows.start)
+        away_m = self.prepared.middles(block)[rows] - self.prepared.sensor(position_m)
+        range_m = np.linalg.norm(away_m, axis=1)
+        return range_weight(range_m, options.range_exponent, options.reference_range_m).astype(
+            np.float64
+        )
+
+    def scatterers(
+        self, block: Block, rows: slice, position_m: Position, visibility: Visibility
+    ) -> tuple[Scatterers, Quality]:
+        """What some of a block's frames count, and the visibility that was used."""
         weight = self.options.weight
-        if weight != "count":
-            totals[:] = self.prepared.surface(block)[rows]
         mask, quality = self._masks.for_rows(block, rows, position_m, visibility)
         facing = mask is None and quality == "facing"
         scatterers = Scatterers(
@@ -428,19 +441,7 @@ class Synthesizer:
             area_vectors=self.prepared.area_vectors(block)[rows] if weight == "projected" else None,
             vertex_counts=self.prepared.heads,
         )
-        frames = block.frames.rows(rows)
-        if self.options.velocity == "vid2doppler":
-            velocity = self.prepared.velocities_vid2doppler(block, rows, place)
-            edges_mps = self.options.axis.edges_mps
-            vid2doppler.count(frames, velocity, edges_mps, place, self._counting, scatterers, into)
-        else:
-            count = histogram.count if kernels_ready() else histogram.count_plain
-            count(frames, place, self._counting, scatterers, into)
-        if self.options.range_law == "frame":
-            range_m = np.linalg.norm(self.prepared.middles(block)[rows] - place, axis=1)
-            law = range_weight(range_m, self.options.range_exponent, self.options.reference_range_m)
-            into.histogram[:] *= law[:, None]
-        return quality
+        return scatterers, quality
 
     # Blocks.
 
@@ -449,7 +450,7 @@ class Synthesizer:
             raise IndexError(f"frame {frame} of {self.mesh.frame_count}")
         return self.prepared.block(frame // self.prepared.block_frames)
 
-    def _blocks_between(self, start: int, stop: int) -> list[tuple[int, int, int]]:
+    def blocks_between(self, start: int, stop: int) -> list[tuple[int, int, int]]:
         """Block number and the frames it holds of ``start`` to ``stop``."""
         size = self.prepared.block_frames
         return [

@@ -48,3 +48,56 @@ def test_synth_says_that_those_columns_are_empty(
     # A radar's noise goes on without anybody.
     assert power[absent].max() <= (0.0 if model == "histogram" else 0.05 * power.max())
     assert json.loads(sd2("info", out, "--json").out)["frames_without_person"] == len(absent)
+
+
+@pytest.fixture
+def fitted(plate: Path) -> Path:
+    """The plate, as if fitted: its velocity is known to ±0.2 m/s."""
+    with np.load(plate) as data:
+        arrays = dict(data)
+    frames, vertices = arrays["vertices"].shape[:2]
+    sigma = np.full((frames, 2), (0.2, 0.05), np.float32)
+    np.savez(
+        plate,
+        **arrays,
+        limbs=["plate", "rest"],
+        vertex_limb=np.zeros(vertices, np.uint8),
+        limb_velocity_sigma_mps=sigma,
+        limb_velocity_sigma_across_mps=0.1 * sigma,
+    )
+    return plate
+
+
+def test_synth_adds_how_well_values_are_known(sd2: Sd2, fitted: Path, tmp_path: Path) -> None:
+    out = tmp_path / "map.npz"
+    assert sd2("synth", fitted, "--out", out).code == 0
+    assert DopplerMap.load(out).uncertainty is None
+    said = sd2("synth", fitted, "--out", out, "--uncertainty")
+    assert said.code == 0
+    assert "known to" in said.out
+    known = DopplerMap.load(out).uncertainty
+    assert known is not None
+    assert known.sd.max() > 0
+    assert json.loads(sd2("info", out, "--json").out)["uncertainty"] > 0.1
+    chosen = sd2("synth", fitted, "--out", out, "--uncertainty", "--tolerance", "20%")
+    assert chosen.code == 0
+    assert DopplerMap.load(out).uncertainty is not None
+
+
+def test_info_says_how_well_velocities_are_known(sd2: Sd2, fitted: Path) -> None:
+    said = sd2("info", fitted).out
+    assert "known to ±0.05 m/s (rest) to ±0.20 m/s (plate)" in said
+
+
+def test_what_is_not_known_is_refused(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
+    out = tmp_path / "map.npz"
+    said = sd2("synth", plate, "--out", out, "--uncertainty")
+    assert said.code == 1
+    assert "does not say how well its velocities are known" in said.err
+    assert not out.exists()
+
+
+def test_a_radar_signal_has_none(sd2: Sd2, fitted: Path, tmp_path: Path) -> None:
+    said = sd2("synth", fitted, "--out", tmp_path / "m.npz", "--uncertainty", "--model", "fmcw")
+    assert said.code == 1
+    assert "--uncertainty is given with --model fmcw" in said.err
