@@ -57,7 +57,10 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         help="measure NAME.zarr, NAME.npz or NAME/mesh.zarr of this folder instead of fitting",
     )
     source.add_argument(
-        "--keep", type=Path, metavar="FOLDER", help="keep what is fitted as NAME.zarr in FOLDER"
+        "--keep",
+        type=Path,
+        metavar="FOLDER",
+        help="keep what is fitted as NAME.zarr in FOLDER; what is there is not fitted again",
     )
     parser.add_argument(
         "--real",
@@ -67,7 +70,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         metavar="VIDEO",
         help=(
             "also fit these videos, whose motion nobody knows, and measure whether the body lies"
-            " on the person that the landmark model sees"
+            " on the person that the landmark model sees; their meshes are called real-NAME"
         ),
     )
     parser.add_argument(
@@ -125,6 +128,8 @@ class _Source(NamedTuple):
         if self.meshes is not None:
             return _mesh_in(self.meshes, name), None
         path = self.folder / f"{name}.zarr"
+        if path.exists():
+            return path, None
         return path, _fit(name, video, path, known)
 
 
@@ -148,11 +153,12 @@ def _scored_real(video: Path, source: _Source) -> RealScore:
     from sd2core.io.mesh import load_mesh
     from sd2core.io.video import open_video
 
-    path, _ = source.fitted(video.stem, video, [])
+    name = f"real-{video.stem}"
+    path, _ = source.fitted(name, video, [])
     with progress_bar(f"Looking at {video.name}") as progress, open_video(video) as reader:
         track = find_landmarks(reader, landmark_models(), silhouettes=None, progress=progress)
     camera = PinholeCamera.default(track.width, track.height)
-    return score_real(video.stem, load_mesh(path), track, camera)
+    return score_real(name, load_mesh(path), track, camera)
 
 
 def _mesh_in(folder: Path, name: str) -> Path:
@@ -169,12 +175,6 @@ def _mesh_in(folder: Path, name: str) -> Path:
 
 def _fit(name: str, video: Path, out: Path, known: list[str]) -> float:
     """Fit one video in a process of its own, as a user does; seconds with its start."""
-    if out.exists():
-        raise Sd2Error(
-            f"{out} exists",
-            "a folder without meshes of these clips",
-            f"Measure it with --meshes {out.parent}, or delete it first",
-        )
     command = [sys.executable, "-m", "sd2core.cli", "fit", str(video), "--out", str(out), *known]
     started = time.perf_counter()
     done = subprocess.run(command, capture_output=True, text=True, check=False)
