@@ -86,6 +86,11 @@ ACTIONS: tuple[Action, ...] = (
         lambda w: w.dialogs.add_folder(), _has_content,
     ),
     Action(
+        "compare", "File", "Compare with mesh…", (),
+        "Measure another mesh of this video against the one that is open",
+        lambda w: w.compare_with_mesh(), _has_mesh,
+    ),
+    Action(
         "relink", "File", "Find missing files…", (),
         "Choose one folder; all missing files are looked for below it",
         lambda w: w.dialogs.relink(),

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QKeySequence
+from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtWidgets import (
     QDialog,
     QDialogButtonBox,
@@ -22,8 +22,10 @@ from PySide6.QtWidgets import (
 
 import sd2core
 from sd2app.actions import ACTIONS, MOUSE
+from sd2app.dialogs.comparison import ComparisonWindow
 from sd2app.dialogs.new_from_video import VIDEOS, NewFromVideoDialog
 from sd2app.dialogs.strip import StripDialog
+from sd2app.models.comparison import ComparisonModel
 from sd2app.models.fit_setup import FitSetupModel
 from sd2app.models.strip import StripModel
 from sd2core.errors import Sd2Error
@@ -40,6 +42,21 @@ _FILES = (
 )
 
 
+_MESHES = (
+    "Mesh or recording (*.npz *.zip zarr.json *.pkl *.obj *.ply *.glb recording.json);;"
+    "All files (*)"
+)
+
+
+def mesh_of(path: Path) -> Path:
+    """What a file that can be chosen stands for: a Zarr group is a folder, frames are several."""
+    if path.name in ("zarr.json", "recording.json"):
+        return path.parent
+    if path.suffix.lower() in (".obj", ".ply", ".glb") and path.parent.is_dir():
+        return path.parent
+    return path
+
+
 class Dialogs:
     """Asks, then calls the models; a failure is handed to ``report`` as a sentence."""
 
@@ -47,6 +64,7 @@ class Dialogs:
         self._parent = parent
         self._context = context
         self._report = report
+        self._comparison: ComparisonWindow | None = None
 
     def new_from_video(self, video: Path | None = None) -> None:
         """Ask what a fit needs, begin it, and show its video.
@@ -113,6 +131,39 @@ class Dialogs:
         """Choose files to add to what is open."""
         if paths := self._ask_files("Add to this recording"):
             self._context.document.add(paths)
+
+    def compare_with_mesh(self, keys: list[QAction], path: Path | None = None) -> None:
+        """Measure another mesh against the one that is open, in a window of its own.
+
+        ``keys`` are actions of the main window that are to work there too.
+        """
+        path = path or self.ask_mesh()
+        context = self._context
+        if path is None or context.document.mesh is None:
+            return
+        self.close_comparison()
+        model = ComparisonModel(context.document, context.sensor, context.jobs, path, self._parent)
+        window = ComparisonWindow(model, context, keys, self.attempt, self._parent)
+        window.closed.connect(self._forget_comparison)
+        # It is about the recording that was open.
+        context.document.opened.connect(window.close)
+        self._comparison = window
+        window.show()
+
+    def close_comparison(self) -> None:
+        """Close it, where it is open."""
+        if self._comparison is not None:
+            self._comparison.close()
+
+    def _forget_comparison(self) -> None:
+        window, self._comparison = self._comparison, None
+        if window is not None:
+            window.deleteLater()
+
+    def ask_mesh(self) -> Path | None:
+        """Choose another mesh, by a file of it or the ``recording.json`` of its recording."""
+        name, _ = QFileDialog.getOpenFileName(self._parent, "Compare with mesh", "", _MESHES)
+        return mesh_of(Path(name)) if name else None
 
     def add_folder(self) -> None:
         """Choose a capture or mesh folder to add to what is open."""

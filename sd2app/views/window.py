@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from sd2app.views.scene3d import SceneView
     from sd2app.views.side_panel import SidePanel
 
+_SHARED_KEYS = ("play", "previous_frame", "next_frame", "back_second", "on_second", "zoom_fit")
+"""Actions that work in the window of a comparison too."""
 _PANELS = ("video", "scene", "sensor", "tracks", "spectrum")
 
 
@@ -331,6 +333,11 @@ class MainWindow(QMainWindow):
         if self._scene is not None:
             self._scene.set_view(name)
 
+    def compare_with_mesh(self, path: Path | None = None) -> None:
+        """Ask for another mesh, and show both."""
+        keys = [self._actions[name] for name in _SHARED_KEYS]
+        self.dialogs.compare_with_mesh(keys, path)
+
     def measure_scene(self) -> None:
         """Measure every plan, where one can watch it."""
         self.side.bring_up("Trade")
@@ -390,6 +397,7 @@ class MainWindow(QMainWindow):
         for name in ("top", "bottom", "rows"):
             self._settings.set_layout(name, getattr(self, f"_{name}").saveState())
         self._ready = False
+        self.dialogs.close_comparison()
         self._importer.close()
         self.context.close()
         if self._scene is not None:

@@ -1,0 +1,1 @@
+"""Two meshes of one video side by side."""
