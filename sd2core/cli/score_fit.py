@@ -60,7 +60,10 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         "--keep",
         type=Path,
         metavar="FOLDER",
-        help="keep what is fitted as NAME.zarr in FOLDER; what is there is not fitted again",
+        help=(
+            "keep what is fitted as NAME.zarr in FOLDER, and its landmarks as"
+            " NAME.landmarks.npz; what is there is not fitted again"
+        ),
     )
     parser.add_argument(
         "--real",
@@ -130,10 +133,11 @@ class _Source(NamedTuple):
         path = self.folder / f"{name}.zarr"
         if path.exists():
             return path, None
-        return path, _fit(name, video, path, known)
+        return path, _fit(name, video, path, [*known, "--landmarks", str(landmarks_of(path))])
 
 
 def _scored(truth: Truth, source: _Source) -> ClipScore:
+    from sd2core.body.landmark_files import load_track
     from sd2core.compare.fit_score import score_clip
     from sd2core.io.mesh import load_mesh
 
@@ -141,8 +145,10 @@ def _scored(truth: Truth, source: _Source) -> ClipScore:
     if source.stature_known:
         known += ["--stature-m", f"{truth.stature_m:g}"]
     path, seconds = source.fitted(truth.name, truth.video, known)
+    landmarks = landmarks_of(path)
+    track = load_track(landmarks) if landmarks.exists() else None
     with progress_bar(f"Measuring {truth.name}") as progress:
-        return score_clip(truth, load_mesh(path), seconds=seconds, progress=progress)
+        return score_clip(truth, load_mesh(path), seconds=seconds, track=track, progress=progress)
 
 
 def _scored_real(video: Path, source: _Source) -> RealScore:
@@ -159,6 +165,11 @@ def _scored_real(video: Path, source: _Source) -> RealScore:
         track = find_landmarks(reader, landmark_models(), silhouettes=None, progress=progress)
     camera = PinholeCamera.default(track.width, track.height)
     return score_real(name, load_mesh(path), track, camera)
+
+
+def landmarks_of(mesh: Path) -> Path:
+    """Where the landmarks are kept that a mesh was fitted to."""
+    return mesh.with_name(f"{mesh.stem}.landmarks.npz")
 
 
 def _mesh_in(folder: Path, name: str) -> Path:

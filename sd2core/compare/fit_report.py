@@ -72,7 +72,16 @@ def reach_table(scores: Sequence[ClipScore], real: Sequence[RealScore] = ()) -> 
     """
     strokes = [stroke for score in scores for stroke in score.strokes]
     fast = [stroke for stroke in strokes if stroke.speed == "fast"]
-    rows = []
+    residuals = [one.residual_m for one in scores if one.residual_m is not None]
+    rows = [
+        Row(
+            "fit residual: joints to the landmarks found, in the picture, mean",
+            100.0 * _mean(residuals),
+            "cm",
+            ("<=", 3.0),
+            detail="at the joint's depth" if residuals else "no landmarks are kept",
+        )
+    ]
     limits: dict[str, tuple[Reach, Reach]] = {
         "hand": (("<=", 0.25), (">=", 0.9)),
         "wrist": (None, None),
@@ -182,6 +191,7 @@ def clip_table(scores: Sequence[ClipScore]) -> list[dict[str, Any]]:
             "sigma_coverage": None
             if one.sigma is None
             else coverage(one.sigma.truth, one.sigma.fitted),
+            "residual_m": one.residual_m,
             "seconds_per_frame": one.seconds_per_frame,
             "notes": list(one.notes),
         }

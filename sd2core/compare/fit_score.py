@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.silhouette import overlap, silhouette
+from sd2core.body.track import LandmarkTrack
 from sd2core.compare.joints import (
     JOINTS,
     JointPatches,
@@ -25,6 +26,7 @@ from sd2core.compare.measures import (
     rms,
     speed_mps,
 )
+from sd2core.compare.real_score import reprojection
 from sd2core.compare.times import at_times, common_times
 from sd2core.compare.truth import Stroke, Truth
 from sd2core.errors import Sd2Error
@@ -128,6 +130,9 @@ class ClipScore:
         joints, ``truth`` their actual errors.
     seconds_per_frame : float or None
         That the fit took.
+    residual_m : float or None
+        Mean distance of joints from the landmarks that were found, in the picture at
+        the joint's depth.
     notes : tuple of str
     """
 
@@ -145,6 +150,7 @@ class ClipScore:
     overlap: float
     sigma: Pair | None = None
     seconds_per_frame: float | None = None
+    residual_m: float | None = None
     notes: tuple[str, ...] = ()
 
 
@@ -153,6 +159,7 @@ def score_clip(
     fitted: MeshSequence,
     *,
     seconds: float | None = None,
+    track: LandmarkTrack | None = None,
     progress: Progress = silent,
 ) -> ClipScore:
     """Measure one fitted mesh.
@@ -165,6 +172,8 @@ def score_clip(
         how well its velocities are known, that is measured too.
     seconds : float, optional
         That the whole fit took.
+    track : LandmarkTrack, optional
+        The landmarks that were fitted to.
     progress : Progress
         Counts frames of the two Doppler maps.
 
@@ -240,6 +249,9 @@ def score_clip(
         overlap=_overlap(pair[0], pair[1], truth),
         sigma=_sigma(pair[1], patches[1], errors[0], measured),
         seconds_per_frame=None if seconds is None else seconds / len(fitted.timebase),
+        residual_m=None
+        if track is None
+        else float(reprojection(fitted, track, truth.camera)[1].mean()),
         notes=tuple(notes),
     )
 

@@ -33,6 +33,7 @@ _CLIPS = (
     ("edge_place_ratio", "ends: place"),
     ("silhouette_overlap", "silhouette"),
     ("sigma_coverage", "1σ covers"),
+    ("residual_m", "residual (m)"),
     ("seconds_per_frame", "s/frame"),
 )
 _REAL = (

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.silhouette import overlap, silhouette
@@ -84,18 +85,41 @@ def score_real(
         height, width = seen.shape
         drawn = silhouette(mesh.frame(frame), mesh.faces, camera, (width, height))
         overlaps.append(overlap(drawn, seen))
-    joints = own_patches(resolution).of(mesh)[:, [JOINTS.index(one) for one in _BOTH]]
-    rows = [LANDMARKS.index(one) for one in _BOTH]
-    pixels = track.image_px[:, rows].astype(np.float64)
-    inside = ((pixels >= 0) & (pixels <= (track.width, track.height))).all(axis=-1)
-    there = track.present[:, None] & (track.visibility[:, rows] >= _SEEN) & inside
-    away_px = np.linalg.norm(camera.project(joints[there]) - pixels[there], axis=-1)
-    away_m = away_px * joints[there][:, 2] / camera.focal_px
+    away_px, away_m = reprojection(mesh, track, camera)
     return RealScore(
         name,
         float(np.nanmean(overlaps)) if overlaps else float("nan"),
         float(np.nanmin(overlaps)) if overlaps else float("nan"),
         float(away_px.mean()) if away_px.size else float("nan"),
         float(away_m.mean()) if away_m.size else float("nan"),
-        int(there.sum()),
+        len(away_px),
     )
+
+
+def reprojection(
+    mesh: MeshSequence, track: LandmarkTrack, camera: PinholeCamera
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """How far joints are from their landmarks in the picture.
+
+    Parameters
+    ----------
+    mesh : MeshSequence
+        With a surface of ours, frame by frame of the track.
+    track : LandmarkTrack
+    camera : PinholeCamera
+
+    Returns
+    -------
+    float64 arrays, shape (n,)
+        In pixels, and in metres at the joint's depth: of shoulders, elbows, wrists,
+        hips, knees and ankles in all frames in which they are seen.
+    """
+    resolution = own_resolution(mesh)
+    assert resolution is not None
+    joints = own_patches(resolution).of(mesh)[:, [JOINTS.index(one) for one in _BOTH]]
+    rows = [LANDMARKS.index(one) for one in _BOTH]
+    pixels = track.image_px[:, rows].astype(np.float64)
+    inside = ((pixels >= 0) & (pixels <= (track.width, track.height))).all(axis=-1)
+    there = track.present[:, None] & (track.visibility[:, rows] >= _SEEN) & inside
+    away_px = np.linalg.norm(camera.project(joints[there]) - pixels[there], axis=-1)
+    return away_px, away_px * joints[there][:, 2] / camera.focal_px

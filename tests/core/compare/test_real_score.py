@@ -1,16 +1,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
-from known_clip import TIMES, waving
+from known_clip import TIMES, waving, write_clip
 
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.silhouette import silhouette
 from sd2core.body.track import LANDMARKS, LandmarkTrack
+from sd2core.compare.fit_score import score_clip
 from sd2core.compare.joints import JOINTS, own_patches
 from sd2core.compare.real_score import score_real
+from sd2core.compare.truth import read_truth
 from sd2core.errors import Sd2Error
 from sd2core.mesh import MeshSequence
 from sd2core.timebase import Timebase
@@ -75,6 +78,15 @@ def test_hidden_landmarks_and_those_outside_are_left_out(
     score = score_real("wave", mesh, replace(track, visibility=visibility, image_px=image), CAMERA)
     assert score.landmarks == seen - 2 * len(TIMES)
     assert score.reprojection_px < 1e-4
+
+
+def test_the_residual_of_a_known_clip(
+    mesh: MeshSequence, track: LandmarkTrack, tmp_path: Path
+) -> None:
+    truth = read_truth(write_clip(tmp_path / "wave", mesh))
+    shifted = replace(track, image_px=track.image_px + np.array([3.0, 4.0], np.float32))
+    score = score_clip(truth, mesh, track=shifted)
+    assert score.residual_m == score_real("wave", mesh, shifted, CAMERA).reprojection_m
 
 
 def test_a_mask_that_is_half_covered(mesh: MeshSequence, track: LandmarkTrack) -> None:
