@@ -282,6 +282,13 @@ class Recording:
             return self.camera.focal_for(width, height)
         return self.mesh_reading.focal_px
 
+    def learn_camera(self) -> None:
+        """Take over the camera that the mesh was fitted with, where nothing is known of it."""
+        from sd2core.io.fitted import fitted_camera
+
+        if self.camera is None and self.mesh is not None and self.mesh_reading.focal_px is None:
+            self.camera = fitted_camera(self.mesh)
+
     def open_video(self, progress: Progress = silent) -> VideoReader:
         """Open the video."""
         from sd2core.io.video import open_video

@@ -14,7 +14,7 @@ import sys
 import time
 from pathlib import Path
 
-STAGES = ["find", "refine", "lift", "fit", "write"]
+STAGES = ["find", "refine", "fit", "write"]
 
 
 def say(**content: object) -> None:

@@ -115,7 +115,11 @@ class NewFromVideoDialog(QDialog):
         form.addRow("", _hint("Drag a rectangle around the person, where there are several."))
         form.addRow("Body height", _row(self._known, self._stature, end=True))
         form.addRow(
-            "", _hint("Fixes the scale: unknown, distances and velocities share its error.")
+            "",
+            _hint(
+                f"{DEFAULT_STATURE_M:g} m where it is not known. It fixes the scale: all distances"
+                " and velocities are proportional to it."
+            ),
         )
         form.addRow("Camera", _row(self._camera, self._angle, self._focal, end=True))
         form.addRow("Save as", _row(self._folder, self._other_folder))

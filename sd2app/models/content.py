@@ -101,6 +101,7 @@ def load_content(recording: Recording, clutter: Clutter, progress: Progress) -> 
 
     problems: list[Sd2Error] = []
 
+    recording.learn_camera()
     missing = recording.missing()
     for role, path in missing.items():
         problems.append(

@@ -16,7 +16,7 @@ WORDS = {
     "fit": "fitting the body",
     "write": "writing the mesh",
 }
-_WEIGHTS = {"models": 0.0, "find": 1.0, "refine": 1.0, "lift": 0.1, "fit": 1.0, "write": 0.1}
+_WEIGHTS = {"models": 0.0, "find": 1.0, "refine": 4.0, "lift": 0.1, "fit": 3.0, "write": 0.3}
 """About how long a frame takes in each stage, relative to the others."""
 _UNKNOWN_WEIGHT = 0.5
 _SETTLING_S = 2.0
@@ -29,7 +29,7 @@ class FitProgress:
     def __init__(self, clock_s: Callable[[], float] = time.monotonic) -> None:
         self._clock_s = clock_s
         self._stages: tuple[str, ...] = ()
-        self._began: tuple[float, float] | None = None  # time and share at the first report
+        self._began: list[tuple[float, float]] = []  # time and share at a stage's first report
         self.stage = ""
         self.done = 0
         self.total = 0
@@ -41,11 +41,12 @@ class FitProgress:
 
     def report(self, message: Progressed) -> None:
         """Take a report."""
+        another = message.stage != self.stage
         self.stage, self.done = message.stage, message.done
         self.total, self.unit = message.total, message.unit
         share = self.share
-        if self._began is None and share is not None:
-            self._began = self._clock_s(), share
+        if share is not None and (another or not self._began):
+            self._began.append((self._clock_s(), share))
 
     @property
     def share(self) -> float | None:
@@ -60,15 +61,18 @@ class FitProgress:
 
     @property
     def left_s(self) -> float | None:
-        """Seconds to the end at the speed so far, None while it is not known."""
+        """Seconds to the end at the speed of this stage, None while it is not known.
+
+        At the beginning of a stage the speed is that since the one before, or before that.
+        """
         share = self.share
-        if self._began is None or share is None:
+        if share is None:
             return None
-        began_s, began_share = self._began
-        elapsed_s, gained = self._clock_s() - began_s, share - began_share
-        if elapsed_s < _SETTLING_S or gained <= 0:
-            return None
-        return elapsed_s * (1.0 - share) / gained
+        for began_s, began_share in reversed(self._began):
+            elapsed_s, gained = self._clock_s() - began_s, share - began_share
+            if elapsed_s >= _SETTLING_S and gained > 0:
+                return elapsed_s * (1.0 - share) / gained
+        return None
 
     @property
     def text(self) -> str:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
-import math
 from dataclasses import replace
 from pathlib import Path
 
 from sd2app.models.fit_request import FitRequest
+from sd2core.io.fitted import fitted_camera
 from sd2core.recording import FILE_NAME, Recording, open_recording
 from sd2core.recording_document import CameraEntry
 from sd2core.relative_paths import plain_path
@@ -59,19 +58,10 @@ def awaits(recording: Recording, video: Path) -> bool:
 
 def camera_of(request: FitRequest, size: tuple[int, int] | None) -> CameraEntry | None:
     """The camera that the body was fitted with, as the mesh says."""
-    stated = _stated_camera(request.mesh)
+    stated = fitted_camera(request.mesh)
     if stated is not None:
         return stated
     if request.focal_px is None:
         return None
     width, height = size or (None, None)
     return CameraEntry(focal_px=request.focal_px, width=width, height=height, source="user")
-
-
-def _stated_camera(mesh: Path) -> CameraEntry | None:
-    try:
-        attributes = json.loads((mesh / "zarr.json").read_text(encoding="utf-8"))["attributes"]
-        entry = CameraEntry.model_validate(attributes["camera"])
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
-    return entry if math.isfinite(entry.focal_px) else None

@@ -14,11 +14,11 @@ from PySide6.QtCore import QObject, Signal
 from sd2app.jobs.latest import Emit, LatestRunner
 from sd2app.models.fit_request import FitRequest, Person, read_request
 from sd2core.body.camera import DEFAULT_FIELD_OF_VIEW_DEG
+from sd2core.body.fit import DEFAULT_STATURE_M as DEFAULT_STATURE_M
 from sd2core.io.video import VideoReader, open_video
 from sd2core.recording import SUFFIX, Recording
 
 CameraWay = Literal["file", "angle", "focal"]
-DEFAULT_STATURE_M = 1.70
 STATURES_M = (0.8, 2.3)
 ANGLES_DEG = (10.0, 150.0)
 _SMALLEST_PERSON = 0.02

@@ -86,6 +86,7 @@ def _import(options: argparse.Namespace) -> None:
         radar_offset_s=options.radar_offset_s,
         title=options.title,
     )
+    recording.learn_camera()
     # Opens every file, so that nothing is made of what cannot be read.
     parts = describe_parts(recording)
     with progress_bar("Copying", unit="file") as progress:

@@ -142,6 +142,7 @@ def _source(options: argparse.Namespace, stack: ExitStack) -> StripSource:
     from sd2core.figures.strip_source import StripSource
 
     recording = _recording(options)
+    recording.learn_camera()
     video = mesh = None
     if recording.video is not None:
         with progress_bar("Reading the video") as progress:

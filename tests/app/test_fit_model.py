@@ -14,6 +14,7 @@ from sd2app.models.fit import FitModel
 from sd2app.models.fit_request import LOCK_NAME, FitRequest, Person, read_request, settled
 from sd2app.models.fit_result import make_recording
 from sd2app.settings import Settings
+from sd2core.cli import build_parser
 from sd2core.errors import Sd2Error
 from sd2core.recording import Recording, open_recording
 from sd2core.recording_document import CameraEntry, Span
@@ -198,6 +199,17 @@ def test_a_request_as_a_command_line(tmp_path) -> None:
     ]  # fmt: skip
 
 
+def test_the_command_knows_every_word_of_it(tmp_path) -> None:
+    request = FitRequest(
+        Path("walk.mp4"), Path("w.sd2"), 1.7, 612.5, Person(frame=9, x=1, y=2, width=30, height=40)
+    )
+    options = build_parser()[0].parse_args(request.arguments())
+    assert (options.video, options.out) == (request.video, request.mesh)
+    assert (options.stature_m, options.focal_px) == (1.7, 612.5)
+    assert (options.person, options.person_frame) == ((1, 2, 30, 40), 9)
+    assert options.progress_json
+
+
 def test_a_request_is_read_back(request_) -> None:
     asked = FitRequest(request_.video, request_.folder, 1.7, 612.5, Person(9, 1, 2, 30, 40))
     asked.save()
@@ -241,7 +253,7 @@ def test_a_name_gets_its_ending(request_, tmp_path) -> None:
 def fitted(request: FitRequest, camera: object = None) -> FitRequest:
     request.save()
     request.mesh.mkdir()
-    attributes = {} if camera is None else {"camera": camera}
+    attributes = {} if camera is None else {"fit": {"camera": camera}}
     (request.mesh / "zarr.json").write_text(json.dumps({"attributes": attributes}))
     return request
 

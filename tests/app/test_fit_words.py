@@ -120,6 +120,19 @@ def test_a_continued_run_counts_only_its_own_time(run) -> None:
     assert progress.left_s == pytest.approx(5.0 * (1 - progress.share) / gained)
 
 
+def test_a_slower_stage_is_judged_by_itself(run) -> None:
+    progress, now = run
+    progress.report(Progressed("find", 0, 90, "frame"))
+    now[0] = 3.0
+    progress.report(Progressed("find", 90, 90, "frame"))
+    progress.report(Progressed("refine", 0, 90, "frame"))
+    before = progress.share
+    assert progress.left_s == pytest.approx(3.0 * (1 - before) / before)
+    now[0] = 33.0
+    progress.report(Progressed("refine", 45, 90, "frame"))
+    assert progress.left_s == pytest.approx(30.0 * (1 - progress.share) / (progress.share - before))
+
+
 def test_words(run) -> None:
     progress, _ = run
     assert progress.text == "starting"

@@ -25,6 +25,7 @@ from sd2app.views.fit_bar import FitBar
 from sd2app.views.landmark_overlay import bones
 from sd2app.views.video import VideoView
 from sd2app.views.window import MainWindow
+from sd2core.body.fit import DEFAULT_STATURE_M
 from sd2core.body.track import LANDMARKS, MIRRORED
 from sd2core.recording import open_recording
 
@@ -120,7 +121,7 @@ def test_from_the_offer_to_the_recording(made, qtbot, video) -> None:
     assert isinstance(person, Person)
     assert (person.x, person.y) == pytest.approx((40, 20), abs=1)
     assert (person.width, person.height) == pytest.approx((80, 80), abs=1)
-    assert asked[0].stature_m == 1.7
+    assert asked[0].stature_m == DEFAULT_STATURE_M
     assert fit.request == asked[0]
     with qtbot.waitSignal(window.context.document.opened, timeout=30_000):
         pass

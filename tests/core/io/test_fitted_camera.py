@@ -1,0 +1,62 @@
+"""The camera that a fitted mesh was made with."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+import zarr
+
+from sd2core.io.fitted import fitted_camera
+from sd2core.recording import MeshReading, Recording
+from sd2core.recording_document import CameraEntry
+
+SAID = {"camera": {"focal_px": 612.5, "width": 640, "height": 480, "source": "metadata"}}
+CAMERA = CameraEntry(focal_px=612.5, width=640, height=480, source="metadata")
+
+
+@pytest.fixture(params=["mesh.zarr", "mesh.npz", "mesh.zarr.zip"])
+def fitted(request, tmp_path: Path) -> Path:
+    """Where the fit says it, in every form of a mesh."""
+    path = tmp_path / request.param
+    if request.param == "mesh.zarr":
+        zarr.open_group(str(path), mode="w").attrs["fit"] = SAID
+    elif request.param == "mesh.zarr.zip":
+        store = zarr.storage.ZipStore(str(path), mode="w")
+        zarr.create_group(store, attributes={"fit": SAID})
+        store.close()
+    else:
+        np.savez(path, fit=np.array(json.dumps(SAID)))
+    return path
+
+
+def test_it_is_read_from_every_form(fitted: Path) -> None:
+    assert fitted_camera(fitted) == CAMERA
+
+
+def test_other_meshes_say_nothing(tmp_path: Path) -> None:
+    np.savez(tmp_path / "plain.npz", vertices=np.zeros((1, 3, 3)))
+    zarr.open_group(str(tmp_path / "plain.zarr"), mode="w")
+    (tmp_path / "text.obj").write_text("v 0 0 0")
+    with zipfile.ZipFile(tmp_path / "odd.npz", "w") as archive:
+        archive.writestr("fit.npy", b"damaged")
+    bad = {"camera": {"focal_px": -1}}
+    np.savez(tmp_path / "bad.npz", fit=np.array(json.dumps(bad)))
+    for name in ("plain.npz", "plain.zarr", "text.obj", "odd.npz", "bad.npz", "none.npz"):
+        assert fitted_camera(tmp_path / name) is None
+
+
+def test_a_recording_learns_what_nobody_said(fitted: Path, tmp_path: Path) -> None:
+    recording = Recording(tmp_path / "a.sd2", mesh=fitted)
+    recording.learn_camera()
+    assert recording.camera == CAMERA
+    known = CameraEntry(focal_px=700, source="user")
+    said = Recording(tmp_path / "b.sd2", mesh=fitted, camera=known)
+    said.learn_camera()
+    assert said.camera == known
+    placed = Recording(tmp_path / "c.sd2", mesh=fitted, mesh_reading=MeshReading(focal_px=650))
+    placed.learn_camera()
+    assert placed.focal_px(640, 480) == 650
