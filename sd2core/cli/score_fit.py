@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import subprocess
 import sys
 import time
@@ -126,7 +127,9 @@ class _Source(NamedTuple):
     folder: Path
     stature_known: bool
 
-    def fitted(self, name: str, video: Path, known: list[str]) -> tuple[Path, float | None]:
+    def fitted(
+        self, name: str, video: Path, known: list[str]
+    ) -> tuple[Path, tuple[float, float] | None]:
         """Path of the mesh, and the seconds its fit took if it was made now."""
         if self.meshes is not None:
             return _mesh_in(self.meshes, name), None
@@ -184,12 +187,15 @@ def _mesh_in(folder: Path, name: str) -> Path:
     )
 
 
-def _fit(name: str, video: Path, out: Path, known: list[str]) -> float:
-    """Fit one video in a process of its own, as a user does; seconds with its start."""
+def _fit(name: str, video: Path, out: Path, known: list[str]) -> tuple[float, float]:
+    """Fit one video in a process of its own, as a user does; seconds and processor seconds."""
     command = [sys.executable, "-m", "sd2core.cli", "fit", str(video), "--out", str(out), *known]
-    started = time.perf_counter()
+    started, before = time.perf_counter(), os.times()
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
         said = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}"]
         raise Sd2Error(f"{name} could not be fitted: {said[0].removeprefix('sd2: ')}")
-    return time.perf_counter() - started
+    after = os.times()
+    worked_s = after.children_user - before.children_user
+    worked_s += after.children_system - before.children_system
+    return time.perf_counter() - started, worked_s

@@ -128,8 +128,8 @@ class ClipScore:
     sigma : Pair or None
         ``fitted`` holds standard deviations that the fit gave for the velocities of
         joints, ``truth`` their actual errors.
-    seconds_per_frame : float or None
-        That the fit took.
+    seconds_per_frame, processor_s_per_frame : float or None
+        That the fit took by the clock, and on all cores together.
     residual_m : float or None
         Mean distance of joints from the landmarks that were found, in the picture at
         the joint's depth.
@@ -150,6 +150,7 @@ class ClipScore:
     overlap: float
     sigma: Pair | None = None
     seconds_per_frame: float | None = None
+    processor_s_per_frame: float | None = None
     residual_m: float | None = None
     notes: tuple[str, ...] = ()
 
@@ -158,7 +159,7 @@ def score_clip(
     truth: Truth,
     fitted: MeshSequence,
     *,
-    seconds: float | None = None,
+    seconds: tuple[float, float] | None = None,
     track: LandmarkTrack | None = None,
     progress: Progress = silent,
 ) -> ClipScore:
@@ -170,8 +171,8 @@ def score_clip(
     fitted : MeshSequence
         Of this clip's video, in the camera frame, with a surface of ours. Where it says
         how well its velocities are known, that is measured too.
-    seconds : float, optional
-        That the whole fit took.
+    seconds : (float, float), optional
+        That the whole fit took: by the clock, and of processor time.
     track : LandmarkTrack, optional
         The landmarks that were fitted to.
     progress : Progress
@@ -248,7 +249,8 @@ def score_clip(
         middle=np.array([rms(one[~edge & measured]) for one in errors]),
         overlap=_overlap(pair[0], pair[1], truth),
         sigma=_sigma(pair[1], patches[1], errors[0], measured),
-        seconds_per_frame=None if seconds is None else seconds / len(fitted.timebase),
+        seconds_per_frame=None if seconds is None else seconds[0] / len(fitted.timebase),
+        processor_s_per_frame=None if seconds is None else seconds[1] / len(fitted.timebase),
         residual_m=None
         if track is None
         else float(reprojection(fitted, track, truth.camera)[1].mean()),

@@ -41,7 +41,7 @@ def row(scores: list[ClipScore], what: str) -> Row:
 
 
 def test_the_truth_itself_is_perfect(truth: Truth) -> None:
-    score = score_clip(truth, truth.mesh(), seconds=7.2)
+    score = score_clip(truth, truth.mesh(), seconds=(7.2, 10.8))
     assert [one.stroke.label for one in score.strokes] == [one["label"] for one in STROKES]
     for stroke in score.strokes:
         for limb in MEASURED:
@@ -53,6 +53,7 @@ def test_the_truth_itself_is_perfect(truth: Truth) -> None:
     assert score.distance_m.max() == score.aligned_m.max() == score.map_l1 == 0.0
     assert score.overlap == 1.0
     assert score.seconds_per_frame == pytest.approx(0.2)
+    assert score.processor_s_per_frame == pytest.approx(0.3)
     assert score.sigma is None
     unmet = [one.what for one in reach_table([score]) if one.met is False]
     assert unmet == ["time for a fit"]
