@@ -69,10 +69,13 @@ class Dialogs:
     def new_from_video(self, video: Path | None = None) -> None:
         """Ask what a fit needs, begin it, and show its video.
 
-        The video is the one that is open where it has no mesh, else it is asked for.
+        The video is that of a fit that was stopped or failed, or the one that is open where
+        it has no mesh; else it is asked for.
         """
         context = self._context
         video = video or context.fit_offer.video
+        if context.fit.state in ("stopped", "failed") and context.fit.request is not None:
+            video = context.fit.request.video
         if video is None:
             name, _ = QFileDialog.getOpenFileName(self._parent, "Video of a person", "", VIDEOS)
             if not name:
@@ -95,6 +98,14 @@ class Dialogs:
             return
         if not context.fit_follower.on_screen and self.may_discard():
             context.document.open([request.video])
+
+    def resume_fit(self) -> None:
+        """Continue a stopped fit; where nothing else is open, its video is."""
+        context = self._context
+        if self.attempt(lambda: (context.fit.resume(), True)) is None:
+            return
+        if context.document.content is None and context.fit.busy and context.fit.request:
+            context.document.open([context.fit.request.video])
 
     def open_fitted(self) -> None:
         """Open the recording that a fit has made."""

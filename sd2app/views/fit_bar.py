@@ -27,8 +27,8 @@ class FitBar(QFrame):
         Asks for what a new fit needs.
     open_result : callable
         Opens the recording that a finished fit has made.
-    attempt : callable
-        Calls what it is given; says what goes wrong.
+    resume : callable
+        Continues what was stopped.
     """
 
     def __init__(
@@ -38,7 +38,7 @@ class FitBar(QFrame):
         offer: FitOffer,
         begin: Callable[[], None],
         open_result: Callable[[], None],
-        attempt: Callable[[Callable[[], None]], object],
+        resume: Callable[[], None],
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
@@ -65,9 +65,7 @@ class FitBar(QFrame):
             "begin": self._button("Fit a body…", "Choose person, height and place", begin),
             "follow": self._button("Follow", "Show each frame as it is worked on", self._toggle),
             "cancel": self._button("Cancel", "Stop; what is done can be continued", fit.cancel),
-            "resume": self._button(
-                "Resume", "Continue where it stopped", lambda: attempt(fit.resume)
-            ),
+            "resume": self._button("Resume", "Continue where it stopped", resume),
             "discard": self._button("Discard", "Remove what was done", fit.discard),
             "open": self._button("Open", "Open the new recording", open_result),
             "close": self._button("✕", "Close this message", self._close),
@@ -109,12 +107,14 @@ class FitBar(QFrame):
             "idle": {"begin", "close"},
             "running": {"follow", "cancel"},
             "cancelling": {"follow", "cancel"},
-            "stopped": {"resume", "discard", "close"},
-            "failed": {"resume", "close"},
+            "stopped": {"begin", "resume", "discard", "close"},
+            "failed": {"begin", "resume", "close"},
             "finished": {"open", "close"},
         }[state]
         for name, button in self._buttons.items():
             button.setVisible(name in shown)
+        self._buttons["begin"].setText("Fit a body…" if state == "idle" else "Change…")
+        self._buttons["resume"].setText("Try again" if state == "failed" else "Resume")
         self._bar.setVisible(self._fit.busy)
         self._left.setVisible(self._fit.busy)
         self._reason.setVisible(state == "failed")

@@ -209,7 +209,7 @@ class MainWindow(QMainWindow):
             c.fit_offer,
             begin=self.dialogs.new_from_video,
             open_result=self.dialogs.open_fitted,
-            attempt=self.dialogs.attempt,
+            resume=self.dialogs.resume_fit,
         )
 
     def _add_scene(self) -> None:

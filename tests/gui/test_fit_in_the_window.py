@@ -179,6 +179,15 @@ def test_a_failure_is_shown_and_put_away(made, qtbot, video) -> None:
     bar = window.findChild(FitBar)
     assert bar._reason.text() == "There is nobody in walk.mp4. Film a person."
     assert bar._reason.isVisible()
+    asked: list[Path | None] = []
+
+    def look(dialog: NewFromVideoDialog) -> None:
+        asked.append(dialog.picker._setup.video)
+        dialog.reject()
+
+    answer(qtbot, look)
+    click(window, qtbot, "Change…")
+    assert asked == [video]
     click(window, qtbot, "✕")
     assert window.context.fit.state == "idle"
 
@@ -199,10 +208,12 @@ def test_closing_asks_and_the_next_start_continues(made, qtbot, video) -> None:
     again = made("--body", settings=settings)
     assert again.context.fit.state == "stopped"
     click(again, qtbot, "Resume")
-    # Nothing else is open: the recording is.
-    with qtbot.waitSignal(again.context.document.opened, timeout=30_000):
-        pass
-    assert again.context.document.recording.folder == video.with_name("walk.sd2")
+    # Nothing else is open: the video is shown, and then the recording.
+    made_of = video.with_name("walk.sd2")
+    document = again.context.document
+    qtbot.waitUntil(
+        lambda: document.content and document.recording.folder == made_of, timeout=30_000
+    )
 
 
 def test_a_folder_in_which_a_fit_was_stopped_can_be_opened(made, qtbot, video) -> None:
