@@ -39,6 +39,7 @@ KERNEL_MODULES = (
     "sd2core.fmcw.kernels",
     "sd2core.body.skinning",
     "sd2core.raster",
+    "sd2core.simulate.people.crops",
 )
 """Every module with kernels; each has ``compile_kernels()``, which calls them once."""
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from sd2core.cli.fit_truth import add_fit_truth
 from sd2core.cli.options import add_command
 from sd2core.cli.output import progress_bar
+from sd2core.cli.simulate_people import add_people
 from sd2core.cli.simulate_radar import add_radar
 
 
@@ -38,6 +39,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     sample.add_argument("out", type=Path, metavar="OUT", help="the recording to make (NAME.sd2)")
     add_radar(kinds)
     add_fit_truth(kinds)
+    add_people(kinds)
     body = add_command(
         kinds,
         "export-body",

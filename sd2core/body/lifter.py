@@ -1,0 +1,266 @@
+"""From a track of landmarks to depth and motion along the line of sight.
+
+A small temporal convolutional network, trained on simulated people (decision 18,
+:mod:`sd2core.simulate.people`); here it only runs, on NumPy.
+"""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.body.camera import PinholeCamera
+from sd2core.body.lifted import LiftedTrack
+from sd2core.body.lifter_features import RATE_HZ, Seen, features, typical_size
+from sd2core.body.track import LANDMARKS, LandmarkTrack
+from sd2core.errors import Sd2Error
+from sd2core.resources import resource_path
+from sd2core.timebase import Timebase
+
+Singles = NDArray[np.float32]
+Floats = NDArray[np.float64]
+
+FORMAT = "sd2-lifter"
+VERSION = 1
+POINTS = len(LANDMARKS)
+OUTPUTS = 2 + 4 * POINTS
+"""Root and its spread, depths and theirs, velocities and theirs; spreads as logarithms."""
+
+LOG_SIGMA = (-6.0, 1.5)
+"""Between these the network's logarithms of spreads are held."""
+
+_WINDOW = 600
+_FAR = 8.0
+_SAME_RATE = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Network:
+    """A stack of dilated convolutions over time, as arrays.
+
+    Every block adds to what comes in: norm, bend, convolution of three frames,
+    bend, matrix. Beyond the ends of a stretch everything is zero.
+
+    Parameters
+    ----------
+    dilations : tuple of int
+        Of the blocks.
+    arrays : mapping of str to float32 array
+        ``mean``, ``spread`` (C,) of the features; ``enter`` (C, H), ``enter_bias``;
+        ``gain`` (n, H), ``wide`` (n, 3, H, H), ``wide_bias`` (n, H), ``flat`` (n, H, H),
+        ``flat_bias`` (n, H); ``last_gain`` (H,), ``leave`` (H, OUTPUTS), ``leave_bias``.
+    """
+
+    dilations: tuple[int, ...]
+    arrays: Mapping[str, Singles]
+
+    @cached_property
+    def reach(self) -> int:
+        """How many frames away something can matter."""
+        return sum(self.dilations)
+
+    def __call__(self, told: Singles) -> Singles:
+        """Outputs (T, OUTPUTS) of features (T, C), computed in windows."""
+        parts = []
+        for start in range(0, len(told), _WINDOW):
+            stop = min(start + _WINDOW, len(told))
+            first, last = max(start - self.reach, 0), min(stop + self.reach, len(told))
+            parts.append(self.whole(told[first:last])[start - first : stop - first])
+        return np.concatenate(parts)
+
+    def whole(self, told: Singles) -> Singles:
+        """The same in one piece."""
+        a = self.arrays
+        x = np.clip((told - a["mean"]) / a["spread"], -_FAR, _FAR)
+        state = x @ a["enter"] + a["enter_bias"]
+        for n, dilation in enumerate(self.dilations):
+            inner = _convolved(_bent(_normed(state, a["gain"][n])), a["wide"][n], dilation)
+            state = state + _bent(inner + a["wide_bias"][n]) @ a["flat"][n] + a["flat_bias"][n]
+        result: Singles = _bent(_normed(state, a["last_gain"])) @ a["leave"] + a["leave_bias"]
+        return result
+
+
+@dataclass(frozen=True, eq=False)
+class Lifter:
+    """A trained network and how its spreads are calibrated.
+
+    Parameters
+    ----------
+    network : Network
+    calibration : float32 array, shape (OUTPUTS,)
+        Added to what comes out: 0 but at the logarithms of spreads.
+    provenance : mapping
+        What it was trained on and by which command.
+    """
+
+    network: Network
+    calibration: Singles
+    provenance: Mapping[str, Any]
+
+    @classmethod
+    def load(cls, path: Path | None = None) -> Lifter:
+        """Read the bundled lifter, or another one.
+
+        Raises
+        ------
+        Sd2Error
+            When the file is missing, damaged or of a later version.
+        """
+        path = resource_path("lifter.npz") if path is None else Path(path)
+        try:
+            with path.open("rb") as stream, np.load(stream, allow_pickle=False) as data:
+                meta = json.loads(str(data["meta"]))
+                if meta.get("format") != FORMAT or meta.get("version", 0) > VERSION:
+                    raise Sd2Error(
+                        f"{path} is of format {meta.get('format')!r} version {meta.get('version')}",
+                        f"{FORMAT!r} up to version {VERSION}",
+                        "Open it with the version of SD² Studio that wrote it",
+                    )
+                arrays = {name: data[name].astype(np.float32) for name in meta["arrays"]}
+                calibration = data["calibration"].astype(np.float32)
+        except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
+            raise Sd2Error(
+                f"{path} cannot be read as a lifter ({error})",
+                "a file written by `sd2 simulate train-lifter`",
+            ) from error
+        return cls(Network(tuple(meta["dilations"]), arrays), calibration, meta["provenance"])
+
+    def lift(self, track: LandmarkTrack, camera: PinholeCamera) -> LiftedTrack:
+        """Depth and motion along the line of sight of every frame with a person.
+
+        Parameters
+        ----------
+        track : LandmarkTrack
+        camera : PinholeCamera
+            Of the same picture.
+
+        Returns
+        -------
+        LiftedTrack
+
+        Raises
+        ------
+        Sd2Error
+            When the camera's picture has another size than the track's.
+        """
+        if (camera.width, camera.height) != (track.width, track.height):
+            raise Sd2Error(
+                f"The camera takes pictures of {camera.width} × {camera.height}",
+                f"{track.width} × {track.height}, as the landmarks were found in",
+            )
+        raw = np.full((len(track), OUTPUTS), np.nan)
+        size = np.full(len(track), np.nan)
+        for start, stop in stretches(track.present):
+            seen, place = _at_rate(_seen(track, camera, start, stop), track.timebase, start, stop)
+            size[start:stop] = typical_size(seen.slopes)
+            raw[start:stop] = _interpolated(self.outputs(seen), place)
+        return _lifted(track.timebase, raw, size)
+
+    def outputs(self, seen: Seen) -> Singles:
+        """Calibrated outputs (T, OUTPUTS) of one stretch."""
+        return np.asarray(self.network(features(seen)) + self.calibration)
+
+
+def stretches(present: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+    """First frame of every run of True, and the frame after its last."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], present, [False]]).astype(np.int8)))
+    for start, stop in edges.reshape(-1, 2):
+        yield int(start), int(stop)
+
+
+def _seen(track: LandmarkTrack, camera: PinholeCamera, start: int, stop: int) -> Seen:
+    part = slice(start, stop)
+    return Seen(
+        camera.slopes(track.image_px[part].astype(np.float64)),
+        track.depth_px[part] / camera.focal_px,
+        track.world_m[part].astype(np.float64),
+        track.visibility[part].astype(np.float64),
+        np.where(track.bridged[part], 0.0, track.confidence[part]),
+    )
+
+
+def _at_rate(seen: Seen, timebase: Timebase, start: int, stop: int) -> tuple[Seen, Floats]:
+    """A stretch resampled to :data:`RATE_HZ`, and where its frames are in the result."""
+    times = timebase.times_s[start:stop]
+    step = np.diff(times) * RATE_HZ
+    if not len(step) or (np.abs(step - 1.0) < _SAME_RATE).all():
+        return seen, np.arange(len(times), dtype=np.float64)
+    place = (times - times[0]) * RATE_HZ
+    return Seen(*(_resampled(np.asarray(part), place) for part in seen)), place
+
+
+def _resampled(values: Floats, place: Floats) -> Floats:
+    """Values (T, ...) at increasing places, at every whole number from 0 to the last.
+
+    Where frames are closer than a tick each tick is their mean, weighted by a
+    triangle of one tick to each side; elsewhere a monotone cubic goes through them.
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    flat = values.reshape(len(values), -1)
+    grid = np.arange(int(place[-1] + 1e-6) + 1)
+    result = PchipInterpolator(place, flat, axis=0)(np.minimum(grid, place[-1]))
+    low = np.minimum(place.astype(np.intp), grid[-1])
+    total, weight = np.zeros((len(grid) + 1, flat.shape[1])), np.zeros(len(grid) + 1)
+    for row, share in ((low, 1.0 - (place - low)), (low + 1, place - low)):
+        share = np.clip(share, 0.0, 1.0)
+        np.add.at(total, row, share[:, None] * flat)
+        np.add.at(weight, row, share)
+    crowded = weight[:-1] > 1.3
+    result[crowded] = total[:-1][crowded] / weight[:-1][crowded, None]
+    return np.asarray(result.reshape(len(grid), *values.shape[1:]))
+
+
+def _interpolated(outputs: Singles, place: Floats) -> Floats:
+    """Rows of outputs at fractional places."""
+    low = np.clip(place.astype(np.intp), 0, max(len(outputs) - 2, 0))
+    share = np.clip(place - low, 0.0, 1.0)[:, None]
+    high = np.minimum(low + 1, len(outputs) - 1)
+    return np.asarray((1.0 - share) * outputs[low] + share * outputs[high])
+
+
+def _lifted(timebase: Timebase, raw: Floats, size: Floats) -> LiftedTrack:
+    root, root_spread, rest = raw[:, 0], raw[:, 1], raw[:, 2:].reshape(len(raw), 4, POINTS)
+    centre = np.exp(root) / size
+    return LiftedTrack(
+        timebase,
+        centre,
+        centre * spread(root_spread),
+        rest[:, 0],
+        spread(rest[:, 1]),
+        rest[:, 2],
+        spread(rest[:, 3]),
+    )
+
+
+def spread(logarithm: NDArray[np.floating]) -> Floats:
+    """Standard deviation of its logarithm."""
+    return np.asarray(np.exp(np.clip(logarithm, *LOG_SIGMA)))
+
+
+def _convolved(x: Singles, kernel: Singles, dilation: int) -> Singles:
+    """Convolution over three frames that far apart; zero beyond the ends."""
+    result: Singles = x @ kernel[1]
+    if len(x) > dilation:
+        result[dilation:] += x[:-dilation] @ kernel[0]
+        result[:-dilation] += x[dilation:] @ kernel[2]
+    return result
+
+
+def _normed(x: Singles, gain: Singles) -> Singles:
+    """Every frame brought to root mean square 1, times a gain per channel."""
+    power = np.mean(x * x, axis=1, keepdims=True)
+    return np.asarray(x * (gain / np.sqrt(power + np.float32(1e-5))))
+
+
+def _bent(x: Singles) -> Singles:
+    """Every value times its logistic function."""
+    return np.asarray(x * (np.float32(0.5) + np.float32(0.5) * np.tanh(np.float32(0.5) * x)))

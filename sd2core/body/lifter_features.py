@@ -1,0 +1,155 @@
+"""What the lifter's network is told of every frame."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.body.lifted import CENTRE
+from sd2core.body.track import LANDMARKS
+
+Floats = NDArray[np.floating]
+Singles = NDArray[np.float32]
+
+RATE_HZ = 30.0
+"""Frames per second that the network is trained on; other tracks are resampled."""
+
+_SHOULDERS, _HIPS = list(CENTRE[:2]), list(CENTRE[2:])
+_TORSO_M = 0.5
+"""A torso's length, which the landmark model's own metres are brought to."""
+
+
+def _rows(*names: str) -> list[int]:
+    return [LANDMARKS.index(name) for name in names]
+
+
+# From, to (each the mean of some landmarks), and length in torsos.
+_BONES = (
+    *(
+        bone
+        for side in "LR"
+        for bone in (
+            (_rows(f"shoulder.{side}"), _rows(f"elbow.{side}"), 0.57),
+            (_rows(f"elbow.{side}"), _rows(f"wrist.{side}"), 0.50),
+            (_rows(f"wrist.{side}"), _rows(f"index.{side}", f"pinky.{side}"), 0.22),
+            (_rows(f"hip.{side}"), _rows(f"knee.{side}"), 0.88),
+            (_rows(f"knee.{side}"), _rows(f"ankle.{side}"), 0.92),
+            (_rows(f"shoulder.{side}"), _rows(f"wrist.{side}"), 1.07),
+        )
+    ),
+    (_HIPS, _SHOULDERS, 1.0),
+    (_SHOULDERS, _rows("nose"), 0.45),
+    (_rows("shoulder.R"), _rows("shoulder.L"), 0.75),
+    (_rows("hip.R"), _rows("hip.L"), 0.45),
+)
+_UNSURE = 0.15
+"""Sine of a bone's angle to the view below which its sign is hardly known."""
+
+
+class Seen(NamedTuple):
+    """One stretch of a track at :data:`RATE_HZ`, as slopes instead of pixels.
+
+    Leading axes of any number may stand before T.
+
+    Parameters
+    ----------
+    slopes : array, shape (..., T, 33, 2)
+        X / z and y / z of every landmark.
+    depth : array, shape (..., T, 33)
+        The landmark model's depth in pixels, divided by the focal length.
+    world_m : array, shape (..., T, 33, 3)
+    visibility : array, shape (..., T, 33)
+    sure : array, shape (..., T)
+        Confidence; 0 in bridged frames.
+    """
+
+    slopes: Floats
+    depth: Floats
+    world_m: Floats
+    visibility: Floats
+    sure: Floats
+
+
+def apparent_size(slopes: Floats) -> Floats:
+    """How long the torso looks: slope between the middles of shoulders and hips, (..., T)."""
+    torso = slopes[..., _SHOULDERS, :].mean(axis=-2) - slopes[..., _HIPS, :].mean(axis=-2)
+    return np.asarray(np.sqrt((torso**2).sum(axis=-1) + 1e-8))
+
+
+def typical_size(slopes: Floats) -> Floats:
+    """The apparent size of a whole stretch, (...,): what slopes are measured in."""
+    return np.asarray(np.median(apparent_size(slopes), axis=-1))
+
+
+def features(seen: Seen) -> Singles:
+    """What the network is told of every frame, (..., T, C).
+
+    All but the direction of the body and its size is free of where the person
+    stands and how far away.
+    """
+    slopes = np.asarray(seen.slopes)
+    size = apparent_size(slopes)  # (..., T)
+    unit = typical_size(slopes)[..., None]  # (..., 1)
+    centre = slopes[..., list(CENTRE), :].mean(axis=-2)  # (..., T, 2)
+    around = (slopes - centre[..., None, :]) / unit[..., None, None]
+    depth = seen.depth / unit[..., None]
+    world = np.asarray(seen.world_m)
+    torso = world[..., _SHOULDERS, :].mean(axis=-2) - world[..., _HIPS, :].mean(axis=-2)
+    length = np.median(np.sqrt((torso**2).sum(axis=-1)), axis=-1)
+    world = world * (_TORSO_M / np.maximum(length, 0.05))[..., None, None, None]
+    apparent = np.log(size / unit)[..., None]
+    length, ahead, signed = _foreshortening(around, world)
+    longest = np.quantile(length, 0.95, axis=-2, keepdims=True)
+    flat = (*slopes.shape[:-2], -1)
+    columns = [
+        around.reshape(flat),
+        rate(around, -3).reshape(flat),
+        depth,
+        rate(depth, -2),
+        world.reshape(flat),
+        rate(world[..., 2], -2),
+        length,
+        rate(length, -2),
+        np.broadcast_to(longest, length.shape),
+        ahead,
+        signed,
+        rate(signed, -2),
+        seen.visibility,
+        np.asarray(seen.sure)[..., None],
+        centre,
+        rate(centre / unit[..., None], -2),
+        apparent,
+        rate(apparent, -2),
+        np.broadcast_to(np.log(unit)[..., None], apparent.shape),
+    ]
+    return np.concatenate(columns, axis=-1).astype(np.float32)
+
+
+def _foreshortening(around: Floats, world_m: Floats) -> tuple[Floats, Floats, Floats]:
+    """Of the bones: how long they look, how far away they point, and that by their looks.
+
+    What a bone of known length lacks in the picture it has in depth; the landmark
+    model's own depth, however weak, says towards which side. All (..., T, bones), as
+    shares of the bones' lengths.
+    """
+    length, ahead = [], []
+    for near, far, torsos in _BONES:
+        across = around[..., far, :].mean(axis=-2) - around[..., near, :].mean(axis=-2)
+        length.append(np.sqrt((across**2).sum(axis=-1) + 1e-6) / torsos)
+        away = world_m[..., far, 2].mean(axis=-1) - world_m[..., near, 2].mean(axis=-1)
+        ahead.append(away / (torsos * _TORSO_M))
+    seen, sine = np.stack(length, axis=-1), np.stack(ahead, axis=-1)
+    lacking = np.sqrt(np.maximum(1.0 - seen**2, 0.0) + 0.01)
+    return seen, sine, np.asarray(sine / np.sqrt(sine**2 + _UNSURE**2) * lacking)
+
+
+def rate(values: Floats, axis: int) -> Floats:
+    """Per second: central differences along one axis, one-sided at its ends."""
+    values = np.moveaxis(np.asarray(values), axis, 0)
+    if len(values) < 2:
+        return np.moveaxis(np.zeros_like(values), 0, axis)
+    inner = (values[2:] - values[:-2]) / 2.0
+    ends = values[1] - values[0], values[-1] - values[-2]
+    return np.moveaxis(RATE_HZ * np.concatenate([ends[0][None], inner, ends[1][None]]), 0, axis)

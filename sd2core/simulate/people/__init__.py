@@ -1,0 +1,1 @@
+"""Random people in random motion, seen by random cameras: what the lifter learns from."""

@@ -1,0 +1,102 @@
+"""Where a random camera stands: a person in a random part of its picture."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from sd2core.body.camera import PinholeCamera
+from sd2core.body.rotations import Floats, applied, product
+from sd2core.body.track import LANDMARKS
+from sd2core.simulate.people.posing import rotated
+
+_SIZES = ((640, 480), (640, 480), (640, 360), (480, 640))
+_UPPER_BODY = tuple(
+    LANDMARKS.index(name) for name in ("nose", "shoulder.L", "shoulder.R", "elbow.L", "elbow.R")
+)
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """A camera, and how the world is moved into its frame.
+
+    Parameters
+    ----------
+    camera : PinholeCamera
+    turn : float64 array, shape (3, 3)
+    shift_m : float64 array, shape (3,)
+        A point x of the world is at ``turn @ x + shift_m`` in the camera frame.
+    """
+
+    camera: PinholeCamera
+    turn: Floats
+    shift_m: Floats
+
+    def points(self, points_m: Floats) -> Floats:
+        """Points (..., 3) of the world in the camera frame."""
+        return np.asarray(applied(self.turn, points_m) + self.shift_m)
+
+    def transforms(self, transforms: Floats) -> Floats:
+        """Transforms of bones (T, B, 3, 4) that end in the camera frame."""
+        seen = np.empty_like(transforms)
+        seen[..., :3] = product(self.turn, transforms[..., :3])
+        seen[..., 3] = self.points(transforms[..., 3])
+        return seen
+
+
+def random_view(rng: np.random.Generator, keypoints_m: Floats) -> View | None:
+    """A camera that sees the upper body of a person all the time.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    keypoints_m : array, shape (T, 33, 3)
+        On the floor of the world, y down, facing about -z.
+
+    Returns
+    -------
+    View or None
+        None where no camera of a hundred sees it: the person walks too far.
+    """
+    upper = keypoints_m[:, _UPPER_BODY]
+    hips = keypoints_m[:, [LANDMARKS.index("hip.L"), LANDMARKS.index("hip.R")]].mean(axis=1)
+    middle = upper.mean(axis=(0, 1))
+    for _ in range(100):
+        width, height = _SIZES[rng.integers(len(_SIZES))]
+        field = math.radians(rng.uniform(45.0, 75.0))
+        camera = PinholeCamera(width, height, max(width, height) / 2.0 / math.tan(field / 2.0))
+        # Half of the people near, as before a webcam, the rest anywhere.
+        distance = rng.uniform(1.2, 2.2) if rng.random() < 0.5 else rng.uniform(1.5, 5.0)
+        aside = rng.uniform(-0.3, 0.3) * distance * width / camera.focal_px
+        above = rng.uniform(0.5, 1.9)
+        # Seen from the front mostly, from anywhere sometimes.
+        azimuth = rng.normal(0.0, 25.0) if rng.random() < 0.95 else rng.uniform(-180.0, 180.0)
+        around = rotated(1, np.array([azimuth]))[0]
+        at = middle + around @ np.array([-aside, -above - middle[1], -distance])
+        slope = rng.uniform(-0.3, 0.3) * height / camera.focal_px
+        pitch = math.degrees(math.atan2(middle[1] - at[1], distance) - math.atan(slope))
+        if abs(pitch) > 17.0:
+            continue
+        turn = rotated(0, np.array([pitch]))[0] @ around.T
+        turn = rotated(2, np.array([rng.normal(0.0, 1.5)]))[0] @ turn
+        view = View(camera, turn, -turn @ at)
+        if _sees(view, upper, hips):
+            return view
+    return None
+
+
+def _sees(view: View, upper: Floats, hips: Floats) -> bool:
+    seen, below = view.points(upper), view.points(hips)
+    if seen[..., 2].min() < 0.7 or below[..., 2].min() < 0.7:
+        return False
+    size = np.array([view.camera.width, view.camera.height])
+    upper_px, hips_px = view.camera.project(seen), view.camera.project(below)
+    inside = np.all((upper_px >= 0.02 * size) & (upper_px <= 0.98 * size), axis=2)
+    return bool(
+        np.all(inside[:, :3])
+        and np.mean(inside[:, 3:]) > 0.7
+        and (hips_px[:, 1] < 1.25 * size[1]).all()
+        and (np.ptp(upper_px[:, :3, 1], axis=1) > 12.0).all()
+    )
