@@ -57,6 +57,20 @@ def real(window: MainWindow) -> None:
     window.context.playback.seek(1.9)
 
 
+def strip() -> None:
+    """Frames of a swipe of the sample above its mesh."""
+    from sd2core.figures.strip import plot_strip
+    from sd2core.figures.strip_source import StripOptions, StripSource
+    from sd2core.recording import open_recording
+
+    recording = open_recording(resource_path("swipes.sd2"))
+    with recording.open_video() as video:
+        source = StripSource.of(recording, video, recording.load_mesh(), recording.title)
+        figure = plot_strip(source, range(48, 84, 5), StripOptions(v_max_mps=1.5))
+    figure.savefig(IMAGES / "strip.png", dpi=110)
+    print((IMAGES / "strip.png").relative_to(REPOSITORY))
+
+
 def take(
     application: QApplication, name: str, paths: list[Path], arrange: Callable[[MainWindow], None]
 ) -> None:
@@ -88,6 +102,7 @@ def main() -> None:
     """Take them all."""
     application = QApplication(sys.argv[:1])
     IMAGES.mkdir(exist_ok=True)
+    strip()
     swipes = [resource_path("swipes.sd2")]
     take(application, "sample.png", swipes, sample)
     take(application, "dark.png", swipes, far_in_the_dark)

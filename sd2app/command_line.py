@@ -64,11 +64,14 @@ def _add_window_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _open(options: argparse.Namespace) -> int:
+    from sd2app.models.fit_request import read_request
     from sd2core.io.kinds import kind_of
 
-    # Says what is wrong before the window is there.
+    # Says what is wrong before the window is there. A folder in which a fit was stopped
+    # is no recording yet, and can be opened.
     for path in options.paths:
-        kind_of(path)
+        if read_request(path) is None:
+            kind_of(path)
     return _show(options.paths, options.screenshot)
 
 

@@ -50,7 +50,8 @@ class ComparisonWindow(QWidget):
         self._model = model
         self._context = context
         self._attempt = attempt
-        self.setWindowTitle("Compare meshes")
+        simulated = " (simulated)" if context.document.simulated else ""
+        self.setWindowTitle(f"{context.document.title}{simulated}: compare meshes")
         self.addActions(keys)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(8, 8, 8, 8)

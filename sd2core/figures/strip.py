@@ -26,7 +26,7 @@ FORMATS = (".png", ".svg", ".pdf")
 _INK, _PAPER = "#1d2127", "#f3f4f6"
 _PICTURE_IN = 1.3
 """Width of one picture."""
-_GAP_IN, _LABEL_IN, _TITLE_IN, _BAR_IN = 0.05, 0.28, 0.3, 0.75
+_GAP_IN, _LABEL_IN, _TITLE_IN, _BAR_IN = 0.05, 0.28, 0.3, 0.95
 _PIXELS_PER_INCH = 300
 
 

@@ -73,7 +73,7 @@ def strong(pixels: np.ndarray) -> tuple[int, int]:
 
 
 def without_bar(pixels: np.ndarray) -> np.ndarray:
-    return pixels[:, :-80]
+    return pixels[:, :-95]
 
 
 def test_approaching_is_red_and_receding_is_blue(source, ball) -> None:
