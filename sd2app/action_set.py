@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtWidgets import QMenu
 
-from sd2app.actions import ACTIONS
+from sd2app.actions import ACTIONS, Action
 from sd2app.icons import transport_icon
 
 if TYPE_CHECKING:
@@ -26,8 +26,7 @@ class ActionSet:
         for row in ACTIONS:
             action = QAction(row.text, window)
             action.setShortcuts([QKeySequence(key) for key in row.keys])
-            keys = ", ".join(row.keys)
-            action.setToolTip(f"{row.tip} ({keys})" if keys else row.tip)
+            action.setToolTip(_tip(row))
             action.setCheckable(row.checked is not None)
             action.triggered.connect(lambda _=False, run=row.run: run(window))
             self._actions[row.id] = action
@@ -39,6 +38,8 @@ class ActionSet:
         """Make the menus; returns the one for recent files, which the window fills."""
         bar = self._window.menuBar()
         menus = {name: bar.addMenu(f"&{name}") for name in _MENUS}
+        for menu in menus.values():
+            menu.setToolTipsVisible(True)
         recent = QMenu("Open recent", menus["File"])
         for row in ACTIONS:
             if row.separator_before:
@@ -53,6 +54,8 @@ class ActionSet:
         for row in ACTIONS:
             action = self._actions[row.id]
             action.setEnabled(row.enabled(self._context))
+            if row.why_not is not None:
+                action.setToolTip(row.why_not(self._context) or _tip(row))
             if row.checked is not None:
                 action.setChecked(row.checked(self._context))
         stack = self._context.document.undo_stack
@@ -78,3 +81,8 @@ class ActionSet:
 
     def _set_icon(self, name: str, icon: str) -> None:
         self._actions[name].setIcon(transport_icon(icon, self._context.display.palette.text))
+
+
+def _tip(row: Action) -> str:
+    keys = ", ".join(row.keys)
+    return f"{row.tip} ({keys})" if keys else row.tip

@@ -30,7 +30,8 @@ def _has_mesh(context: Context) -> bool:
 class Action:
     """One row.
 
-    ``checked`` makes it checkable and says whether it is on.
+    ``checked`` makes it checkable and says whether it is on; ``why_not`` says in place
+    of the tip why it is not enabled.
     """
 
     id: str
@@ -43,6 +44,7 @@ class Action:
     checked: Test | None = None
     separator_before: bool = False
     icon: str = ""
+    why_not: Callable[[Context], str] | None = None
 
 
 MOUSE = (
@@ -218,6 +220,15 @@ ACTIONS: tuple[Action, ...] = (
         "reset_reference", "View", "Set 0 dB to what is shown", ("R",),
         "Make the strongest bin of each map 0 dB",
         lambda w: w.context.reset_references(), _has_content,
+    ),
+    Action(
+        "uncertain", "View", "Show uncertain cells", ("U",),
+        "Take the colour from cells of the synthetic map that are known to worse than half of"
+        " their value; the pointer reads value ± deviation",
+        lambda w: w.context.uncertainty.set_shown(not w.context.uncertainty.shown),
+        lambda c: not c.uncertainty.why_not,
+        lambda c: c.uncertainty.shown and not c.uncertainty.why_not,
+        why_not=lambda c: c.uncertainty.why_not,
     ),
     Action(
         "show_sensor", "View", "Sensor panel", ("S",), "Where the sensor is and what it sees",

@@ -7,6 +7,24 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+_TINT = np.array([1.0, 0.72, 0.42])
+"""Of equal luminances relative to each other; brought to that of each colour."""
+
+
+@cache
+def uncertain_table(name: str) -> NDArray[np.uint32]:
+    """The same lightness without the colour: grey, or amber where the map itself is grey."""
+    table = lookup_table(name)
+    rgb = np.stack([table >> 16 & 255, table >> 8 & 255, table & 255], axis=1).astype(float)
+    light = rgb @ _LUMINANCE
+    grey = np.repeat(light[:, None], 3, axis=1)
+    if np.ptp(rgb, axis=1).max() < 8:
+        grey = light[:, None] * _TINT / (_TINT @ _LUMINANCE)
+    channels = np.clip(np.rint(grey), 0, 255).astype(np.uint32)
+    packed = 0xFF000000 | channels[:, 0] << 16 | channels[:, 1] << 8 | channels[:, 2]
+    return packed.astype(np.uint32)
+
 
 @cache
 def lookup_table(name: str) -> NDArray[np.uint32]:

@@ -23,6 +23,7 @@ from sd2app.models.sensor import SensorModel
 from sd2app.models.synthesis import SynthesisModel
 from sd2app.models.tracks import PointerModel, TrackModel
 from sd2app.models.trade import TradeModel
+from sd2app.models.uncertainty import UncertaintyModel
 from sd2app.models.video import VideoModel
 from sd2app.models.visible_span import VisibleSpanModel
 from sd2app.settings import Settings
@@ -46,6 +47,7 @@ class Context:
     real: TrackModel
     trade: TradeModel
     synthesis: SynthesisModel
+    uncertainty: UncertaintyModel
     edits: Edits
     fit: FitModel
     fit_follower: FitFollower
@@ -62,6 +64,7 @@ class Context:
         """Stop every thread and let go of the files."""
         self.playback.pause()
         self.fit.close()
+        self.uncertainty.close()
         self.synthesis.close()
         self.trade.close()
         self.video.close()
@@ -88,6 +91,7 @@ def build_context(
     trade = TradeModel(jobs, settings, ladder or CORE, parent)
     fit = FitModel(settings, parent, fit_command or COMMAND)
     follower = FitFollower(fit, document, playback, parent)
+    synthesis = SynthesisModel(document, sensor, playback, span, synthetic, jobs, trade, parent)
     context = Context(
         settings=settings,
         jobs=jobs,
@@ -102,7 +106,8 @@ def build_context(
         synthetic=synthetic,
         real=real,
         trade=trade,
-        synthesis=SynthesisModel(document, sensor, playback, span, synthetic, jobs, trade, parent),
+        synthesis=synthesis,
+        uncertainty=UncertaintyModel(document, synthesis, trade, synthetic, jobs, settings, parent),
         edits=Edits(document, sensor),
         fit=fit,
         fit_follower=follower,

@@ -46,6 +46,19 @@ class CellUncertainty:
                 f"expected is of shape {self.expected.shape}, sd of {self.sd.shape}", "the same"
             )
 
+    def deviation(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """How far from a map's values the truth may be: root mean square, (bins, frames).
+
+        sqrt(sd² + (expected − value)²). The standard deviation alone would call a value
+        well known that is almost certainly somewhere else.
+        """
+        deviation: NDArray[np.float32] = np.hypot(self.sd, self.expected - values)
+        return deviation
+
+    def between(self, start: int, stop: int) -> CellUncertainty:
+        """Of frames ``start`` to ``stop`` (exclusive)."""
+        return CellUncertainty(self.expected[:, start:stop], self.sd[:, start:stop])
+
 
 @dataclass(frozen=True, eq=False)
 class DopplerMap:

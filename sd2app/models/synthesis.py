@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,10 +26,10 @@ from sd2app.models.trade import TradeModel
 from sd2app.models.visible_span import VisibleSpanModel
 from sd2app.models.ways import budget_ms, distance_m, final_way, final_words, rough_way
 from sd2core.doppler.options import PRESETS
-from sd2core.doppler.synthesizer import FrameScattering
+from sd2core.doppler.synthesizer import FrameScattering, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.progress import Cancelled
-from sd2core.sensor import Vector
+from sd2core.sensor import Vector, VirtualSensor
 from sd2core.spectrum import DopplerMap
 
 if TYPE_CHECKING:
@@ -170,6 +171,16 @@ class SynthesisModel(QObject):
         self._announce()
         self._follow()
 
+    def made_by(self) -> tuple[Callable[[], Synthesizer], VirtualSensor] | None:
+        """What made the map that is shown, and from where; None until it is complete.
+
+        Asking for the synthesizer may take long.
+        """
+        carriers, plan = self._carriers, self._plan
+        if carriers is None or self._moving or not self.complete:
+            return None
+        return lambda: carriers.of(plan), self._sensor.sensor
+
     def export(self, path: Path) -> None:
         """Write the map that is shown with its provenance, the plan included."""
         if self._carriers is None or not self.complete:
@@ -178,6 +189,7 @@ class SynthesisModel(QObject):
         in_use = self._trade.in_use
         if in_use is not None:
             made = replace(made, meta=made.meta | in_use.plan.provenance(in_use.error))
+        made = replace(made, uncertainty=self._track.uncertainty)
         made.save(path)
 
     def close(self) -> None:

@@ -10,12 +10,24 @@ from PySide6.QtCore import QObject, Signal
 
 from sd2app.models.display import HeatmapLevels
 from sd2core.presence import runs
-from sd2core.spectrum import DopplerMap
+from sd2core.spectrum import CellUncertainty, DopplerMap
+
+UNCERTAIN_SHARE = 0.5
+"""A cell is uncertain where the truth may be farther from its value than this share of it."""
+
+_FAINT_SHARE = 0.05
+"""Of the highest level: what is fainter does not show on a linear scale."""
+
+_SHOWS_SHARE = 0.1
+"""Of the highest level: what may be there although nothing shows."""
 
 
 @dataclass(frozen=True)
 class Reading:
-    """One cell of a map under the pointer."""
+    """One cell of a map under the pointer.
+
+    ``deviation`` is how far from the value the truth may be, where that is known.
+    """
 
     track: str
     time_s: float
@@ -24,6 +36,7 @@ class Reading:
     value: float
     level_db: float
     note: str = ""
+    deviation: float | None = None
 
 
 class TrackModel(QObject):
@@ -41,6 +54,7 @@ class TrackModel(QObject):
         self.title = title
         self._map: DopplerMap | None = None
         self._covered: NDArray[np.bool_] | None = None
+        self._uncertainty: CellUncertainty | None = None
         self._offset_s = 0.0
         self._reference = 1.0
         self._status = ""
@@ -72,6 +86,11 @@ class TrackModel(QObject):
         return self._status
 
     @property
+    def uncertainty(self) -> CellUncertainty | None:
+        """How well the map's cells are known; None while that is not known or not asked for."""
+        return self._uncertainty
+
+    @property
     def gaps_s(self) -> tuple[tuple[float, float], ...]:
         """Stretches without a person, half-open on the recording's clock."""
         if self._map is None or self._map.present is None:
@@ -94,8 +113,15 @@ class TrackModel(QObject):
         """Show another map, or none."""
         self._map = doppler_map
         self._covered = covered
+        self._uncertainty = None
         self._strongest = None
         self.changed.emit()
+
+    def set_uncertainty(self, uncertainty: CellUncertainty | None) -> None:
+        """Say how well the cells of this map are known."""
+        if uncertainty is not self._uncertainty:
+            self._uncertainty = uncertainty
+            self.changed.emit()
 
     def set_offset(self, offset_s: float) -> None:
         """Align the map in time."""
@@ -134,6 +160,37 @@ class TrackModel(QObject):
             shade = values / np.float32(self._reference * 10.0 ** (levels.high_db / 10.0))
         return np.clip(shade, 0.0, 1.0).astype(np.float32)
 
+    def _deviation(self, index: int, frame: int) -> float | None:
+        if self._map is None or self._uncertainty is None:
+            return None
+        column = self._map.values[:, frame : frame + 1]
+        return float(self._uncertainty.between(frame, frame + 1).deviation(column)[index, 0])
+
+    def uncertain(self, levels: HeatmapLevels, start: int, stop: int) -> NDArray[np.bool_] | None:
+        """Cells that are known to worse than :data:`UNCERTAIN_SHARE` of their value.
+
+        Where nothing shows, being fainter than the faintest level, those that may well
+        show after all: whose deviation is a tenth of the highest level.
+        Deviations are those of :meth:`CellUncertainty.deviation`.
+
+        Returns
+        -------
+        bool array, shape (bins, stop - start), or None
+            None where nothing is known of uncertainty.
+        """
+        if self._map is None or self._uncertainty is None:
+            return None
+        values = self._map.values[:, start:stop]
+        highest = self._reference * 10.0 ** (levels.high_db / 10.0)
+        faintest = _FAINT_SHARE * highest
+        if levels.scale == "dB":
+            faintest = self._reference * 10.0 ** (levels.low_db / 10.0)
+        shows = np.float32(UNCERTAIN_SHARE) * values
+        limit = np.where(values >= faintest, shows, np.float32(_SHOWS_SHARE * highest))
+        deviation = self._uncertainty.between(start, stop).deviation(values)
+        found: NDArray[np.bool_] = deviation > limit
+        return found
+
     def read(self, time_s: float, velocity_mps: float) -> Reading | None:
         """What stands at a time and velocity, or None where there is nothing."""
         frame = self.frame_at(time_s)
@@ -158,6 +215,7 @@ class TrackModel(QObject):
             value=float(value),
             level_db=float(self.levels_db(value)),
             note=note,
+            deviation=self._deviation(index, frame),
         )
 
 

@@ -19,7 +19,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from sd2app.colour_maps import lookup_table
 from sd2app.models.display import DisplayModel
 from sd2app.models.playback import PlaybackModel
-from sd2app.models.tracks import PointerModel, TrackModel
+from sd2app.models.tracks import UNCERTAIN_SHARE, PointerModel, TrackModel
 from sd2app.models.visible_span import VisibleSpanModel
 from sd2app.views.map_widget import MapWidget, paint_cursor
 from sd2app.views.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, signed_text, ticks
@@ -150,6 +150,9 @@ class HeatmapView(MapWidget):
         parts = [self._track.status]
         if gaps_s := self._track.gaps_s:
             parts.append(f"no person in {sum(end - start for start, end in gaps_s):.2f} s")
+        if self._track.uncertainty is not None:
+            colour = "amber" if self._display.levels.colour_map == "gray" else "grey"
+            parts.append(f"{colour}: ±{100 * UNCERTAIN_SHARE:.0f} % or worse")
         if self._track.covered is None and -math.inf < strongest_db < lowest_db:
             level = f"{strongest_db:.0f}".replace("-", "−")
             parts.append(f"strongest bin {level} dB, below the scale: R sets 0 dB here")

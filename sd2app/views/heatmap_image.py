@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtGui import QImage
 
-from sd2app.colour_maps import lookup_table
+from sd2app.colour_maps import lookup_table, uncertain_table
 from sd2app.models.display import HeatmapLevels
 from sd2app.models.tracks import TrackModel
 
@@ -25,6 +28,53 @@ def column_frames(
     return frames
 
 
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """Which frames of a map share a pixel column.
+
+    Parameters
+    ----------
+    filled : bool array, shape (columns,)
+        Columns with a frame.
+    begin, end : int
+        Frames that are in view, half-open.
+    starts : int64 array, shape (filled columns,)
+        First frame of every filled column, counted from ``begin``.
+    """
+
+    filled: NDArray[np.bool_]
+    begin: int
+    end: int
+    starts: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, track: TrackModel, start_s: float, stop_s: float, columns: int) -> Columns:
+        """Of the stretch in view."""
+        assert track.map is not None
+        timebase = track.map.timebase
+        frames = column_frames(
+            timebase.times_s,
+            timebase.end_s,
+            start_s - track.offset_s,
+            stop_s - track.offset_s,
+            columns,
+        )
+        first = frames[:-1]
+        filled = (first >= 0) & (first < len(timebase))
+        if not filled.any():
+            return cls(filled, 0, 0, np.zeros(0, np.int64))
+        begin, end = int(first[filled][0]), int(frames[1:][filled][-1])
+        end = min(max(end, int(first[filled][-1]) + 1), len(timebase))
+        return cls(filled, begin, end, first[filled] - begin)
+
+    def strongest(self, values: NDArray[Any]) -> NDArray[Any]:
+        """The largest of every column's frames, (bins, filled columns), of (bins, end - begin)."""
+        if values.shape[1] > self.starts.size:
+            largest: NDArray[Any] = np.maximum.reduceat(values, self.starts, axis=1)
+            return largest
+        return values[:, self.starts]
+
+
 def shade_columns(
     track: TrackModel, levels: HeatmapLevels, start_s: float, stop_s: float, columns: int
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
@@ -39,32 +89,37 @@ def shade_columns(
     filled : bool array, shape (columns,)
     """
     assert track.map is not None
-    timebase = track.map.timebase
-    frames = column_frames(
-        timebase.times_s,
-        timebase.end_s,
-        start_s - track.offset_s,
-        stop_s - track.offset_s,
-        columns,
-    )
-    first = frames[:-1]
-    filled = (first >= 0) & (first < len(timebase))
+    view = Columns.of(track, start_s, stop_s, columns)
+    filled = view.filled.copy()
     shades = np.zeros((track.map.axis.bins, columns), np.float32)
     if not filled.any():
         return shades, filled
-    begin, end = int(first[filled][0]), int(frames[1:][filled][-1])
-    end = min(max(end, int(first[filled][-1]) + 1), len(timebase))
-    stretch = track.map.values[:, begin:end]
-    starts = first[filled] - begin
-    values = (
-        np.maximum.reduceat(stretch, starts, axis=1)
-        if end - begin > starts.size
-        else stretch[:, starts]
-    )
+    values = view.strongest(track.map.values[:, view.begin : view.end])
     shades[:, filled] = track.shade(values, levels)
     if track.covered is not None:
-        filled[filled] = track.covered[first[filled]]
+        filled[filled] = track.covered[view.starts + view.begin]
     return shades, filled
+
+
+def uncertain_columns(
+    track: TrackModel, levels: HeatmapLevels, start_s: float, stop_s: float, columns: int
+) -> NDArray[np.bool_] | None:
+    """Where what is shown is uncertain, bool (bins, columns); None where that is not known.
+
+    Of several frames that share a column the one that is shown decides.
+    """
+    assert track.map is not None
+    view = Columns.of(track, start_s, stop_s, columns)
+    uncertain = track.uncertain(levels, view.begin, view.end)
+    if uncertain is None:
+        return None
+    found = np.zeros((track.map.axis.bins, columns), bool)
+    if view.filled.any():
+        values = track.map.values[:, view.begin : view.end]
+        known = view.strongest(np.where(uncertain, np.float32(-1.0), values))
+        unknown = view.strongest(np.where(uncertain, values, np.float32(-1.0)))
+        found[:, view.filled] = unknown >= np.maximum(known, 0.0)
+    return found
 
 
 def heatmap_image(
@@ -75,9 +130,13 @@ def heatmap_image(
     columns: int,
     background: int,
 ) -> QImage:
-    """One pixel per column and bin, fastest approach on top."""
+    """One pixel per column and bin, fastest approach on top; uncertain cells without colour."""
     shades, filled = shade_columns(track, levels, start_s, stop_s, columns)
-    colours = lookup_table(levels.colour_map)[(shades * 255.0).astype(np.uint8)]
+    numbers = (shades * 255.0).astype(np.uint8)
+    colours = lookup_table(levels.colour_map)[numbers]
+    uncertain = uncertain_columns(track, levels, start_s, stop_s, columns)
+    if uncertain is not None:
+        colours = np.where(uncertain, uncertain_table(levels.colour_map)[numbers], colours)
     colours[:, ~filled] = background
     pixels = np.ascontiguousarray(colours[::-1])  # (bins, columns)
     height, width = pixels.shape

@@ -102,6 +102,7 @@ def action_button(action: QAction, text: str) -> QToolButton:
     def follow() -> None:
         button.setEnabled(action.isEnabled())
         button.setChecked(action.isChecked())
+        button.setToolTip(action.toolTip())
 
     action.changed.connect(follow)
     return button

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
 from PySide6.QtCore import QRectF, QSignalBlocker, QSize
-from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
+from PySide6.QtGui import QAction, QColor, QImage, QPainter, QPaintEvent
 from PySide6.QtWidgets import (
     QGridLayout,
     QHBoxLayout,
@@ -12,29 +13,45 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from sd2app.colour_maps import lookup_table
+from sd2app.colour_maps import lookup_table, uncertain_table
 from sd2app.models.display import COLOUR_MAPS, DisplayModel
 from sd2app.models.tracks import TrackModel
-from sd2app.views.inputs import Choice, NumberBox
+from sd2app.views.inputs import Choice, NumberBox, action_button
+
+_STRIP_PX = 14
 
 
 class _ColourStrip(QWidget):
-    def __init__(self, display: DisplayModel, parent: QWidget | None = None) -> None:
+    """The colours of the levels; below them those of uncertain cells, where there are any."""
+
+    def __init__(
+        self,
+        display: DisplayModel,
+        tracks: tuple[TrackModel, ...],
+        parent: QWidget | None = None,
+    ) -> None:
         super().__init__(parent)
         self._display = display
-        self.setFixedHeight(12)
+        self._tracks = tracks
+        self.setFixedHeight(_STRIP_PX)
         display.levels_changed.connect(self.update)
+        for track in tracks:
+            track.changed.connect(self.update)
 
     def sizeHint(self) -> QSize:
-        return QSize(200, 12)
+        return QSize(200, _STRIP_PX)
 
     def paintEvent(self, event: QPaintEvent) -> None:
         with QPainter(self) as painter:
             self._paint(painter)
 
     def _paint(self, painter: QPainter) -> None:
-        table = lookup_table(self._display.levels.colour_map)
-        image = QImage(table.tobytes(), 256, 1, 1024, QImage.Format.Format_RGB32)
+        name = self._display.levels.colour_map
+        strips = [lookup_table(name)]
+        if any(track.uncertainty is not None for track in self._tracks):
+            strips.append(uncertain_table(name))
+        pixels = np.ascontiguousarray(strips)
+        image = QImage(pixels.tobytes(), 256, len(strips), 1024, QImage.Format.Format_RGB32)
         painter.drawImage(QRectF(self.rect()), image)
         painter.setPen(QColor(self._display.palette.border))
         painter.drawRect(self.rect().adjusted(0, 0, -1, -1))
@@ -47,6 +64,7 @@ class LevelBar(QWidget):
         self,
         display: DisplayModel,
         tracks: tuple[TrackModel, ...],
+        uncertain: QAction,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
@@ -70,9 +88,11 @@ class LevelBar(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(8, 4, 8, 8)
         layout.setSpacing(4)
-        layout.addWidget(_ColourStrip(display, self))
+        layout.addWidget(_ColourStrip(display, tracks, self))
         ends = QHBoxLayout()
         ends.addWidget(self._low)
+        ends.addStretch(1)
+        ends.addWidget(action_button(uncertain, "Uncertain"))
         ends.addStretch(1)
         ends.addWidget(self._high)
         layout.addLayout(ends)

@@ -143,6 +143,7 @@ class SpectrumView(QWidget):
         frame = curve.track.frame_at(self._playback.time_s)
         if frame is None or _nobody_in(doppler_map, frame):
             return
+        self._paint_band(painter, plot, curve, frame, v_max)
         shades = curve.track.shade(doppler_map.values[:, frame], self._display.levels)
         points = QPolygonF()
         for velocity, shade in zip(doppler_map.axis.centres_mps, np.asarray(shades), strict=True):
@@ -161,6 +162,27 @@ class SpectrumView(QWidget):
         painter.setPen(QPen(colour, 2))
         painter.setBrush(Qt.BrushStyle.NoBrush)
         painter.drawPolyline(points)
+
+    def _paint_band(
+        self, painter: QPainter, plot: QRectF, curve: Curve, frame: int, v_max: float
+    ) -> None:
+        """What is expected, one standard deviation up and down, where that is known."""
+        doppler_map, known = curve.track.map, curve.track.uncertainty
+        if known is None or doppler_map is None:
+            return
+        value, sd = known.expected[:, frame], known.sd[:, frame]
+        centres = doppler_map.axis.centres_mps
+        band = QPolygonF()
+        for ends, order in ((value + sd, 1), (np.maximum(value - sd, 0.0), -1)):
+            shades = curve.track.shade(ends, self._display.levels)
+            for velocity, shade in zip(centres[::order], shades[::order], strict=True):
+                x = plot.left() + plot.width() * float(shade)
+                band.append(QPointF(x, _y_of(plot, velocity, v_max)))
+        colour = QColor(getattr(self._display.palette, curve.colour))
+        colour.setAlpha(90)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QBrush(colour, Qt.BrushStyle.Dense4Pattern))
+        painter.drawPolygon(band)
 
     def _paint_legend(self, painter: QPainter, shown: list[Curve]) -> None:
         x = 8.0

@@ -100,6 +100,12 @@ class StatusLine(QWidget):
             self._jobs.cancel(self._jobs.jobs[0])
 
 
+def _value_text(reading: Reading) -> str:
+    if reading.deviation is None:
+        return f"{reading.value:.3g}"
+    return f"{reading.value:.3g} ± {reading.deviation:.2g}"
+
+
 def reading_text(reading: Reading) -> str:
     """Time, frame, velocity with sign, and level, in words."""
     if reading.velocity_mps > 0:
@@ -113,7 +119,7 @@ def reading_text(reading: Reading) -> str:
         clock_text(reading.time_s),
         f"frame {reading.frame}",
         f"{velocity} m/s ({direction})",
-        f"{level} ({reading.value:.3g})",
+        f"{level} ({_value_text(reading)})",
     ]
     if reading.note:
         parts.append(reading.note)

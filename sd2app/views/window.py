@@ -188,7 +188,7 @@ class MainWindow(QMainWindow):
         side = QVBoxLayout()
         curves = (Curve(c.synthetic, "synthetic"), Curve(c.real, "real"))
         side.addWidget(SpectrumView(curves, c.playback, c.display, c.pointer), 1)
-        side.addWidget(LevelBar(c.display, (c.synthetic, c.real)))
+        side.addWidget(LevelBar(c.display, (c.synthetic, c.real), self._actions["uncertain"]))
         fill(self._panels["spectrum"], side)
 
     def _video_view(self) -> QWidget:
@@ -243,6 +243,7 @@ class MainWindow(QMainWindow):
         c.fit_taker.noted.connect(self.messages.note)
         c.synthesis.failed.connect(self.messages.warn)
         c.trade.failed.connect(self.messages.warn)
+        c.uncertainty.failed.connect(self.messages.warn)
         c.trade.noted.connect(self.messages.note)
         c.video.failed.connect(self.messages.warn)
         c.document.undo_stack.indexChanged.connect(self._refresh)
@@ -252,6 +253,7 @@ class MainWindow(QMainWindow):
             c.playback.loop_changed,
             c.display.mesh_changed,
             c.overlay.changed,
+            c.uncertainty.changed,
             c.fit.state_changed,
             c.synthesis.completed,
             c.trade.plan_changed,

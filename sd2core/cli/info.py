@@ -245,8 +245,8 @@ def describe_map(path: Path, doppler: DopplerMap) -> Description:
         "nulled bins": _bins(doppler.axis, doppler.null_bins),
         "known to": ""
         if doppler.uncertainty is None
-        else f"±{_deviation(doppler):.0%} of a value (one standard deviation; the median of the"
-        " cells that are not faint)",
+        else f"±{_deviation(doppler):.0%} of a value (root mean square; the median of the cells"
+        " that are not faint)",
         "unseen bins": _bins(doppler.axis, doppler.unseen_bins),
         **_synthesis_facts(doppler.meta),
     }
@@ -321,14 +321,15 @@ def _known_to(mesh: MeshSequence) -> str:
 
 
 def _deviation(doppler: DopplerMap) -> float:
-    """Standard deviation of a value relative to it; the median of the cells that count."""
+    """How far from a value the truth may be, relative to it; the median of cells that count."""
     import numpy as np
 
     assert doppler.uncertainty is not None
     counted = doppler.values > FAINT * doppler.values.max(initial=0.0)
     if not counted.any():
         return 0.0
-    return float(np.median(doppler.uncertainty.sd[counted] / doppler.values[counted]))
+    deviation = doppler.uncertainty.deviation(doppler.values)
+    return float(np.median(deviation[counted] / doppler.values[counted]))
 
 
 def _absent(present: NDArray[np.bool_] | None) -> int:
