@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import swinging_ball
 from PySide6.QtCore import QPoint
 from PySide6.QtWidgets import QLabel
 
@@ -15,7 +14,7 @@ from sd2app.views.spectrum import SpectrumView
 from sd2app.views.status import StatusLine
 from sd2app.views.timeline import Overview
 from sd2app.views.video import VideoView
-from sd2core.io.mesh import save_mesh
+from sd2core.io.mesh import load_mesh, save_mesh
 
 GONE = (25, 40)
 
@@ -23,7 +22,7 @@ GONE = (25, 40)
 @pytest.fixture
 def window(empty_window, recording_copy, qtbot):
     """The window on the ball, which is not there for half a second."""
-    ball = swinging_ball()
+    ball = load_mesh(recording_copy / "mesh.npz")
     present = np.ones(ball.frame_count, bool)
     present[slice(*GONE)] = False
     save_mesh(replace(ball, present=present), recording_copy / "mesh.npz")

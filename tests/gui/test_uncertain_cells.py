@@ -6,14 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import swinging_ball
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QLabel, QToolButton
 
 from sd2app.views.heatmap import HeatmapView
 from sd2app.views.level_bar import LevelBar
 from sd2app.views.status import StatusLine
-from sd2core.io.mesh import save_mesh
+from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.sensor import VirtualSensor
 from sd2core.spectrum import DopplerMap
 from sd2core.uncertainty import VelocityUncertainty
@@ -22,7 +21,7 @@ from sd2core.uncertainty import VelocityUncertainty
 @pytest.fixture
 def fitted(empty_window, recording_copy, qtbot):
     """The window on the ball, whose velocity is known to ±0.5 m/s from the camera."""
-    ball = swinging_ball()
+    ball = load_mesh(recording_copy / "mesh.npz")
     frames = ball.frame_count
     known = VelocityUncertainty(
         ("ball",),
