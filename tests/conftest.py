@@ -8,6 +8,9 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from sd2core.body.landmark_models import LandmarkModels, landmark_models
+from sd2core.errors import Sd2Error
+
 # A busy machine is no failure: no test asserts a time.
 settings.register_profile("sd2", deadline=None)
 settings.load_profile("sd2")
@@ -25,3 +28,15 @@ def shared_data() -> Path:
     if os.environ.get("SD2_REQUIRE_SHARED") == "1":
         pytest.fail(reason)
     pytest.skip(reason)
+
+
+@pytest.fixture(scope="session")
+def models() -> LandmarkModels:
+    """The landmark models; fetched where the tests must not skip."""
+    required = os.environ.get("SD2_REQUIRE_SHARED") == "1"
+    try:
+        return landmark_models(download=required)
+    except Sd2Error as error:
+        if required:
+            pytest.fail(str(error))
+        pytest.skip(f"needs the landmark models, see `sd2 fetch-models` ({error})")

@@ -229,8 +229,6 @@ def check_fit_output(out: Path) -> None:
     ------
     Sd2Error
     """
-    from sd2core.io.kinds import kind_of
-
     if out.suffix.lower() not in (".zarr", ".npz"):
         raise Sd2Error(
             f"The mesh is to be written as {out.name}", "a name that ends in .zarr or .npz"
@@ -239,14 +237,13 @@ def check_fit_output(out: Path) -> None:
         raise Sd2Error(
             f"The folder {out.absolute().parent} does not exist", "an existing folder for the mesh"
         )
-    if out.exists() and (out.is_dir() or out.stat().st_size):
-        kind = kind_of(out)
-        if kind != "mesh":
-            raise Sd2Error(
-                f"{out} exists and is a {kind}",
-                "a new name, or a mesh to replace",
-                "Choose another name, or delete it first",
-            )
+    # `mktemp` leaves an empty file to be filled.
+    if out.exists() and not (_is_mesh(out) or (out.is_file() and not out.stat().st_size)):
+        raise Sd2Error(
+            f"{out} exists and is no mesh",
+            "a new name, or a mesh to replace",
+            "Choose another name, or delete it first",
+        )
     partial = out.with_name(out.name + PARTIAL)
     if partial.exists() and not _is_ours(partial):
         raise Sd2Error(
@@ -254,6 +251,17 @@ def check_fit_output(out: Path) -> None:
             "that name free for the work",
             "Choose another name, or move it away",
         )
+
+
+def _is_mesh(path: Path) -> bool:
+    """Whether a file or folder holds vertices by that name."""
+    if path.is_dir():
+        return (path / "vertices").is_dir()
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return "vertices.npy" in archive.namelist()
+    except (OSError, zipfile.BadZipFile):
+        return False
 
 
 def _partial(out: Path, restart: bool) -> Path:
