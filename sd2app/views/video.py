@@ -16,9 +16,7 @@ from sd2app.models.overlay import OverlayModel
 from sd2app.models.playback import PlaybackModel
 from sd2app.models.video import VideoModel
 from sd2app.views.landmark_overlay import draw_landmarks
-from sd2app.views.mesh_overlay import blend
-from sd2core.compiled import kernels_ready
-from sd2core.figures.surface import shaded
+from sd2app.views.mesh_overlay import draw_mesh
 
 
 class VideoView(QWidget):
@@ -68,8 +66,6 @@ class VideoView(QWidget):
             painter.setPen(QColor(colours.muted))
             painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, self._absence())
             return
-        if self._overlay.style.shown:
-            picture = self._with_mesh(picture)
         height, width = picture.shape[:2]
         picture = np.ascontiguousarray(picture)
         image = QImage(picture.data, width, height, 3 * width, QImage.Format.Format_RGB888)
@@ -78,6 +74,8 @@ class VideoView(QWidget):
         box.moveCenter(QRectF(self.rect()).center())
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
         painter.drawImage(box, image)
+        if self._overlay.style.shown:
+            self._paint_mesh(painter, box)
         landmarks = self._landmarks()
         if landmarks is not None:
             draw_landmarks(painter, landmarks, box, (width, height))
@@ -98,22 +96,20 @@ class VideoView(QWidget):
             return None
         return self._fit.landmarks_at(self._video.shown_frame)
 
-    def _with_mesh(self, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    def _paint_mesh(self, painter: QPainter, box: QRectF) -> None:
         mesh, reader = self._document.mesh, self._video.reader
         if mesh is None or reader is None:
-            return picture
+            return
         time_s = reader.timebase.time_of(self._video.shown_frame)
         if not mesh.timebase.covers(time_s):
-            return picture
+            return
         frame = mesh.timebase.frame_at(time_s)
         if not mesh.presence.there[frame]:
-            return picture
-        vertices = mesh.frame(frame)
+            return
         style = self._overlay.style
-        # Dots while the kernels are being compiled.
-        dots = style.as_dots or not kernels_ready()
-        light = shaded(vertices, None if dots else mesh.faces, self._document.camera)
-        colour = QColor(self._display.palette.overlay).getRgb()[:3]
         # Dots cover little: they have to be stronger to be seen at all.
         opacity = style.opacity**0.5 if style.as_dots else style.opacity
-        return blend(picture, light, colour, opacity)
+        faces = None if style.as_dots else mesh.faces
+        colour = QColor(self._display.palette.overlay)
+        camera = self._document.camera
+        draw_mesh(painter, box, mesh.frame(frame), faces, camera, colour, opacity)

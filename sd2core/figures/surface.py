@@ -139,7 +139,10 @@ def lightness(vertices_m: NDArray[np.floating], faces: NDArray[np.int32]) -> NDA
 
 
 def shaded(
-    vertices_m: NDArray[np.floating], faces: NDArray[np.int32] | None, camera: PinholeCamera
+    vertices_m: NDArray[np.floating],
+    faces: NDArray[np.int32] | None,
+    camera: PinholeCamera,
+    frame: Frame | None = None,
 ) -> NDArray[np.float32]:
     """What a lamp at the camera makes of a mesh.
 
@@ -150,6 +153,8 @@ def shaded(
     faces : int32 array, shape (F, 3), or None
         None: dots.
     camera : PinholeCamera
+    frame : Frame, optional
+        The whole picture by default.
 
     Returns
     -------
@@ -157,26 +162,30 @@ def shaded(
         0 beside the mesh; on it from a third (edge-on) to 1 (square on, and dots).
     """
     if faces is None:
-        return dotted(vertices_m, camera)
-    view = seen(vertices_m, faces, camera)
+        return dotted(vertices_m, camera, frame)
+    view = seen(vertices_m, faces, camera, frame)
     light = np.zeros(view.owner.shape, np.float32)
     light[view.shown] = view.interpolated(lightness(vertices_m, faces)[:, None])[:, 0]
     return light
 
 
-def dotted(vertices_m: NDArray[np.floating], camera: PinholeCamera) -> NDArray[np.float32]:
+def dotted(
+    vertices_m: NDArray[np.floating], camera: PinholeCamera, frame: Frame | None = None
+) -> NDArray[np.float32]:
     """The nearest vertex of every cell as a square of ones, (height, width)."""
+    frame = frame or Frame.whole(camera)
     pixels, depth = projected(vertices_m, camera)
-    size = max(round(max(camera.width, camera.height) / _DOTS_ACROSS), 1)
-    light = np.zeros((camera.height, camera.width), np.float32)
+    pixels = frame.place(pixels)
+    size = max(round(max(frame.width, frame.height) / _DOTS_ACROSS), 1)
+    light = np.zeros((frame.height, frame.width), np.float32)
     with np.errstate(invalid="ignore"):
-        inside = ((pixels >= 0) & (pixels < (camera.width, camera.height))).all(axis=1)
+        inside = ((pixels >= 0) & (pixels < (frame.width, frame.height))).all(axis=1)
     pixels = pixels[inside][np.argsort(depth[inside], kind="stable")]
     cells = np.floor(pixels / (_CELL_PER_DOT * size)).astype(np.int64)
     _, first = np.unique(cells, axis=0, return_index=True)
     corner = np.floor(pixels[first] - (size - 1) / 2).astype(np.int64)
     for offset in np.ndindex(size, size):
         columns, rows = (corner + offset).T
-        columns = np.clip(columns, 0, camera.width - 1)
-        light[np.clip(rows, 0, camera.height - 1), columns] = 1.0
+        columns = np.clip(columns, 0, frame.width - 1)
+        light[np.clip(rows, 0, frame.height - 1), columns] = 1.0
     return light

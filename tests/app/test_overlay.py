@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
+from PySide6.QtGui import QColor, QImage, QPainter
 
 from sd2app.models.overlay import OverlayModel, OverlayStyle
 from sd2app.settings import Settings
-from sd2app.views.mesh_overlay import blend
+from sd2app.views.mesh_overlay import tinted
 from sd2core.body.camera import PinholeCamera
-from sd2core.figures.surface import shaded
+from sd2core.figures.surface import Frame, shaded
 
 CAMERA = PinholeCamera(160, 120, 150.0)
 
@@ -62,14 +63,32 @@ def test_what_is_behind_the_camera_is_not_drawn(ball) -> None:
         assert not shaded(behind, faces, CAMERA).any()
 
 
+def test_a_part_of_the_picture_is_drawn_enlarged(ball) -> None:
+    faces = np.asarray(ball.faces, np.int32)
+    whole = shaded(ball.vertices, faces, CAMERA) > 0
+    part = shaded(ball.vertices, faces, CAMERA, Frame(80, 30, 120, 120, zoom=3.0)) > 0
+    x, y = centre_px(whole)
+    assert centre_px(part) == pytest.approx((3 * (x - 80), 3 * (y - 30)), abs=1.5)
+    assert part.sum() == pytest.approx(9 * whole.sum(), rel=0.05)
+
+
 @pytest.mark.parametrize(("opacity", "mixed"), [(0.0, 100), (0.25, 125), (1.0, 200)])
 def test_opacity_mixes_mesh_and_picture(opacity, mixed) -> None:
-    picture = np.full((2, 2, 3), 100, np.uint8)
     light = np.array([[1.0, 0.0], [0.0, 0.0]], np.float32)
-    result = blend(picture, light, (200, 200, 200), opacity)
-    assert result[0, 0].tolist() == [mixed] * 3
-    assert (result.reshape(-1, 3)[1:] == 100).all()
-    assert (picture == 100).all()
+    pixels = tinted(light, (200, 200, 200), opacity)
+    picture = QImage(2, 2, QImage.Format.Format_RGB32)
+    picture.fill(QColor(100, 100, 100))
+    with QPainter(picture) as painter:
+        painter.drawImage(
+            0, 0, QImage(pixels.data, 2, 2, 8, QImage.Format.Format_ARGB32_Premultiplied)
+        )
+    assert picture.pixelColor(0, 0).red() == pytest.approx(mixed, abs=1)
+    assert all(picture.pixelColor(x, y).red() == 100 for x, y in ((1, 0), (0, 1), (1, 1)))
+
+
+def test_channels_are_in_their_places() -> None:
+    (pixel,) = tinted(np.ones((1, 1), np.float32), (10, 20, 30), 1.0)[0]
+    assert pixel == 0xFF0A141E
 
 
 def test_the_choice_is_remembered() -> None:

@@ -14,13 +14,13 @@ from sd2app.models.document import DocumentModel
 from sd2app.models.overlay import OverlayModel
 from sd2app.models.playback import PlaybackModel
 from sd2app.models.video import VideoModel
-from sd2app.views.mesh_overlay import blend
-from sd2core.compiled import kernels_ready
-from sd2core.figures.surface import shaded
+from sd2app.views.mesh_overlay import draw_mesh
 
 _TITLE_PX = 24
 _GREY = 56
 """Of the ground where there is no video."""
+_LEAST_OPACITY = 0.2
+"""What is compared has to be seen."""
 
 
 def colour_of(display: DisplayModel, number: int) -> QColor:
@@ -86,7 +86,7 @@ class ComparedPicture(QWidget):
         painter.drawText(box, Qt.AlignmentFlag.AlignVCenter, elided)
         ground = QRectF(0, _TITLE_PX, self.width(), self.height() - _TITLE_PX)
         painter.fillRect(ground, QColor(colours.well))
-        picture = self._picture()
+        picture, time_s = self._picture()
         height, width = picture.shape[:2]
         image = QImage(picture.data, width, height, 3 * width, QImage.Format.Format_RGB888)
         scale = min(ground.width() / width, ground.height() / height)
@@ -94,22 +94,26 @@ class ComparedPicture(QWidget):
         placed.moveCenter(ground.center())
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
         painter.drawImage(placed, image)
+        self._paint_mesh(painter, placed, time_s)
 
-    def _picture(self) -> NDArray[np.uint8]:
-        camera = self._document.camera
+    def _picture(self) -> tuple[NDArray[np.uint8], float]:
+        """The picture on screen and its time; a plain ground where there is no video."""
         reader, picture = self._video.reader, self._video.picture
-        time_s = self._playback.time_s
         if reader is not None and picture is not None:
             time_s = reader.timebase.time_of(self._video.shown_frame)
-        else:
-            picture = np.full((camera.height, camera.width, 3), _GREY, np.uint8)
+            return np.ascontiguousarray(picture), time_s
+        camera = self._document.camera
+        ground = np.full((camera.height, camera.width, 3), _GREY, np.uint8)
+        return ground, self._playback.time_s
+
+    def _paint_mesh(self, painter: QPainter, box: QRectF, time_s: float) -> None:
         mesh = self._comparison.mesh(self._number)
         if mesh is None or not mesh.timebase.covers(time_s):
-            return np.ascontiguousarray(picture)
+            return
         frame = mesh.timebase.frame_at(time_s)
         if not mesh.presence.there[frame]:
-            return np.ascontiguousarray(picture)
-        faces = mesh.faces if kernels_ready() else None
-        light = shaded(mesh.frame(frame), faces, camera)
-        colour = colour_of(self._display, self._number).getRgb()[:3]
-        return blend(picture, light, colour, max(self._overlay.style.opacity, 0.2))
+            return
+        opacity = max(self._overlay.style.opacity, _LEAST_OPACITY)
+        colour = colour_of(self._display, self._number)
+        camera = self._document.camera
+        draw_mesh(painter, box, mesh.frame(frame), mesh.faces, camera, colour, opacity)
