@@ -17,6 +17,7 @@ FOUND = 0.5
 _SURVEYED = 12
 _STEP_S = 0.5
 _EVERY_FRAME_S = 20.0
+_NEARLY = 0.8
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,7 @@ def choose(
     detector : PoseDetector
     landmarker : PoseLandmarker
     progress : callable
+        Called now and then; may raise ``Cancelled``.
 
     Raises
     ------
@@ -78,21 +80,21 @@ def choose(
     for frames in _rounds(video):
         new = [frame for frame in frames if frame not in looked]
         looked.update(new)
-        best, best_rank = None, 0.0
-        for number, frame in enumerate(new):
-            progress(number, len(new))
+        found: list[tuple[float, Start]] = []
+        for frame in new:
+            progress(0, len(video))
             picture = video.read(frame)
             people, score = detector.look(picture)
             best_score = max(best_score, score)
-            for found in people:
-                rank = found.score * _prominence(found.roi, video.width, video.height)
-                if rank <= best_rank:
-                    continue
-                pose = landmarker.in_picture(picture, found.roi)
+            for each in people:
+                pose = landmarker.in_picture(picture, each.roi)
                 if pose.confidence >= FOUND:
-                    best, best_rank = Start(frame, pose.next_roi), rank
-        if best is not None:
-            return best
+                    rank = each.score * _prominence(each.roi, video.width, video.height)
+                    found.append((rank, Start(frame, pose.next_roi)))
+        if found:
+            enough = _NEARLY * max(rank for rank, _ in found)
+            # An early one: a video decodes forwards only.
+            return next(start for rank, start in found if rank >= enough)
     raise Sd2Error(
         f"No person was found in {video.path} (in the best of {len(looked)} frames the model is"
         f" {100 * best_score:.0f} % sure)",

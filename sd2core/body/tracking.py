@@ -21,7 +21,7 @@ _STEP_S = 1.0 / 15.0
 """How often to look: what is between follows from the path, which is smooth."""
 _LOOK_ROUND_S = 0.5
 _MAX_CANDIDATES = 4
-_BLOCK_BYTES = 96 * 2**20
+_BLOCK_BYTES = 192 * 2**20
 
 
 @dataclass(eq=False)
