@@ -9,12 +9,18 @@ are left as they are.
 from __future__ import annotations
 
 import os
+import shutil
+import subprocess
 import sys
+import tempfile
+import time
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QWidget
 
+from sd2app.dialogs.comparison import ComparisonWindow
+from sd2app.models.fit_request import FitRequest
 from sd2app.screenshot import wait_until_settled
 from sd2app.settings import Settings
 from sd2app.theme import apply_theme
@@ -71,10 +77,59 @@ def strip() -> None:
     print((IMAGES / "strip.png").relative_to(REPOSITORY))
 
 
-def take(
-    application: QApplication, name: str, paths: list[Path], arrange: Callable[[MainWindow], None]
-) -> None:
-    """Open, wait, arrange, wait, write."""
+def fitting(application: QApplication) -> None:
+    """A body being fitted to a real video, with what has been found so far."""
+    with tempfile.TemporaryDirectory() as folder:
+        video = Path(shutil.copy(SHARED / "video" / "walk.mkv", folder))
+        window = opened(application, [video])
+        fit = window.context.fit
+        fit.start(FitRequest(video, video.with_suffix(".sd2")))
+
+        def far_enough() -> bool:
+            progress = fit.progress
+            second_pass = progress is not None and progress.stage == "refine"
+            return not fit.busy or (second_pass and progress.done > 0.55 * progress.total)
+
+        wait_for(application, far_enough)
+        if fit.busy:
+            save(window, "fitting.png")
+        else:
+            print(f"fitting.png is left as it is: {fit.text}", file=sys.stderr)
+        fit.cancel()
+        wait_for(application, lambda: not fit.busy)
+        window.close()
+
+
+def comparison(application: QApplication) -> None:
+    """The sample's mesh, which is the truth, beside the body that is fitted to its video."""
+    sample_folder = resource_path("swipes.sd2")
+    with tempfile.TemporaryDirectory() as folder:
+        fitted = Path(folder) / "sd2 fit.zarr"
+        video = str(sample_folder / "video.mp4")
+        command = [sys.executable, "-m", "sd2app.command_line", "fit", video, "--out", str(fitted)]
+        if subprocess.run(command, check=False).returncode != 0:
+            print("comparison.png is left as it is: the fit failed", file=sys.stderr)
+            return
+        window = opened(application, [sample_folder])
+        window.context.playback.seek(2.1)
+        window.compare_with_mesh(fitted)
+        compared = window.findChild(ComparisonWindow)
+        wait_for(application, lambda: compared._model.comparison is not None)
+        wait_until_settled(application, window, LIMIT_S)
+        save(compared, "comparison.png")
+        window.close()
+
+
+def wait_for(application: QApplication, condition: Callable[[], bool]) -> None:
+    """Run the event loop until something is so; at most five minutes."""
+    deadline = time.monotonic() + 300.0
+    while not condition() and time.monotonic() < deadline:
+        application.processEvents()
+        time.sleep(0.01)
+
+
+def opened(application: QApplication, paths: list[Path]) -> MainWindow:
+    """The window on some files, everything computed."""
     apply_theme(application, False)
     settings = Settings.forgetful()
     settings.dark = False
@@ -83,19 +138,33 @@ def take(
     window.show()
     window.populate()
     window.open_paths(paths)
-    for step in (lambda _: None, arrange):
-        step(window)
-        if not wait_until_settled(application, window, LIMIT_S):
-            sys.exit(f"{name}: the window was still busy after {LIMIT_S:.0f} s")
+    if not wait_until_settled(application, window, LIMIT_S):
+        sys.exit(f"The window was still busy with {paths[0].name} after {LIMIT_S:.0f} s")
+    return window
+
+
+def save(widget: QWidget, name: str) -> None:
+    """Write a picture of a window."""
+    widget.grab().save(str(IMAGES / name))
+    print(IMAGES.joinpath(name).relative_to(REPOSITORY))
+
+
+def take(
+    application: QApplication, name: str, paths: list[Path], arrange: Callable[[MainWindow], None]
+) -> None:
+    """Open, wait, arrange, wait, write."""
+    window = opened(application, paths)
+    arrange(window)
+    if not wait_until_settled(application, window, LIMIT_S):
+        sys.exit(f"{name}: the window was still busy after {LIMIT_S:.0f} s")
     if window.messages.text:
         print(f"{name}: {window.messages.text}", file=sys.stderr)
         window.messages.hide()
         application.processEvents()
-    window.grab().save(str(IMAGES / name))
+    save(window, name)
     window.context.document.undo_stack.setClean()
     window.close()
     application.processEvents()
-    print(IMAGES.joinpath(name).relative_to(REPOSITORY))
 
 
 def main() -> None:
@@ -107,9 +176,11 @@ def main() -> None:
     take(application, "sample.png", swipes, sample)
     take(application, "dark.png", swipes, far_in_the_dark)
     take(application, "trade.png", swipes, trade)
+    comparison(application)
     walk = [SHARED / "video" / "walk.mkv", SHARED / "mesh" / "walk.npz"]
     if all(path.exists() for path in walk):
         take(application, "real-video.png", walk, real)
+        fitting(application)
     else:
         print(f"real-video.png is left as it is: there is no {walk[0]}", file=sys.stderr)
 
