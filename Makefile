@@ -12,7 +12,7 @@ COMPILED := .venv/.compiled
 # Among them every module in KERNEL_MODULES of sd2core/compiled.py.
 KERNELS := $(wildcard sd2core/compiled.py sd2core/raster.py sd2core/body/*.py sd2core/scattering/*.py sd2core/doppler/*.py sd2core/fmcw/*.py)
 
-.PHONY: help setup demo test test-slow lint format bench wheel screenshots accuracy clean
+.PHONY: help setup demo test test-slow lint format bench wheel screenshots accuracy fitting clean
 
 help:
 	@echo "make demo         set up, and open the sample recording in the window"
@@ -25,6 +25,7 @@ help:
 	@echo "make wheel        dist/*.whl"
 	@echo "make screenshots  the pictures in docs/"
 	@echo "make accuracy     docs/accuracy-and-speed.md, measured (some five minutes)"
+	@echo "make fitting      docs/fitting.md, measured (some ten minutes)"
 	@echo "make clean        remove what the above made, .venv included"
 
 setup: system-packages $(COMPILED) landmark-models
@@ -80,6 +81,9 @@ screenshots: system-packages-for-tests setup
 
 accuracy: setup
 	$(BIN)/python docs/accuracy_and_speed.py
+
+fitting: setup
+	$(BIN)/python docs/fitting.py
 
 clean:
 	rm -rf .venv build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks \

@@ -1,0 +1,114 @@
+"""Makes ``fitting.md`` and its pictures: ``make fitting``, about ten minutes.
+
+Every figure is measured when this runs. Clips and fits stay in ``build/fitting`` (or the
+folder that is named); what is there is not made again, and its time is not known. The
+real videos are left out where the recordings are not there (``SD2_SHARED_DATA``).
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from sd2core.atomic import atomic_write_text
+from sd2core.cli import build_parser, run
+from sd2core.compare.figure import save_comparison
+from sd2core.compare.meshes import compare_meshes
+from sd2core.compare.truth import read_truth
+from sd2core.compiled import warm_up
+from sd2core.io.mesh import load_mesh
+from sd2core.io.video import open_video
+from sd2core.ladder.scene import this_machine
+
+DOCS = Path(__file__).resolve().parent
+IMAGES = DOCS / "images"
+SHARED = Path(os.environ.get("SD2_SHARED_DATA", DOCS.parent.parent / "shared" / "data"))
+REAL = ("walk.mkv", "help.mkv", "again.mkv")
+
+SHOWN = (
+    ("horizontal-slow", 2.2),
+    ("horizontal-normal", 2.0),
+    ("vertical-slow", 1.2),
+    ("all-fast", 1.2),
+    ("horizontal-fast", 1.2),
+    ("vertical-fast", 1.1),
+    ("walk", 2.0),
+    ("turn-other", 1.6),
+)
+COMPARED = "all-normal"
+
+PAGE = """\
+# How good the fit from video is
+
+What `sd2 fit` makes of videos whose motion is known, measured. Made by
+
+```
+make fitting
+```
+
+on {machine}: sixteen videos of simulated people (`sd2 simulate fit-truth`), whose motions
+nothing in the program was made or trained with, fitted by `sd2 fit` with the camera's focal
+length and the person's height given, and measured by `sd2 score-fit`. What the clips can and
+cannot say is [decision 19](decisions/0019-known-truth-for-the-fit.md).
+
+![Frames of eight of the clips](images/fit-truth.png)
+
+**Line-of-sight velocity** is that of a limb towards the camera, by the exact change of range
+over the central difference, as the Doppler chain takes it. **Map L1** is the sum of the absolute
+differences between the synthetic Doppler maps of the fitted and of the true mesh (the paper's
+preset, smoothed) over the sum of the true one. **Peak kept** is the fitted hand's largest speed
+along the line of sight over the true one's; more than 1 is too much. **Ends** are the first and
+last five frames, over those between. Joints are patches of the surface.
+
+{tables}
+The clip {compared}, true and fitted:
+
+![Doppler maps and velocities of one clip, true and fitted](images/fit-compared.png)
+"""
+
+
+def main() -> None:
+    """Make what is missing, measure everything and write the page."""
+    warm_up()
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else DOCS.parent / "build" / "fitting"
+    folder.mkdir(parents=True, exist_ok=True)
+    clips, fits, tables = folder / "clips", folder / "fits", folder / "tables.md"
+    _sd2("simulate", "fit-truth", clips)
+    _frames(clips)
+    videos = [SHARED / "video" / name for name in REAL]
+    real = [video for video in videos if video.exists()]
+    _sd2(
+        "score-fit", clips, "--keep", fits, "--markdown", tables, *(["--real", *real] * bool(real))
+    )
+    truth = read_truth(clips / COMPARED)
+    pair = [truth.mesh(), load_mesh(fits / f"{COMPARED}.zarr")]
+    save_comparison(compare_meshes(pair, ["true", "fitted"]), IMAGES / "fit-compared.png")
+    page = PAGE.format(machine=this_machine(), tables=tables.read_text("utf-8"), compared=COMPARED)
+    atomic_write_text(DOCS / "fitting.md", page)
+
+
+def _sd2(*arguments: object) -> None:
+    code = run(build_parser()[0], [str(argument) for argument in arguments])
+    if code:
+        sys.exit(code)
+
+
+def _frames(clips: Path) -> None:
+    """One frame of each clip that is shown."""
+    figure = Figure(figsize=(9.6, 3.7), dpi=100)
+    for number, (name, time_s) in enumerate(SHOWN):
+        with open_video(clips / name / "video.mp4") as video:
+            picture = np.asarray(video.read(video.timebase.frame_at(time_s)))
+        column, row = number % 4, number // 4
+        axes = figure.add_axes((0.25 * column, 0.5 - 0.5 * row, 0.249, 0.498))
+        axes.imshow(picture)
+        axes.set_axis_off()
+    figure.savefig(IMAGES / "fit-truth.png")
+
+
+if __name__ == "__main__":
+    main()
