@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.model import Body, Skeleton
-from sd2core.body.track import LANDMARKS
 from sd2core.errors import Sd2Error
 
 LIMBS: tuple[str, ...] = (
@@ -96,26 +95,6 @@ def _limb_of(bone: str) -> int:
         f"The skeleton has a bone {bone!r}, which belongs to no limb",
         "the bones of the bundled body",
     )
-
-
-def limb_sigma(landmark_sigma_mps: NDArray[np.floating]) -> NDArray[np.float32]:
-    """Standard deviation of every limb's velocity from its landmarks' (root mean square).
-
-    Parameters
-    ----------
-    landmark_sigma_mps : float array, shape (T, 33)
-        In the order of :data:`LANDMARKS`.
-
-    Returns
-    -------
-    float32 array, shape (T, L)
-    """
-    squares = np.asarray(landmark_sigma_mps, np.float64) ** 2
-    found = np.empty((len(squares), len(LIMBS)), np.float32)
-    for number, limb in enumerate(LIMBS):
-        columns = [LANDMARKS.index(name) for name in LIMB_LANDMARKS[limb]]
-        found[:, number] = np.sqrt(squares[:, columns].mean(axis=1))
-    return found
 
 
 def vertex_limbs(body: Body) -> NDArray[np.uint8]:

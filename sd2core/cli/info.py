@@ -314,9 +314,12 @@ def _known_to(mesh: MeshSequence) -> str:
         return ""
     typical = (known.along_mps[mesh.presence.there] ** 2).mean(axis=0) ** 0.5
     best, worst = int(typical.argmin()), int(typical.argmax())
+    words = "along the camera's line of sight known to"
+    if typical[best] == typical[worst]:
+        return f"{words} ±{typical[best]:.2f} m/s"
     return (
-        f"along the camera's line of sight known to ±{typical[best]:.2f} m/s"
-        f" ({known.limbs[best]}) to ±{typical[worst]:.2f} m/s ({known.limbs[worst]})"
+        f"{words} ±{typical[best]:.2f} m/s ({known.limbs[best]})"
+        f" to ±{typical[worst]:.2f} m/s ({known.limbs[worst]})"
     )
 
 

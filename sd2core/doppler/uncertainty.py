@@ -38,7 +38,7 @@ _REACH = 4.0
 """Where the normal distribution is cut, in standard deviations."""
 
 _STEP_BINS = 0.25
-_FEWEST_STEPS = 16
+_FEWEST_STEPS, _MOST_STEPS = 16, 256
 _FRAMES = 128
 """Worked out together."""
 
@@ -105,7 +105,10 @@ class _Piece:
             mesh.times_s, start, stop, options.time_sigma_s
         )
         frames = slice(self._first, self._last)
+        # What may be anywhere on the axis need not be told from what may be even farther.
+        self._worst_mps = 2.0 * options.axis.v_max_mps
         most_mps = float(max(known.along_mps[frames].max(), known.across_mps[frames].max()))
+        most_mps = min(most_mps, self._worst_mps)
         room_bins = math.ceil(_REACH * most_mps / options.axis.bin_width_mps) + 1
         self._axis = FineAxis(synthesizer.counting, 0 if options.beyond == "wrap" else room_bins)
 
@@ -170,6 +173,7 @@ class _Piece:
             sigma_mps[target] = known.towards(
                 self._sensor.position_m, self._limb_places(block, rows), low
             )
+        sigma_mps = np.minimum(sigma_mps, self._worst_mps)
         return fine, sigma_mps / synthesizer.options.axis.bin_width_mps
 
     def _counted(self, block: Block, rows: slice) -> NDArray[np.float64]:
@@ -211,7 +215,8 @@ def _grid(most_bins: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Values of a standard normal number and their shares, fine enough for such a deviation."""
     if most_bins == 0:
         return np.zeros(1), np.ones(1)
-    steps = max(_FEWEST_STEPS, math.ceil(2 * _REACH * most_bins / _STEP_BINS))
+    wanted = math.ceil(2 * _REACH * most_bins / _STEP_BINS)
+    steps = min(max(_FEWEST_STEPS, wanted), _MOST_STEPS)
     nodes = np.linspace(-_REACH, _REACH, steps + 1)
     share = np.exp(-0.5 * nodes**2)
     return nodes, share / share.sum()

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sd2core.body.limbs import LIMB_LANDMARKS, LIMBS, bone_limbs, limb_sigma, vertex_limbs
+from sd2core.body.limbs import LIMB_LANDMARKS, LIMBS, bone_limbs, vertex_limbs
 from sd2core.body.model import Body
 from sd2core.body.rotations import about
 from sd2core.body.track import LANDMARKS
@@ -89,14 +89,3 @@ def test_an_unknown_bone_is_named(body: Body) -> None:
     strange = replace(body.skeleton, names=("tail", *body.skeleton.names[1:]))
     with pytest.raises(Sd2Error, match="'tail'"):
         bone_limbs(strange)
-
-
-def test_a_limb_is_known_as_well_as_its_landmarks() -> None:
-    sigma = np.zeros((2, len(LANDMARKS)))
-    sigma[1, LANDMARKS.index("wrist.L")] = 0.3
-    found = limb_sigma(sigma)
-    assert not found[0].any()
-    touched = {LIMBS[limb] for limb in np.flatnonzero(found[1])}
-    assert touched == {"forearm.L", "hand.L"}
-    assert found[1, LIMBS.index("forearm.L")] == pytest.approx(0.3 / np.sqrt(2))
-    np.testing.assert_allclose(limb_sigma(np.full((3, 33), 0.2)), 0.2, rtol=1e-6)

@@ -145,6 +145,16 @@ def test_one_limb_of_one_velocity_gives_the_normal_distribution() -> None:
     np.testing.assert_allclose(found.sd[:, 5] ** 2, share * (1 - share), atol=0.015)
 
 
+@pytest.mark.parametrize("sigma", [5.0, 1e4])
+def test_what_is_not_known_at_all_may_be_anywhere(sigma: float) -> None:
+    found = Synthesizer(scene(sigma), replace(ALL, beyond="wrap")).uncertainty(CAMERA)
+    # Folded back, every bin is as likely as another.
+    inner = found.expected[:11]  # away from the bins that are nulled
+    np.testing.assert_allclose(inner, 1 / 32, rtol=0.05)
+    lost = Synthesizer(scene(sigma), ALL).uncertainty(CAMERA)
+    assert 0 < lost.expected.sum(axis=0).max() < 0.5
+
+
 def test_a_sensor_aside_of_the_camera_knows_more() -> None:
     made = Synthesizer(scene(0.3, across=0.03), PRESETS["paper"])
     ahead, aside = (made.uncertainty(place) for place in (CAMERA, sensor_at(2.2, 0.0, 2.2)))
