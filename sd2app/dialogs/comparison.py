@@ -22,6 +22,7 @@ from sd2app.models.comparison import ComparisonModel
 from sd2app.views.comparison.curves import JointCurves
 from sd2app.views.comparison.pictures import ComparedPicture
 from sd2app.views.comparison.table import JointTable
+from sd2app.views.elided import ElidedLabel
 from sd2app.views.frames import fill, panel, splitter
 from sd2app.views.heatmap import HeatmapView
 from sd2app.views.inputs import Choice
@@ -70,9 +71,14 @@ class ComparisonWindow(QWidget):
     def _head(self) -> QHBoxLayout:
         row = QHBoxLayout()
         row.setSpacing(8)
-        self._summary = QLabel(self)
+        self._summary = ElidedLabel(self)
         self._summary.setObjectName("title")
         self._reference = Choice("The mesh that is taken to be right", self)
+        # However long the names of the meshes are.
+        self._reference.setSizeAdjustPolicy(
+            Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
+        )
+        self._reference.setMinimumContentsLength(14)
         self._reference.addItems(list(self._model.labels))
         self._reference.currentIndexChanged.connect(self._model.set_reference)
         self._export = QToolButton(self)
@@ -80,8 +86,7 @@ class ComparisonWindow(QWidget):
         self._export.setText("Export figure…")
         self._export.setToolTip("Write maps and velocities of both (.png, .svg, .pdf)")
         self._export.clicked.connect(self._ask)
-        row.addWidget(self._summary)
-        row.addStretch(1)
+        row.addWidget(self._summary, 1)
         row.addWidget(QLabel("measured against", self))
         row.addWidget(self._reference)
         row.addWidget(self._export)

@@ -46,7 +46,7 @@ class FitBar(QFrame):
         self.setAccessibleName("Fit of a body")
         self.setMinimumHeight(_HEIGHT)
         self._fit, self._follower, self._offer = fit, follower, offer
-        self._title = QLabel(self)
+        self._title = ElidedLabel(self)
         self._title.setObjectName("title")
         self._stage = ElidedLabel(self)
         self._stage.setObjectName("muted")

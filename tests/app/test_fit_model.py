@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QLockFile
 
+from sd2app.command_line import main
 from sd2app.models.fit import FitModel
 from sd2app.models.fit_request import LOCK_NAME, FitRequest, Person, read_request, settled
 from sd2app.models.fit_result import make_recording
@@ -214,6 +215,16 @@ def test_a_request_is_read_back(request_) -> None:
     asked = FitRequest(request_.video, request_.folder, 1.7, 612.5, Person(9, 1, 2, 30, 40))
     asked.save()
     assert read_request(request_.folder) == asked
+
+
+def test_the_command_line_opens_what_was_stopped(request_, monkeypatch, capsys) -> None:
+    shown: list[object] = []
+    monkeypatch.setattr("sd2app.command_line._show", lambda paths, _: shown.append(paths))
+    request_.folder.mkdir()
+    assert main(["open", str(request_.folder)]) == 1  # it holds nothing
+    request_.save()
+    assert main(["open", str(request_.folder)]) == 0
+    assert shown == [[request_.folder]]
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"version": 9}', '{"version": 1, "person": 3}'])
