@@ -55,6 +55,7 @@ class TrackModel(QObject):
         self._map: DopplerMap | None = None
         self._covered: NDArray[np.bool_] | None = None
         self._uncertainty: CellUncertainty | None = None
+        self._gaps: tuple[tuple[int, int], ...] = ()
         self._offset_s = 0.0
         self._reference = 1.0
         self._status = ""
@@ -93,11 +94,16 @@ class TrackModel(QObject):
     @property
     def gaps_s(self) -> tuple[tuple[float, float], ...]:
         """Stretches without a person, half-open on the recording's clock."""
-        if self._map is None or self._map.present is None:
+        if self._map is None:
             return ()
-        ends_s = np.append(self._map.times_s, self._map.timebase.end_s) + self._offset_s
+        timebase = self._map.timebase
         return tuple(
-            (float(ends_s[start]), float(ends_s[stop])) for start, stop in runs(~self._map.present)
+            (
+                timebase.time_of(start) + self._offset_s,
+                (timebase.time_of(stop) if stop < len(timebase) else timebase.end_s)
+                + self._offset_s,
+            )
+            for start, stop in self._gaps
         )
 
     @property
@@ -114,6 +120,8 @@ class TrackModel(QObject):
         self._map = doppler_map
         self._covered = covered
         self._uncertainty = None
+        present = None if doppler_map is None else doppler_map.present
+        self._gaps = () if present is None else runs(~present)
         self._strongest = None
         self.changed.emit()
 

@@ -77,6 +77,7 @@ def read_model_output(
     raw.frames_per_s = None if rate is None or not rate.size else float(rate.reshape(-1)[0])
     _number_frames(raw, entry, path)
     _place_in_front(raw, entry, path, image_size, focal_px, distance_m)
+    _mark_gaps(raw)
     return raw
 
 
@@ -186,13 +187,25 @@ def _number_frames(raw: RawMesh, entry: dict[Any, Any], path: Path) -> None:
             "one video frame number per frame",
         )
     raw.frame_numbers = numbers
-    missing = int(numbers[-1] - numbers[0] + 1 - count)
-    if missing > 0:
-        gap = int(np.flatnonzero(np.diff(numbers) > 1)[0])
-        raw.notes.append(
-            f"{missing:,} video frames hold no mesh, the first after frame {numbers[gap]}; motion "
-            "runs evenly across the gap."
-        )
+
+
+def _mark_gaps(raw: RawMesh) -> None:
+    """Where video frames are missing, one frame without a person that lasts as long."""
+    numbers = raw.frame_numbers
+    if numbers is None or not (np.diff(numbers) > 0).all():
+        return  # what does not increase is said when times are made of it
+    gaps = np.flatnonzero(np.diff(numbers) > 1)
+    if not gaps.size:
+        return
+    missing = int(numbers[-1] - numbers[0] + 1 - len(numbers))
+    raw.notes.append(
+        f"{missing:,} video frames hold no mesh, the first after frame {numbers[gaps[0]]}; they are"
+        " taken as time without a person."
+    )
+    held = np.insert(np.arange(len(numbers)), gaps + 1, gaps)
+    raw.vertices = np.asarray(raw.vertices)[held]
+    raw.frame_numbers = np.insert(numbers, gaps + 1, numbers[gaps] + 1)
+    raw.present = np.insert(np.ones(len(numbers), bool), gaps + 1, False)
 
 
 def _place_in_front(
