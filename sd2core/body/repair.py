@@ -6,7 +6,6 @@ every frame rate and size of picture.
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -349,16 +348,18 @@ def bridged(found: Found, max_gap_s: float) -> Found:
 
     By a curve that does not overshoot (monotone piecewise cubic).
     """
-    rows = np.flatnonzero(found.present)
-    fill = np.zeros(len(found.times_s), bool)
-    for before, after in itertools.pairwise(rows):
-        if after - before > 1 and found.times_s[after] - found.times_s[before] <= max_gap_s + 1e-9:
-            fill[before + 1 : after] = True
-    if not fill.any():
+    rows, times = np.flatnonzero(found.present), found.times_s
+    short = (np.diff(rows) > 1) & (np.diff(times[rows]) <= max_gap_s + 1e-9)
+    if not short.any():
         return found
     from scipy.interpolate import PchipInterpolator
 
-    times, changed = found.times_s, {}
+    fill = np.zeros(len(times), bool)
+    near = np.zeros(len(rows), bool)  # the curve depends on two frames before and after
+    for number in np.flatnonzero(short):
+        fill[rows[number] + 1 : rows[number + 1]] = True
+        near[max(number - 2, 0) : number + 4] = True
+    rows, changed = rows[near], {}
     for name in ("image_px", "depth_px", "world_m", "visibility"):
         values = getattr(found, name).copy()
         values[fill] = PchipInterpolator(times[rows], values[rows], axis=0)(times[fill])

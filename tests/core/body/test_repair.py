@@ -241,6 +241,17 @@ class TestGaps:
             if not filled:
                 assert same(mended, lost)
 
+    def test_other_gaps_change_nothing(self) -> None:
+        """Of several gaps each is filled as if it were the only one."""
+        true = waving(np.arange(120) / 30.0)
+        gaps = [range(20, 25), range(28, 31), range(60, 90), range(100, 104)]
+        together = bridged(self.lost(true, at(120, *(k for gap in gaps for k in gap))), 0.5)
+        assert not together.present[60:90].any()
+        alone = bridged(self.lost(true, at(120, *gaps[3])), 0.5)
+        np.testing.assert_array_equal(together.image_px[100:104], alone.image_px[100:104])
+        first = bridged(self.lost(true, at(120, *gaps[0], *gaps[1])), 0.5)
+        np.testing.assert_array_equal(together.world_m[:60], first.world_m[:60])
+
     def test_both_ends_stay_empty(self) -> None:
         true = waving(np.arange(60) / 30.0)
         mended = bridged(self.lost(true, at(60, 0, 1, 58, 59)), 0.5)
