@@ -27,6 +27,8 @@ _MARGIN = 0.1
 """Of the body's extent, around it."""
 _SURFACE_PIXELS = 800
 """Across a picture: twice what is shown, for smooth outlines."""
+_MOST_PIXELS = 800
+"""Across a picture of the video: twice what is printed."""
 _CENTRED: Any = {"ha": "center", "va": "center"}
 _CELL_SHARE = 0.018
 _DOT_PT = 0.6
@@ -103,7 +105,7 @@ def draw_picture(
         assert source.video is not None
         left, top = int(box.left), int(box.top)
         picture = source.video.read(frame)[top : top + box.height, left : left + box.width]
-        axes.imshow(picture, extent=extent, aspect="auto", interpolation="antialiased")
+        axes.imshow(_reduced(picture), extent=extent, aspect="auto", interpolation="antialiased")
     if row == "video":
         return
     if body is None:
@@ -121,8 +123,8 @@ def draw_picture(
 
 def _surface(
     body: Body, faces: NDArray[np.int32], camera: PinholeCamera, box: Frame, over: bool
-) -> NDArray[np.float32]:
-    """The surface lit from the camera, as RGBA from 0 to 1."""
+) -> NDArray[np.uint8]:
+    """The surface lit from the camera, as RGBA bytes."""
     zoom = _SURFACE_PIXELS / box.width
     fine = Frame(
         box.left, box.top, max(round(box.width * zoom), 1), max(round(box.height * zoom), 1), zoom
@@ -131,9 +133,22 @@ def _surface(
     light = lightness(body.vertices_m, faces)[:, None]
     colours = rgb(_OVERLAY) / 255 if over else body.colours
     rgba = np.zeros((*view.owner.shape, 4), np.float32)
-    rgba[view.shown, :3] = view.interpolated(colours * light)
+    shown = view.interpolated(colours * light)
+    if len(shown):
+        rgba[..., :3] = shown.mean(axis=0)  # where it is resampled it mixes with what is beside it
+    rgba[view.shown, :3] = shown
     rgba[view.shown, 3] = _OVERLAY_SHARE if over else 1.0
-    return np.clip(rgba, 0, 1)
+    return np.rint(255 * np.clip(rgba, 0, 1)).astype(np.uint8)
+
+
+def _reduced(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """A picture (H, W, 3) no finer than a figure can show, by means of whole blocks of pixels."""
+    size = picture.shape[1] // _MOST_PIXELS
+    if size < 2:
+        return picture
+    height, width = (side // size for side in picture.shape[:2])
+    blocks = picture[: height * size, : width * size].reshape(height, size, width, size, 3)
+    return np.rint(blocks.mean(axis=(1, 3))).astype(np.uint8)
 
 
 def _draw_dots(

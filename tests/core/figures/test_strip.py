@@ -17,7 +17,7 @@ from sd2core.body.camera import PinholeCamera
 from sd2core.compiled import warm_up
 from sd2core.errors import Sd2Error
 from sd2core.figures.strip import plot_strip, save_strip
-from sd2core.figures.strip_drawing import Body, strip_box
+from sd2core.figures.strip_drawing import Body, _reduced, strip_box
 from sd2core.figures.strip_source import StripOptions, StripSource
 from sd2core.mesh import MeshSequence
 from sd2core.sensor import VirtualSensor
@@ -211,3 +211,12 @@ def test_what_is_not_there_cannot_be_drawn(source) -> None:
 def test_a_name_no_figure_can_have(source, tmp_path) -> None:
     with pytest.raises(Sd2Error, match=r"\.png"):
         save_strip(plot_strip(source, [0]), tmp_path / "strip.jpg", source, [0], StripOptions())
+
+
+def test_a_large_video_is_made_smaller_without_shifting_it() -> None:
+    across = np.zeros((900, 2000, 3), np.uint8)
+    across[:] = (np.arange(2000) // 8)[None, :, None]
+    small = _reduced(across)
+    assert small.shape == (450, 1000, 3)
+    assert small[7, 500, 0] == across[7, 1000, 0]
+    assert _reduced(across[:, :1500]).shape == (900, 1500, 3)
