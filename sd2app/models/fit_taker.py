@@ -59,6 +59,9 @@ class FitTaker(QObject):
             return
         self._settings.add_recent(made.folder)
         waiting = self._follower.on_screen and recording is not None and recording.mesh is None
+        if recording is not None and recording.folder == made.folder:
+            # Saving what is open must not take the mesh away again.
+            recording.mesh, recording.camera = made.mesh, made.camera
         if self._document.content is None or (waiting and not self._document.modified):
             self.open_result()
 

@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
 
 from sd2app.dialogs.new_from_video import NewFromVideoDialog
 from sd2app.models.fit_request import FitRequest, Person
+from sd2app.models.fit_setup import FitSetupModel
 from sd2app.settings import Settings
 from sd2app.views.fit_bar import FitBar
 from sd2app.views.landmark_overlay import bones
@@ -27,7 +28,8 @@ from sd2app.views.video import VideoView
 from sd2app.views.window import MainWindow
 from sd2core.body.fit import DEFAULT_STATURE_M
 from sd2core.body.track import LANDMARKS, MIRRORED
-from sd2core.recording import open_recording
+from sd2core.recording import Recording, open_recording
+from sd2core.sensor import VirtualSensor
 
 FAKE = Path(__file__).resolve().parent.parent / "fake_fit.py"
 
@@ -235,6 +237,30 @@ def test_what_is_open_meanwhile_stays_open(made, qtbot, video, small_recording) 
     with qtbot.waitSignal(c.document.opened, timeout=20_000):
         click(window, qtbot, "Open")
     assert c.document.recording.folder == video.with_name("walk.sd2")
+
+
+def test_a_recording_that_is_open_keeps_its_edits_and_gets_the_mesh(made, qtbot, video) -> None:
+    saved = Recording.create(video.with_name("mine.sd2"), video=video, title="Mine")
+    window = made("--body", "--pause-s", 0.02)
+    show(window, qtbot, saved.folder)
+    c = window.context
+    setup = FitSetupModel()
+    setup.choose_video(c.fit_offer.video, c.document.recording)
+    qtbot.waitUntil(lambda: setup.ready, timeout=10_000)
+    assert setup.completes
+    c.fit.start(setup.request())
+    setup.close()
+    sensor = VirtualSensor(position_m=(0.5, 0.0, 0.0))
+    c.edits.place_sensor(sensor)
+    # There is an edit that is not saved: nothing is opened over it.
+    qtbot.waitUntil(lambda: c.fit.state == "finished", timeout=30_000)
+    assert window.dialogs.save()
+    kept = open_recording(saved.folder)
+    assert kept.mesh == saved.folder / "mesh.zarr"
+    assert (kept.sensor, kept.title) == (sensor, "Mine")
+    with qtbot.waitSignal(c.document.opened, timeout=20_000):
+        click(window, qtbot, "Open")
+    assert c.document.mesh is not None
 
 
 def test_the_key_asks_for_a_video(made, qtbot, monkeypatch) -> None:
