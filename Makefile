@@ -10,7 +10,7 @@ export PYTHON
 INSTALLED := .venv/.installed
 COMPILED := .venv/.compiled
 # Among them every module in KERNEL_MODULES of sd2core/compiled.py.
-KERNELS := $(wildcard sd2core/compiled.py sd2core/raster.py sd2core/body/*.py sd2core/scattering/*.py sd2core/doppler/*.py sd2core/fmcw/*.py)
+KERNELS := $(wildcard sd2core/compiled.py sd2core/raster.py sd2core/body/*.py sd2core/scattering/*.py sd2core/doppler/*.py sd2core/fmcw/*.py sd2core/simulate/people/*.py)
 
 .PHONY: help setup demo test test-slow lint format bench wheel screenshots accuracy fitting clean
 
