@@ -15,7 +15,7 @@ from sd2core.body.track import LandmarkTrack
 _PICTURE_SD = 0.006
 """Of a landmark that is well visible, in apparent statures: 3 pixels of 480."""
 _LEAST_VISIBILITY = 0.05
-_DEPTH_CAUTION = 2.0
+DEPTH_CAUTION = 2.0
 """Depths of neighbouring frames err alike, so each tells less than it seems to."""
 
 
@@ -86,9 +86,9 @@ def evidence_of(
         slopes_sd=_PICTURE_SD * (stature_m / depth_m)[:, None] / visibility,
         trunk=CENTRE,
         depth_m=stature_m * lifted.depth,
-        depth_sd_m=_DEPTH_CAUTION * stature_m * lifted.depth_sigma,
+        depth_sd_m=DEPTH_CAUTION * stature_m * lifted.depth_sigma,
         trunk_m=depth_m,
-        trunk_sd_m=_DEPTH_CAUTION * stature_m * lifted.centre_sigma,
+        trunk_sd_m=DEPTH_CAUTION * stature_m * lifted.centre_sigma,
         velocity_mps=stature_m * lifted.velocity,
         velocity_sd_mps=stature_m * lifted.velocity_sigma,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from sd2core.body.evidence import Evidence, evidence_of
 from sd2core.body.fitted import BodyFit
 from sd2core.body.initial import Pose, initial_pose
 from sd2core.body.keypoints import KeypointSpace
+from sd2core.body.leaning import with_leaning_arms
 from sd2core.body.lifted import LiftedTrack, lifted_by_world
 from sd2core.body.rig import JOINTS, Rig
 from sd2core.body.rotations import Floats, from_vector, to_vector, transposed
@@ -97,10 +99,10 @@ def fit_body(
         def tick(done: int, number: int = number) -> None:
             progress(number * ROUNDS + done, total)
 
-        found = (
-            _kept(workspace, number, part)
-            or solve(rig, part, initial_pose(rig, part.points_m, trust[start:stop]), tick).pose
-        )
+        found = _kept(workspace, number, part)
+        if found is None:
+            first = initial_pose(rig, with_leaning_arms(part, rig), trust[start:stop])
+            found = solve(rig, part, first, tick).pose
         _keep(workspace, number, part, found)
         _blend(pose, found, start, overlap)
     progress(total, total)
@@ -206,7 +208,9 @@ def _finished(
     nearest = np.where(later, known[after], known[before])
     turns, translation_m = pose.turns[nearest], pose.translation_m[nearest]
     keypoints_m = rig.keypoints.positions(rig.transforms(turns, translation_m))
-    residual_m = np.linalg.norm(keypoints_m - evidence.points_m, axis=-1)
+    # A landmark lies on its ray; how far the trunk is, is the fit's own finding.
+    trunk_m = keypoints_m[:, evidence.trunk, 2].mean(axis=1)
+    residual_m = np.linalg.norm(keypoints_m - replace(evidence, trunk_m=trunk_m).points_m, axis=-1)
     residual_m[~track.present] = np.nan
     return BodyFit(
         timebase=track.timebase,

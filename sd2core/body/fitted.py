@@ -39,7 +39,8 @@ class BodyFit:
     keypoints_m : float64 array, shape (T, 33, 3)
         The fitted body's landmarks in the camera frame.
     residual_m : float64 array, shape (T, 33)
-        How far from them the lifted landmarks are; NaN in empty frames.
+        How far from them the lifted landmarks are, around the fitted trunk; NaN in empty
+        frames.
     along_sd_mps, across_sd_mps : float64 arrays, shape (T, 33)
         Standard deviation of each landmark's velocity along the line of sight, and in
         any direction at right angles to it; 0 in empty frames.

@@ -16,8 +16,9 @@ import numpy as np
 from sd2core.body.banded import Normal
 from sd2core.body.evidence import Evidence
 from sd2core.body.initial import Pose
-from sd2core.body.rig import JOINT, JOINTS, Rig
+from sd2core.body.rig import BEHIND, CHEST, JOINT, JOINTS, Rig
 from sd2core.body.rotations import Floats, from_vector, to_vector, transposed
+from sd2core.body.track import LANDMARKS
 
 _RELAXED_DEG = 35.0
 """From the rest pose, arms held away, to hanging arms."""
@@ -40,6 +41,17 @@ _HABIT_RAD = {
 _LIMITS_RAD = {"elbow": (-0.65, 1.95), "knee": (-0.15, 2.2)}
 _LIMIT_SD_RAD = 0.03
 
+# What arms do seldom: to be behind the plane of the chest. Marks from and to, how far
+# behind is common, and the standard deviation of more, in lengths of the upper arm.
+_BEHIND = tuple(
+    (LANDMARKS.index(start) if start else CHEST, LANDMARKS.index(end), common, sd)
+    for side in "LR"
+    for start, end, common, sd in (
+        (f"shoulder.{side}", f"elbow.{side}", 0.15, 0.15),
+        (None, f"wrist.{side}", 0.15, 0.3),
+    )
+)
+
 _FAR_PX = 3.0
 _FAR_DEPTH = 2.0
 """Standard deviations from where on a residual counts less."""
@@ -54,6 +66,7 @@ class Residuals(NamedTuple):
     velocity: Floats  # (T - 1, 33)
     habit: Floats  # (T, n), and (T, n) of the limits
     limit: Floats
+    behind: Floats  # (T, 4)
     smooth: Floats  # (T - 2, n)
 
 
@@ -73,14 +86,18 @@ class Objective:
         self.rig, self.evidence, self.acceleration_sd = rig, evidence, acceleration_sd
         self._relaxed, self._habit_sd, self._limits = _habits(rig)
         self._step_s = np.diff(evidence.times_s)
+        heads, index = rig.skeleton.heads_m, rig.skeleton.index
+        self._arm_m = float(
+            np.linalg.norm(heads[index["lowerarm01.L"]] - heads[index["upperarm01.L"]])
+        )
 
     def residuals(self, pose: Pose) -> Residuals:
         """Residuals of one pose through time."""
-        positions = self.rig.keypoints.positions(self.rig.transforms(*pose))
-        return self._residuals(pose, positions)
+        return self._residuals(pose, self.rig.marks.positions(self.rig.transforms(*pose)))
 
-    def _residuals(self, pose: Pose, positions: Floats) -> Residuals:
+    def _residuals(self, pose: Pose, marks: Floats) -> Residuals:
         seen = self.evidence
+        positions = marks[:, : len(LANDMARKS)]
         depth = positions[..., 2]  # (T, 33)
         trunk = depth[:, seen.trunk].mean(axis=1)
         velocity, velocity_sd = self._velocity()
@@ -94,6 +111,7 @@ class Objective:
             (np.diff(depth, axis=0) / self._step_s[:, None] - velocity) / velocity_sd,
             angles / self._habit_sd,
             beyond / _LIMIT_SD_RAD,
+            self._behind(marks)[0],
             self.accelerations(pose) / self.acceleration_sd,
         )
 
@@ -109,7 +127,7 @@ class Objective:
     def trust(self, residuals: Residuals) -> Residuals:
         """Square roots of the weights that make far residuals count less."""
         size = (residuals.picture**2).sum(axis=-1, keepdims=True)
-        ones = [np.ones(1)] * 3
+        ones = [np.ones(1)] * 4
         return Residuals(
             1.0 / (1.0 + size / _FAR_PX**2),
             1.0 / np.sqrt(1.0 + (residuals.depth / _FAR_DEPTH) ** 2),
@@ -122,9 +140,10 @@ class Objective:
         """Half the weighted sum of squares, and the equations of the next step."""
         seen = self.evidence
         transforms = self.rig.transforms(*pose)
-        positions = self.rig.keypoints.positions(transforms)
-        jacobian = self.rig.jacobian(transforms, positions)  # (T, 33, 3, n)
-        residuals = weighted(self._residuals(pose, positions), trust)
+        marks = self.rig.marks.positions(transforms)
+        moves = self.rig.jacobian(transforms, marks)  # (T, 35, 3, n)
+        residuals = weighted(self._residuals(pose, marks), trust)
+        positions, jacobian = marks[:, : len(LANDMARKS)], moves[:, : len(LANDMARKS)]
         frames, _, _, unknowns = jacobian.shape
         normal = Normal.zeros(frames, unknowns)
 
@@ -156,6 +175,7 @@ class Objective:
             residuals.habit, [(0, np.broadcast_to(1.0 / self._habit_sd, (frames, unknowns)))]
         )
         normal.add_diagonal(residuals.limit, [(0, (residuals.limit != 0.0) / _LIMIT_SD_RAD)])
+        normal.add(residuals.behind, [(0, self._behind(marks, moves)[1])])
         if frames > 2:
             first, second = self._step_s[:-1, None], self._step_s[1:, None]
             middle = 0.5 * (first + second)
@@ -184,6 +204,27 @@ class Objective:
             0.5 * (seen.velocity_mps[1:] + seen.velocity_mps[:-1]),
             0.5 * (seen.velocity_sd_mps[1:] + seen.velocity_sd_mps[:-1]),
         )
+
+    def _behind(self, marks: Floats, moves: Floats | None = None) -> tuple[Floats, Floats]:
+        """How far arms are behind the chest more than is common, and its derivative.
+
+        Returns
+        -------
+        residuals : float64 array, shape (T, 4)
+        derivatives : float64 array, shape (T, 4, n)
+            Empty without the marks' own.
+        """
+        starts, ends, common, sd = (np.array(part) for part in zip(*_BEHIND, strict=True))
+        lines = marks[:, ends] - marks[:, starts]  # (T, 4, 3)
+        back = (marks[:, BEHIND] - marks[:, CHEST])[:, None]
+        beyond = (lines * back).sum(axis=-1) / self._arm_m - common
+        residuals = np.maximum(beyond, 0.0) / sd
+        if moves is None:
+            return residuals, np.empty(0)
+        turned = (moves[:, BEHIND] - moves[:, CHEST])[:, None]  # (T, 1, 3, n)
+        shifted = moves[:, ends] - moves[:, starts]
+        slope = (lines[..., None] * turned + shifted * back[..., None]).sum(axis=-2)
+        return residuals, slope * ((beyond > 0.0) / (sd * self._arm_m))[..., None]
 
     def _angles(self, pose: Pose) -> Floats:
         """Turn of every joint from relaxed about its axes, (T, n); 0 for the translation."""

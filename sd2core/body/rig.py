@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from sd2core.body.keypoints import Keypoints
 from sd2core.body.model import Skeleton
 from sd2core.body.rotations import Floats, applied, product
+from sd2core.body.track import LANDMARKS
 
 
 @dataclass(frozen=True)
@@ -73,6 +74,11 @@ JOINTS = (
 JOINT = {joint.name: number for number, joint in enumerate(JOINTS)}
 """Number of a joint by its name."""
 
+CHEST, BEHIND = len(LANDMARKS), len(LANDMARKS) + 1
+"""Where the chest and the point behind it are among a rig's marks."""
+
+_CHEST = "spine01"
+
 
 class Rig:
     """The joints of one body, and how its keypoints follow them.
@@ -88,6 +94,9 @@ class Rig:
         Only the bones that the joints turn or the keypoints follow.
     keypoints : Keypoints
         On these bones.
+    marks : Keypoints
+        The same, then a point of the chest and one a metre behind it: they tell
+        what is in front of a person.
     axes : list of float64 arrays, shape (3, 1) or (3, 3)
         What each joint may turn about, in the axes of the rest pose.
     columns : list of slice
@@ -104,6 +113,11 @@ class Rig:
         place = {int(bone): number for number, bone in enumerate(self._kept)}
         bones = np.array([place[int(bone)] for bone in keypoints.bones], np.intp)
         self.keypoints = replace(keypoints, bones=bones)
+        chest = self.skeleton.index[_CHEST]
+        ends = self.skeleton.heads_m[chest] + np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+        self.marks = Keypoints(
+            np.concatenate([bones, [chest, chest]]), np.concatenate([keypoints.rest_m, ends])
+        )
         self.axes = [_axes(joint, self.skeleton) for joint in JOINTS]
         ends = np.cumsum([axes.shape[1] for axes in self.axes])
         self.columns = [
@@ -137,7 +151,7 @@ class Rig:
         return rotations
 
     def jacobian(self, transforms: Floats, positions_m: Floats) -> Floats:
-        """How keypoints move with every degree of freedom, (T, 33, 3, freedoms).
+        """How marks move with every degree of freedom, (T, 35, 3, freedoms).
 
         A small turn by δ about a joint's axis a, made on the right of its rotation,
         moves a point x by δ (W a) × (x − p): W is the bone's rotation in the world
@@ -172,7 +186,7 @@ class Rig:
 
     @cached_property
     def _follows(self) -> dict[int, NDArray[np.intp]]:
-        """For every bone that turns, the keypoints that it carries."""
+        """For every bone that turns, the marks that it carries."""
         parents = self.skeleton.parents
 
         def carried(bone: int, by: int) -> bool:
@@ -182,7 +196,7 @@ class Rig:
 
         return {
             by: np.array(
-                [row for row, bone in enumerate(self.keypoints.bones) if carried(int(bone), by)],
+                [row for row, bone in enumerate(self.marks.bones) if carried(int(bone), by)],
                 np.intp,
             )
             for bones in self._bones

@@ -43,7 +43,7 @@ def test_jacobian_is_the_derivative(seed: int) -> None:
     rig = rig_of(rng)
     pose = random_pose(rig, rng)
     transforms = rig.transforms(*pose)
-    jacobian = rig.jacobian(transforms, rig.keypoints.positions(transforms))
+    jacobian = rig.jacobian(transforms, rig.marks.positions(transforms))
     step = 1e-6
     for freedom in rng.choice(rig.freedoms, 12, replace=False):
         ends = []
@@ -55,7 +55,7 @@ def test_jacobian_is_the_derivative(seed: int) -> None:
                 if columns.start <= freedom < columns.stop:
                     axis = rig.axes[number][:, freedom - columns.start]
                     turns[:, number] = turns[:, number] @ from_vector(sign * step * axis)
-            ends.append(positions(rig, Pose(turns, translation)))
+            ends.append(rig.marks.positions(rig.transforms(turns, translation)))
         np.testing.assert_allclose(
             jacobian[..., freedom], (ends[0] - ends[1]) / (2 * step), atol=1e-8
         )
