@@ -15,7 +15,8 @@ from sd2core.body.fitted import BodyFit
 from sd2core.body.initial import Pose, initial_pose
 from sd2core.body.keypoints import KeypointSpace
 from sd2core.body.leaning import with_leaning_arms
-from sd2core.body.lifted import LiftedTrack, lifted_by_world
+from sd2core.body.lifted import LiftedTrack
+from sd2core.body.lifter import Lifter
 from sd2core.body.rig import JOINTS, Rig
 from sd2core.body.rotations import Floats, from_vector, to_vector, transposed
 from sd2core.body.shape import BodyShape, ShapeSpace
@@ -48,7 +49,7 @@ def fit_body(
     camera: PinholeCamera,
     *,
     stature_m: float | None = None,
-    lift: Lift = lifted_by_world,
+    lift: Lift | None = None,
     workspace: Path | None = None,
     progress: Progress = silent,
 ) -> BodyFit:
@@ -60,8 +61,8 @@ def fit_body(
     camera : PinholeCamera
     stature_m : float, optional
         The person's height, which fixes the scale; :data:`DEFAULT_STATURE_M` without.
-    lift : callable
-        Gives the landmarks their depth.
+    lift : callable, optional
+        Gives the landmarks their depth: the bundled lifter, where not given.
     workspace : Path, optional
         An existing folder where finished stretches are kept, so that a stopped fit
         goes on there.
@@ -84,7 +85,8 @@ def fit_body(
         )
     if not track.present.any():
         raise Sd2Error("No frame of the video shows a person", "at least one")
-    evidence = evidence_of(track, lift(track, camera), camera, stature_m)
+    lifted = (lift or Lifter.load().lift)(track, camera)
+    evidence = evidence_of(track, lifted, camera, stature_m)
     trust = track.visibility.astype(np.float64)
     people = _People()
     shape = _shape(people, track, evidence, trust, camera, stature_m)
@@ -101,8 +103,9 @@ def fit_body(
 
         found = _kept(workspace, number, part)
         if found is None:
-            first = initial_pose(rig, with_leaning_arms(part, rig), trust[start:stop])
-            found = solve(rig, part, first, tick).pose
+            leaning = with_leaning_arms(part, rig)
+            first = initial_pose(rig, leaning.points_m, trust[start:stop])
+            found = solve(rig, leaning, first, tick).pose
         _keep(workspace, number, part, found)
         _blend(pose, found, start, overlap)
     progress(total, total)

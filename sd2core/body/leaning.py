@@ -8,6 +8,8 @@ along the line of sight, and keeps arms from behind the chest, where they seldom
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,12 +25,13 @@ _SPEED_MPS = 1.5
 """Standard deviation of what elbows and wrists do along the line of sight."""
 _COMMON_M = 0.03
 _BEHIND_SD_M = 0.03
+_LEAN_SD_M = 0.08
 _MOST = 3.0
 """Standard deviations at which depths and habits stop to count more."""
 
 
-def with_leaning_arms(evidence: Evidence, rig: Rig) -> Floats:
-    """Landmarks in the camera frame, arms with the lengths they have.
+def with_leaning_arms(evidence: Evidence, rig: Rig) -> Evidence:
+    """Depths of elbows, wrists and hands by the lengths of the arms.
 
     Parameters
     ----------
@@ -38,14 +41,23 @@ def with_leaning_arms(evidence: Evidence, rig: Rig) -> Floats:
 
     Returns
     -------
-    float64 array, shape (T, 33, 3)
-        :attr:`Evidence.points_m` but for elbows, wrists and hands.
+    Evidence
+        With these depths, and their standard deviations no less than
+        :data:`_LEAN_SD_M`.
     """
     points_m = evidence.points_m
     back = _back(points_m)
     for side in "LR":
         _lean(points_m, evidence, rig, back, side)
-    return points_m
+    arms = [
+        _AT[f"{part}.{side}"]
+        for part in ("elbow", "wrist", "pinky", "index", "thumb")
+        for side in "LR"
+    ]
+    depth_m, depth_sd_m = evidence.depth_m.copy(), evidence.depth_sd_m.copy()
+    depth_m[:, arms] = points_m[:, arms, 2] - evidence.trunk_m[:, None]
+    depth_sd_m[:, arms] = _LEAN_SD_M
+    return replace(evidence, depth_m=depth_m, depth_sd_m=depth_sd_m)
 
 
 def _back(points_m: Floats) -> Floats:

@@ -19,7 +19,7 @@ _FIRST_ROTATION_RADPS2 = 60.0
 _FIRST_TRANSLATION_MPS2 = 6.0
 _LEAST_ROTATION_RADPS2 = 0.3
 _LEAST_TRANSLATION_MPS2 = 0.05
-_LIVELINESS = 1.5
+_LIVELINESS = 1.0
 """Standard deviation of an acceleration over what was found around it."""
 _AROUND_S = 0.15
 ROUNDS = 4
