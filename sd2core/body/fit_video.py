@@ -31,6 +31,7 @@ from sd2core.errors import Sd2Error
 from sd2core.io.mesh import save_mesh
 from sd2core.io.video import VideoReader, open_video
 from sd2core.progress import Progress
+from sd2core.resources import resource_path
 
 Stage = Literal["models", "find", "refine", "fit", "write"]
 
@@ -290,6 +291,7 @@ def _fit_folder(
         "choices": asdict(choices) | {"resolution": None},
         "camera": asdict(camera),
         "version": __version__,
+        "lifter": hashlib.sha256(resource_path("lifter.npz").read_bytes()).hexdigest(),
         "landmarks": hashlib.sha256(
             b"".join(
                 np.ascontiguousarray(each).tobytes()
