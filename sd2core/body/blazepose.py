@@ -175,24 +175,32 @@ class PoseDetector:
         """Everybody in a picture (height, width, 3), RGB; surest first."""
         return self.look(picture)[0]
 
-    def look(self, picture: Pixels) -> tuple[list[Detection], float]:
-        """Everybody in a picture, and how sure the surest place is of showing a person."""
+    def look(self, picture: Pixels, square: Roi | None = None) -> tuple[list[Detection], float]:
+        """Everybody in a picture, and how sure the surest place is of showing a person.
+
+        Parameters
+        ----------
+        picture : uint8 array, shape (height, width, 3)
+        square : Roi, optional
+            Only in this upright part of it: people less than some two fifths as high
+            as what is looked at are not found.
+        """
         height, width = picture.shape[:2]
-        size = float(max(width, height))
-        whole = Roi(width / 2.0, height / 2.0, size)
-        crop = whole.cut(picture, _DETECTOR_PX)
+        if square is None:
+            square = Roi(width / 2.0, height / 2.0, float(max(width, height)))
+        crop = square.cut(picture, _DETECTOR_PX)
         boxes, logits = self._network.run(crop.astype(np.float32) / np.float32(127.5) - 1)
         scores = _sigmoid(logits[0, :, 0])
         kept = np.flatnonzero(scores >= _FOUND)
         raw = boxes[0, kept].astype(np.float64) / _DETECTOR_PX  # (n, 12)
         places = np.concatenate([raw[:, :2], raw[:, 4:8]], axis=1)
         places += np.tile(self._anchors[kept], 3)
+        corner = np.array([square.centre_x_px, square.centre_y_px]) - square.size_px / 2.0
         found = []
         for rows in _same_person(places[:, :2], raw[:, 2:4], scores[kept]):
             weights = scores[kept[rows]]
             middle = weights @ places[rows] / weights.sum()
-            # Places are parts of the letterboxed square, whose middle is the picture's.
-            middle = (middle - 0.5) * size + np.tile([width / 2.0, height / 2.0], 3)
+            middle = square.size_px * middle + np.tile(corner, 3)
             found.append(Detection(Roi.around(middle[2:4], middle[4:6]), float(weights[0])))
         return found, float(scores.max())
 

@@ -77,20 +77,22 @@ def choose(
     """
     best_score = 0.0
     looked: set[int] = set()
-    for frames in _rounds(video):
-        new = [frame for frame in frames if frame not in looked]
-        looked.update(new)
+    for frames, part in _rounds(video):
+        looked.update(frames)
+        squares = _parts(video.width, video.height, part)
         found: list[tuple[float, Start]] = []
-        for frame in new:
-            progress(0, len(video))
+        for frame in frames:
             picture = video.read(frame)
-            people, score = detector.look(picture)
-            best_score = max(best_score, score)
-            for each in people:
-                pose = landmarker.in_picture(picture, each.roi)
-                if pose.confidence >= FOUND:
-                    rank = each.score * _prominence(each.roi, video.width, video.height)
-                    found.append((rank, Start(frame, pose.next_roi)))
+            for square in squares:
+                progress(0, len(video))
+                people, score = detector.look(picture, square)
+                best_score = max(best_score, score if not people else 0.0)
+                for each in people:
+                    pose = landmarker.in_picture(picture, each.roi)
+                    best_score = max(best_score, min(score, pose.confidence))
+                    if pose.confidence >= FOUND:
+                        rank = each.score * _prominence(each.roi, video.width, video.height)
+                        found.append((rank, Start(frame, pose.next_roi)))
         if found:
             enough = _NEARLY * max(rank for rank, _ in found)
             # An early one: a video decodes forwards only.
@@ -103,8 +105,8 @@ def choose(
     )
 
 
-def _rounds(video: VideoReader) -> list[list[int]]:
-    """Frames to look at, ever more of them."""
+def _rounds(video: VideoReader) -> list[tuple[list[int], float]]:
+    """Frames to look at, and in parts of what size; ever more of them, ever smaller ones."""
     frames, duration_s = len(video), float(video.timebase.times_s[-1])
     few = np.unique(np.linspace(0, frames - 1, min(frames, _SURVEYED)).round().astype(int))
     step_s = 0.0 if duration_s <= _EVERY_FRAME_S else _STEP_S
@@ -114,7 +116,21 @@ def _rounds(video: VideoReader) -> list[list[int]]:
         if times[frame] - last >= step_s:
             many.append(frame)
             last = float(times[frame])
-    return [few.tolist(), many]
+    chosen: list[int] = few.tolist()
+    return [(chosen, 1.0), (chosen, 0.5), (many, 1.0), (chosen, 0.25)]
+
+
+def _parts(width: int, height: int, part: float) -> list[Roi | None]:
+    """Squares of part of the longer side that cover the picture, each point two to four times."""
+    if part == 1.0:
+        return [None]
+    size = part * max(width, height)
+    x, y = (
+        np.linspace(min(size, side) / 2.0, max(side - size / 2.0, side / 2.0), count)
+        for side in (width, height)
+        for count in [1 if side <= size else int(np.ceil(2.0 * (side - size) / size)) + 1]
+    )
+    return [Roi(float(column), float(row), size) for row in y for column in x]
 
 
 def _prominence(roi: Roi, width: int, height: int) -> float:
@@ -167,15 +183,10 @@ def _squares(rectangle: Rectangle, picture: Pixels, detector: PoseDetector) -> l
     y = rectangle.y_px + rectangle.height_px / 2
     size = max(rectangle.width_px, rectangle.height_px)
     around = Roi(x, y, 1.25 * size)
-    squares = [found.roi for found in detector.people(picture)]
-    # A small person shows only in a part of the picture made larger.
+    # A small person shows only where a part of the picture is looked at.
     part = Roi(x, y, 1.6 * size)
-    detail = 512
-    matrix = part.matrix(detail)
-    for found in detector.people(part.cut(picture, detail)):
-        centre = matrix @ [found.roi.centre_x_px, found.roi.centre_y_px, 1.0]
-        scale = part.size_px / detail
-        squares.append(Roi(centre[0], centre[1], scale * found.roi.size_px, found.roi.angle_rad))
+    people = detector.people(picture) + detector.look(picture, part)[0]
+    squares = [found.roi for found in people]
     squares = [roi for roi in squares if _within(roi, rectangle)]
     squares.sort(
         key=lambda roi: (

@@ -9,7 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.appearance import Signature, signature, similarity
-from sd2core.body.blazepose import Floats, Pixels, Pose, PoseDetector, PoseLandmarker, Roi
+from sd2core.body.blazepose import (
+    Detection,
+    Floats,
+    Pixels,
+    Pose,
+    PoseDetector,
+    PoseLandmarker,
+    Roi,
+)
 from sd2core.body.choosing import FOUND, Start
 from sd2core.body.roi_path import Sightings, roi_numbers
 from sd2core.io.video import VideoReader
@@ -21,6 +29,7 @@ _STEP_S = 1.0 / 15.0
 """How often to look: what is between follows from the path, which is smooth."""
 _LOOK_ROUND_S = 0.5
 _MAX_CANDIDATES = 4
+_SMALL = 0.6
 _BLOCK_BYTES = 192 * 2**20
 
 
@@ -104,7 +113,7 @@ class Follower:
         """Look for the person in the whole picture."""
         gap_s = time_s - self.time_s
         best, best_rank = None, -np.inf
-        for found in self.detector.people(picture)[:_MAX_CANDIDATES]:
+        for found in self._people(picture, self._predicted(time_s))[:_MAX_CANDIDATES]:
             away = self._away(found.roi, time_s)
             # Somebody far away this soon is somebody else.
             if away > 0.5 + 1.5 * gap_s:
@@ -119,6 +128,13 @@ class Follower:
             if rank > best_rank:
                 best, best_rank = pose, rank
         return best
+
+    def _people(self, picture: Pixels, near: Roi) -> list[Detection]:
+        """People in the picture; where they are small, those around a place."""
+        if near.size_px > _SMALL * max(picture.shape[:2]):
+            return self.detector.people(picture)
+        around = Roi(near.centre_x_px, near.centre_y_px, 1.5 * near.size_px)
+        return self.detector.look(picture, around)[0] + self.detector.people(picture)
 
     def _accept(self, picture: Pixels, pose: Pose, time_s: float) -> None:
         roi, gap_s = pose.next_roi, time_s - self.time_s
@@ -140,7 +156,7 @@ class Follower:
 
     def _look_round(self, picture: Pixels, pose: Pose) -> None:
         """Learn what others look like while they stand apart."""
-        for found in self.detector.people(picture)[: _MAX_CANDIDATES + 1]:
+        for found in self._people(picture, pose.next_roi)[: _MAX_CANDIDATES + 1]:
             if _apart(found.roi, pose.next_roi) < 0.2 * pose.next_roi.size_px:
                 continue
             other = self._look(picture, found.roi)

@@ -176,6 +176,23 @@ class TestPictures:
         assert track.visibility[:, hidden].max() < 0.5
         assert np.median(track.visibility[:, shown]) > 0.7
 
+    @pytest.mark.parametrize("share", [0.25, 0.15])
+    def test_a_small_person(self, models: LandmarkModels, tmp_path: Path, share: float) -> None:
+        """Far away, to the left; the model sees people from two fifths of the picture on."""
+        wide = cv2.resize(empty_room(), (1280, 720))
+        filmed = []
+        for each in swiping()[0][::3]:
+            small = cv2.resize(each, None, fx=3 * share, fy=3 * share, interpolation=cv2.INTER_AREA)
+            rows, columns = small.shape[:2]
+            scene = wide.copy()
+            scene[400 : 400 + rows, 200 : 200 + columns] = small
+            filmed.append(scene)
+        track = found(film(tmp_path / "far.mp4", filmed), models)
+        assert track.present.all()
+        truth = 3 * share * swiping()[1][::3] + [200, 400]
+        off = np.hypot(*np.moveaxis(track.image_px - truth, -1, 0))
+        assert np.median(off) < 0.03 * 3 * share * PERSON_PX
+
     def test_portrait(self, models: LandmarkModels, tmp_path: Path) -> None:
         path = film(tmp_path / "portrait.mp4", [each[:, 60:220] for each in swiping()[0]])
         track = found(path, models)
