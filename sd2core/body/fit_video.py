@@ -146,9 +146,9 @@ def fit_video(
         When something is wrong with the video, the choices or the output.
     """
     partial = _partial(out, restart)
-    found_models = landmark_models(models, report.progress_of("models"))
     with open_video(path) as video:
         camera, camera_source = camera_of(video, choices.focal_px, choices.field_of_view_deg)
+        found_models = landmark_models(models, report.progress_of("models"))
         resumed = (partial / _LANDMARKS).is_dir()
         _begin(partial)
         report.started(video, resumed)

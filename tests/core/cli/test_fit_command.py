@@ -190,6 +190,20 @@ class TestOutput:
         with np.load(out) as arrays:
             assert json.loads(str(arrays["fit"]))["camera"] == about["camera"]
 
+    def test_two_frames_and_one_without_anybody(
+        self, sd2: Sd2, models: LandmarkModels, tmp_path: Path
+    ) -> None:
+        pictures = swiping()[0]
+        empty = [empty_room()] * 12
+        path = film(tmp_path / "short.mp4", [pictures[0], pictures[1], *empty, pictures[2]])
+        outcome = sd2("fit", path, "--out", tmp_path / "mesh.zarr", "--resolution", "low")
+        assert outcome.code == 0, outcome.err
+        mesh = load_mesh(tmp_path / "mesh.zarr")
+        assert mesh.present is not None
+        np.testing.assert_array_equal(np.flatnonzero(mesh.present), [0, 1, 14])
+        assert "Left empty, without the person: 12 frames." in outcome.out
+        assert np.isfinite(vertices(tmp_path / "mesh.zarr")).all()
+
     @pytest.mark.parametrize(
         ("name", "said"),
         [
