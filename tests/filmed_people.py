@@ -19,7 +19,7 @@ from sd2core.simulate.render import Camera, Renderer
 CAMERA = Camera(320, 240, 300.0)
 DISTANCE_M = 2.6
 STEP_S = 1.0 / 15.0
-FRAMES = 18
+FRAMES = 12
 _FROM_S = 0.6
 
 Picture = NDArray[np.uint8]
