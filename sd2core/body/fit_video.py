@@ -6,11 +6,13 @@ import hashlib
 import json
 import os
 import shutil
+import sys
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import IO, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +42,7 @@ STAGES: tuple[Stage, ...] = ("find", "refine", "fit", "write")
 
 PARTIAL = ".partial"
 _MARKER = "sd2-fit.json"
+_LOCK = "lock"
 _LANDMARKS = "landmarks"
 
 
@@ -145,38 +148,38 @@ def fit_video(
     Sd2Error
         When something is wrong with the video, the choices or the output.
     """
-    partial = _partial(out, restart)
+    check_fit_output(out)
+    partial = out.with_name(out.name + PARTIAL)
     with open_video(path) as video:
         camera, camera_source = camera_of(video, choices.focal_px, choices.field_of_view_deg)
         found_models = landmark_models(models, report.progress_of("models"))
-        resumed = (partial / _LANDMARKS).is_dir()
-        _begin(partial)
-        report.started(video, resumed)
-        stages = _Stages(report)
-        track = find_landmarks(
-            video,
-            found_models,
-            person=choices.person,
-            max_gap_s=choices.max_gap_s,
-            progress=stages.progress,
-            on_stage=stages.begin,
-            on_frame=stages.on_frame,
-            workspace=partial / _LANDMARKS,
-        )
-        notes = (*video.notes, *track.notes)
-    fit = fit_body(
-        track,
-        camera,
-        stature_m=choices.stature_m,
-        workspace=_fit_folder(partial, track, choices, camera),
-        progress=report.progress_of("fit"),
-    )
-    _write(fit, out, partial, choices.resolution, report.progress_of("write"))
-    made = FittedVideo(fit, track, camera, camera_source, notes)
-    _describe(partial / _new(out), provenance(made, path, choices))
-    if landmarks_out is not None:
-        save_track(track, landmarks_out)
-    _take_place(partial, out)
+        with _claimed(partial, restart):
+            report.started(video, (partial / _LANDMARKS).is_dir())
+            stages = _Stages(report)
+            track = find_landmarks(
+                video,
+                found_models,
+                person=choices.person,
+                max_gap_s=choices.max_gap_s,
+                progress=stages.progress,
+                on_stage=stages.begin,
+                on_frame=stages.on_frame,
+                workspace=partial / _LANDMARKS,
+            )
+            fit = fit_body(
+                track,
+                camera,
+                stature_m=choices.stature_m,
+                workspace=_fit_folder(partial, track, choices, camera),
+                progress=report.progress_of("fit"),
+            )
+            made = FittedVideo(fit, track, camera, camera_source, (*video.notes, *track.notes))
+            _write(fit, out, partial, choices.resolution, report.progress_of("write"))
+            _describe(partial / _new(out), provenance(made, path, choices))
+            if landmarks_out is not None:
+                save_track(track, landmarks_out)
+            _take_place(partial, out)
+    shutil.rmtree(partial, ignore_errors=True)
     return made
 
 
@@ -265,22 +268,53 @@ def _is_mesh(path: Path) -> bool:
         return False
 
 
-def _partial(out: Path, restart: bool) -> Path:
-    check_fit_output(out)
-    partial = out.with_name(out.name + PARTIAL)
-    if restart and partial.exists():
-        shutil.rmtree(partial)
-    return partial
-
-
 def _is_ours(partial: Path) -> bool:
-    return partial.is_dir() and ((partial / _MARKER).is_file() or not any(partial.iterdir()))
+    if not partial.is_dir():
+        return False
+    names = {path.name for path in partial.iterdir()}
+    return _MARKER in names or names <= {_LOCK}
 
 
-def _begin(partial: Path) -> None:
+@contextmanager
+def _claimed(partial: Path, restart: bool) -> Iterator[None]:
+    """Make the folder of the work, or take it over; nobody else's until the end.
+
+    Raises
+    ------
+    Sd2Error
+        When another process is at it.
+    """
     partial.mkdir(exist_ok=True)
-    text = json.dumps({"format": "sd2-fit-partial", "version": 1, "made_by": __version__})
-    atomic_write_text(partial / _MARKER, text + "\n")
+    with (partial / _LOCK).open("ab") as lock:
+        try:
+            _lock(lock)
+        except OSError as error:
+            raise Sd2Error(
+                f"{partial} is in use: another process fits the same mesh",
+                "one at a time",
+                "Wait until it is done, or write another mesh",
+            ) from error
+        if restart:
+            for path in partial.iterdir():
+                if path.is_dir():
+                    shutil.rmtree(path)
+                elif path.name != _LOCK:
+                    path.unlink()
+        text = json.dumps({"format": "sd2-fit-partial", "version": 1, "made_by": __version__})
+        atomic_write_text(partial / _MARKER, text + "\n")
+        yield
+
+
+def _lock(stream: IO[bytes]) -> None:
+    """Lock an open file against other processes; it is unlocked when closed, also by a kill."""
+    if sys.platform == "win32":
+        import msvcrt
+
+        msvcrt.locking(stream.fileno(), msvcrt.LK_NBLCK, 1)
+    else:
+        import fcntl
+
+        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def _fit_folder(
@@ -347,4 +381,3 @@ def _take_place(partial: Path, out: Path) -> None:
         with new.open("rb") as stream:
             os.fsync(stream.fileno())
         os.replace(new, out)
-    shutil.rmtree(partial, ignore_errors=True)

@@ -157,6 +157,21 @@ class TestKilled:
         assert vertices(tmp_path / "mesh.npz").shape == (FRAMES, 1229, 3)
         assert [path.name for path in tmp_path.iterdir()] == ["mesh.npz"]
 
+    @pytest.mark.skipif(os.name == "nt", reason="flock")
+    def test_two_at_once(
+        self, sd2: Sd2, clip: Path, models: LandmarkModels, tmp_path: Path
+    ) -> None:
+        import fcntl
+
+        out = tmp_path / "mesh.npz"
+        partial = tmp_path / "mesh.npz.partial"
+        partial.mkdir()
+        with (partial / "lock").open("ab") as held:
+            fcntl.flock(held, fcntl.LOCK_EX)
+            outcome = sd2(*arguments(clip, out, "--restart"))
+        assert outcome.code == 1
+        assert f"{partial} is in use" in outcome.err
+
     @pytest.mark.slow
     @pytest.mark.skipif(os.name == "nt", reason="SIGKILL")
     @pytest.mark.parametrize("name", ["mesh.zarr", "mesh.npz"])
