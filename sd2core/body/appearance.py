@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.body.blazepose import CROP_PX, Floats, Pixels, Pose
+from sd2core.body.blazepose import Pose
+from sd2core.body.roi import CROP_PX, Floats, Pixels
 from sd2core.body.track import LANDMARKS
 
 Signature = NDArray[np.float32]

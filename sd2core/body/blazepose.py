@@ -6,7 +6,6 @@ the files are those of :mod:`sd2core.body.landmark_models`, run by LiteRT.
 
 from __future__ import annotations
 
-import math
 import os
 import threading
 from collections.abc import Iterator
@@ -19,19 +18,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.body.roi import CROP_PX, Floats, Pixels, Roi
 from sd2core.body.track import MIRRORED
 from sd2core.errors import Sd2Error
 
-Pixels = NDArray[np.uint8]
 Singles = NDArray[np.float32]
-Floats = NDArray[np.float64]
 
 POINTS = 39
 """The 33 landmarks, two that say where to look next, and four that are not used."""
 CENTRE, RIM = 33, 34
 """The middle of the hips, and a point on the circle around the whole person."""
-CROP_PX = 256
-"""Side of what the landmark network sees."""
 CLOSE_UP = 0.9
 """The second look at a frame takes a smaller square than the first."""
 
@@ -39,69 +35,12 @@ _DETECTOR_PX = 224
 _FOUND = 0.5
 _STRIDES = (8, 16, 32, 32, 32)
 _ANCHORS_PER_CELL = 2
-_MARGIN = 1.25
-"""How much larger than the person's circle the square around it is."""
 _CELL_PX = 4
 _REFINE_CELLS = 3
 _REFINE_FROM = 0.5
 _DISAGREEMENT = 0.04
 _CHATTER = threading.Lock()
 _MIRRORED = list(MIRRORED)
-
-
-@dataclass(frozen=True)
-class Roi:
-    """A square in the picture, turned so that the person in it stands upright.
-
-    Parameters
-    ----------
-    centre_x_px, centre_y_px : float
-        Pixel coordinates; the centre of the first pixel is at 0.5.
-    size_px : float
-        Side of the square.
-    angle_rad : float
-        How far it is turned clockwise, as seen in the picture.
-    """
-
-    centre_x_px: float
-    centre_y_px: float
-    size_px: float
-    angle_rad: float = 0.0
-
-    @classmethod
-    def around(cls, centre_px: Floats, rim_px: Floats) -> Roi:
-        """The square around a person whose hips are at ``centre_px``.
-
-        ``rim_px`` lies above the head, on the circle around the person.
-        """
-        dx, dy = (float(value) for value in np.subtract(rim_px, centre_px))
-        angle = math.pi / 2.0 - math.atan2(-dy, dx)
-        return cls(
-            float(centre_px[0]),
-            float(centre_px[1]),
-            2.0 * _MARGIN * math.hypot(dx, dy),
-            math.remainder(angle, math.tau),
-        )
-
-    def scaled(self, factor: float) -> Roi:
-        """A square of another size around the same point."""
-        return replace(self, size_px=factor * self.size_px)
-
-    def matrix(self, crop_px: int = CROP_PX) -> Floats:
-        """From pixel coordinates (x, y, 1) of the crop to those of the picture, (2, 3)."""
-        scale = self.size_px / crop_px
-        c, s = scale * math.cos(self.angle_rad), scale * math.sin(self.angle_rad)
-        half = crop_px / 2.0
-        return np.array(
-            [
-                [c, -s, self.centre_x_px - (c - s) * half],
-                [s, c, self.centre_y_px - (s + c) * half],
-            ]
-        )
-
-    def cut(self, picture: Pixels, crop_px: int = CROP_PX) -> Pixels:
-        """What is in the square, (crop_px, crop_px, 3); black outside the picture."""
-        return _sampled(picture, self.matrix(crop_px), crop_px)
 
 
 @dataclass(frozen=True, eq=False)
@@ -348,23 +287,6 @@ def _without_chatter() -> Iterator[None]:
             os.dup2(kept, 2)
             os.close(kept)
             os.close(nowhere)
-
-
-def _sampled(picture: Pixels, matrix: Floats, crop_px: int) -> Pixels:
-    """The crop whose pixel coordinates ``matrix`` takes to the picture's."""
-    import cv2
-
-    # OpenCV counts from the centre of the first pixel, we from its corner.
-    centred = matrix.copy()
-    centred[:, 2] += matrix[:, :2] @ [0.5, 0.5] - 0.5
-    crop: Pixels = cv2.warpAffine(
-        picture,
-        centred,
-        (crop_px, crop_px),
-        flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
-        borderMode=cv2.BORDER_CONSTANT,
-    )
-    return crop
 
 
 def _upright(roi: Roi) -> Roi:

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sd2core.body.blazepose import Pixels, PoseDetector, PoseLandmarker, Roi
+from sd2core.body.blazepose import PoseDetector, PoseLandmarker
+from sd2core.body.roi import Pixels, Roi
 from sd2core.errors import Sd2Error
 from sd2core.io.video import VideoReader
 from sd2core.progress import Progress, silent

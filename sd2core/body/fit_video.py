@@ -26,7 +26,7 @@ from sd2core.body.fit import DEFAULT_STATURE_M, fit_body
 from sd2core.body.fitted import BodyFit
 from sd2core.body.landmark_files import save_track
 from sd2core.body.landmark_models import landmark_models
-from sd2core.body.landmarks import DEFAULT_MAX_GAP_S, OnFrame, find_landmarks
+from sd2core.body.landmarks import DEFAULT_MAX_GAP_S, SIGHTINGS, OnFrame, find_landmarks
 from sd2core.body.model import Resolution
 from sd2core.body.track import LandmarkTrack
 from sd2core.errors import Sd2Error
@@ -153,7 +153,7 @@ def fit_video(
     with open_video(path) as video:
         camera, camera_source = camera_of(video, choices.focal_px, choices.field_of_view_deg)
         found_models = landmark_models(models, report.progress_of("models"))
-        with _claimed(partial, restart):
+        with _claimed(partial, restart), _left_only_with_work(partial):
             report.started(video, (partial / _LANDMARKS).is_dir())
             stages = _Stages(report)
             track = find_landmarks(
@@ -303,6 +303,17 @@ def _claimed(partial: Path, restart: bool) -> Iterator[None]:
         text = json.dumps({"format": "sd2-fit-partial", "version": 1, "made_by": __version__})
         atomic_write_text(partial / _MARKER, text + "\n")
         yield
+
+
+@contextmanager
+def _left_only_with_work(partial: Path) -> Iterator[None]:
+    """Remove the folder when the video turns out not to be one of a person."""
+    try:
+        yield
+    except Sd2Error:
+        if not (partial / _LANDMARKS / SIGHTINGS).exists():
+            shutil.rmtree(partial, ignore_errors=True)
+        raise
 
 
 def _lock(stream: IO[bytes]) -> None:

@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.body.blazepose import Pose, PoseDetector, PoseLandmarker, Roi
+from sd2core.body.blazepose import Pose, PoseDetector, PoseLandmarker
 from sd2core.body.choosing import Rectangle, Start, choose, chosen_by
 from sd2core.body.landmark_files import load_track, read_arrays, save_track, write_arrays
 from sd2core.body.landmark_models import LandmarkModels
 from sd2core.body.refining import Refiner, Stretch
 from sd2core.body.repair import Found, repaired
+from sd2core.body.roi import Roi
 from sd2core.body.roi_path import Sightings, roi_numbers, roi_path
 from sd2core.body.track import LandmarkTrack
 from sd2core.body.tracking import Follower, Search
@@ -33,6 +34,9 @@ OnFrame = Callable[[int, NDArray[np.float32], NDArray[np.float32]], None]
 
 DEFAULT_MAX_GAP_S = 0.5
 DEFAULT_SILHOUETTES = 24
+
+SIGHTINGS = "sightings.npz"
+"""In a workspace: what the first pass found."""
 
 _WORKSPACE_VERSION = 1
 _STRETCH_FRAMES = 256
@@ -118,7 +122,7 @@ def _found(
     store: _Store,
 ) -> Sightings:
     """The first pass."""
-    kept = store.read("sightings.npz")
+    kept = store.read(SIGHTINGS)
     if kept is not None:
         return Sightings(**kept)
     detector = PoseDetector(models.detector, threads)
@@ -145,7 +149,7 @@ def _found(
         progress(round(done * len(video) / total), len(video))
 
     sightings = search.run(seen)
-    store.write("sightings.npz", vars(sightings))
+    store.write(SIGHTINGS, vars(sightings))
     return sightings
 
 

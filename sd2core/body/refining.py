@@ -14,8 +14,9 @@ from queue import SimpleQueue
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.body.blazepose import CLOSE_UP, CROP_PX, Pixels, Pose, PoseLandmarker, Roi
+from sd2core.body.blazepose import CLOSE_UP, Pose, PoseLandmarker
 from sd2core.body.choosing import FOUND
+from sd2core.body.roi import CROP_PX, Pixels, Roi
 from sd2core.io.video import VideoReader
 
 Singles = NDArray[np.float32]

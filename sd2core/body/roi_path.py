@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.body.blazepose import Floats, Roi
+from sd2core.body.roi import Floats, Roi
 
 _CENTRE_S = 0.2
 _SIZE_S = 0.5

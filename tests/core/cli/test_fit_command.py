@@ -127,7 +127,7 @@ class TestLines:
         assert outcome.code == 1
         assert last["event"] == "error"
         assert last["text"].startswith("No person was found in")
-        assert not (tmp_path / "mesh.zarr").exists()
+        assert not list(tmp_path.glob("mesh*"))
 
 
 class TestKilled:
