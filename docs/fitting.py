@@ -62,7 +62,12 @@ over the central difference, as the Doppler chain takes it. **Map L1** is the su
 differences between the synthetic Doppler maps of the fitted and of the true mesh (the paper's
 preset, smoothed) over the sum of the true one. **Peak kept** is the fitted hand's largest speed
 along the line of sight over the true one's; more than 1 is too much. **Ends** are the first and
-last five frames, over those between. Joints are patches of the surface.
+last five frames, over those between. Joints are patches of the surface. Time by the clock counts
+whatever else the machine did; processor time is the fit's own, on all cores together.
+
+What limits the figures is depth: given the true depths and velocities along the optical axis in
+the lifter's place, the same fit of the same landmarks is well within all of them ([decision
+19](decisions/0019-known-truth-for-the-fit.md), last paragraph).
 
 {tables}
 The clip {compared}, true and fitted:
