@@ -16,7 +16,8 @@ _PICTURE_SD = 0.006
 """Of a landmark that is well visible, in apparent statures: 3 pixels of 480."""
 _LEAST_VISIBILITY = 0.05
 DEPTH_CAUTION = 2.0
-"""Depths of neighbouring frames err alike, so each tells less than it seems to."""
+VELOCITY_CAUTION = 4.0
+"""Neighbouring frames err alike, so each tells less than it seems to."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,5 +91,5 @@ def evidence_of(
         trunk_m=depth_m,
         trunk_sd_m=DEPTH_CAUTION * stature_m * lifted.centre_sigma,
         velocity_mps=stature_m * lifted.velocity,
-        velocity_sd_mps=stature_m * lifted.velocity_sigma,
+        velocity_sd_mps=VELOCITY_CAUTION * stature_m * lifted.velocity_sigma,
     )

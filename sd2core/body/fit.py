@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.camera import PinholeCamera
-from sd2core.body.evidence import Evidence, evidence_of
+from sd2core.body.evidence import VELOCITY_CAUTION, Evidence, evidence_of
 from sd2core.body.fitted import BodyFit
 from sd2core.body.initial import Pose, initial_pose
 from sd2core.body.keypoints import KeypointSpace
@@ -223,7 +223,7 @@ def _finished(
         present=track.present.copy(),
         keypoints_m=keypoints_m,
         residual_m=residual_m,
-        along_sd_mps=_there(_ALONG * evidence.velocity_sd_mps, track.present),
+        along_sd_mps=_there(_ALONG * evidence.velocity_sd_mps / VELOCITY_CAUTION, track.present),
         across_sd_mps=_there(
             _ACROSS_PER_S * evidence.slopes_sd * keypoints_m[..., 2], track.present
         ),

@@ -25,7 +25,7 @@ _SPEED_MPS = 1.5
 """Standard deviation of what elbows and wrists do along the line of sight."""
 _COMMON_M = 0.03
 _BEHIND_SD_M = 0.03
-_LEAN_SD_M = 0.08
+_LEAN_SD_M = 0.06
 _MOST = 3.0
 """Standard deviations at which depths and habits stop to count more."""
 
