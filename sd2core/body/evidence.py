@@ -36,7 +36,7 @@ class Evidence:
     trunk_m, trunk_sd_m : float64 arrays, shape (T,)
         Depth of the middle of the trunk.
     velocity_mps, velocity_sd_mps : float64 arrays, shape (T, 33)
-        Change of depth, positive away.
+        Change of that depth, positive away.
     """
 
     times_s: Floats
@@ -79,6 +79,8 @@ def evidence_of(
     stature_m : float
         Gives everything its scale.
     """
+    # How the trunk moves is told better by how the person grows in the picture.
+    trunk = lifted.velocity[:, CENTRE].mean(axis=1, keepdims=True)
     visibility = np.clip(track.visibility.astype(np.float64), _LEAST_VISIBILITY, 1.0)
     depth_m = stature_m * lifted.centre_depth
     return Evidence(
@@ -90,6 +92,6 @@ def evidence_of(
         depth_sd_m=DEPTH_CAUTION * stature_m * lifted.depth_sigma,
         trunk_m=depth_m,
         trunk_sd_m=DEPTH_CAUTION * stature_m * lifted.centre_sigma,
-        velocity_mps=stature_m * lifted.velocity,
+        velocity_mps=stature_m * (lifted.velocity - trunk),
         velocity_sd_mps=VELOCITY_CAUTION * stature_m * lifted.velocity_sigma,
     )

@@ -108,7 +108,8 @@ class Objective:
             (positions[..., :2] / depth[..., None] - seen.slopes) / seen.slopes_sd[..., None],
             (depth - trunk[:, None] - seen.depth_m) / seen.depth_sd_m,
             ((trunk - seen.trunk_m) / seen.trunk_sd_m)[:, None],
-            (np.diff(depth, axis=0) / self._step_s[:, None] - velocity) / velocity_sd,
+            (np.diff(depth - trunk[:, None], axis=0) / self._step_s[:, None] - velocity)
+            / velocity_sd,
             angles / self._habit_sd,
             beyond / _LIMIT_SD_RAD,
             self._behind(marks)[0],
@@ -158,9 +159,8 @@ class Objective:
         )
 
         trunk = along[:, seen.trunk].mean(axis=1, keepdims=True)  # (T, 1, n)
-        normal.add(
-            residuals.depth, [(0, (along - trunk) * (trust.depth / seen.depth_sd_m)[..., None])]
-        )
+        apart = along - trunk
+        normal.add(residuals.depth, [(0, apart * (trust.depth / seen.depth_sd_m)[..., None])])
         normal.add(
             residuals.trunk,
             [(0, trunk * (trust.trunk / seen.trunk_sd_m[:, None])[..., None])],
@@ -169,7 +169,7 @@ class Objective:
             per_m = trust.velocity / (self._velocity()[1] * self._step_s[:, None])
             normal.add(
                 residuals.velocity,
-                [(0, -along[:-1] * per_m[..., None]), (1, along[1:] * per_m[..., None])],
+                [(0, -apart[:-1] * per_m[..., None]), (1, apart[1:] * per_m[..., None])],
             )
         normal.add_diagonal(
             residuals.habit, [(0, np.broadcast_to(1.0 / self._habit_sd, (frames, unknowns)))]
