@@ -187,6 +187,7 @@ def _blend(pose: Pose, found: Pose, start: int, overlap: int) -> None:
     if overlap:
         shared = slice(start, start + overlap)
         share = np.linspace(0.0, 1.0, overlap + 2)[1:-1]
+        share = share**3 * (10.0 + share * (6.0 * share - 15.0))  # no kink in velocity
         between = to_vector(transposed(pose.turns[shared]) @ found.turns[:overlap])
         pose.turns[shared] = pose.turns[shared] @ from_vector(share[:, None, None] * between)
         pose.translation_m[shared] += share[:, None] * (
