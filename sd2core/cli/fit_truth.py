@@ -32,17 +32,22 @@ def add_fit_truth(kinds: argparse._SubParsersAction) -> None:
     )
     parser.add_argument("out", type=Path, nargs="?", metavar="OUT", help="the folder to fill")
     parser.add_argument(
-        "--clips", metavar="NAMES", help="only these, separated by commas (default: all)"
+        "--clips",
+        metavar="NAMES",
+        help=(
+            "only these, separated by commas, or `tuning`: six other clips by which the weights"
+            " of the fit were chosen (default: all but those)"
+        ),
     )
     parser.add_argument("--list", action="store_true", help="name the clips and make nothing")
 
 
 def _fit_truth(options: argparse.Namespace) -> None:
-    from sd2core.simulate.fit_truth import CLIPS, clip_named, make_fit_truth
+    from sd2core.simulate.fit_truth import CLIPS, TUNING, clip_named, make_fit_truth
 
     if options.list:
-        width = max(len(clip.name) for clip in CLIPS)
-        for clip in CLIPS:
+        width = max(len(clip.name) for clip in (*CLIPS, *TUNING))
+        for clip in (*CLIPS, *TUNING):
             print(
                 f"{clip.name:<{width}}  {clip.person}, {clip.room}, at {clip.distance_m:g} m,"
                 f" camera {clip.camera_m:g} m high"
@@ -51,7 +56,7 @@ def _fit_truth(options: argparse.Namespace) -> None:
     if options.out is None:
         raise Sd2Error("No folder is given", "sd2 simulate fit-truth OUT")
     names = [name for name in (options.clips or "").split(",") if name]
-    clips = [clip_named(name) for name in names] or CLIPS
+    clips = TUNING if names == ["tuning"] else [clip_named(name) for name in names] or CLIPS
     with progress_bar("Simulating", unit="frame") as progress:
         made = make_fit_truth(options.out, clips, progress)
     print(f"{len(made)} clips in {options.out}")

@@ -104,18 +104,28 @@ CLIPS = (
         "turn-other", Action("turn", turn_deg=(-85.0, 60.0)), "dora", "office", 2.6, 1.2, 26, -0.1
     ),
 )
-"""What ``sd2 simulate fit-truth`` makes."""
+"""What ``sd2 simulate fit-truth`` makes: nothing was chosen or trained by these."""
+
+TUNING = (
+    Clip("tune-1", _swipes(_ALL, "fast"), "ada", "window", 2.4, 1.2, 101, 0.1),
+    Clip("tune-2", _swipes(_ALL, "normal"), "bo", "studio", 2.0, 1.1, 102),
+    Clip("tune-3", _swipes(_HORIZONTAL * 2, "fast", "L"), "dora", "office", 2.6, 1.3, 103, -0.1),
+    Clip("tune-4", _swipes(_VERTICAL * 2, "fast"), "chen", "evening", 2.2, 1.0, 104),
+    Clip("tune-5", _swipes(_ALL, "normal", "L"), "femi", "studio", 3.0, 1.2, 105, 0.15),
+    Clip("tune-6", _swipes(_ALL, "fast"), "emil", "window", 3.2, 1.4, 106),
+)
+"""Other clips, by which the weights of the fit were chosen (``--clips tuning``)."""
 
 
 def clip_named(name: str) -> Clip:
-    """One of :data:`CLIPS`.
+    """One of :data:`CLIPS` or :data:`TUNING`.
 
     Raises
     ------
     Sd2Error
         When there is none of this name.
     """
-    for clip in CLIPS:
+    for clip in (*CLIPS, *TUNING):
         if clip.name == name:
             return clip
     raise Sd2Error(
