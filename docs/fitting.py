@@ -51,7 +51,7 @@ make fitting
 ```
 
 on {machine}: sixteen videos of simulated people (`sd2 simulate fit-truth`), whose motions
-nothing in the program was made or trained with, fitted by `sd2 fit` with the camera's focal
+nothing in the program was trained with, fitted by `sd2 fit` with the camera's focal
 length and the person's height given, and measured by `sd2 score-fit`. What the clips can and
 cannot say is [decision 19](decisions/0019-known-truth-for-the-fit.md).
 

@@ -104,7 +104,7 @@ CLIPS = (
         "turn-other", Action("turn", turn_deg=(-85.0, 60.0)), "dora", "office", 2.6, 1.2, 26, -0.1
     ),
 )
-"""What ``sd2 simulate fit-truth`` makes: nothing was chosen or trained by these."""
+"""What ``sd2 simulate fit-truth`` makes; the weights of the fit were chosen by others."""
 
 TUNING = (
     Clip("tune-1", _swipes(_ALL, "fast"), "ada", "window", 2.4, 1.2, 101, 0.1),
