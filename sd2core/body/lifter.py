@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.lifted import LiftedTrack
-from sd2core.body.lifter_features import RATE_HZ, Seen, features, typical_size
-from sd2core.body.track import LANDMARKS, LandmarkTrack
+from sd2core.body.lifter_features import RATE_HZ, Seen, features, mirrored, rate, typical_size
+from sd2core.body.track import LANDMARKS, MIRRORED, LandmarkTrack
 from sd2core.errors import Sd2Error
 from sd2core.resources import resource_path
 from sd2core.timebase import Timebase
@@ -32,7 +32,13 @@ FORMAT = "sd2-lifter"
 VERSION = 1
 POINTS = len(LANDMARKS)
 OUTPUTS = 2 + 4 * POINTS
-"""Root and its spread, depths and theirs, velocities and theirs; spreads as logarithms."""
+"""Root and its spread, depths and theirs, velocities and theirs; spreads as logarithms.
+
+Velocities are whole, or what is to be added to the rate of the depths: see
+:attr:`Network.beyond_rates`.
+"""
+
+_VELOCITIES = slice(2 + 2 * POINTS, 2 + 3 * POINTS)
 
 LOG_SIGMA = (-6.0, 1.5)
 """Between these the network's logarithms of spreads are held."""
@@ -57,10 +63,13 @@ class Network:
         ``mean``, ``spread`` (C,) of the features; ``enter`` (C, H), ``enter_bias``;
         ``gain`` (n, H), ``wide`` (n, 3, H, H), ``wide_bias`` (n, H), ``flat`` (n, H, H),
         ``flat_bias`` (n, H); ``last_gain`` (H,), ``leave`` (H, OUTPUTS), ``leave_bias``.
+    beyond_rates : bool
+        Whether its velocities are what is to be added to the rate of its depths.
     """
 
     dilations: tuple[int, ...]
     arrays: Mapping[str, Singles]
+    beyond_rates: bool = False
 
     @cached_property
     def reach(self) -> int:
@@ -131,7 +140,8 @@ class Lifter:
                 f"{path} cannot be read as a lifter ({error})",
                 "a file written by `sd2 simulate train-lifter`",
             ) from error
-        return cls(Network(tuple(meta["dilations"]), arrays), calibration, meta["provenance"])
+        network = Network(tuple(meta["dilations"]), arrays, meta.get("beyond_rates", False))
+        return cls(network, calibration, meta["provenance"])
 
     def lift(self, track: LandmarkTrack, camera: PinholeCamera) -> LiftedTrack:
         """Depth and motion along the line of sight of every frame with a person.
@@ -165,8 +175,43 @@ class Lifter:
         return _lifted(track.timebase, raw, size)
 
     def outputs(self, seen: Seen) -> Singles:
-        """Calibrated outputs (T, OUTPUTS) of one stretch."""
-        return np.asarray(self.network(features(seen)) + self.calibration)
+        """Calibrated outputs (T, OUTPUTS) of one stretch, velocities in full.
+
+        The mean of what the network says of the stretch, of its mirror image, and of
+        both played backwards, so that it treats sides and directions of time alike.
+        """
+        return symmetric(self.network, seen) + self.calibration
+
+
+def symmetric(network: Network, seen: Seen) -> Singles:
+    """Mean of the outputs over a stretch's mirror image and reversal, velocities in full."""
+    size = float(typical_size(seen.slopes))
+    total = np.zeros((len(seen.sure), OUTPUTS), np.float32)
+    for view in (seen, mirrored(seen)):
+        told = features(view)
+        backwards = features(Seen(*(np.asarray(part)[::-1] for part in view)))
+        ahead, back = network(told), network(backwards)
+        if network.beyond_rates:
+            ahead, back = with_rates(ahead, size), with_rates(back, size)
+        back = back[::-1].copy()
+        back[:, _VELOCITIES] *= -1.0
+        both = ahead + back
+        if view is not seen:
+            rest = both[:, 2:].reshape(-1, 4, POINTS)[..., list(MIRRORED)]
+            both = np.concatenate([both[:, :2], rest.reshape(len(both), -1)], axis=1)
+        total += both
+    return np.asarray(total / 4.0, np.float32)
+
+
+def with_rates(out: Singles, size: float) -> Singles:
+    """Outputs (T, OUTPUTS) with the rates of centre and depths added to the velocities.
+
+    ``size`` is that of :func:`~sd2core.body.lifter_features.typical_size`.
+    """
+    full = out.copy()
+    centre = np.exp(out[:, :1]) / np.float32(size) * rate(out[:, :1], 0)
+    full[:, _VELOCITIES] += rate(out[:, 2 : 2 + POINTS], 0) + centre
+    return full
 
 
 def stretches(present: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.lifted import CENTRE
-from sd2core.body.track import LANDMARKS
+from sd2core.body.track import LANDMARKS, MIRRORED
 
 Floats = NDArray[np.floating]
 Singles = NDArray[np.float32]
@@ -70,6 +70,18 @@ class Seen(NamedTuple):
     world_m: Floats
     visibility: Floats
     sure: Floats
+
+
+def mirrored(seen: Seen) -> Seen:
+    """The same before a mirror: left is right."""
+    sides, x = list(MIRRORED), np.array([-1.0, 1.0], np.float32)
+    return Seen(
+        seen.slopes[..., sides, :] * x,
+        seen.depth[..., sides],
+        seen.world_m[..., sides, :] * np.append(x, np.float32(1.0)),
+        seen.visibility[..., sides],
+        seen.sure,
+    )
 
 
 def apparent_size(slopes: Floats) -> Floats:

@@ -38,6 +38,11 @@ def add_people(kinds: argparse._SubParsersAction) -> None:
     data.add_argument(
         "--held-out", action="store_true", help="with the kinds of motion kept for testing"
     )
+    data.add_argument(
+        "--natural",
+        action="store_true",
+        help="with elbows and trunk as people have them, not any way they can",
+    )
     data.add_argument("--processes", type=positive_int, default=2, metavar="P", help="(default: 2)")
     data.add_argument("--models", type=Path, metavar="FOLDER", help="the landmark models")
     train = add_command(
@@ -46,9 +51,20 @@ def add_people(kinds: argparse._SubParsersAction) -> None:
         "train the lifter of `sd2 fit` on takes of lifter-data",
         handler=_train,
         description='Needs the "train" extra: pip install "sd2-studio[train]".',
-        examples="  sd2 simulate train-lifter people --out lifter.npz",
+        examples=(
+            "  sd2 simulate train-lifter people --out lifter.npz\n"
+            "  sd2 simulate train-lifter people more --start lifter.npz --out better.npz"
+        ),
     )
-    train.add_argument("data", type=Path, metavar="DATA", help="folder of the takes")
+    train.add_argument("data", type=Path, nargs="+", metavar="DATA", help="folders of the takes")
+    train.add_argument("--start", type=Path, metavar="FILE", help="a lifter to go on from")
+    train.add_argument(
+        "--steps",
+        type=positive_int,
+        metavar="N",
+        help="of optimisation (default: %(default)s)",
+        default=2200,
+    )
     train.add_argument("--out", type=Path, required=True, metavar="FILE", help="to write (.npz)")
     train.add_argument("--seed", type=int, default=0, metavar="S", help="of all that is random")
     score = add_command(
@@ -82,6 +98,7 @@ def _data(options: argparse.Namespace) -> None:
             options.takes,
             options.seed,
             held_out=options.held_out,
+            natural=options.natural,
             processes=options.processes,
             models=options.models,
             progress=progress,
@@ -90,10 +107,12 @@ def _data(options: argparse.Namespace) -> None:
 
 
 def _train(options: argparse.Namespace) -> None:
+    from sd2core.body.lifter import Lifter
     from sd2core.cli.reading import check_output
 
     check_output(options.out, ".npz")
-    takes = _takes(options.data)
+    takes = [take for folder in options.data for take in _takes(folder)]
+    start = Lifter.load(options.start) if options.start else None
     try:
         import torch  # noqa: F401
     except ImportError as error:
@@ -105,7 +124,8 @@ def _train(options: argparse.Namespace) -> None:
     from sd2core.simulate.people.train_lifter import Recipe, save_lifter, train_on
 
     with progress_bar("Training", unit="step") as progress:
-        lifter = train_on(takes, Recipe(seed=options.seed), progress)
+        recipe = Recipe(steps=options.steps, seed=options.seed)
+        lifter = train_on(takes, recipe, progress, start=start)
     save_lifter(lifter, options.out)
     print(f"Wrote {options.out}")
 

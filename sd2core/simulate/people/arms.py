@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sd2core.body.rotations import Floats
+from sd2core.simulate.gestures import elbow_position
 from sd2core.simulate.people.signals import Moves, envelope, follow, wander
 
 PARAMETERS = 11
@@ -15,6 +16,18 @@ and deviation of the hand in degrees, curl of the fingers and of the thumb (0 to
 
 _TURN = ([25.0, 0.0, 0.0], [50.0, 22.0, 9.0])
 """Mean and spread of pronation, flexion and deviation."""
+
+_NATURAL_TURN = ([25.0, 0.0, 0.0], [30.0, 16.0, 6.0])
+
+_SWEEPS = 0.7
+
+_ELBOW_RESTS = 0.6
+
+_UPPER = 0.54
+"""Of an arm's length, its upper arm."""
+
+_NATURAL = {"any": 0.35}
+"""How much rarer a zone is in natural motion."""
 
 _FASTEST = 7.0
 """Arm lengths per second; 4 to 5 m/s."""
@@ -92,16 +105,27 @@ def still_arm(rng: np.random.Generator, times_s: Floats) -> Floats:
     return np.tile(_target(rng, zone), (len(times_s), 1))
 
 
-def moving_arm(rng: np.random.Generator, times_s: Floats, style: ArmStyle) -> Floats:
+def moving_arm(
+    rng: np.random.Generator,
+    times_s: Floats,
+    style: ArmStyle,
+    *,
+    natural: bool = False,
+    elbows_rest: bool = False,
+) -> Floats:
     """Parameters of an arm through time, (T, PARAMETERS).
 
     The first three are the wrist's place seen from the shoulder in arm lengths:
-    away from the body's middle, down, ahead.
+    away from the body's middle, down, ahead. ``natural`` arms let their elbows hang
+    and mostly sweep about the shoulder, others hold them any way; with ``elbows_rest``
+    the forearm often turns about an elbow that stays.
     """
-    straight = rng.random() < 0.5
+    straight = rng.random() < (1.0 - _SWEEPS if natural else 0.5)
     names = [name for name, _ in style.zones]
     chances = np.array([share for _, share in style.zones])
-    poses = [_target(rng, names[rng.choice(len(names), p=chances / chances.sum())])]
+    if natural:
+        chances = chances * [_NATURAL.get(name, 1.0) for name in names]
+    poses = [_target(rng, names[rng.choice(len(names), p=chances / chances.sum())], natural)]
     starts, lengths = [], []
     now = times_s[0] + rng.uniform(-1.0, 0.5)
     while now < times_s[-1]:
@@ -110,7 +134,13 @@ def moving_arm(rng: np.random.Generator, times_s: Floats, style: ArmStyle) -> Fl
                 rng.standard_normal(PARAMETERS)
             )
         else:
-            target = _target(rng, names[rng.choice(len(names), p=chances / chances.sum())])
+            zone = names[rng.choice(len(names), p=chances / chances.sum())]
+            target = _target(rng, zone, natural)
+            # An arm sweeps about its shoulder more often than it stretches on the way.
+            if natural and zone != "hang" and poses[-1][2] < 0.95 and rng.random() < _SWEEPS:
+                target[2] = np.clip(poses[-1][2] + 0.08 * rng.standard_normal(), 0.4, 0.97)
+        if elbows_rest and poses[-1][1] > -75.0 and rng.random() < _ELBOW_RESTS:
+            target[:6] = _about_elbow(rng, poses[-1])
         far = float(np.linalg.norm(_place(target) - _place(poses[-1])))
         length = float(np.exp(rng.uniform(np.log(style.shortest_s), np.log(style.longest_s))))
         length = max(length, 1.9 * far / _FASTEST)
@@ -135,8 +165,10 @@ def moving_arm(rng: np.random.Generator, times_s: Floats, style: ArmStyle) -> Fl
     return arm
 
 
-def _target(rng: np.random.Generator, zone: str) -> Floats:
+def _target(rng: np.random.Generator, zone: str, natural: bool = False) -> Floats:
     """One pose; the wrist by azimuth, elevation (degrees) and reach."""
+    if natural:
+        return _natural_target(rng, zone)
     low, high = np.array(ZONES[zone]).T
     hanging = zone == "hang"
     elbow = rng.normal([0.6, 0.7, 0.6], [0.25, 0.4, 0.3])
@@ -148,6 +180,46 @@ def _target(rng: np.random.Generator, zone: str) -> Floats:
     curl = rng.beta(0.8, 1.0) if not hanging else rng.uniform(0.1, 0.5)
     thumb = np.clip(curl + rng.normal(0.0, 0.25), 0.0, 1.0)
     return np.concatenate([rng.uniform(low, high), elbow, turn, [curl, thumb]])
+
+
+def _natural_target(rng: np.random.Generator, zone: str) -> Floats:
+    """One pose with the elbow where people have it: below the hand, further out if it is high."""
+    low, high = np.array(ZONES[zone]).T
+    place = rng.uniform(low, high)
+    if zone == "hang":
+        elbow = rng.normal([0.45, 0.0, 0.9], [0.15, 0.05, 0.15])
+    else:
+        raised = np.clip((place[1] + 10.0) / 60.0, 0.0, 1.0)
+        elbow = rng.normal([0.5 + 0.4 * raised, 1.0 - 0.3 * raised, 0.3], [0.22, 0.15, 0.2])
+    mean, sd = ([-25.0, 4.0, 0.0], [12.0, 8.0, 4.0]) if zone == "hang" else _NATURAL_TURN
+    turn = np.clip(rng.normal(mean, sd), [-60.0, -45.0, -18.0], [90.0, 45.0, 18.0])
+    curl = rng.uniform(0.05, 0.45) if rng.random() < 0.75 else rng.uniform(0.4, 1.0)
+    thumb = np.clip(curl + rng.normal(0.0, 0.2), 0.0, 1.0)
+    return np.concatenate([place, elbow, turn, [curl, thumb]])
+
+
+def _about_elbow(rng: np.random.Generator, pose: Floats) -> Floats:
+    """Wrist and elbow, with the forearm turned about the elbow of another pose."""
+    shoulder, wrist = np.zeros((1, 3)), _places(pose[None, :3])
+    # Poles point away from the body's middle, down, back; places ahead.
+    pole = pose[None, 3:6] * np.array([1.0, 1.0, -1.0])
+    elbow = elbow_position(shoulder, wrist, _UPPER, 1.0 - _UPPER, pole)[0]
+    for _ in range(30):
+        azimuth, elevation = np.radians(rng.uniform([-110.0, -80.0], [60.0, 85.0]))
+        level = np.cos(elevation)
+        way = np.array([np.sin(azimuth) * level, -np.sin(elevation), np.cos(azimuth) * level])
+        place = elbow + (1.0 - _UPPER) * way
+        reach = float(np.linalg.norm(place))
+        if 0.4 < reach < 0.97:
+            break
+    else:
+        return pose[:6]
+    spherical = [
+        np.degrees(np.arctan2(place[0], place[2])),
+        np.degrees(np.arcsin(-place[1] / reach)),
+        reach,
+    ]
+    return np.concatenate([spherical, elbow * np.array([1.0, 1.0, -1.0]) / _UPPER])
 
 
 def _place(pose: Floats) -> Floats:

@@ -27,6 +27,8 @@ _HIPS = [LANDMARKS.index("hip.L"), LANDMARKS.index("hip.R")]
 _SHOULDERS = [LANDMARKS.index("shoulder.L"), LANDMARKS.index("shoulder.R")]
 _WRISTS = [LANDMARKS.index("wrist.L"), LANDMARKS.index("wrist.R")]
 _WALK = 2  # takes have 0 and 1 in this place
+_ANY_WAY = 4
+"""Every fourth motion holds the arms any way they can be held."""
 _CANDIDATES = 24
 _ROBUST = 0.06
 """Statures; residuals beyond count less."""
@@ -122,7 +124,7 @@ class Emulator:
         drawn = rng.integers(0, len(self._marks), _CANDIDATES)
         far = (((self._marks[drawn] - _marks(walk.places)) / self._spread) ** 2).sum(axis=1)
         donor = int(drawn[np.argmin(far)])
-        size = np.float32(rng.uniform(0.1, 1.0))
+        size = np.float32(rng.uniform(0.05, 0.8))
         start = 0
         part = slice(start, start + len(walk.places))
         depth = walk.places[..., 2]
@@ -143,7 +145,9 @@ def random_walks(emulator: Emulator, count: int, seed: int) -> list[Walk]:
     """Motions of random people, not drawn."""
     stage, walks = Stage(), []
     for number in range(count):
-        scene = stage.scene(np.random.default_rng((seed, _WALK, number)))
+        rng = np.random.default_rng((seed, _WALK, number))
+        natural = number % _ANY_WAY != 0
+        scene = stage.scene(rng, natural=natural, elbows_rest=natural)
         walks.append(emulator.walk(scene.keypoints_m, scene.bone_turns, scene.shape.stature_m))
     return walks
 

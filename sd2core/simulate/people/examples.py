@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.lifted import CENTRE
-from sd2core.body.lifter_features import Seen, features, rate, typical_size
+from sd2core.body.lifter_features import Seen, features, mirrored, rate, typical_size
 from sd2core.body.track import MIRRORED
 from sd2core.simulate.people.emulate import Emulator, Walk
 from sd2core.simulate.people.takes import Take
 
 Singles = NDArray[np.float32]
 
-_MIRRORED = list(MIRRORED)
 _TURN_DEG = 8.0
 _GAP_SHARE = 0.15
 _LONGEST_GAP = 8
@@ -46,12 +45,15 @@ class Batch(NamedTuple):
     root : float32 array, shape (N, T)
         Logarithm of the centre's depth times the typical size.
     depth, velocity : float32 array, shape (N, T, 33)
+    size : float32 array, shape (N,)
+        The typical apparent size.
     """
 
     told: Singles
     root: Singles
     depth: Singles
     velocity: Singles
+    size: Singles
 
 
 def example(take: Take) -> Example:
@@ -78,12 +80,14 @@ def batch(examples: Sequence[Example]) -> Batch:
     seen = Seen(*(np.stack(parts) for parts in zip(*(e.seen for e in examples), strict=True)))
     truth = np.stack([e.depth for e in examples])
     centre = truth[..., list(CENTRE)].mean(axis=-1)
-    root = np.log(centre * typical_size(seen.slopes)[:, None])
+    size = typical_size(seen.slopes)
+    root = np.log(centre * size[:, None])
     return Batch(
         features(seen),
         root.astype(np.float32),
         truth - centre[..., None],
         np.asarray(rate(truth, 1), np.float32),
+        size.astype(np.float32),
     )
 
 
@@ -94,9 +98,9 @@ def varied(rng: np.random.Generator, one: Example, length: int) -> Example:
     slopes, depth, world, visibility, sure = (np.array(part[step]) for part in one.seen)
     truth = one.depth[step]
     if rng.random() < 0.5:
-        slopes = slopes[:, _MIRRORED] * np.array([-1, 1], np.float32)
-        world = world[:, _MIRRORED] * np.array([-1, 1, 1], np.float32)
-        depth, visibility, truth = (part[:, _MIRRORED] for part in (depth, visibility, truth))
+        other = mirrored(Seen(slopes, depth, world, visibility, sure))
+        slopes, depth, world, visibility, sure = (np.asarray(part) for part in other)
+        truth = truth[:, list(MIRRORED)]
     if rng.random() < 0.5:
         slopes, depth, world, visibility, sure, truth = (
             part[::-1] for part in (slopes, depth, world, visibility, sure, truth)

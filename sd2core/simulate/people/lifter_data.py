@@ -19,6 +19,7 @@ def make_lifter_data(
     seed: int = 0,
     *,
     held_out: bool = False,
+    natural: bool = False,
     processes: int = 2,
     models: Path | None = None,
     progress: Progress = silent,
@@ -34,6 +35,8 @@ def make_lifter_data(
     seed : int
     held_out : bool
         With the motion that is kept for testing.
+    natural : bool
+        With elbows and trunk as people have them, not any way they can.
     processes : int
     models : Path, optional
         Folder of the landmark models.
@@ -49,7 +52,7 @@ def make_lifter_data(
     landmark_models(models)
     folder.mkdir(parents=True, exist_ok=True)
     missing = [n for n in range(takes) if not take_path(folder, n).exists()]
-    job = partial(_make, folder, seed, held_out)
+    job = partial(_make, folder, seed, held_out, natural)
     done = takes - len(missing)
     progress(done, takes)
     context = multiprocessing.get_context("spawn")
@@ -86,6 +89,7 @@ def _start(models: Path | None) -> None:
     _maker = TakeMaker(PoseLandmarker(landmark_models(models).landmarker))
 
 
-def _make(folder: Path, seed: int, held_out: bool, number: int) -> None:
+def _make(folder: Path, seed: int, held_out: bool, natural: bool, number: int) -> None:
     assert _maker is not None
-    _maker.make((seed, int(held_out), number), held_out=held_out).save(take_path(folder, number))
+    take = _maker.make((seed, int(held_out), number), held_out=held_out, natural=natural)
+    take.save(take_path(folder, number))

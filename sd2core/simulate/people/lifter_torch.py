@@ -53,6 +53,31 @@ class LifterNetwork(nn.Module):
                 cast(nn.Linear, layer).weight.mul_(0.3)
             self.leave.weight.mul_(0.1)
 
+    @classmethod
+    def continued(cls, network: Network, dropout: float) -> LifterNetwork:
+        """A network with the weights of one in NumPy."""
+        a = {name: torch.from_numpy(array.copy()) for name, array in network.arrays.items()}
+        made = cls(
+            network.arrays["mean"],
+            network.arrays["spread"],
+            a["enter"].shape[1],
+            network.dilations,
+            dropout,
+        )
+        with torch.no_grad():
+            made.enter.weight.copy_(a["enter"].T)
+            made.enter.bias.copy_(a["enter_bias"])
+            made.gain.copy_(a["gain"])
+            made.last_gain.copy_(a["last_gain"])
+            made.leave.weight.copy_(a["leave"].T)
+            made.leave.bias.copy_(a["leave_bias"])
+            for n, (wide, flat) in enumerate(zip(made.wide, made.flat, strict=True)):
+                wide.weight.copy_(a["wide"][n].permute(2, 1, 0))
+                wide.bias.copy_(a["wide_bias"][n])
+                flat.weight.copy_(a["flat"][n].T)
+                flat.bias.copy_(a["flat_bias"][n])
+        return made
+
     def forward(self, told: torch.Tensor) -> torch.Tensor:
         """Outputs (N, T, OUTPUTS) of features (N, T, C)."""
         x = ((told - self.mean) / self.spread).clamp(-_FAR, _FAR)
@@ -87,7 +112,7 @@ class LifterNetwork(nn.Module):
             name: np.ascontiguousarray(cast(torch.Tensor, tensor).detach().numpy(), np.float32)
             for name, tensor in tensors.items()
         }
-        return Network(self.dilations, arrays)
+        return Network(self.dilations, arrays, beyond_rates=True)
 
 
 def _normed(x: torch.Tensor, gain: torch.Tensor) -> torch.Tensor:

@@ -39,14 +39,20 @@ class Deed:
         Styles of left and right arm.
     still : bool
         Nothing but breath and sway.
+    natural : bool
+        Elbows and trunk as people have them, not any way they can.
+    elbows_rest : bool
+        Forearms often turn about elbows that stay.
     """
 
     legs: str
     arms: tuple[str, str]
     still: bool
+    natural: bool = False
+    elbows_rest: bool = False
 
 
-def random_deed(rng: np.random.Generator, *, held_out: bool = False) -> Deed:
+def random_deed(rng: np.random.Generator, *, held_out: bool = False, natural: bool = False) -> Deed:
     """What to do; ``held_out`` takes the arms' styles from those kept for testing."""
     styles = list(HELD_OUT_STYLES if held_out else TRAINING_STYLES)
     legs = str(rng.choice(list(MODES), p=list(MODES.values())))
@@ -60,7 +66,7 @@ def random_deed(rng: np.random.Generator, *, held_out: bool = False) -> Deed:
         other = "rest"
     arms = (one, other) if rng.random() < 0.5 else (other, one)
     still = bool(rng.random() < _STILL)
-    return Deed("stand" if still and legs != "sit" else legs, arms, still)
+    return Deed("stand" if still and legs != "sit" else legs, arms, still, natural)
 
 
 def random_motion(
@@ -97,7 +103,11 @@ def _drawn(
     feet = footwork(rng, times_s, deed.legs, still=deed.still)
     styles = TRAINING_STYLES | HELD_OUT_STYLES
     arms = [
-        still_arm(rng, times_s) if deed.still else moving_arm(rng, times_s, styles[name])
+        still_arm(rng, times_s)
+        if deed.still
+        else moving_arm(
+            rng, times_s, styles[name], natural=deed.natural, elbows_rest=deed.elbows_rest
+        )
         for name in deed.arms
     ]
     if deed.arms[0] == deed.arms[1] and rng.random() < 0.5:
@@ -107,7 +117,8 @@ def _drawn(
             arm[:, 2] += rng.uniform(0.05, 0.35) * back * feet.stride
     rotations = np.tile(np.eye(3), (count, len(skeleton), 1, 1))
     liveliness = 0.05 if deed.still else rng.uniform(0.2, 1.0)
-    _turn_trunk(rng, skeleton, rotations, times_s, arms, liveliness)
+    lean_deg = (1.5, 3.0) if deed.natural else (4.0, 7.0)
+    _turn_trunk(rng, skeleton, rotations, times_s, arms, liveliness, lean_deg)
     translation = _stand(skeleton, rotations, stature_m, feet)
     _step(skeleton, rotations, stature_m, feet, translation)
     for side, arm in zip("LR", arms, strict=True):
@@ -122,11 +133,12 @@ def _turn_trunk(
     times_s: Floats,
     arms: list[Floats],
     liveliness: float,
+    lean_deg: tuple[float, float],
 ) -> None:
     """Lean, twist and breathe; shoulders and trunk go some way with the arms."""
     index = skeleton.index
     lean = rng.normal(0.0, [6.0, 7.0, 3.0])
-    lean[0] = rng.normal(4.0, 7.0)
+    lean[0] = rng.normal(*lean_deg)
     slow = wander(rng, times_s, rng.uniform(0.2, 0.9), 3) * rng.uniform(0.5, 7.0, 3)
     angles = lean + liveliness * slow  # (T, 3): forwards, twist, aside
     follow_arms = rng.uniform(-5.0, 22.0) * (liveliness > 0.1)

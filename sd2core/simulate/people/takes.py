@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -109,14 +109,21 @@ class Stage:
         self._keypoints = KeypointSpace(self.space)
 
     def scene(
-        self, rng: np.random.Generator, *, held_out: bool = False, frames: int = FRAMES
+        self,
+        rng: np.random.Generator,
+        *,
+        held_out: bool = False,
+        natural: bool = False,
+        elbows_rest: bool = False,
+        frames: int = FRAMES,
     ) -> Scene:
         """A random scene; ``held_out`` with the motion that is kept for testing."""
         times = np.arange(frames) / RATE_HZ
         while True:
             shape = self.space.random(rng)
             skeleton = self.space.skeleton(shape)
-            deed = random_deed(rng, held_out=held_out)
+            deed = random_deed(rng, held_out=held_out, natural=natural)
+            deed = replace(deed, elbows_rest=elbows_rest)
             motion = random_motion(rng, skeleton, shape.stature_m, times, deed)
             transforms = skeleton.transforms(*motion)
             keypoints = self._keypoints.of(shape)
@@ -145,7 +152,14 @@ class TakeMaker:
         self._landmarker = landmarker
         self._stage = Stage()
 
-    def make(self, seed: tuple[int, ...], *, held_out: bool = False, frames: int = FRAMES) -> Take:
+    def make(
+        self,
+        seed: tuple[int, ...],
+        *,
+        held_out: bool = False,
+        natural: bool = False,
+        frames: int = FRAMES,
+    ) -> Take:
         """One take of a random person.
 
         Parameters
@@ -153,10 +167,12 @@ class TakeMaker:
         seed : tuple of int
         held_out : bool
             With the motion that is kept for testing.
+        natural : bool
+            With elbows and trunk as people have them.
         frames : int
         """
         rng = np.random.default_rng(seed)
-        scene = self._stage.scene(rng, held_out=held_out, frames=frames)
+        scene = self._stage.scene(rng, held_out=held_out, natural=natural, frames=frames)
         camera = scene.camera
         body = self._stage.space.load("medium", scene.shape)
         painter = CropPainter(

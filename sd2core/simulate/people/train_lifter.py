@@ -14,7 +14,17 @@ import torch
 from numpy.typing import NDArray
 
 from sd2core.atomic import atomic_write
-from sd2core.body.lifter import FORMAT, LOG_SIGMA, OUTPUTS, POINTS, VERSION, Lifter, Network
+from sd2core.body.lifter import (
+    FORMAT,
+    LOG_SIGMA,
+    OUTPUTS,
+    POINTS,
+    VERSION,
+    Lifter,
+    Network,
+    symmetric,
+)
+from sd2core.body.lifter_features import RATE_HZ
 from sd2core.body.track import LANDMARKS
 from sd2core.progress import Progress, silent
 from sd2core.simulate.people.emulate import Emulator, Walk, random_walks
@@ -47,10 +57,10 @@ class Recipe:
     width : int
     dilations : tuple of int
     dropout : float
-    first_steps, steps : int
-        Of optimisation: on emulated motion first, then on drawn takes, with
-        ``emulated_share`` of the batch still emulated.
+    steps : int
+        Of optimisation.
     emulated_share : float
+        Of every batch; the rest is from drawn takes.
     batch : int
     frames : int
         Of each example.
@@ -64,12 +74,11 @@ class Recipe:
     seed : int
     """
 
-    width: int = 192
+    width: int = 128
     dilations: tuple[int, ...] = (1, 2, 4, 8, 2, 1)
     dropout: float = 0.1
-    first_steps: int = 3000
-    steps: int = 3000
-    emulated_share: float = 0.3
+    steps: int = 2200
+    emulated_share: float = 0.6
     batch: int = 24
     frames: int = 64
     rate: float = 1.5e-3
@@ -77,19 +86,23 @@ class Recipe:
     depth: float = 4.0
     root: float = 2.0
     change: float = 0.3
-    walks: int = 1600
+    walks: int = 1000
     seed: int = 0
 
 
-def train_on(takes: Sequence[Take], recipe: Recipe, progress: Progress = silent) -> Lifter:
+def train_on(
+    takes: Sequence[Take],
+    recipe: Recipe,
+    progress: Progress = silent,
+    start: Lifter | None = None,
+) -> Lifter:
     """Train on drawn takes and on emulated motion that follows them.
 
     Deterministic for the same takes, recipe, machine and number of threads.
     """
     emulator = Emulator([take for n, take in enumerate(takes) if n % _CALIBRATION_EVERY])
-    return train(
-        takes, random_walks(emulator, recipe.walks, recipe.seed), emulator, recipe, progress
-    )
+    walks = random_walks(emulator, recipe.walks, recipe.seed)
+    return train(takes, walks, emulator, recipe, progress, start=start)
 
 
 def train(
@@ -99,6 +112,7 @@ def train(
     recipe: Recipe,
     progress: Progress = silent,
     log: Callable[[str], None] | None = None,
+    start: Lifter | None = None,
 ) -> Lifter:
     """Train a lifter.
 
@@ -113,6 +127,8 @@ def train(
     progress : Progress
     log : callable, optional
         Told the losses now and then.
+    start : Lifter, optional
+        To go on from; its width and dilations stay.
     """
     torch.manual_seed(recipe.seed)
     rng = np.random.default_rng(recipe.seed)
@@ -120,47 +136,43 @@ def train(
     kept = [one for n, one in enumerate(examples) if n % _CALIBRATION_EVERY == 0]
     learnt = [one for n, one in enumerate(examples) if n % _CALIBRATION_EVERY]
     told = np.concatenate([batch([one]).told[0] for one in learnt[:200]])
-    network = LifterNetwork(
-        told.mean(axis=0),
-        np.maximum(told.std(axis=0), 1e-3),
-        recipe.width,
-        recipe.dilations,
-        recipe.dropout,
-    )
-    stages = [(recipe.steps, recipe.emulated_share if walks else 0.0, recipe.rate)]
-    if walks and recipe.first_steps:
-        stages = [
-            (recipe.first_steps, 1.0, recipe.rate),
-            (recipe.steps, recipe.emulated_share, 0.7 * recipe.rate),
-        ]
-    total, done = sum(stage[0] for stage in stages), 0
-    mean = copy.deepcopy(network)
-    for steps, share, peak in stages:
-        optimiser = torch.optim.AdamW(network.parameters(), lr=peak, weight_decay=0.02)
-        schedule = torch.optim.lr_scheduler.OneCycleLR(
-            optimiser, peak, total_steps=steps + 1, pct_start=0.1
+    if start is not None:
+        network = LifterNetwork.continued(start.network, recipe.dropout)
+    else:
+        spread = np.maximum(told.std(axis=0), 1e-3)
+        network = LifterNetwork(
+            told.mean(axis=0), spread, recipe.width, recipe.dilations, recipe.dropout
         )
-        for step in range(steps):
-            drawn = _drawn(rng, learnt, walks, emulator, share, recipe)
-            network.train()
-            loss, parts = losses(network(torch.from_numpy(drawn.told)), drawn, recipe)
-            optimiser.zero_grad()
-            loss.backward()
-            torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
-            optimiser.step()
-            schedule.step()
-            _follow(mean, network, min(0.995, step / (step + 20.0)))
-            done += 1
-            progress(done, total)
-            if log is not None and (step % 250 == 0 or step == steps - 1):
-                log(f"{done}: " + ", ".join(f"{name} {value:.4f}" for name, value in parts.items()))
-        network.load_state_dict(mean.state_dict())
+    share = recipe.emulated_share if walks else 0.0
+    mean = copy.deepcopy(network)
+    optimiser = torch.optim.AdamW(network.parameters(), lr=recipe.rate, weight_decay=0.02)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(
+        optimiser, recipe.rate, total_steps=recipe.steps + 1, pct_start=0.1
+    )
+    network.train()
+    for step in range(recipe.steps):
+        drawn = _drawn(rng, learnt, walks, emulator, share, recipe)
+        loss, parts = losses(network(torch.from_numpy(drawn.told)), drawn, recipe)
+        optimiser.zero_grad()
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
+        optimiser.step()
+        schedule.step()
+        _follow(mean, network, min(0.995, step / (step + 20.0)))
+        progress(step + 1, recipe.steps)
+        if log is not None and (step % 250 == 0 or step == recipe.steps - 1):
+            log(f"{step + 1}: " + ", ".join(f"{name} {value:.4f}" for name, value in parts.items()))
     mean.eval()
     exported = mean.exported()
     return Lifter(
         exported,
         calibration(exported, kept),
-        {"recipe": asdict(recipe), "takes": len(takes), "walks": len(walks or ())},
+        {
+            "recipe": asdict(recipe),
+            "takes": len(takes),
+            "walks": len(walks or ()),
+            "start": dict(start.provenance) if start is not None else None,
+        },
     )
 
 
@@ -189,10 +201,11 @@ def losses(
     """The loss and its parts; spreads learn from errors, but errors not from spreads."""
     weights = torch.from_numpy(landmark_weights())
     rest = out[..., 2:].unflatten(-1, (4, POINTS))
-    root, depth, velocity = (torch.from_numpy(part) for part in truth[1:])
+    root, depth, velocity, size = (torch.from_numpy(part) for part in truth[1:])
     root_error = out[..., 0] - root
     depth_error = rest[..., 0, :] - depth
-    velocity_error = rest[..., 2, :] - velocity
+    centre = torch.exp(out[..., :1].detach()) / size[:, None, None] * _rate(out[..., :1])
+    velocity_error = rest[..., 2, :] + _rate(rest[..., 0, :]) + centre - velocity
     change = sum(
         (_huber((depth_error[:, k:] - depth_error[:, :-k]) * 30.0 / k, 1.0) * weights).mean()
         for k in (1, 2, 4)
@@ -219,6 +232,13 @@ def landmark_weights() -> Singles:
     return np.array(weights, np.float32) / np.float32(np.mean(weights))
 
 
+def _rate(values: torch.Tensor) -> torch.Tensor:
+    """Of (N, T, n), as :func:`sd2core.body.lifter_features.rate`."""
+    inner = (values[:, 2:] - values[:, :-2]) / 2.0
+    ends = values[:, 1:2] - values[:, :1], values[:, -1:] - values[:, -2:-1]
+    return RATE_HZ * torch.cat([ends[0], inner, ends[1]], dim=1)
+
+
 def _huber(error: torch.Tensor, knee: float) -> torch.Tensor:
     return torch.nn.functional.huber_loss(
         error, torch.zeros_like(error), reduction="none", delta=knee
@@ -242,7 +262,7 @@ def calibration(network: Network, kept: Sequence[Example]) -> Singles:
     ratios = []
     for one in kept:
         truth = batch([one])
-        out = network(truth.told[0])
+        out = symmetric(network, one.seen)
         error, log_sigma = errors(out, truth)
         ratios.append(np.abs(error) / np.exp(np.clip(log_sigma, *LOG_SIGMA)))
     share = np.quantile(np.concatenate(ratios), 0.68, axis=0)  # (1 + 33 + 33,)
@@ -275,6 +295,7 @@ def save_lifter(lifter: Lifter, path: Path) -> None:
         "format": FORMAT,
         "version": VERSION,
         "dilations": list(lifter.network.dilations),
+        "beyond_rates": lifter.network.beyond_rates,
         "arrays": sorted(arrays),
         "provenance": dict(lifter.provenance),
     }

@@ -15,7 +15,7 @@ from sd2core.body.lifted import CENTRE
 from sd2core.body.lifter import OUTPUTS, Lifter, Network, stretches
 from sd2core.body.lifter_features import Seen, features
 from sd2core.body.shape import ShapeSpace
-from sd2core.body.track import LandmarkTrack
+from sd2core.body.track import LANDMARKS, MIRRORED, LandmarkTrack
 from sd2core.errors import Sd2Error
 from sd2core.simulate.people.motion import Deed, random_motion
 from sd2core.timebase import Timebase
@@ -48,13 +48,15 @@ def _network(channels: int, rng: np.random.Generator) -> Network:
     return Network((1, 4, 2), {name: value.astype(np.float32) for name, value in arrays.items()})
 
 
-def _moving(seed: int, seconds: float, *, still: bool) -> tuple[np.ndarray, float]:
+def _moving(
+    seed: int, seconds: float, *, still: bool, style: str = "strokes", natural: bool = False
+) -> tuple[np.ndarray, float]:
     """Keypoints of someone who moves the right arm, in metres, and the stature."""
     rng = np.random.default_rng(seed)
     space = ShapeSpace()
     shape, times = space.random(rng), np.arange(0.0, seconds, 1.0 / 30.0)
     skeleton = space.skeleton(shape)
-    deed = Deed("stand", ("rest", "strokes"), still)
+    deed = Deed("stand", ("rest", style), still, natural)
     motion = random_motion(rng, skeleton, shape.stature_m, times, deed)
     places = KeypointSpace(space).of(shape).positions(skeleton.transforms(*motion))
     return places + np.array([0.0, 1.1, DISTANCE_M]), shape.stature_m
@@ -135,6 +137,37 @@ def test_a_still_person_is_still(lifter: Lifter) -> None:
         replace(noisy, image_px=noisy.image_px + jitter.astype(np.float32)), CAMERA
     )
     assert np.sqrt(np.mean((stature_m * lifted.velocity) ** 2)) < 0.06
+
+
+def test_unseen_motion_is_followed_along_the_line_of_sight(lifter: Lifter) -> None:
+    found, wanted, within = [], [], []
+    elbow = LANDMARKS.index("elbow.R")
+    for seed in range(20, 26):
+        places, stature_m = _moving(seed, 2.0, still=False, style="quick", natural=True)
+        lifted = lifter.lift(_track(places), CAMERA)
+        wanted.append(np.gradient(places[:, elbow, 2], 1.0 / 30.0))
+        found.append(stature_m * lifted.velocity[:, elbow])
+        sigma_mps = stature_m * lifted.velocity_sigma[:, elbow]
+        within.append(np.abs(found[-1] - wanted[-1]) < sigma_mps)
+        centre = places[:, CENTRE, 2].mean(axis=1)
+        np.testing.assert_allclose(stature_m * lifted.centre_depth, centre, rtol=0.15)
+    v, w = np.concatenate(found), np.concatenate(wanted)
+    assert np.corrcoef(v, w)[0, 1] > 0.6
+    assert np.sqrt(np.mean((v - w) ** 2)) < 0.9 * w.std()
+    assert 0.5 < np.mean(np.concatenate(within)) < 0.95
+
+
+def test_sides_and_directions_of_time_are_treated_alike(lifter: Lifter) -> None:
+    places, _ = _moving(3, 1.5, still=False)
+    track = _track(places)
+    plain = lifter.lift(track, CAMERA)
+    sides = list(MIRRORED)
+    mirror = lifter.lift(_track(places[:, sides] * [-1.0, 1.0, 1.0]), CAMERA)
+    np.testing.assert_allclose(mirror.velocity[:, sides], plain.velocity, atol=2e-3)
+    np.testing.assert_allclose(mirror.centre_depth, plain.centre_depth, rtol=1e-3)
+    backwards = lifter.lift(_track(places[::-1]), CAMERA)
+    np.testing.assert_allclose(-backwards.velocity[::-1], plain.velocity, atol=2e-3)
+    np.testing.assert_allclose(backwards.depth_sigma[::-1], plain.depth_sigma, rtol=1e-2)
 
 
 def test_empty_frames_stay_empty_and_part_the_clip(lifter: Lifter) -> None:
