@@ -24,6 +24,7 @@ from sd2core.body.shaping import shape_of_lengths, shape_of_outlines
 from sd2core.body.solve import ROUNDS, solve, solve_stills
 from sd2core.body.track import LandmarkTrack
 from sd2core.errors import Sd2Error
+from sd2core.presence import runs
 from sd2core.progress import Progress, silent
 
 Lift = Callable[[LandmarkTrack, PinholeCamera], LiftedTrack]
@@ -91,7 +92,7 @@ def fit_body(
     people = _People()
     shape = _shape(people, track, evidence, trust, camera, stature_m)
     rig = people.rig(shape)
-    windows = [window for stretch in stretches(track.present) for window in _windows(*stretch)]
+    windows = [window for stretch in runs(track.present) for window in _windows(*stretch)]
     total = len(windows) * ROUNDS
     pose = Pose(np.tile(np.eye(3), (len(track), len(JOINTS), 1, 1)), np.zeros((len(track), 3)))
     for number, (start, stop, overlap) in enumerate(windows):
@@ -121,12 +122,6 @@ class _People:
 
     def rig(self, shape: BodyShape) -> Rig:
         return Rig(self.space.skeleton(shape), self.keypoints.of(shape))
-
-
-def stretches(present: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First frame and the one after the last of every run of frames with a person."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], present, [False]]).astype(np.int8)))
-    return [(int(start), int(stop)) for start, stop in edges.reshape(-1, 2)]
 
 
 def _windows(start: int, stop: int) -> Iterator[tuple[int, int, int]]:
@@ -205,12 +200,9 @@ def _finished(
 ) -> BodyFit:
     known = np.flatnonzero(track.present)
     frames = np.arange(len(track))
-    # Empty frames hold the nearest pose.
-    after = np.clip(np.searchsorted(known, frames), 0, len(known) - 1)
-    before = np.clip(after - 1, 0, None)
-    later = np.abs(known[after] - frames) < np.abs(known[before] - frames)
-    nearest = np.where(later, known[after], known[before])
-    turns, translation_m = pose.turns[nearest], pose.translation_m[nearest]
+    # Empty frames hold the last known pose, those before it the first.
+    held = known[np.clip(np.searchsorted(known, frames, side="right") - 1, 0, None)]
+    turns, translation_m = pose.turns[held], pose.translation_m[held]
     keypoints_m = rig.keypoints.positions(rig.transforms(turns, translation_m))
     # A landmark lies on its ray; how far the trunk is, is the fit's own finding.
     trunk_m = keypoints_m[:, evidence.trunk, 2].mean(axis=1)
@@ -242,8 +234,9 @@ def _kept(workspace: Path | None, number: int, part: Evidence) -> Pose | None:
         return None
     try:
         with np.load(file, allow_pickle=False) as data:
-            if not np.array_equal(data["slopes"], part.slopes):
-                return None
+            for name in ("slopes", "depth_m", "trunk_m"):
+                if not np.array_equal(data[name], getattr(part, name)):
+                    return None
             return Pose(data["turns"], data["translation_m"])
     except (OSError, ValueError, KeyError):
         return None
@@ -255,5 +248,10 @@ def _keep(workspace: Path | None, number: int, part: Evidence, found: Pose) -> N
     if workspace is not None:
         with atomic_write(workspace / f"pose-{number:05d}.npz") as stream:
             np.savez(
-                stream, slopes=part.slopes, turns=found.turns, translation_m=found.translation_m
+                stream,
+                slopes=part.slopes,
+                depth_m=part.depth_m,
+                trunk_m=part.trunk_m,
+                turns=found.turns,
+                translation_m=found.translation_m,
             )

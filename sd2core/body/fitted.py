@@ -31,8 +31,8 @@ class BodyFit:
     timebase : Timebase
     shape : BodyShape
     turns : float64 array, shape (T, J, 3, 3)
-        Rotation of every joint of :data:`sd2core.body.rig.JOINTS`; the nearest known
-        one in empty frames.
+        Rotation of every joint of :data:`sd2core.body.rig.JOINTS`; the last known one
+        in empty frames.
     translation_m : float64 array, shape (T, 3)
     present : bool array, shape (T,)
         False in empty frames.

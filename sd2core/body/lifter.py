@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -22,6 +22,7 @@ from sd2core.body.lifted import LiftedTrack
 from sd2core.body.lifter_features import RATE_HZ, Seen, features, mirrored, rate, typical_size
 from sd2core.body.track import LANDMARKS, MIRRORED, LandmarkTrack
 from sd2core.errors import Sd2Error
+from sd2core.presence import runs
 from sd2core.resources import resource_path
 from sd2core.timebase import Timebase
 
@@ -168,7 +169,7 @@ class Lifter:
             )
         raw = np.full((len(track), OUTPUTS), np.nan)
         size = np.full(len(track), np.nan)
-        for start, stop in stretches(track.present):
+        for start, stop in runs(track.present):
             seen, place = _at_rate(_seen(track, camera, start, stop), track.timebase, start, stop)
             size[start:stop] = typical_size(seen.slopes)
             raw[start:stop] = _interpolated(self.outputs(seen), place)
@@ -212,13 +213,6 @@ def with_rates(out: Singles, size: float) -> Singles:
     centre = np.exp(out[:, :1]) / np.float32(size) * rate(out[:, :1], 0)
     full[:, _VELOCITIES] += rate(out[:, 2 : 2 + POINTS], 0) + centre
     return full
-
-
-def stretches(present: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
-    """First frame of every run of True, and the frame after its last."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], present, [False]]).astype(np.int8)))
-    for start, stop in edges.reshape(-1, 2):
-        yield int(start), int(stop)
 
 
 def _seen(track: LandmarkTrack, camera: PinholeCamera, start: int, stop: int) -> Seen:

@@ -7,7 +7,7 @@ import pytest
 
 from sd2core.body import fit as fitting
 from sd2core.body.camera import PinholeCamera
-from sd2core.body.fit import fit_body, stretches
+from sd2core.body.fit import fit_body
 from sd2core.body.fitted import BodyFit
 from sd2core.body.keypoints import KeypointSpace
 from sd2core.body.lifted import CENTRE, LiftedTrack, lifted_by_world
@@ -165,7 +165,7 @@ def test_outlines_tell_a_heavy_person_from_a_light_one() -> None:
     assert girths[0.95] > 1.05 * girths[0.05]
 
 
-def test_empty_frames_hold_the_nearest_pose_and_are_marked(scene: Scene) -> None:
+def test_empty_frames_hold_the_last_known_pose_and_are_marked(scene: Scene) -> None:
     gap = slice(20, 40)
     track = Scene(60).track
     track.present[gap] = False
@@ -176,7 +176,7 @@ def test_empty_frames_hold_the_nearest_pose_and_are_marked(scene: Scene) -> None
     assert found.present.sum() == 40
     assert np.isfinite(found.turns).all()
     np.testing.assert_array_equal(found.keypoints_m[25], found.keypoints_m[19])
-    np.testing.assert_array_equal(found.keypoints_m[35], found.keypoints_m[40])
+    np.testing.assert_array_equal(found.keypoints_m[39], found.keypoints_m[19])
     assert np.isnan(found.residual_m[gap]).all()
     assert (found.quality[gap] == 0).all()
     away = np.linalg.norm(found.keypoints_m - scene.keypoints_m, axis=-1)
@@ -279,8 +279,3 @@ def test_depth_by_world_coordinates(scene: Scene) -> None:
         lifted.depth * stature_m, factor * (true[..., 2] - centre[:, None]), atol=1e-6
     )
     np.testing.assert_allclose(lifted.centre_depth * stature_m, factor * centre, rtol=0.05)
-
-
-def test_stretches() -> None:
-    assert stretches(np.array([True, True, False, True])) == [(0, 2), (3, 4)]
-    assert stretches(np.zeros(3, bool)) == []
