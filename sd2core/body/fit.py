@@ -41,7 +41,7 @@ _OUTLINES = 16
 
 # Measured on simulated people (docs/decisions/0022): what the lifter says of its
 # velocities, and the fit's error across the view per error of a landmark there.
-_ALONG = 0.75
+_ALONG = 0.57
 _ACROSS_PER_S = 3.0
 
 
