@@ -14,6 +14,7 @@ from sd2core.body.evidence import VELOCITY_CAUTION, Evidence, evidence_of
 from sd2core.body.fitted import BodyFit
 from sd2core.body.initial import Pose, initial_pose
 from sd2core.body.keypoints import KeypointSpace
+from sd2core.body.landmark_files import read_arrays, write_arrays
 from sd2core.body.leaning import with_leaning_arms
 from sd2core.body.lifted import LiftedTrack
 from sd2core.body.lifter import Lifter
@@ -38,6 +39,8 @@ _WINDOW_FRAMES = 600
 _OVERLAP_FRAMES = 60
 _MASK_SURE = 128
 _OUTLINES = 16
+_TOLD_BY = ("slopes", "depth_m", "trunk_m")
+"""What tells that a kept window was fitted to the same evidence."""
 
 # Measured on simulated people (docs/decisions/0022): what the lifter says of its
 # velocities, and the fit's error across the view per error of a landmark there.
@@ -106,8 +109,8 @@ def fit_body(
         if found is None:
             leaning = with_leaning_arms(part, rig)
             first = initial_pose(rig, leaning.points_m, trust[start:stop])
-            found = solve(rig, leaning, first, tick).pose
-        _keep(workspace, number, part, found)
+            found = solve(rig, leaning, first, tick)
+            _keep(workspace, number, part, found)
         _blend(pose, found, start, overlap)
     progress(total, total)
     return _finished(track, evidence, rig, shape, pose)
@@ -229,29 +232,22 @@ def _there(values: Floats, present: NDArray[np.bool_]) -> Floats:
 
 def _kept(workspace: Path | None, number: int, part: Evidence) -> Pose | None:
     """A finished window of an earlier run with the same evidence."""
-    file = workspace and workspace / f"pose-{number:05d}.npz"
-    if not file or not file.is_file():
+    if workspace is None:
         return None
     try:
-        with np.load(file, allow_pickle=False) as data:
-            for name in ("slopes", "depth_m", "trunk_m"):
-                if not np.array_equal(data[name], getattr(part, name)):
-                    return None
-            return Pose(data["turns"], data["translation_m"])
-    except (OSError, ValueError, KeyError):
-        return None
+        arrays, _ = read_arrays(_window_file(workspace, number))
+        if all(np.array_equal(arrays[name], getattr(part, name)) for name in _TOLD_BY):
+            return Pose(arrays["turns"], arrays["translation_m"])
+    except (Sd2Error, KeyError):
+        pass  # Missing or damaged: it is made again.
+    return None
 
 
 def _keep(workspace: Path | None, number: int, part: Evidence, found: Pose) -> None:
-    from sd2core.atomic import atomic_write
-
     if workspace is not None:
-        with atomic_write(workspace / f"pose-{number:05d}.npz") as stream:
-            np.savez(
-                stream,
-                slopes=part.slopes,
-                depth_m=part.depth_m,
-                trunk_m=part.trunk_m,
-                turns=found.turns,
-                translation_m=found.translation_m,
-            )
+        told = {name: getattr(part, name) for name in _TOLD_BY}
+        write_arrays(_window_file(workspace, number), told | found._asdict(), {})
+
+
+def _window_file(workspace: Path, number: int) -> Path:
+    return workspace / f"pose-{number:05d}.npz"

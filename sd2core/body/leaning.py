@@ -42,8 +42,7 @@ def with_leaning_arms(evidence: Evidence, rig: Rig) -> Evidence:
     Returns
     -------
     Evidence
-        With these depths, and their standard deviations no less than
-        :data:`_LEAN_SD_M`.
+        With these depths, known to 6 cm.
     """
     points_m = evidence.points_m
     back = _back(points_m)

@@ -6,8 +6,6 @@ A small temporal convolutional network, trained on simulated people (decision 18
 
 from __future__ import annotations
 
-import json
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.body.bundled_file import open_arrays
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.lifted import LiftedTrack
 from sd2core.body.lifter_features import RATE_HZ, Seen, features, mirrored, rate, typical_size
@@ -125,22 +124,10 @@ class Lifter:
             When the file is missing, damaged or of a later version.
         """
         path = resource_path("lifter.npz") if path is None else Path(path)
-        try:
-            with path.open("rb") as stream, np.load(stream, allow_pickle=False) as data:
-                meta = json.loads(str(data["meta"]))
-                if meta.get("format") != FORMAT or meta.get("version", 0) > VERSION:
-                    raise Sd2Error(
-                        f"{path} is of format {meta.get('format')!r} version {meta.get('version')}",
-                        f"{FORMAT!r} up to version {VERSION}",
-                        "Open it with the version of SD² Studio that wrote it",
-                    )
-                arrays = {name: data[name].astype(np.float32) for name in meta["arrays"]}
-                calibration = data["calibration"].astype(np.float32)
-        except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
-            raise Sd2Error(
-                f"{path} cannot be read as a lifter ({error})",
-                "a file written by `sd2 simulate train-lifter`",
-            ) from error
+        command = "sd2 simulate train-lifter"
+        with open_arrays(path, FORMAT, VERSION, "a lifter", command) as (meta, data):
+            arrays = {name: data[name].astype(np.float32) for name in meta["arrays"]}
+            calibration = data["calibration"].astype(np.float32)
         network = Network(tuple(meta["dilations"]), arrays, meta.get("beyond_rates", False))
         return cls(network, calibration, meta["provenance"])
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import zipfile
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,8 +11,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.body.bundled_file import open_arrays
 from sd2core.body.rotations import Floats, applied, product
-from sd2core.errors import Sd2Error
 from sd2core.resources import resource_path
 
 FORMAT = "sd2-body"
@@ -223,21 +221,9 @@ def read_body_arrays(names: Sequence[str], path: Path | None = None) -> list[NDA
         When the file is missing, damaged, of a later version, or lacks one of them.
     """
     path = resource_path("body.npz") if path is None else Path(path)
-    try:
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as data:
-            meta = json.loads(str(data["meta"]))
-            if meta.get("format") != FORMAT or meta.get("version", 0) > VERSION:
-                raise Sd2Error(
-                    f"{path} is of format {meta.get('format')!r} version {meta.get('version')}",
-                    f"{FORMAT!r} up to version {VERSION}",
-                    "Open it with the version of SD² Studio that wrote it",
-                )
-            return [data[name] for name in names]
-    except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
-        raise Sd2Error(
-            f"{path} cannot be read as a body ({error})",
-            "a file written by `sd2 simulate export-body`",
-        ) from error
+    command = "sd2 simulate export-body"
+    with open_arrays(path, FORMAT, VERSION, "a body", command) as (_, data):
+        return [data[name] for name in names]
 
 
 def vertex_normals(vertices_m: Floats, faces: NDArray[np.int32]) -> Floats:

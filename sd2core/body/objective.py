@@ -1,10 +1,10 @@
 """What a pose through time must agree with, and its Gauss–Newton equations.
 
-Six kinds of residuals, each divided by its standard deviation: landmarks in the
+Seven kinds of residuals, each divided by its standard deviation: landmarks in the
 picture, their depth behind the middle of the trunk, the trunk's own depth, their
-velocity along the optical axis, what joints do and can do, and smoothness (the
-acceleration of every degree of freedom). Landmarks, depths and velocities far off
-count less (iteratively reweighted least squares).
+velocity along the optical axis relative to it, what joints do and can do, arms behind
+the chest, and smoothness (the acceleration of every degree of freedom). Landmarks,
+depths and velocities far off count less (iteratively reweighted least squares).
 """
 
 from __future__ import annotations

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.roi import Floats, Roi
+from sd2core.presence import runs
 
 _CENTRE_S = 0.2
 _SIZE_S = 0.5
@@ -56,8 +57,7 @@ def roi_path(sightings: Sightings, times_s: Floats) -> list[Roi | None]:
     path: list[Roi | None] = [None] * len(times_s)
     found = np.isfinite(sightings.rois[:, 0])
     # Stretches of sightings in which the person was never lost.
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], found, [False]]).astype(np.int8)))
-    for start, stop in edges.reshape(-1, 2):
+    for start, stop in runs(found):
         frames = sightings.frames[start:stop]
         times = times_s[frames]
         rois = sightings.rois[start:stop].copy()

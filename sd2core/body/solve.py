@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
@@ -27,21 +26,12 @@ _STEPS = 8
 _CONVERGED = 1e-3
 
 
-class Solution(NamedTuple):
-    """A pose through time and what it was found with."""
-
-    pose: Pose
-    residuals: Residuals
-    acceleration_sd: Floats
-    costs: tuple[float, ...]
-
-
 def solve(
     rig: Rig,
     evidence: Evidence,
     start: Pose,
     tick: Callable[[int], None] = lambda done: None,
-) -> Solution:
+) -> Pose:
     """The pose through time that agrees best with the evidence.
 
     The smoothness follows the motion: after each round, every degree of freedom may
@@ -60,14 +50,13 @@ def solve(
     frames = len(evidence.times_s)
     sd = np.full((max(frames - 2, 0), rig.freedoms), _FIRST_ROTATION_RADPS2)
     sd[:, -3:] = _FIRST_TRANSLATION_MPS2
-    pose, costs = start, []
+    pose = start
     for number in range(ROUNDS):
         objective = Objective(rig, evidence, sd)
-        pose, least = _descend(objective, pose, robust=number > 0, tick=partial(tick, number))
-        costs.append(least)
+        pose = _descend(objective, pose, robust=number > 0, tick=partial(tick, number))
         if number < ROUNDS - 1:
             sd = _liveliness(objective.accelerations(pose), evidence.times_s)
-    return Solution(pose, objective.residuals(pose), sd, tuple(costs))
+    return pose
 
 
 def solve_stills(rig: Rig, evidence: Evidence, start: Pose) -> Pose:
@@ -75,18 +64,15 @@ def solve_stills(rig: Rig, evidence: Evidence, start: Pose) -> Pose:
     apart = replace(evidence, velocity_sd_mps=np.full_like(evidence.velocity_sd_mps, np.inf))
     sd = np.full((max(len(evidence.times_s) - 2, 0), rig.freedoms), np.inf)
     objective = Objective(rig, apart, sd)
-    pose, _ = _descend(objective, start, robust=False, tick=lambda: None)
-    return _descend(objective, pose, robust=True, tick=lambda: None)[0]
+    pose = _descend(objective, start, robust=False, tick=lambda: None)
+    return _descend(objective, pose, robust=True, tick=lambda: None)
 
 
-def _descend(
-    objective: Objective, pose: Pose, *, robust: bool, tick: Callable[[], None]
-) -> tuple[Pose, float]:
+def _descend(objective: Objective, pose: Pose, *, robust: bool, tick: Callable[[], None]) -> Pose:
     """Levenberg–Marquardt until the cost hardly falls."""
     damping = 1e-4
     residuals = objective.residuals(pose)
     plain = Residuals(*[np.ones(1)] * len(residuals))
-    now = np.inf
     for _ in range(_STEPS):
         tick()
         trust = objective.trust(residuals) if robust else plain
@@ -99,12 +85,12 @@ def _descend(
                 break
             damping = max(damping, 1e-4) * 10.0
         else:
-            return pose, now
+            return pose
         pose, residuals = tried, found
         damping = max(damping / 10.0, 1e-6)
         if now - then < _CONVERGED * now:
             break
-    return pose, now
+    return pose
 
 
 def _liveliness(accelerations: Floats, times_s: Floats) -> Floats:

@@ -13,6 +13,7 @@ from sd2app.models.playback import PlaybackModel
 from sd2app.models.visible_span import VisibleSpanModel
 from sd2app.views.comparison.pictures import colour_of
 from sd2app.views.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, signed_text, ticks
+from sd2core.presence import runs
 
 _TITLE_PX = 24
 _LEAST_MPS = 0.2
@@ -130,8 +131,7 @@ class JointCurves(QWidget):
         self, times_s: np.ndarray, velocity: np.ndarray, plot: QRectF, limit: float
     ) -> list[QPolygonF]:
         """The stretches without a gap, in pixels."""
-        scale, known = self.scale, np.isfinite(velocity)
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]])))
+        scale = self.scale
         return [
             QPolygonF(
                 [
@@ -142,7 +142,7 @@ class JointCurves(QWidget):
                     for k in range(start, stop)
                 ]
             )
-            for start, stop in zip(edges[::2], edges[1::2], strict=True)
+            for start, stop in runs(np.isfinite(velocity))
         ]
 
 
