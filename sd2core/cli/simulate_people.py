@@ -50,7 +50,6 @@ def add_people(kinds: argparse._SubParsersAction) -> None:
         "train-lifter",
         "train the lifter of `sd2 fit` on takes of lifter-data",
         handler=_train,
-        description='Needs the "train" extra: pip install "sd2-studio[train]".',
         examples=(
             "  sd2 simulate train-lifter people --out lifter.npz\n"
             "  sd2 simulate train-lifter people more --start lifter.npz --out better.npz"
@@ -113,14 +112,6 @@ def _train(options: argparse.Namespace) -> None:
     check_output(options.out, ".npz")
     takes = [take for folder in options.data for take in _takes(folder)]
     start = Lifter.load(options.start) if options.start else None
-    try:
-        import torch  # noqa: F401
-    except ImportError as error:
-        raise Sd2Error(
-            f"torch cannot be loaded ({error})",
-            "torch, to train",
-            'pip install "sd2-studio[train]"',
-        ) from error
     from sd2core.simulate.people.train_lifter import Recipe, save_lifter, train_on
 
     with progress_bar("Training", unit="step") as progress:

@@ -1,0 +1,1 @@
+"""A body driven by a recorded skeleton."""

@@ -1,0 +1,409 @@
+"""Pairs to learn from: synthetic Doppler beside what a radar saw of the same movement.
+
+On disk a Zarr store with all takes one after another along the frames, and beside the
+arrays ``takes.jsonl``, one line per take. A take counts once its line is there, so a
+writer that is killed leaves whole takes.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal, NamedTuple, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+from sd2core.sensor import VelocityAxis
+
+PairKind = Literal["simulated", "real"]
+"""Whether the targets come from a simulated radar or from a real one."""
+
+FORMAT = "sd2-pairs"
+VERSION = 1
+INDEX_NAME = "takes.jsonl"
+
+_CHUNK_FRAMES = 2250
+_REMAKE = "Make the pairs again with `sd2 simulate campaign` or `sd2 pairs`"
+
+
+class TakeKey(NamedTuple):
+    """What no two takes of a set share."""
+
+    subject: str
+    name: str
+    placement: int
+
+
+@dataclass(frozen=True, eq=False)
+class Take:
+    """One uninterrupted stretch, seen by one sensor.
+
+    Parameters
+    ----------
+    subject : str
+    name : str
+        Unique within the subject.
+    synthetic : float32 array, shape (frames, bins)
+        Input: share of vertices per bin.
+    radar : float32 array, shape (frames, bins)
+        Target, on the same axis.
+    times_s : float64 array, shape (frames,)
+        From the start of the take.
+    label : int8 array, shape (frames,)
+        Index into :attr:`PairSet.labels`; 0 is background.
+    sensor_position_m : float64 array, shape (3,)
+        (0, 0, 0) is at the camera.
+    placement : int
+        0 for the take's own sensor; 1 and up are the same movement seen from elsewhere.
+    """
+
+    subject: str
+    name: str
+    synthetic: NDArray[np.float32]
+    radar: NDArray[np.float32]
+    times_s: NDArray[np.float64]
+    label: NDArray[np.int8]
+    sensor_position_m: NDArray[np.float64]
+    placement: int = 0
+
+    def __post_init__(self) -> None:
+        frames = len(self.times_s)
+        if self.synthetic.ndim != 2 or self.synthetic.shape != self.radar.shape:
+            raise Sd2Error(
+                f"Take {self.title}: synthetic is of shape {self.synthetic.shape}, radar of"
+                f" {self.radar.shape}",
+                "(frames, bins), both the same",
+            )
+        if not len(self.synthetic) == len(self.label) == frames > 0:
+            raise Sd2Error(
+                f"Take {self.title}: {len(self.synthetic)} frames, {len(self.label)} labels,"
+                f" {frames} times",
+                "the same number, at least one",
+            )
+        for name in ("synthetic", "radar"):
+            values = getattr(self, name)
+            if not (np.isfinite(values).all() and (values >= 0).all()):
+                raise Sd2Error(
+                    f"Take {self.title}: {name} holds values that are negative or not finite",
+                    "finite values, zero or more",
+                )
+
+    @property
+    def key(self) -> TakeKey:
+        """What no other take shares."""
+        return TakeKey(self.subject, self.name, self.placement)
+
+    @property
+    def title(self) -> str:
+        """To name it in a message."""
+        return f"{self.subject}/{self.name}" + (f"@{self.placement}" if self.placement else "")
+
+
+@dataclass(frozen=True, eq=False)
+class PairSet:
+    """Takes that share an axis, a frame rate and labels.
+
+    Parameters
+    ----------
+    kind : {"simulated", "real"}
+    axis : VelocityAxis
+    null_bins : tuple of int
+        Bins that are zero on purpose, in input and target.
+    frame_rate_hz : float
+    labels : tuple of str
+        The first is the background.
+    takes : tuple of Take
+    provenance : dict
+        How it was made; kept as JSON.
+    """
+
+    kind: PairKind
+    axis: VelocityAxis
+    null_bins: tuple[int, ...]
+    frame_rate_hz: float
+    labels: tuple[str, ...]
+    takes: tuple[Take, ...]
+    provenance: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def subjects(self) -> tuple[str, ...]:
+        """In the order of their first takes."""
+        return tuple(dict.fromkeys(take.subject for take in self.takes))
+
+    @property
+    def frames(self) -> int:
+        """Of all takes together."""
+        return sum(len(take.times_s) for take in self.takes)
+
+    def of(self, subjects: Iterable[str]) -> PairSet:
+        """The takes of these subjects.
+
+        Raises
+        ------
+        Sd2Error
+            When a subject has no take.
+        """
+        wanted = tuple(subjects)
+        missing = [name for name in wanted if name not in self.subjects]
+        if missing:
+            raise Sd2Error(
+                f"No takes of subject {', '.join(missing)}", f"one of {', '.join(self.subjects)}"
+            )
+        return replace(self, takes=tuple(take for take in self.takes if take.subject in wanted))
+
+    def placements(self, *, first_only: bool) -> PairSet:
+        """All takes, or only what every take's own sensor saw."""
+        if not first_only:
+            return self
+        return replace(self, takes=tuple(take for take in self.takes if take.placement == 0))
+
+
+class PairWriter:
+    """Appends takes to a store; goes on with one that was begun.
+
+    Parameters
+    ----------
+    path : Path
+        Folder of the Zarr store; made when it is not there.
+    kind, axis, null_bins, frame_rate_hz, labels, provenance
+        As :class:`PairSet` has them. What is there already must agree.
+
+    Raises
+    ------
+    Sd2Error
+        When the path holds something else, or pairs of another kind.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        *,
+        kind: PairKind,
+        axis: VelocityAxis,
+        null_bins: Sequence[int],
+        frame_rate_hz: float,
+        labels: Sequence[str],
+        provenance: dict[str, Any],
+    ) -> None:
+        self._path = Path(path)
+        header = {
+            "format": FORMAT,
+            "version": VERSION,
+            "kind": kind,
+            "bins": axis.bins,
+            "v_max_mps": axis.v_max_mps,
+            "null_bins": list(null_bins),
+            "frame_rate_hz": float(frame_rate_hz),
+            "labels": list(labels),
+            "provenance": json.loads(json.dumps(provenance)),
+        }
+        if (self._path / "zarr.json").exists():
+            self._group = _reopened(self._path, header)
+        else:
+            self._group = _begun(self._path, header)
+        self._index = _read_index(self._path)
+        _drop_torn_line(self._path, len(self._index))
+        self._frames = max((entry["stop"] for entry in self._index), default=0)
+
+    @property
+    def done(self) -> set[TakeKey]:
+        """Takes that are there."""
+        return {_key(entry) for entry in self._index}
+
+    def append(self, take: Take) -> None:
+        """Add one take.
+
+        Raises
+        ------
+        Sd2Error
+            When it is there already, or of other bins or labels.
+        """
+        if take.key in self.done:
+            raise Sd2Error(f"{self._path} already holds the take {take.title}", "each take once")
+        header = self._group.attrs
+        if take.synthetic.shape[1] != header["bins"]:
+            raise Sd2Error(
+                f"Take {take.title} has {take.synthetic.shape[1]} bins",
+                f"{header['bins']}, as {self._path} has",
+            )
+        if not 0 <= take.label.min() <= take.label.max() < len(header["labels"]):
+            raise Sd2Error(
+                f"Take {take.title} has labels from {take.label.min()} to {take.label.max()}",
+                f"0 to {len(header['labels']) - 1}",
+            )
+        start, stop = self._frames, self._frames + len(take.times_s)
+        for name in ("synthetic", "radar", "times_s", "label"):
+            array: Any = self._group[name]
+            # What a killed writer left beyond the last line is written over.
+            if array.shape[0] < stop:
+                array.resize((stop, *array.shape[1:]))
+            array[start:stop] = getattr(take, name)
+        entry = {
+            "subject": take.subject,
+            "name": take.name,
+            "placement": take.placement,
+            "start": start,
+            "stop": stop,
+            "sensor_position_m": [float(x) for x in take.sensor_position_m],
+        }
+        with (self._path / INDEX_NAME).open("a", encoding="utf-8") as index:
+            index.write(json.dumps(entry) + "\n")
+            index.flush()
+            os.fsync(index.fileno())
+        self._index.append(entry)
+        self._frames = stop
+
+
+def is_pair_store(path: Path) -> bool:
+    """Whether a folder looks like pairs; reads one small file."""
+    try:
+        header = json.loads((Path(path) / "zarr.json").read_text(encoding="utf-8"))
+        return bool(header["attributes"]["format"] == FORMAT)
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
+
+
+def read_pairs(path: Path) -> PairSet:
+    """Read a store of pairs.
+
+    Raises
+    ------
+    Sd2Error
+        When it is none, of a newer version, empty or damaged.
+    """
+    import zarr
+
+    path = Path(path)
+    if not is_pair_store(path):
+        raise Sd2Error(
+            f"{path} holds no pairs of synthetic and radar Doppler",
+            "a folder made by `sd2 simulate campaign` or `sd2 pairs`",
+        )
+    group = zarr.open_group(str(path), mode="r")
+    header: dict[str, Any] = dict(group.attrs)
+    _check_version(path, header)
+    index = _read_index(path)
+    if not index:
+        raise Sd2Error(f"{path} holds no take yet", "at least one", _REMAKE)
+    arrays: dict[str, Any] = {}
+    frames = max(entry["stop"] for entry in index)
+    for name in ("synthetic", "radar", "times_s", "label"):
+        if name not in group or group[name].shape[0] < frames:
+            raise Sd2Error(
+                f"{path}: the array {name} is missing or shorter than {INDEX_NAME} says",
+                f"{frames} frames",
+                _REMAKE,
+            )
+        arrays[name] = group[name][:frames]
+    takes = tuple(
+        Take(
+            subject=entry["subject"],
+            name=entry["name"],
+            placement=entry["placement"],
+            sensor_position_m=np.array(entry["sensor_position_m"], np.float64),
+            **{name: array[entry["start"] : entry["stop"]] for name, array in arrays.items()},
+        )
+        for entry in index
+    )
+    try:
+        kind = header["kind"]
+        if kind not in get_args(PairKind):
+            raise Sd2Error(f"{path}: its kind is {kind!r}", f"one of {get_args(PairKind)}")
+        return PairSet(
+            kind=kind,
+            axis=VelocityAxis(int(header["bins"]), float(header["v_max_mps"])),
+            null_bins=tuple(header["null_bins"]),
+            frame_rate_hz=float(header["frame_rate_hz"]),
+            labels=tuple(header["labels"]),
+            takes=takes,
+            provenance=header["provenance"],
+        )
+    except KeyError as error:
+        raise Sd2Error(
+            f"{path}: its header lacks {error}", f"{FORMAT} {VERSION}", _REMAKE
+        ) from None
+
+
+def _check_version(path: Path, header: dict[str, Any]) -> None:
+    if header.get("version") != VERSION:
+        raise Sd2Error(
+            f"{path} is of version {header.get('version')}", f"version {VERSION}", _REMAKE
+        )
+
+
+def _begun(path: Path, header: dict[str, Any]) -> Any:
+    import zarr
+
+    if path.exists() and (not path.is_dir() or any(path.iterdir())):
+        raise Sd2Error(f"{path} is there and holds no pairs", "a new or empty folder")
+    group = zarr.open_group(str(path), mode="w", attributes=header)
+    bins = header["bins"]
+    for name, shape, kind in (
+        ("synthetic", (0, bins), "float32"),
+        ("radar", (0, bins), "float32"),
+        ("times_s", (0,), "float64"),
+        ("label", (0,), "int8"),
+    ):
+        group.create_array(
+            name, shape=shape, dtype=kind, chunks=(_CHUNK_FRAMES, *shape[1:]), fill_value=0
+        )
+    return group
+
+
+def _reopened(path: Path, header: dict[str, Any]) -> Any:
+    import zarr
+
+    if not is_pair_store(path):
+        raise Sd2Error(f"{path} is there and holds no pairs", "a new or empty folder")
+    group = zarr.open_group(str(path), mode="r+")
+    there = dict(group.attrs)
+    for name, value in header.items():
+        if there.get(name) != value:
+            raise Sd2Error(
+                f"{path} was begun with {name} {there.get(name)}",
+                f"{value}, as it is asked for now",
+                "Go on with the same settings, or choose another folder",
+            )
+    return group
+
+
+def _read_index(path: Path) -> list[dict[str, Any]]:
+    """Lines of takes; the last one is left out when it was not written to its end."""
+    index = path / INDEX_NAME
+    if not index.exists():
+        return []
+    lines = index.read_text(encoding="utf-8").split("\n")
+    entries = []
+    for number, line in enumerate(lines[:-1], start=1):
+        try:
+            entry = json.loads(line)
+            _key(entry), entry["stop"] - entry["start"], entry["sensor_position_m"]
+        except (ValueError, KeyError, TypeError):
+            raise Sd2Error(
+                f"{index}: line {number} cannot be read: {line[:80]!r}",
+                "one take, as JSON",
+                "Delete the line to lose that take alone",
+            ) from None
+        entries.append(entry)
+    return entries
+
+
+def _drop_torn_line(path: Path, lines: int) -> None:
+    index = path / INDEX_NAME
+    if not index.exists():
+        return
+    content = index.read_bytes()
+    if not content.endswith(b"\n"):
+        whole = content[: content.rfind(b"\n") + 1]
+        assert whole.count(b"\n") == lines
+        with index.open("r+b") as file:
+            file.truncate(len(whole))
+
+
+def _key(entry: dict[str, Any]) -> TakeKey:
+    return TakeKey(entry["subject"], entry["name"], entry["placement"])

@@ -1,0 +1,72 @@
+"""Windows of equal length to learn from, and back."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+
+LENGTH = 72
+OVERLAP = 10
+"""Frames, as the paper cuts them."""
+
+
+def segment_starts(frames: int, length: int = LENGTH, overlap: int = OVERLAP) -> NDArray[np.int64]:
+    """First frames of the windows that cover a stretch.
+
+    Neighbours share ``overlap`` frames; the last window ends with the stretch and may
+    share more. A stretch shorter than a window has none.
+
+    Raises
+    ------
+    Sd2Error
+        When the overlap is not smaller than the length.
+    """
+    if not 0 <= overlap < length:
+        raise Sd2Error(
+            f"Windows of {length} frames overlap by {overlap}", f"an overlap of 0 to {length - 1}"
+        )
+    if frames < length:
+        return np.zeros(0, np.int64)
+    starts = np.arange(0, frames - length + 1, length - overlap)
+    if starts[-1] + length < frames:
+        starts = np.append(starts, frames - length)
+    return starts
+
+
+def cut(
+    values: NDArray[np.float32], starts: NDArray[np.int64], length: int = LENGTH
+) -> NDArray[np.float32]:
+    """Windows of a stretch: (frames, bins) → (windows, length, bins)."""
+    cut_out: NDArray[np.float32] = values[starts[:, None] + np.arange(length)]
+    return cut_out
+
+
+def join(
+    windows: NDArray[np.float32], starts: NDArray[np.int64], frames: int
+) -> NDArray[np.float32]:
+    """Put windows back together, blended linearly where they overlap.
+
+    Parameters
+    ----------
+    windows : float32 array, shape (windows, length, bins)
+    starts : int array, shape (windows,)
+        They cover every frame.
+    frames : int
+
+    Returns
+    -------
+    float32 array, shape (frames, bins)
+    """
+    length = windows.shape[1]
+    # Towards its ends a window knows less of what is around a frame.
+    ramp = np.minimum(np.arange(1, length + 1), np.arange(length, 0, -1)).astype(np.float64)
+    joined = np.zeros((frames, windows.shape[2]))
+    weight = np.zeros(frames)
+    for window, start in zip(windows, starts, strict=True):
+        joined[start : start + length] += ramp[:, None] * window
+        weight[start : start + length] += ramp
+    if not weight.all():
+        raise ValueError(f"frame {int(np.argmin(weight))} is in no window")
+    return (joined / weight[:, None]).astype(np.float32)
