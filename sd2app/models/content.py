@@ -65,9 +65,11 @@ def recording_of(paths: Sequence[Path], base: Recording | None = None) -> Record
     kinds: dict[Kind, Path] = {}
     for path in paths:
         kind = kind_of(path)
-        if kind == "map":
+        if kind in ("map", "pairs"):
             raise Sd2Error(
-                f"{path} is a Doppler map",
+                f"{path} is a Doppler map"
+                if kind == "map"
+                else f"{path} holds pairs to learn from",
                 "a recording, video, mesh or radar capture",
                 "Look at it with `sd2 info`",
             )

@@ -1,4 +1,4 @@
-"""``sd2 info``: what is in a recording, video, mesh, capture or map."""
+"""``sd2 info``: what is in a recording, video, mesh, capture, map or pairs."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser = add_command(
         commands,
         "info",
-        "what is in a recording, video, mesh, radar capture or Doppler map",
+        "what is in a recording, video, mesh, radar capture, Doppler map or pairs",
         handler=_info,
         examples="  sd2 info walk.sd2\n  sd2 info walk.npz --json",
     )
@@ -91,6 +91,11 @@ def describe(path: Path, options: argparse.Namespace) -> Description:
         from sd2core.io.radar import load_capture
 
         return describe_capture(path, load_capture(path))
+    if kind == "pairs":
+        from sd2core.cli.info_pairs import describe_pairs
+        from sd2core.pairs import read_pairs
+
+        return describe_pairs(path, read_pairs(path))
     from sd2core.spectrum import DopplerMap
 
     return describe_map(path, DopplerMap.load(path))
@@ -242,19 +247,19 @@ def describe_map(path: Path, doppler: DopplerMap) -> Description:
         "time": _clock(doppler.timebase),
         "no person": _gaps(doppler.present, doppler.timebase),
         "unit": doppler.unit,
-        "nulled bins": _bins(doppler.axis, doppler.null_bins),
+        "nulled bins": bins_in_words(doppler.axis, doppler.null_bins),
         "known to": ""
         if doppler.uncertainty is None
         else f"±{_deviation(doppler):.0%} of a value (root mean square; the median of the cells"
         " that are not faint)",
-        "unseen bins": _bins(doppler.axis, doppler.unseen_bins),
+        "unseen bins": bins_in_words(doppler.axis, doppler.unseen_bins),
         **_synthesis_facts(doppler.meta),
     }
     notes = tuple(doppler.meta.get("notes", ()))
     return Description(f"Doppler map {path}", data, facts, notes)
 
 
-def _bins(axis: VelocityAxis, bins: tuple[int, ...]) -> str:
+def bins_in_words(axis: VelocityAxis, bins: tuple[int, ...]) -> str:
     """Their numbers and the velocities that they cover."""
     if not bins:
         return ""

@@ -7,16 +7,17 @@ from pathlib import Path
 from typing import Literal
 
 from sd2core.errors import Sd2Error
+from sd2core.pairs import is_pair_store
 from sd2core.relative_paths import is_pattern
 
-Kind = Literal["recording", "video", "mesh", "radar", "map"]
+Kind = Literal["recording", "video", "mesh", "radar", "map", "pairs"]
 
 VIDEO_SUFFIXES = frozenset({".mp4", ".mkv", ".mov", ".avi", ".webm", ".m4v", ".mpg", ".ts", ".wmv"})
 MESH_SUFFIXES = frozenset({".obj", ".ply", ".glb", ".pkl", ".pickle", ".joblib"})
 
 
 def kind_of(path: Path) -> Kind:
-    """Recognise a recording, video, mesh, radar capture or Doppler map.
+    """Recognise a recording, video, mesh, radar capture, Doppler map or pairs.
 
     Raises
     ------
@@ -51,6 +52,8 @@ def kind_of(path: Path) -> Kind:
 def _kind_of_folder(folder: Path) -> Kind:
     if (folder / "recording.json").exists():
         return "recording"
+    if is_pair_store(folder):
+        return "pairs"
     if (folder / "zarr.json").exists() or folder.suffix == ".zarr":
         return "mesh"
     if (folder / "radar.npy").exists() or any(folder.glob("*/radar.npy")):
