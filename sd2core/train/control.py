@@ -1,0 +1,101 @@
+"""Steering a run from outside: one word in a file, which the training reads at every step.
+
+A file works on every system, needs no open connection, and a window that was closed and
+opened again can go on steering.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+from sd2core.atomic import atomic_write_text
+
+Word = Literal["run", "pause", "stop", "cancel"]
+WORDS: tuple[Word, ...] = get_args(Word)
+
+_PAUSED_POLL_S = 0.1
+
+
+def write_control(path: Path, word: Word) -> None:
+    """Tell a run what to do."""
+    atomic_write_text(path, word + "\n")
+
+
+def read_control(path: Path) -> Word:
+    """What a run was told; ``run`` where nothing, or nothing that is known, was said."""
+    try:
+        text = path.read_text(encoding="utf-8").strip()
+    except (OSError, UnicodeDecodeError):
+        return "run"
+    for word in WORDS:
+        if text == word:
+            return word
+    return "run"
+
+
+class Control:
+    """What a run is told, by its file or by a signal.
+
+    Parameters
+    ----------
+    path : Path
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._signal: signal.Signals | None = None
+
+    @property
+    def signal(self) -> signal.Signals | None:
+        """The signal that asked for the end, if one did."""
+        return self._signal
+
+    def word(self) -> Word:
+        """What to do now. A signal means ``stop``, unless the file says ``cancel``."""
+        word = read_control(self._path)
+        if self._signal is not None and word != "cancel":
+            return "stop"
+        return word
+
+    def wait_while_paused(self, sleep: Callable[[float], None] = time.sleep) -> tuple[Word, float]:
+        """Wait until the word is another than ``pause``.
+
+        Returns
+        -------
+        word : Word
+        seconds : float
+            How long it took.
+        """
+        begun_s = time.monotonic()
+        while (word := self.word()) == "pause":
+            sleep(_PAUSED_POLL_S)
+        return word, time.monotonic() - begun_s
+
+    def take_signals(self) -> None:
+        """Let SIGTERM and SIGINT mean ``stop``; only in the main thread."""
+        if threading.current_thread() is threading.main_thread():
+            for number in (signal.SIGTERM, signal.SIGINT):
+                signal.signal(number, self._note)
+
+    def _note(self, number: int, frame: Any) -> None:
+        self._signal = signal.Signals(number)
+
+
+@contextmanager
+def signals_kept() -> Iterator[None]:
+    """Put back how SIGTERM and SIGINT were handled."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGINT)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

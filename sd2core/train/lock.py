@@ -1,0 +1,73 @@
+"""A file that a process holds for as long as it lives.
+
+The system lets go of it whatever ends the process, and no later process inherits it, as
+one may inherit a number: so it tells a run under way from one that died.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import IO
+
+if sys.platform == "win32":
+    import msvcrt
+
+    def _grab(stream: IO[bytes]) -> bool:
+        stream.seek(0)
+        try:
+            msvcrt.locking(stream.fileno(), msvcrt.LK_NBLCK, 1)
+        except OSError:
+            return False
+        return True
+else:
+    import fcntl
+
+    def _grab(stream: IO[bytes]) -> bool:
+        try:
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            return False
+        return True
+
+
+class FileLock:
+    """Exclusive hold on a file, once taken.
+
+    Parameters
+    ----------
+    path : Path
+        Made when it is not there.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._stream: IO[bytes] | None = None
+
+    def take(self) -> bool:
+        """Whether it could be taken; False when another process, or this one, holds it."""
+        stream = self._path.open("ab")
+        if not _grab(stream):
+            stream.close()
+            return False
+        self._stream = stream
+        return True
+
+    def release(self) -> None:
+        """Let go."""
+        if self._stream is not None:
+            self._stream.close()
+            self._stream = None
+
+
+def is_locked(path: Path) -> bool:
+    """Whether a process holds the file."""
+    if not path.exists():
+        return False
+    try:
+        lock = FileLock(path)
+        free = lock.take()
+    except OSError:  # somebody else's file, or one that was deleted just now
+        return False
+    lock.release()
+    return not free

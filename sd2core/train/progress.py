@@ -1,0 +1,148 @@
+"""Progress of a run as JSON lines: written by the training, read by whoever looks on.
+
+``docs/formats.md`` says what the lines mean. The file is only ever added to, so that
+whoever follows it never misses a line; a run that is resumed says from where, and
+:func:`standing` drops what that makes void.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, Self
+
+Event = dict[str, Any]
+
+
+class ProgressWriter:
+    """Adds lines to a file, at once.
+
+    Parameters
+    ----------
+    path : Path
+        Made when it is not there. A last line that a kill tore off is ended, so that
+        the next one begins anew.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        torn = path.exists() and path.read_bytes()[-1:] not in (b"", b"\n")
+        self._stream = path.open("a", encoding="utf-8")
+        if torn:
+            self._stream.write("\n")
+
+    def say(self, event: str, **content: Any) -> None:
+        """Write one line; numbers that are not finite become null."""
+        line = {"event": event, **{key: _plain(value) for key, value in content.items()}}
+        self._stream.write(json.dumps(line, ensure_ascii=False) + "\n")
+        self._stream.flush()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stream.close()
+
+
+class StepLines:
+    """Keeps the lines of single steps few: at most two a second.
+
+    Parameters
+    ----------
+    writer : ProgressWriter
+    every_s : float
+    """
+
+    def __init__(self, writer: ProgressWriter, every_s: float = 0.5) -> None:
+        self._writer = writer
+        self._every_s = every_s
+        self._last_s = -math.inf
+
+    @property
+    def due(self) -> bool:
+        """Whether it is time for a line."""
+        return time.monotonic() - self._last_s >= self._every_s
+
+    def say(self, **content: Any) -> None:
+        """Write a line of a step."""
+        self._last_s = time.monotonic()
+        self._writer.say("step", **content)
+
+
+class ProgressTail:
+    """Follows a file that grows.
+
+    Parameters
+    ----------
+    path : Path
+        May not be there yet.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._offset = 0
+
+    def new(self) -> list[Event]:
+        """Whole lines since the last call; a line that is still being written comes later."""
+        try:
+            with self._path.open("rb") as stream:
+                stream.seek(self._offset)
+                content = stream.read()
+        except OSError:  # not there yet, or discarded
+            return []
+        whole = content[: content.rfind(b"\n") + 1]
+        self._offset += len(whole)
+        return [event for line in whole.splitlines() if (event := _parsed(line)) is not None]
+
+
+def read_events(path: Path) -> list[Event]:
+    """All lines of a file that are whole; none where there is no file."""
+    return ProgressTail(path).new()
+
+
+def standing(events: Iterable[Event]) -> list[Event]:
+    """The lines that count: where a run was resumed, what it did again is dropped.
+
+    A kill loses the steps since the last checkpoint. They are done again, with the same
+    result, and would be there twice.
+    """
+    kept: list[Event] = []
+    for event in events:
+        if event["event"] == "start" and event.get("resumed"):
+            done = int(event.get("steps_done", 0))
+            kept = [one for one in kept if not _undone(one, done)]
+        kept.append(event)
+    return kept
+
+
+def last_of(events: Iterable[Event], kind: str) -> Event | None:
+    """The last line of a kind."""
+    found = None
+    for event in events:
+        if event["event"] == kind:
+            found = event
+    return found
+
+
+def _undone(event: Event, done: int) -> bool:
+    if event["event"] in ("end", "stopping", "paused", "resumed"):
+        return True
+    return event["event"] in ("step", "epoch") and int(event.get("step", 0)) > done
+
+
+def _parsed(line: bytes) -> Event | None:
+    try:
+        event = json.loads(line)
+    except ValueError:  # torn by a kill
+        return None
+    return event if isinstance(event, dict) and isinstance(event.get("event"), str) else None
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, float):
+        # Seven digits tell apart what single precision does.
+        return float(f"{value:.7g}") if math.isfinite(value) else None
+    return value

@@ -1,0 +1,125 @@
+"""Settings of a run: what is refused, and that TOML loses nothing."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import settings as hypothesis_settings
+from hypothesis import strategies as st
+
+from sd2core.errors import Sd2Error
+from sd2core.train.config import (
+    DataConfig,
+    MachineConfig,
+    ModelConfig,
+    TrainConfig,
+    TrainingConfig,
+    config_from,
+    config_text,
+    read_config,
+    settings,
+)
+
+NAMES = st.text(st.characters(codec="utf-8", exclude_categories=("Cs",)), min_size=1)
+SHARES = st.floats(0.0, 0.5)
+
+
+@st.composite
+def configs(draw: st.DrawFn) -> TrainConfig:
+    names = draw(st.lists(st.text("abc ä'\"\\", min_size=1), min_size=1, max_size=3))
+    frames = draw(st.integers(2, 500))
+    return TrainConfig(
+        DataConfig(
+            pairs=tuple(Path("/data") / name.replace("\\", "_") for name in names),
+            validation_subjects=draw(st.none() | st.lists(NAMES).map(tuple)),
+            segment_frames=frames,
+            overlap_frames=draw(st.integers(0, frames - 1)),
+            range_factor=draw(st.floats(1.0, 4.0)),
+        ),
+        ModelConfig(
+            draw(NAMES),
+            draw(st.dictionaries(NAMES, st.booleans() | st.integers() | SHARES | NAMES)),
+        ),
+        TrainingConfig(
+            minutes=draw(st.none() | st.floats(0.01, 1000.0)),
+            learning_rate=draw(st.floats(1e-8, 1.0)),
+            seed=draw(st.integers(0, 2**31 - 1)),
+        ),
+        MachineConfig(deterministic=draw(st.booleans())),
+    )
+
+
+@given(configs())
+@hypothesis_settings(max_examples=40)
+def test_toml_and_back(config: TrainConfig) -> None:
+    folder = Path("/somewhere/run")
+    again = config_from(tomllib.loads(config_text(config, folder)), folder)
+    assert again == config
+
+
+def test_paths_are_relative_to_the_file(tmp_path: Path) -> None:
+    (tmp_path / "settings").mkdir()
+    path = tmp_path / "settings" / "a.toml"
+    path.write_text('[data]\npairs = ["../campaign.zarr", "/far/mars.zarr"]\n')
+    config = read_config(path)
+    assert config.data.pairs == (tmp_path / "campaign.zarr", Path("/far/mars.zarr"))
+    # As the paper has it.
+    assert (config.data.segment_frames, config.data.overlap_frames) == (72, 10)
+    assert (config.training.batch_size, config.training.epochs) == (64, 500)
+    assert config.model == ModelConfig("s4")
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ({"training": {"epochs": 0}}, "training.epochs is 0. Expected: a whole number from 1"),
+        ({"training": {"epochs": 2.5}}, r"training.epochs is 2.5"),
+        ({"training": {"epochs": True}}, "training.epochs is True"),
+        ({"training": {"learning_rate": float("nan")}}, "training.learning_rate is nan"),
+        ({"training": {"select_by": "loss"}}, "is 'loss'. Expected: one of rmse, mae"),
+        ({"machine": {"device": "tpu"}}, "machine.device is 'tpu'. Expected: one of auto, cpu, cu"),
+        ({"machine": {"deterministic": 1}}, "machine.deterministic is 1. Expected: true or false"),
+        ({"data": {"overlap_frames": 72}}, "data.overlap_frames is 72. Expected: less than"),
+        ({"data": {"test_subjects": "anna"}}, "data.test_subjects is 'anna'. Expected: a list"),
+        ({"data": {"pairs": []}}, "data.pairs is"),
+        ({"model": {"options": {"channels": [1]}}}, "model.options is"),
+        ({"model": "s4"}, r"model is 's4'. Expected: a section \[model\]"),
+        ({"training": {"epoch": 3}}, r"unknown setting in \[training\]: epoch. Expected: one of"),
+        ({"trainer": {}}, "unknown section: trainer. Expected: one of data, model, training, mach"),
+    ],
+)
+def test_what_is_refused_and_how(content: dict[str, Any], said: str) -> None:
+    content = {"data": {"pairs": ["a"]}} | content
+    if "pairs" not in content["data"]:
+        content["data"] = {"pairs": ["a"], **content["data"]}
+    with pytest.raises(Sd2Error, match=said):
+        config_from(content, Path("/"))
+
+
+def test_no_pairs() -> None:
+    with pytest.raises(Sd2Error, match="name no pairs"):
+        config_from({}, Path("/"))
+
+
+def test_what_is_no_toml(tmp_path: Path) -> None:
+    with pytest.raises(Sd2Error, match="does not exist"):
+        read_config(tmp_path / "a.toml")
+    (tmp_path / "a.toml").write_text("[data")
+    with pytest.raises(Sd2Error, match="cannot be read"):
+        read_config(tmp_path / "a.toml")
+
+
+def test_every_setting_is_explained() -> None:
+    assert all(one.about and one.allowed for one in settings())
+    assert len({(one.section, one.name) for one in settings()}) == len(settings()) > 20
+
+
+def test_replacing_checks_too() -> None:
+    config = TrainConfig(DataConfig((Path("a"),)))
+    assert config.with_values({"training": {"epochs": 3}}).training.epochs == 3
+    with pytest.raises(Sd2Error, match=r"training\.epochs is -1"):
+        config.with_values({"training": {"epochs": -1}})
