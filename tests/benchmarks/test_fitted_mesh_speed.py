@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,7 +29,7 @@ def kernels() -> None:
     warm_up()
 
 
-def test_posing_the_finest_surface(capsys: pytest.CaptureFixture[str]) -> None:
+def test_posing_the_finest_surface(benchmark: Any, capsys: pytest.CaptureFixture[str]) -> None:
     body = Body.load("high")
     random = np.random.default_rng(0)
     turns = np.tile(np.eye(3), (FRAMES, len(body.skeleton), 1, 1))
@@ -37,7 +38,7 @@ def test_posing_the_finest_surface(capsys: pytest.CaptureFixture[str]) -> None:
         turns[:, bone] = about(axis / np.linalg.norm(axis), random.uniform(-30, 30, FRAMES))
     transforms = body.skeleton.transforms(turns)
     slots_s = best_s(lambda: body.pose(turns), 3)
-    kernel_s = best_s(lambda: pose_vertices(body, transforms), 5)
+    kernel_s = benchmark.pedantic(lambda: best_s(lambda: pose_vertices(body, transforms), 5))
     with capsys.disabled():
         print(
             f"\nposing {len(body.vertices_m)} vertices: {1e3 * kernel_s / FRAMES:.2f} ms/frame,"
@@ -62,7 +63,7 @@ def sample() -> MeshSequence:
 
 
 def test_finding_how_well_a_map_is_known(
-    sample: MeshSequence, capsys: pytest.CaptureFixture[str]
+    benchmark: Any, sample: MeshSequence, capsys: pytest.CaptureFixture[str]
 ) -> None:
     maker = Synthesizer(sample)
     maker.prepare()
@@ -70,7 +71,7 @@ def test_finding_how_well_a_map_is_known(
     map_s = best_s(lambda: maker.map(VirtualSensor((next(moves), 0.0, 0.0))), 3)
     sensor = VirtualSensor()
     maker.map(sensor)
-    spent_s = best_s(lambda: maker.uncertainty(sensor), 3)
+    spent_s = benchmark.pedantic(lambda: best_s(lambda: maker.uncertainty(sensor), 3))
     with capsys.disabled():
         print(
             f"\nuncertainty of {sample.frame_count} frames of {sample.vertex_count} vertices:"
