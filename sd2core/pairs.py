@@ -206,7 +206,7 @@ class PairWriter:
             self._group = _reopened(self._path, header)
         else:
             self._group = _begun(self._path, header)
-        self._index = _read_index(self._path)
+        self._index = read_index(self._path)
         _drop_torn_line(self._path, len(self._index))
         self._frames = max((entry["stop"] for entry in self._index), default=0)
 
@@ -286,8 +286,8 @@ def read_pairs(path: Path) -> PairSet:
         )
     group = zarr.open_group(str(path), mode="r")
     header: dict[str, Any] = dict(group.attrs)
-    _check_version(path, header)
-    index = _read_index(path)
+    check_version(path, header)
+    index = read_index(path)
     if not index:
         raise Sd2Error(f"{path} holds no take yet", "at least one", _REMAKE)
     arrays: dict[str, Any] = {}
@@ -329,7 +329,8 @@ def read_pairs(path: Path) -> PairSet:
         ) from None
 
 
-def _check_version(path: Path, header: dict[str, Any]) -> None:
+def check_version(path: Path, header: dict[str, Any]) -> None:
+    """Refuse a store of another version."""
     if header.get("version") != VERSION:
         raise Sd2Error(
             f"{path} is of version {header.get('version')}", f"version {VERSION}", _REMAKE
@@ -372,7 +373,7 @@ def _reopened(path: Path, header: dict[str, Any]) -> Any:
     return group
 
 
-def _read_index(path: Path) -> list[dict[str, Any]]:
+def read_index(path: Path) -> list[dict[str, Any]]:
     """Lines of takes; the last one is left out when it was not written to its end."""
     index = path / INDEX_NAME
     if not index.exists():
