@@ -48,13 +48,16 @@ if TYPE_CHECKING:
 
 SUFFIX = ".sd2"
 
-Role = Literal["video", "mesh", "faces", "radar"]
+Role = Literal["video", "mesh", "faces", "radar", "denoiser"]
 """What a file is to the recording."""
 
 _PLACED_BY_VIDEO = {".pkl", ".pickle", ".joblib"}
 """Outputs of body models, which know their place only in the picture's pixels."""
 
 ROLES: tuple[Role, ...] = get_args(Role)
+
+_AIDS: set[Role] = {"faces", "denoiser"}
+"""Files that are nothing to look at by themselves."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +94,11 @@ class Recording:
     radar_offset_s : float
         Time on the recording's clock at which the first radar frame was taken.
         The clock is the video's, or the mesh's where there is no video.
+    denoiser : Path or None
+        Model file that the synthetic map is denoised with.
+    bundled_denoiser : str or None
+        The same by the name of a model that comes with the program; empty where the map
+        is not to be denoised. Neither: nobody has chosen.
     sensor : VirtualSensor
     spans : tuple of Span
     title : str
@@ -107,6 +115,8 @@ class Recording:
     radar: Path | None = None
     mesh_reading: MeshReading = field(default_factory=MeshReading)
     radar_offset_s: float = 0.0
+    denoiser: Path | None = None
+    bundled_denoiser: str | None = None
     sensor: VirtualSensor = field(default_factory=VirtualSensor)
     spans: tuple[Span, ...] = ()
     title: str = ""
@@ -125,6 +135,7 @@ class Recording:
         radar: Path | None = None,
         mesh_reading: MeshReading | None = None,
         radar_offset_s: float = 0.0,
+        denoiser: Path | None = None,
         sensor: VirtualSensor | None = None,
         spans: tuple[Span, ...] = (),
         title: str = "",
@@ -142,6 +153,7 @@ class Recording:
             radar=radar,
             mesh_reading=mesh_reading or MeshReading(),
             radar_offset_s=radar_offset_s,
+            denoiser=denoiser,
             sensor=sensor or VirtualSensor(),
             spans=tuple(spans),
             title=title,
@@ -170,9 +182,11 @@ class Recording:
         files: dict[Role, Path] = {}
         for role, path in self._files().items():
             if not _exists(role, Path(path)):
+                if role == "denoiser":  # everything else can be shown without it
+                    continue
                 raise Sd2Error(f"The {role} {path} does not exist", "a file or folder")
             files[role] = plain_path(Path(path))
-        if not files.keys() - {"faces"}:
+        if not files.keys() - _AIDS:
             raise Sd2Error(
                 f"{folder} would hold nothing", "a video, a mesh or a radar capture, or several"
             )
@@ -264,6 +278,7 @@ class Recording:
         document.mesh_reading = self.mesh_reading
         document.camera = self.camera
         document.radar_offset_s = _finite(self.radar_offset_s, "radar offset in seconds")
+        document.bundled_denoiser = self.bundled_denoiser
         document.spans = tuple(self.spans)
         for name in ("position_m", "azimuth_deg", "elevation_deg", "field_of_view_deg"):
             setattr(document.sensor, name, getattr(self.sensor, name))
@@ -358,6 +373,8 @@ def open_recording(path: Path) -> Recording:
         mesh=located_path(document.mesh, folder),
         faces=located_path(document.faces, folder),
         radar=located_path(document.radar, folder),
+        denoiser=located_path(document.denoiser, folder),
+        bundled_denoiser=document.bundled_denoiser,
         mesh_reading=document.mesh_reading,
         radar_offset_s=document.radar_offset_s,
         sensor=_sensor(document, folder / FILE_NAME),

@@ -116,6 +116,8 @@ class Document(BaseModel):
     faces: StoredPath | None = None
     radar: StoredPath | None = None
     radar_offset_s: FiniteFloat = 0.0
+    denoiser: StoredPath | None = None
+    bundled_denoiser: str | None = None
     sensor: SensorEntry = SensorEntry()
     spans: tuple[Span, ...] = ()
 

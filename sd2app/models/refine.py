@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,9 +42,16 @@ class Way:
     visibility: Visibility | None = None
 
 
+Companion = Callable[[NDArray[np.float32]], Any]
+"""Makes something more of a stretch (bins, frames), in the same background task."""
+
+
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A computed stretch on its way to the window."""
+    """A computed stretch on its way to the window.
+
+    ``more`` is what a companion made of it.
+    """
 
     sensor: VirtualSensor
     start: int
@@ -51,6 +59,7 @@ class Part:
     rank: int
     words: str
     unit: str
+    more: Any = None
 
 
 def worked_out(
@@ -59,6 +68,7 @@ def worked_out(
     start: int,
     stop: int,
     proceed: Callable[[], None] = lambda: None,
+    companion: Companion | None = None,
 ) -> Part:
     """Frames ``start`` to ``stop``; ``proceed`` is called on the way and may raise."""
     synthesizer = way.synthesizer()
@@ -67,7 +77,8 @@ def worked_out(
     if way.visibility == "frozen" and stretch.quality == "facing":
         # No mask is kept.
         rank, words = ROUGH, _ROUGH_WORDS
-    return Part(sensor, start, stretch, rank, words, synthesizer.unit)
+    more = companion(stretch.values) if companion is not None else None
+    return Part(sensor, start, stretch, rank, words, synthesizer.unit, more)
 
 
 def is_swept_whole(vertices: int, frames: int) -> bool:

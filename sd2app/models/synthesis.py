@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from sd2app.jobs.latest import LatestRunner
-from sd2app.models.canvas import AS_DRAGGED, FINAL, Canvas, View
+from sd2app.models.canvas import FINAL, View
 from sd2app.models.carriers import Carriers
 from sd2app.models.compiling import CompilerModel
-from sd2app.models.content import reference_of
 from sd2app.models.document import DocumentModel
 from sd2app.models.jobs import Job, JobsModel
+from sd2app.models.painted_map import PaintedMap
 from sd2app.models.playback import PlaybackModel
 from sd2app.models.readier import Readier
 from sd2app.models.readout import FrameReader, Readout
-from sd2app.models.refine import Part, Way, is_swept_whole, refine, worked_out
+from sd2app.models.refine import Companion, Part, Way, is_swept_whole, refine, worked_out
 from sd2app.models.sensor import SensorModel
 from sd2app.models.tracks import TrackModel
 from sd2app.models.trade import TradeModel
@@ -47,6 +47,11 @@ class SynthesisModel(QObject):
     background, the stretch in view first; then a plan is chosen for the new
     place, carried out if it is another, and at last one for the next drag. Any
     new move interrupts all of it. A map stays until it is replaced.
+
+    Signals
+    -------
+    painted : Part
+        A stretch came onto the map.
     """
 
     frame_changed = Signal()
@@ -54,6 +59,7 @@ class SynthesisModel(QObject):
     readout_changed = Signal()
     moving_changed = Signal()
     completed = Signal()
+    painted = Signal(object)
     failed = Signal(str)
 
     def __init__(
@@ -72,6 +78,8 @@ class SynthesisModel(QObject):
         self._sensor = sensor
         self._span = span
         self._track = track
+        self._painted = PaintedMap(track)
+        self._companion: Callable[[], Companion | None] = lambda: None
         self._jobs = jobs
         self._trade = trade
         self._reader = FrameReader(document, sensor, playback)
@@ -119,7 +127,8 @@ class SynthesisModel(QObject):
     @property
     def complete(self) -> bool:
         """Whether every frame is as the plan says for the sensor where it stands."""
-        return self._canvas.final and self._canvas.sensor == self._sensor.sensor
+        canvas = self._painted.canvas
+        return canvas.final and canvas.sensor == self._sensor.sensor
 
     @property
     def torso_m(self) -> Vector | None:
@@ -166,7 +175,7 @@ class SynthesisModel(QObject):
         except Sd2Error as error:
             self.failed.emit(str(error))
             return
-        self._canvas = Canvas.blank(options.axis.bins, mesh.frame_count)
+        self._painted.begin(options, mesh)
         self._compiler.start()
         self._announce()
         self._follow()
@@ -181,16 +190,29 @@ class SynthesisModel(QObject):
             return None
         return lambda: carriers.of(plan), self._sensor.sensor
 
+    def accompany(self, companion: Callable[[], Companion | None]) -> None:
+        """Ask ``companion`` before each sweep what is to be made of it, in step with it."""
+        self._companion = companion
+
     def export(self, path: Path) -> None:
-        """Write the map that is shown with its provenance, the plan included."""
+        """Write the map that is shown with its provenance."""
+        self.whole_map().save(path)
+
+    def whole_map(self) -> DopplerMap:
+        """The map that is shown, made anew with its provenance, the plan included.
+
+        Raises
+        ------
+        Sd2Error
+            When it is not complete.
+        """
         if self._carriers is None or not self.complete:
             raise Sd2Error("The synthetic map is not complete yet", "a final map", "Wait for it")
         made = self._carriers.of(self._plan).map(self._sensor.sensor)
         in_use = self._trade.in_use
         if in_use is not None:
             made = replace(made, meta=made.meta | in_use.plan.provenance(in_use.error))
-        made = replace(made, uncertainty=self._track.uncertainty)
-        made.save(path)
+        return replace(made, uncertainty=self._track.uncertainty)
 
     def close(self) -> None:
         """Stop computing."""
@@ -208,14 +230,11 @@ class SynthesisModel(QObject):
     # --- following ------------------------------------------------------------------------
 
     def _forget(self) -> None:
-        self._canvas = Canvas.blank(2, 0)
+        self._painted.forget()
         self._reader.forget()
         self._plan: Plan | None = None
         self._dragging_plan: Plan | None = None
-        self._unit = ""
-        self._words: dict[int, str] = {}
         self._readier.forget()
-        self._needs_reference = True
         self._again = False
         self._sweeping = False
 
@@ -235,7 +254,7 @@ class SynthesisModel(QObject):
         self._readier.cancel()
         if self._sensor.dragging:
             self._rest.start()
-            self._set_moving(self._moving or self._sensor.sensor != self._canvas.sensor)
+            self._set_moving(self._moving or self._sensor.sensor != self._painted.canvas.sensor)
             self._follow_clock()
             if self._sweeping and self._runner.busy:
                 self._again = True
@@ -255,7 +274,8 @@ class SynthesisModel(QObject):
         self._end_job()
         self._again, self._sweeping = False, True
         sensor, way, (start, stop) = self._sensor.sensor, self._rough_way(), self._swept()
-        self._runner.submit(lambda emit: worked_out(way, sensor, start, stop))
+        companion = self._companion()
+        self._runner.submit(lambda emit: worked_out(way, sensor, start, stop, companion=companion))
 
     def _settle(self) -> None:
         """Rough where nothing is known yet, then as planned; the stretch in view first."""
@@ -266,7 +286,7 @@ class SynthesisModel(QObject):
         self._again = self._sweeping = False
         sensor = self._sensor.sensor
         self._trade.rest_at(sensor)
-        rank = self._canvas.ranks_for(sensor)
+        rank = self._painted.canvas.ranks_for(sensor)
         if rank.min() >= FINAL:
             self._set_moving(False)
             self._go_on()
@@ -316,8 +336,7 @@ class SynthesisModel(QObject):
             self._say_quality()
             return
         self._plan = plan
-        self._canvas.demote()
-        self._words[AS_DRAGGED] = self._words.get(FINAL, self._words.get(AS_DRAGGED, ""))
+        self._painted.demote()
         if not self._moving:
             self._settle()
 
@@ -326,7 +345,8 @@ class SynthesisModel(QObject):
         if self._carriers is None or self._moving or stop <= start:
             return
         self._say_quality()
-        if self._canvas.rank[start:stop].min() < FINAL and self._canvas.frames > stop - start:
+        canvas = self._painted.canvas
+        if canvas.rank[start:stop].min() < FINAL and canvas.frames > stop - start:
             self._settle()
 
     def _cancel(self) -> None:
@@ -355,45 +375,15 @@ class SynthesisModel(QObject):
         self._go_on()
 
     def _take(self, part: Part) -> None:
-        self._canvas.paint(part.sensor, part.start, part.stretch, part.rank)
-        self._words[part.rank] = part.words
-        self._unit = part.unit
-        if self._needs_reference and self._canvas.full:
-            self._needs_reference = False
-            self._track.set_reference(reference_of(self._canvas.values))
-        covered = None if self._canvas.full else self._canvas.rank > 0
-        self._track.set_map(self._map(), covered)
+        self._painted.take(part)
         self._say_quality()
+        self.painted.emit(part)
         self.readout_changed.emit()
 
-    def _map(self) -> DopplerMap:
-        assert self._carriers is not None
-        options, mesh = self._carriers.options, self._carriers.mesh
-        return DopplerMap(
-            values=self._canvas.values,
-            axis=options.axis,
-            timebase=mesh.timebase,
-            kind="synthetic",
-            unit=self._unit,
-            null_bins=options.null_bins,
-            present=mesh.presence.measured,
-        )
-
     def _say_quality(self) -> None:
-        start, stop = self._frames_in_view()
-        rank = self._canvas.rank[start:stop]
-        if self._carriers is None or not rank.any():
-            return
-        final = float((rank >= FINAL).mean())
-        lowest = int(rank[rank > 0].min())
-        words = self._words.get(lowest, "")
-        if lowest == FINAL:
-            words = final_words(self._carriers, self._trade.in_use)
-        if 0 < final < 1 and lowest < FINAL:
-            words = f"{words}, {100 * final:.0f} % final"
-        if self._compiler.busy:
-            words += " · compiling, exact follows"
-        self._track.set_status(words)
+        if self._carriers is not None:
+            final = final_words(self._carriers, self._trade.in_use)
+            self._painted.say_quality(self._frames_in_view(), final, self._compiler.busy)
 
     def _fail(self, error: Exception) -> None:
         self._sweeping = False
@@ -428,7 +418,7 @@ class SynthesisModel(QObject):
 
     def _swept(self) -> View:
         """Frames that follow a hand: the whole clip when it is short, else what is in view."""
-        frames = self._canvas.frames
+        frames = self._painted.canvas.frames
         return (0, frames) if is_swept_whole(self._vertices, frames) else self._frames_in_view()
 
     def _budget_ms(self) -> float:

@@ -59,7 +59,11 @@ def open_ball(context, qtbot, ball):
 def test_rough_comes_before_exact(context, qtbot, ball):
     ranks = []
     context.synthetic.changed.connect(
-        lambda: ranks.append(context.synthesis._canvas.rank.copy()) if context.synthetic.map else 0
+        lambda: (
+            ranks.append(context.synthesis._painted.canvas.rank.copy())
+            if context.synthetic.map
+            else 0
+        )
     )
     open_ball(context, qtbot, ball)
     qtbot.waitUntil(lambda: context.synthesis.complete, timeout=10_000)
@@ -81,7 +85,9 @@ def test_every_sweep_of_a_fast_hand_is_for_one_placement(context, qtbot, ball):
     open_ball(context, qtbot, ball)
     qtbot.waitUntil(lambda: context.synthesis.complete, timeout=10_000)
     shown = []
-    context.synthetic.changed.connect(lambda: shown.append(context.synthesis._canvas.sensor))
+    context.synthetic.changed.connect(
+        lambda: shown.append(context.synthesis._painted.canvas.sensor)
+    )
     context.edits.begin_sensor_drag()
     for step in range(200):
         context.edits.drag_sensor((step * 0.005, 0.0, 0.0))

@@ -480,3 +480,33 @@ def test_an_impossible_camera_is_refused(files: Path, camera: dict) -> None:
     (made.folder / FILE_NAME).write_text(json.dumps(content(made) | {"camera": camera}))
     with pytest.raises(Sd2Error, match="camera"):
         open_recording(made.folder)
+
+
+def test_the_chosen_denoiser_moves_with_the_recording(files: Path, tmp_path: Path) -> None:
+    made = make(files)
+    assert made.denoiser is None
+    assert made.bundled_denoiser is None
+    made.denoiser = files / "own.safetensors"
+    made.denoiser.write_bytes(b"weights")
+    made.save()
+    moved = tmp_path / "elsewhere"
+    files.parent.rename(moved)
+    again = open_recording(moved / made.folder.relative_to(files.parent))
+    assert again.denoiser == moved / files.relative_to(files.parent) / "own.safetensors"
+    assert not again.missing()
+    again.denoiser, again.bundled_denoiser = None, ""
+    again.save()
+    assert open_recording(again.folder).bundled_denoiser == ""
+    assert open_recording(again.folder).denoiser is None
+
+
+def test_a_missing_denoiser_is_named_and_hinders_nothing(files: Path) -> None:
+    made = make(files)
+    made.denoiser = files / "gone.safetensors"
+    made.save()
+    again = open_recording(made.folder)
+    assert again.missing() == {"denoiser": files / "gone.safetensors"}
+    other = again.save_as(made.folder.with_name("other.sd2"))
+    assert open_recording(other.folder).denoiser == files / "gone.safetensors"
+    with pytest.raises(Sd2Error, match="would hold nothing"):
+        Recording.create(made.folder.with_name("third.sd2"), denoiser=other.folder)
