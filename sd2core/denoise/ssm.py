@@ -1,0 +1,184 @@
+"""Convolution kernels of structured state spaces, exact for every step size and length.
+
+Sources: A. Gu, K. Goel, C. Ré, "Efficiently modeling long sequences with structured state
+spaces" (2022), "S4"; A. Gu, A. Gupta, K. Goel, C. Ré, "On the parameterization and
+initialization of diagonal state space models" (2022), "S4D".
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+from sd2core.denoise.feedback import circle, close_loop
+from sd2core.denoise.legs import legs_normal_form
+from sd2core.denoise.power_sums import power_sums
+from sd2core.errors import Sd2Error
+
+
+class StateMatrix(NamedTuple):
+    """A = V (Λ − p pᵀ) V* and V* B; of every conjugate pair one is kept.
+
+    Attributes
+    ----------
+    poles : (…, N/2) complex
+        Λ, real parts negative.
+    low_rank : (…, N/2) real
+        p. Any p can be made real by turning the phases of the basis.
+    inputs : (…, N/2) complex
+        V* B.
+    """
+
+    poles: Tensor
+    low_rank: Tensor
+    inputs: Tensor
+
+
+def legs_state_matrix(state_size: int, device: torch.device | str | None = None) -> StateMatrix:
+    """HiPPO-LegS, complex128."""
+    form = legs_normal_form(state_size)
+    return StateMatrix(
+        torch.tensor(form.poles, device=device),
+        torch.tensor(form.low_rank, device=device),
+        torch.tensor(form.inputs, device=device),
+    )
+
+
+def legs_kernel(C: Tensor, dt: Tensor, length: int, matrix: StateMatrix | None = None) -> Tensor:
+    """Kernel of S4: k[l] = C Āˡ B̄ of the HiPPO-LegS matrix, discretised bilinearly.
+
+    x′ = A x + B u, y = C x with (Gu et al. 2022, S4, equation 2)::
+
+        A[n, k] = −√((2n + 1)(2k + 1)) for n > k, −(n + 1) for n = k, 0 for n < k
+        B[n]    = √(2n + 1)
+        Ā = (I − Δ/2 A)⁻¹ (I + Δ/2 A),   B̄ = (I − Δ/2 A)⁻¹ Δ B      (equation 3)
+
+    The SD² paper prints A without its minus sign; that kernel grows past 1e48.
+
+    Parameters
+    ----------
+    C : (H, N) or (N,) float32 or float64
+        In the dense basis of A and B above. N is even.
+    dt : (H,) or () float
+        Δ, above 0.
+    length : int
+    matrix : StateMatrix, optional
+        What takes the place of HiPPO-LegS, in the basis V of its normal form, where C is C V;
+        the layer gives what it has learned.
+
+    Returns
+    -------
+    (H, length) or (length,), of the type of C.
+    """
+    if matrix is None:
+        matrix = legs_state_matrix(C.shape[-1], C.device)
+    return _low_rank_kernel(matrix, to_normal_basis(C), dt, length, C.dtype)
+
+
+def to_normal_basis(C: Tensor) -> Tensor:
+    """C V: (…, N) real, in the dense basis → (…, N/2) complex128."""
+    form = legs_normal_form(C.shape[-1])
+    basis = torch.view_as_real(torch.tensor(form.basis, device=C.device)).flatten(1)  # (N, N)
+    return torch.view_as_complex((C.double() @ basis).unflatten(-1, (-1, 2)))
+
+
+def low_rank_kernel(matrix: StateMatrix, C: Tensor, dt: Tensor, length: int) -> Tensor:
+    """Kernel of any normal matrix less one of rank one, discretised bilinearly.
+
+    With z for the shift by one frame and R = (1 − Δ/2 Λ − z (1 + Δ/2 Λ))⁻¹ (Gu et al. 2022,
+    S4, lemma C.4, before its division by 1 + z)::
+
+        Σ k[l] zˡ = a − (1 + z) b c / (1 + (1 + z) d)
+        a = Δ C R B,  b = C R p,  c = Δ²/2 pᵀ R B,  d = Δ/2 pᵀ R p
+
+    R is diagonal, so a … d are sums of powers of (1 + Δ/2 λ) / (1 − Δ/2 λ). S4 evaluates the
+    quotient at the roots of unity, which gives a kernel that wraps around and must be cured with
+    C (I − Āᴸ); here the four series are divided as series (`close_loop`), and no node, no Āᴸ and
+    no wrapped kernel occurs. All of it is in double precision.
+
+    Parameters
+    ----------
+    matrix : StateMatrix
+    C : (…, N/2) complex64 or complex128
+        In the basis of `matrix`.
+    dt : (…) float
+
+    Returns
+    -------
+    (…, length) float32 or float64, by the type of C.
+    """
+    return _low_rank_kernel(matrix, C, dt, length, C.real.dtype)
+
+
+def _low_rank_kernel(
+    matrix: StateMatrix, C: Tensor, dt: Tensor, length: int, precision: torch.dtype
+) -> Tensor:
+    check_length(length)
+    dt = dt.to(torch.float64)[..., None]
+    poles = matrix.poles.to(torch.complex128)
+    low_rank = matrix.low_rank.to(torch.float64)
+    inputs = matrix.inputs.to(torch.complex128)
+    half = 0.5 * dt
+    ahead = half * poles
+    inverse = 1.0 / (1.0 - ahead)
+    looped = low_rank * inverse
+    driven = (dt * inputs) * inverse
+    terms = (C * driven, C * looped, (half * low_rank) * driven, (half * low_rank) * looped)
+    shape = torch.broadcast_shapes(*(term.shape for term in terms))
+    weights = torch.stack([term.expand(shape) for term in terms], -2)
+    points, radius = circle(length, precision)
+    series = power_sums(
+        ((1.0 + ahead) * (radius * inverse)).expand(shape).reshape(-1, shape[-1]),
+        weights.reshape(-1, 4, shape[-1]),
+        length,
+    )
+    kernel = close_loop(series, points, radius)
+    return kernel.to(precision).reshape(*shape[:-1], length)
+
+
+def diagonal_kernel(A: Tensor, B: Tensor, C: Tensor, dt: Tensor, length: int) -> Tensor:
+    """Kernel of S4D: k[l] = 2 Re Σₙ C[n] Āˡ[n] B̄[n], zero-order hold.
+
+    Ā = exp(Δ A), B̄ = (exp(Δ A) − 1) / A · B (Gu et al. 2022, S4D, equations 2 and 3), whose
+    limit Δ B is taken at A → 0.
+
+    Parameters
+    ----------
+    A, B, C : (H, N/2) or (N/2,) complex64 or complex128
+        One of each conjugate pair, hence the 2 Re. Re A ≤ 0.
+    dt : (H,) or () float
+    length : int
+
+    Returns
+    -------
+    (H, length) or (length,) float32 or float64, by the type of C.
+    """
+    check_length(length)
+    precision = C.real.dtype
+    dt = dt.to(torch.float64)[..., None]
+    exponent = dt * A.to(torch.complex128)
+    weights = C * B * (dt * expm1_ratio(exponent))
+    poles = torch.exp(exponent).expand(weights.shape)
+    states = weights.shape[-1]
+    kernel = power_sums(poles.reshape(-1, states), weights.reshape(-1, 1, states), length)
+    return kernel.to(precision).reshape(*weights.shape[:-1], length)
+
+
+def expm1_ratio(x: Tensor) -> Tensor:
+    """(exp(x) − 1) / x, and 1 at x = 0."""
+    small = x.abs() < 1e-2
+    safe = torch.where(small, torch.ones_like(x), x)
+    series = 1.0 + x / 2 * (1.0 + x / 3 * (1.0 + x / 4 * (1.0 + x / 5 * (1.0 + x / 6))))
+    return torch.where(small, series, torch.expm1(safe) / safe)
+
+
+def check_length(length: int) -> None:
+    """Refuse what is no length."""
+    if length < 1:
+        raise Sd2Error(
+            found=f"a kernel of length {length}",
+            expected="at least one frame",
+            remedy="Give a recording with frames.",
+        )
