@@ -29,3 +29,11 @@ def resource_path(name: str) -> Path:
         "an installation with its resources",
         "Install SD² Studio again",
     )
+
+
+def bundled_files(pattern: str) -> list[Path]:
+    """Files that come with the program, e.g. ``bundled_files("*.safetensors")``, by name."""
+    for folder in _FOLDERS:
+        if folder.is_dir():
+            return sorted(folder.glob(pattern))
+    return []

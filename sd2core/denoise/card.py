@@ -1,0 +1,137 @@
+"""What a model file says about its model; reading it needs no torch."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+from sd2core.denoise.scaling import Scaling
+from sd2core.errors import Sd2Error
+from sd2core.sensor import VelocityAxis
+
+FORMAT = "sd2-denoiser"
+VERSION = 1
+
+TrainedOn = Literal["simulated", "real"]
+"""Whether the targets came from a simulated radar or from a real one."""
+
+
+@dataclass(frozen=True)
+class ModelCard:
+    """A trained denoiser, but for its weights.
+
+    Parameters
+    ----------
+    model : str
+        A name of :data:`sd2core.denoise.registry.MODELS` or ``FILTERS``.
+    options : mapping
+        What it was built with.
+    scaling : Scaling
+    axis : VelocityAxis
+    null_bins : tuple of int
+        Bins that are zero on purpose, in what it gets and in what it answers.
+    frame_rate_hz : float
+    trained_on : {"simulated", "real"}
+    unit : str
+        What a value of 1 means in what it answers.
+    title : str
+        To call it in a list; the file's name where it is empty.
+    about : mapping
+        ``data``, ``command``, ``metrics``, ``limits`` and what else fits into JSON.
+    parameters : int
+        Numbers that were learnt; known when the card comes from a file.
+    path : Path, optional
+        The file.
+    """
+
+    model: str
+    options: Mapping[str, Any]
+    scaling: Scaling
+    axis: VelocityAxis
+    null_bins: tuple[int, ...]
+    frame_rate_hz: float
+    trained_on: TrainedOn
+    unit: str = "power"
+    title: str = ""
+    about: Mapping[str, Any] = field(default_factory=dict)
+    parameters: int = 0
+    path: Path | None = None
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.frame_rate_hz) and self.frame_rate_hz > 0):
+            raise Sd2Error(f"The model's frame rate is {self.frame_rate_hz}", "a number above 0")
+        if self.trained_on not in get_args(TrainedOn):
+            raise Sd2Error(
+                f"The model was trained on {self.trained_on!r}", f"one of {get_args(TrainedOn)}"
+            )
+        bins = tuple(sorted({int(number) for number in self.null_bins}))
+        if bins and not 0 <= bins[0] <= bins[-1] < self.axis.bins:
+            raise Sd2Error(f"null_bins is {bins}", f"bins from 0 to {self.axis.bins - 1}")
+        object.__setattr__(self, "null_bins", bins)
+
+    @property
+    def name(self) -> str:
+        """Name of the file, without its ending; the kind of model before there is a file."""
+        return self.path.stem if self.path is not None else self.model
+
+    def to_json(self) -> dict[str, Any]:
+        """As kept in the header of a model file."""
+        return {
+            "format": FORMAT,
+            "version": VERSION,
+            "model": self.model,
+            "options": dict(self.options),
+            "scaling": self.scaling.to_json(),
+            "axis": {"bins": self.axis.bins, "v_max_mps": self.axis.v_max_mps},
+            "null_bins": list(self.null_bins),
+            "frame_rate_hz": self.frame_rate_hz,
+            "trained_on": self.trained_on,
+            "unit": self.unit,
+            "title": self.title,
+            "about": dict(self.about),
+            "parameters": self.parameters,
+        }
+
+    @classmethod
+    def from_json(cls, content: dict[str, Any], path: Path | None = None) -> ModelCard:
+        """Read what :meth:`to_json` gave.
+
+        Raises
+        ------
+        Sd2Error
+            When it is something else, or of a newer version.
+        """
+        where = "The model" if path is None else str(path)
+        try:
+            if content["format"] != FORMAT or not isinstance(content["version"], int):
+                raise ValueError(f"format {content['format']!r}")
+            if content["version"] > VERSION:
+                raise Sd2Error(
+                    f"{where} is of version {content['version']}",
+                    f"a denoiser up to version {VERSION}",
+                    "Use the version of SD² Studio that made it, or a newer one",
+                )
+            return cls(
+                model=str(content["model"]),
+                options=dict(content["options"]),
+                scaling=Scaling.from_json(content["scaling"]),
+                axis=VelocityAxis(
+                    int(content["axis"]["bins"]), float(content["axis"]["v_max_mps"])
+                ),
+                null_bins=tuple(content["null_bins"]),
+                frame_rate_hz=float(content["frame_rate_hz"]),
+                trained_on=content["trained_on"],
+                unit=str(content["unit"]),
+                title=str(content["title"]),
+                about=dict(content["about"]),
+                parameters=int(content["parameters"]),
+                path=path,
+            )
+        except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
+            raise Sd2Error(
+                f"{where}: its description is damaged ({error!r})",
+                "a model file written by `sd2 train`",
+            ) from error

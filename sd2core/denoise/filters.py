@@ -1,0 +1,189 @@
+"""Denoisers without training: what a model must beat to be worth its name.
+
+All are causal. They work on compressed values, as models do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from sd2core.denoise.model import Denoiser, State
+
+_MEDIANS = ((3, 1), (3, 3), (5, 1), (5, 3), (7, 1), (7, 3))
+"""Frames and bins to choose from."""
+
+_MEDIAN_FRAMES = 50_000
+"""Enough to choose a median and its gain."""
+
+
+class NoDenoiser(Denoiser):
+    """Hands on what it gets: synthetic energy, brought to the level of the radar's."""
+
+    def __init__(self, bins: int) -> None:
+        super().__init__(bins, residual=False)
+
+    def initial_state(self, batch: int = 1) -> State:
+        """Nothing."""
+        return None
+
+    def correction_chunk(self, values: Tensor, state: State) -> tuple[Tensor, State]:
+        """The values."""
+        return values, state
+
+
+class _Neighbourhood(Denoiser):
+    """Looks at each cell with the frames before it and the bins beside it."""
+
+    def __init__(self, bins: int, frames: int, width: int) -> None:
+        super().__init__(bins, residual=False)
+        self.frames = frames
+        self.width = width
+
+    def initial_state(self, batch: int = 1) -> State:
+        """Nothing; before its first frame a clip is as in it."""
+        return None
+
+    def neighbours(self, values: Tensor, state: State) -> tuple[Tensor, State]:
+        """(B, L, bins) to (B, L, bins, frames · width), oldest frame and lowest bin first."""
+        if state is None:
+            state = values[:, :1].expand(-1, self.frames - 1, -1)
+        known = torch.cat([state, values], 1)  # (B, frames − 1 + L, bins)
+        side = self.width // 2
+        padded = nn.functional.pad(known, (side, side), "replicate")
+        around = padded.unfold(1, self.frames, 1).unfold(2, self.width, 1)
+        return around.flatten(3), known[:, known.shape[1] - self.frames + 1 :]
+
+
+class MedianDenoiser(_Neighbourhood):
+    """Median over the last frames and the neighbouring bins, times one number.
+
+    Parameters
+    ----------
+    bins : int
+    frames, width : int
+        Odd.
+    """
+
+    def __init__(self, bins: int, *, frames: int = 5, width: int = 3) -> None:
+        super().__init__(bins, frames, width)
+        self.level = nn.Parameter(torch.ones(()), requires_grad=False)
+
+    def correction_chunk(self, values: Tensor, state: State) -> tuple[Tensor, State]:
+        """Median of the neighbours."""
+        around, state = self.neighbours(values, state)
+        return self.level * around.median(-1).values, state
+
+
+class WienerDenoiser(_Neighbourhood):
+    """The causal linear filter of least squared error (N. Wiener, 1949), and a mean per bin.
+
+    The same weights for all bins; they solve the Wiener–Hopf equations of the training
+    takes.
+
+    Parameters
+    ----------
+    bins : int
+    frames, width : int
+        Extent of the filter; width is odd.
+    """
+
+    def __init__(self, bins: int, *, frames: int = 9, width: int = 5) -> None:
+        super().__init__(bins, frames, width)
+        here = torch.zeros(frames, width)
+        here[-1, width // 2] = 1.0
+        self.weight = nn.Parameter(here.flatten(), requires_grad=False)
+        self.mean = nn.Parameter(torch.zeros(bins), requires_grad=False)
+
+    def correction_chunk(self, values: Tensor, state: State) -> tuple[Tensor, State]:
+        """Weighted sum of the neighbours."""
+        around, state = self.neighbours(values, state)
+        return around @ self.weight + self.mean, state
+
+
+def fit_median(
+    inputs: Sequence[NDArray[np.float32]],
+    targets: Sequence[NDArray[np.float32]],
+    null_bins: Sequence[int] = (),
+) -> MedianDenoiser:
+    """The median, and the number it is multiplied by, of least squared error.
+
+    Parameters
+    ----------
+    inputs, targets : sequence of float32 arrays, shape (frames, bins)
+        Compressed, one per take. Of many takes some serve.
+    null_bins : sequence of int
+        Bins that do not count.
+    """
+    stride = max(1, sum(map(len, inputs)) // _MEDIAN_FRAMES)
+    bins = inputs[0].shape[1]
+    counted = _counted(bins, null_bins)
+    best: tuple[float, MedianDenoiser] | None = None
+    for frames, width in _MEDIANS:
+        candidate = MedianDenoiser(bins, frames=frames, width=width)
+        cross, power = 0.0, 0.0
+        for one, target in zip(inputs[::stride], targets[::stride], strict=True):
+            found = candidate(torch.from_numpy(one)[None])[0].numpy()[:, counted].astype(np.float64)
+            cross += float((found * target[:, counted]).sum())
+            power += float((found**2).sum())
+        # With the best factor cross / power the squared error falls by cross² / power.
+        gained = cross**2 / power if power > 0 else 0.0
+        if best is None or gained > best[0]:
+            candidate.level.fill_(cross / power if power > 0 else 1.0)
+            best = gained, candidate
+    assert best is not None
+    return best[1]
+
+
+def fit_wiener(
+    inputs: Sequence[NDArray[np.float32]],
+    targets: Sequence[NDArray[np.float32]],
+    null_bins: Sequence[int] = (),
+    *,
+    frames: int = 9,
+    width: int = 5,
+) -> WienerDenoiser:
+    """The filter of least squared error, in closed form.
+
+    Parameters
+    ----------
+    inputs, targets : sequence of float32 arrays, shape (frames, bins)
+        Compressed, one per take.
+    null_bins : sequence of int
+        Bins that do not count.
+    frames, width : int
+        Extent of the filter.
+    """
+    bins = inputs[0].shape[1]
+    counted = _counted(bins, null_bins)
+    wiener = WienerDenoiser(bins, frames=frames, width=width)
+    taps, rows = frames * width, sum(map(len, inputs))
+    first_x, first_y = np.zeros((len(counted), taps)), np.zeros(len(counted))
+    gram, cross = np.zeros((taps, taps)), np.zeros(taps)
+    for one, target in zip(inputs, targets, strict=True):
+        around = wiener.neighbours(torch.from_numpy(one)[None], None)[0][0]
+        x = around.numpy()[:, counted].astype(np.float64)  # (L, counted, taps)
+        y = target[:, counted].astype(np.float64)
+        first_x += x.sum(0)
+        first_y += y.sum(0)
+        flat = x.reshape(-1, taps)
+        gram += flat.T @ flat
+        cross += flat.T @ y.ravel()
+    mean_x, mean_y = first_x / rows, first_y / rows
+    # Deviations from the means per bin, which are added again at the end.
+    gram -= rows * mean_x.T @ mean_x
+    cross -= rows * mean_x.T @ mean_y
+    # Neighbouring cells of smoothed maps are nearly alike.
+    gram += 1e-7 * np.trace(gram) / taps * np.eye(taps)
+    weight = np.linalg.lstsq(gram, cross, rcond=None)[0]
+    wiener.weight.copy_(torch.from_numpy(weight))
+    wiener.mean[counted] = torch.from_numpy(mean_y - mean_x @ weight).float()
+    return wiener
+
+
+def _counted(bins: int, null_bins: Sequence[int]) -> list[int]:
+    return [number for number in range(bins) if number not in set(null_bins)]

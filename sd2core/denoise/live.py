@@ -1,0 +1,282 @@
+"""A trained denoiser at work: on whole maps, and on frames as they come."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from sd2core import __version__
+from sd2core.denoise import matching
+from sd2core.denoise.card import ModelCard
+from sd2core.denoise.model import Denoiser
+from sd2core.errors import Sd2Error
+from sd2core.progress import Progress, silent
+from sd2core.segments import OVERLAP, cut, join, segment_starts
+from sd2core.spectrum import DopplerMap
+
+CHUNK = 512
+"""Frames that a causal model is given at once; of long maps the state is handed on."""
+
+_ROUND = 64
+_BATCH = 16
+
+
+class TrainedDenoiser:
+    """A model and all that is needed to use it.
+
+    Parameters
+    ----------
+    network : Denoiser
+        Put into evaluation mode.
+    card : ModelCard
+    """
+
+    def __init__(self, network: Denoiser, card: ModelCard) -> None:
+        if network.bins != card.axis.bins:
+            raise Sd2Error(
+                f"The network has {network.bins} bins, its axis {card.axis.bins}", "the same number"
+            )
+        self.network = network.eval()
+        self.card = card
+
+    @property
+    def device(self) -> torch.device:
+        """Where the weights are."""
+        return next((one.device for one in self.network.parameters()), torch.device("cpu"))
+
+    def denoise(self, doppler: DopplerMap, progress: Progress = silent) -> DopplerMap:
+        """What a radar would show in place of a synthetic map.
+
+        Frames without a person stay empty, and what was before them is forgotten: every
+        stretch is a clip of its own (docs/decisions/0021). A map of another frame rate,
+        or of uneven frames, is brought to the model's rate and back.
+
+        Parameters
+        ----------
+        doppler : DopplerMap
+            Of kind ``synthetic``, on the model's axis, of any length.
+        progress : callable
+            Called with frames; may raise ``Cancelled``.
+
+        Raises
+        ------
+        Sd2Error
+            When the map is not of the kind that the model was trained on.
+        """
+        matching.check_map(doppler, self.card)
+        energies = np.ascontiguousarray(doppler.values.T)  # (frames, bins)
+        denoised = np.zeros_like(energies)
+        done, total = 0, len(energies)
+        resampled = False
+
+        def work(values: NDArray[np.float32]) -> NDArray[np.float32]:
+            return self.denoise_values(values, lambda frames, _: progress(done + frames, total))
+
+        for start, stop in matching.stretches(doppler, self.card):
+            values, times_s = energies[start:stop], doppler.times_s[start:stop]
+            done = start
+            if matching.is_regular(times_s, self.card.frame_rate_hz):
+                denoised[start:stop] = work(values)
+            else:
+                resampled = True
+                denoised[start:stop] = matching.at_rate(
+                    work, values, times_s, self.card.frame_rate_hz
+                )
+        progress(total, total)
+        denoised[:, list(doppler.unseen_bins)] = 0.0
+        return replace(
+            doppler,
+            values=denoised.T,
+            kind="denoised",
+            unit=self.card.unit,
+            null_bins=self.card.null_bins,
+            meta=self._provenance(doppler, resampled),
+            uncertainty=None,
+        )
+
+    def denoise_values(
+        self, energies: NDArray[np.float32], progress: Progress = silent
+    ) -> NDArray[np.float32]:
+        """One stretch at the model's frame rate.
+
+        Parameters
+        ----------
+        energies : float32 array, shape (frames, bins)
+            Not negative, in the unit of the synthetic maps that the model knows.
+        progress : callable
+
+        Returns
+        -------
+        float32 array, shape (frames, bins)
+            Not negative, in the unit of the radar maps that it learnt from.
+        """
+        values = np.array(energies, dtype=np.float32)
+        if values.ndim != 2 or values.shape[1] != self.card.axis.bins:
+            raise Sd2Error(
+                f"The values are of shape {values.shape}", f"(frames, {self.card.axis.bins})"
+            )
+        values[:, list(self.card.null_bins)] = 0.0
+        if not len(values):
+            return values
+        compressed = self.card.scaling.input.compress(values)
+        run = self._in_chunks if self.network.window is None else self._in_windows
+        expanded = self.card.scaling.target.expand(run(compressed, progress))
+        expanded[:, list(self.card.null_bins)] = 0.0
+        return expanded
+
+    def live(self) -> LiveDenoiser:
+        """For frames as they come."""
+        return LiveDenoiser(self)
+
+    def _in_chunks(self, values: NDArray[np.float32], progress: Progress) -> NDArray[np.float32]:
+        """A causal model: what comes after a frame does not touch it, so the end is padded.
+
+        Few lengths occur that way, and kernels that were worked out for one are used again.
+        """
+        frames = len(values)
+        length = min(-(-frames // _ROUND) * _ROUND, CHUNK)
+        padded = np.zeros((-(-frames // length) * length, values.shape[1]), np.float32)
+        padded[:frames] = values
+        done = np.empty_like(padded)
+        with torch.no_grad():
+            if len(padded) == length:
+                done[:] = self._answer(self.network, padded)
+                return done[:frames]
+            state = self.network.initial_state(1)
+            for start in range(0, frames, length):
+                progress(start, frames)
+                chunk = torch.from_numpy(padded[start : start + length])[None].to(self.device)
+                answer, state = self.network.chunk(chunk, state)
+                done[start : start + length] = answer[0].cpu().numpy()
+        return done[:frames]
+
+    def _in_windows(self, values: NDArray[np.float32], progress: Progress) -> NDArray[np.float32]:
+        """A model of fixed windows: they overlap and are blended."""
+        window = self.network.window
+        assert window is not None
+        frames = len(values)
+        known = np.pad(values, ((0, max(0, window - frames)), (0, 0)), "symmetric")
+        starts = segment_starts(len(known), window, OVERLAP)
+        windows = cut(known, starts, window)
+        done = np.empty_like(windows)
+        with torch.no_grad():
+            for first in range(0, len(windows), _BATCH):
+                progress(min(int(starts[first]), frames), frames)
+                batch = torch.from_numpy(windows[first : first + _BATCH]).to(self.device)
+                done[first : first + _BATCH] = self.network(batch).cpu().numpy()
+        return join(done, starts, len(known))[:frames]
+
+    def _answer(
+        self, network: Callable[[torch.Tensor], torch.Tensor], values: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
+        answer: NDArray[np.float32] = (
+            network(torch.from_numpy(values)[None].to(self.device))[0].cpu().numpy()
+        )
+        return answer
+
+    def _provenance(self, doppler: DopplerMap, resampled: bool) -> dict[str, Any]:
+        card, notes = self.card, []
+        emptied = sorted(set(card.null_bins) - set(doppler.null_bins))
+        if emptied:
+            notes.append(
+                f"bins {', '.join(map(str, emptied))} were emptied, as in the maps that the model"
+                " learnt from"
+            )
+        if resampled:
+            notes.append(
+                f"frames at {doppler.timebase.frames_per_s:.4g}/s were interpolated to the model's"
+                f" {card.frame_rate_hz:g}/s and back"
+            )
+        told = {
+            "model": card.model,
+            "name": card.name,
+            "title": card.title,
+            "trained_on": card.trained_on,
+            "data": card.about.get("data"),
+        }
+        meta: dict[str, Any] = {"denoiser": told, "input": doppler.meta, "version": __version__}
+        if "sensor" in doppler.meta:
+            meta["sensor"] = doppler.meta["sensor"]
+        if notes:
+            meta["notes"] = notes
+        return meta
+
+
+class LiveDenoiser:
+    """Frame in, frame out, without delay.
+
+    A causal model answers as it does for the whole map. A model of fixed windows sees
+    the last frames only and answers for the newest, at the window's border, where it
+    knows less than in the middle: it differs from its answer for the whole map.
+
+    Parameters
+    ----------
+    trained : TrainedDenoiser
+
+    Attributes
+    ----------
+    equals_batch : bool
+        Whether the answers are those for the whole map.
+    """
+
+    def __init__(self, trained: TrainedDenoiser) -> None:
+        self._trained = trained
+        self._card = trained.card
+        self.equals_batch = trained.network.window is None
+        self._nulled = list(trained.card.null_bins)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget what was; a new clip begins."""
+        network = self._trained.network
+        self._frames: deque[NDArray[np.float32]] = deque(maxlen=network.window or 1)
+        with torch.no_grad():
+            self._state = network.initial_state(1) if self.equals_batch else None
+
+    def step(self, energies: NDArray[np.float32], present: bool = True) -> NDArray[np.float32]:
+        """Answer to the next frame.
+
+        Parameters
+        ----------
+        energies : float32 array, shape (bins,)
+        present : bool
+            False where there is no person: the answer is empty, and a new clip begins.
+
+        Returns
+        -------
+        float32 array, shape (bins,)
+        """
+        values = np.array(energies, dtype=np.float32)
+        if values.shape != (self._card.axis.bins,):
+            raise Sd2Error(f"The frame is of shape {values.shape}", f"({self._card.axis.bins},)")
+        if not present:
+            self.reset()
+            return np.zeros_like(values)
+        values[self._nulled] = 0.0
+        compressed = self._card.scaling.input.compress(values)
+        expanded = self._card.scaling.target.expand(self._answer(compressed))
+        expanded[self._nulled] = 0.0
+        return expanded
+
+    def _answer(self, compressed: NDArray[np.float32]) -> NDArray[np.float32]:
+        network, device = self._trained.network, self._trained.device
+        answer: NDArray[np.float32]
+        with torch.no_grad():
+            if self.equals_batch:
+                frame = torch.from_numpy(compressed)[None].to(device)
+                tensor, self._state = network.step(frame, self._state)
+                answer = tensor[0].cpu().numpy()
+                return answer
+            self._frames.append(compressed)
+            known = np.stack(self._frames)
+            missing = (network.window or 0) - len(known)
+            # The past is mirrored until there is enough of it.
+            known = np.pad(known, ((missing, 0), (0, 0)), "symmetric")
+            answer = network(torch.from_numpy(known)[None].to(device))[0, -1].cpu().numpy()
+        return answer

@@ -1,0 +1,260 @@
+"""How far a denoised map is from what the radar saw.
+
+All functions take energies as (frames, bins), NumPy arrays of equal shape.
+
+**Peak velocity.** The centre of the strongest bin of a frame (of several equal ones the
+lowest). Bins that are zero on purpose are zero in both maps and never the strongest. A
+frame without any energy has no peak velocity.
+
+**Error.** e = v̂ − v for every frame in which the target has a peak velocity v. Where the
+estimate has none there, it says that nothing moves: v̂ = 0. Leaving hard frames empty
+therefore does not pay, and how many there are is counted. Frames in which the target has
+no peak velocity cannot be judged; they are counted and left out. MAE is the mean of |e|,
+σ the standard deviation of e about its mean. So MAE ≤ √(σ² + bias²). The standard
+deviation of |e| is given as well, for comparison with tables that mean that one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.denoise.scaling import Compression
+from sd2core.errors import Sd2Error
+from sd2core.sensor import VelocityAxis
+
+
+@dataclass(frozen=True)
+class VelocityError:
+    """Error of one velocity per frame.
+
+    Parameters
+    ----------
+    mae_mps : float
+        Mean of |e|; NaN where no frame can be judged, as are all that follow.
+    sd_mps : float
+        Standard deviation σ of e about its mean.
+    sd_absolute_mps : float
+        Standard deviation of |e|.
+    bias_mps : float
+        Mean of e.
+    rmse_mps : float
+    correlation : float
+        Of estimate and target (Pearson); NaN where one of them does not vary.
+    frames : int
+        Frames that were judged.
+    empty_target : int
+        Frames left out because the target is empty.
+    empty_estimate : int
+        Judged frames in which the estimate is empty and counts as 0 m/s.
+    """
+
+    mae_mps: float
+    sd_mps: float
+    sd_absolute_mps: float
+    bias_mps: float
+    rmse_mps: float
+    correlation: float
+    frames: int
+    empty_target: int
+    empty_estimate: int
+
+    def to_json(self) -> dict[str, float | int]:
+        """By name."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class MapError:
+    """Error of whole maps.
+
+    Parameters
+    ----------
+    relative_l1 : float
+        Σ|x̂ − x| / Σx of the energies; 0 when both are empty, infinite when only the
+        estimate is not.
+    rmse_compressed : float
+        Root mean square error of compressed values, over the bins that are not nulled;
+        1 for an empty estimate of maps like those of the training.
+    correlation : float
+        Pearson's, of compressed values over all these cells; NaN where one of the maps
+        does not vary.
+    """
+
+    relative_l1: float
+    rmse_compressed: float
+    correlation: float
+
+    def to_json(self) -> dict[str, float]:
+        """By name."""
+        return asdict(self)
+
+
+def peak_velocity_mps(
+    energies: NDArray[np.floating], axis: VelocityAxis, floor: float = 0.0
+) -> NDArray[np.float64]:
+    """Centre of the strongest bin per frame, (frames,); NaN where a frame is empty.
+
+    Parameters
+    ----------
+    energies : float array, shape (frames, bins)
+    axis : VelocityAxis
+    floor : float
+        A frame that does not exceed it counts as empty.
+    """
+    _check(energies, axis)
+    peak = axis.centres_mps[energies.argmax(axis=1)]
+    return np.where(energies.max(axis=1) > floor, peak, np.nan)
+
+
+def mean_velocity_mps(
+    energies: NDArray[np.floating], axis: VelocityAxis, floor: float = 0.0
+) -> NDArray[np.float64]:
+    """Energy-weighted mean velocity per frame, (frames,); NaN where a frame is empty.
+
+    Parameters
+    ----------
+    energies, axis, floor
+        As for :func:`peak_velocity_mps`.
+    """
+    _check(energies, axis)
+    values = energies.astype(np.float64)
+    total = values.sum(axis=1)
+    known = (values.max(axis=1) > floor) & (total > 0)
+    return np.divide(values @ axis.centres_mps, total, out=np.full_like(total, np.nan), where=known)
+
+
+def velocity_error(
+    estimate_mps: NDArray[np.float64],
+    target_mps: NDArray[np.float64],
+    frames: NDArray[np.bool_] | None = None,
+) -> VelocityError:
+    """Compare velocities frame by frame; the definition is at the head of this module.
+
+    Parameters
+    ----------
+    estimate_mps, target_mps : float64 array, shape (frames,)
+        NaN where a frame is empty.
+    frames : bool array, shape (frames,), optional
+        Only these, e.g. those of one gesture.
+    """
+    if estimate_mps.shape != target_mps.shape:
+        raise Sd2Error(
+            f"The estimate has {estimate_mps.shape} frames, the target {target_mps.shape}",
+            "the same",
+        )
+    if frames is not None:
+        estimate_mps, target_mps = estimate_mps[frames], target_mps[frames]
+    judged = ~np.isnan(target_mps)
+    target = target_mps[judged]
+    found = estimate_mps[judged]
+    empty = np.isnan(found)
+    found = np.where(empty, 0.0, found)
+    error = found - target
+    if not len(error):
+        nan = float("nan")
+        return VelocityError(nan, nan, nan, nan, nan, nan, 0, int((~judged).sum()), 0)
+    return VelocityError(
+        mae_mps=float(np.abs(error).mean()),
+        sd_mps=float(error.std()),
+        sd_absolute_mps=float(np.abs(error).std()),
+        bias_mps=float(error.mean()),
+        rmse_mps=float(np.sqrt((error**2).mean())),
+        correlation=_correlation(found, target),
+        frames=len(error),
+        empty_target=int((~judged).sum()),
+        empty_estimate=int(empty.sum()),
+    )
+
+
+def peak_error(
+    estimate: NDArray[np.floating],
+    target: NDArray[np.floating],
+    axis: VelocityAxis,
+    frames: NDArray[np.bool_] | None = None,
+) -> VelocityError:
+    """Error of the peak velocity (the paper's Table 1), of energies (frames, bins)."""
+    return velocity_error(
+        peak_velocity_mps(estimate, axis), peak_velocity_mps(target, axis), frames
+    )
+
+
+def mean_velocity_error(
+    estimate: NDArray[np.floating],
+    target: NDArray[np.floating],
+    axis: VelocityAxis,
+    frames: NDArray[np.bool_] | None = None,
+) -> VelocityError:
+    """Error of the energy-weighted mean velocity, of energies (frames, bins)."""
+    return velocity_error(
+        mean_velocity_mps(estimate, axis), mean_velocity_mps(target, axis), frames
+    )
+
+
+def map_error(
+    estimate: NDArray[np.floating],
+    target: NDArray[np.floating],
+    compression: Compression,
+    null_bins: tuple[int, ...] = (),
+) -> MapError:
+    """Error of all cells.
+
+    Parameters
+    ----------
+    estimate, target : float array, shape (frames, bins)
+        Energies in the unit of the target.
+    compression : Compression
+        Of targets, as the model has it.
+    null_bins : tuple of int
+        Bins that do not count.
+    """
+    if estimate.shape != target.shape:
+        raise Sd2Error(f"The maps are of shape {estimate.shape} and {target.shape}", "the same")
+    found, wanted = (
+        np.delete(values, list(null_bins), axis=1).astype(np.float64)
+        for values in (estimate, target)
+    )
+    difference, total = float(np.abs(found - wanted).sum()), float(wanted.sum())
+    without_target = float("inf") if difference > 0 else 0.0
+    relative = difference / total if total > 0 else without_target
+    found, wanted = compression.compress(found), compression.compress(wanted)
+    rmse = float(np.sqrt(((found - wanted) ** 2).mean())) if found.size else float("nan")
+    return MapError(relative, rmse, _correlation(found.ravel(), wanted.ravel()))
+
+
+def stands_out(
+    energies: NDArray[np.floating], null_bins: tuple[int, ...] = (), factor: float = 10.0
+) -> NDArray[np.bool_]:
+    """Frames whose strongest bin lies above the noise, (frames,).
+
+    A radar's map is never empty: where nothing moves, its strongest bin is that of the
+    noise, and its velocity says nothing. The noise is the median of all cells of the
+    take, which holds as long as movement fills less than half of them.
+
+    Parameters
+    ----------
+    energies : float array, shape (frames, bins)
+        Of one take.
+    null_bins : tuple of int
+        Bins that do not count.
+    factor : float
+        How far above the noise, as a ratio of energies; 10 is 10 dB.
+    """
+    counted = np.delete(energies, list(null_bins), axis=1)
+    if not counted.size:
+        return np.zeros(len(energies), bool)
+    out: NDArray[np.bool_] = counted.max(axis=1) > factor * np.median(counted)
+    return out
+
+
+def _check(energies: NDArray[np.floating], axis: VelocityAxis) -> None:
+    if energies.ndim != 2 or energies.shape[1] != axis.bins:
+        raise Sd2Error(f"The values are of shape {energies.shape}", f"(frames, {axis.bins})")
+
+
+def _correlation(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+    if len(one) < 2 or one.std() == 0 or other.std() == 0:
+        return float("nan")
+    return float(np.corrcoef(one, other)[0, 1])

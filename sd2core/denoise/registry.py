@@ -1,0 +1,186 @@
+"""The models by name, with options that make them comparable."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Literal
+
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from sd2core.denoise.model import Denoiser
+
+Match = Literal["parameters", "time"]
+"""parameters: about as many numbers to learn as the S4; time: about as long a step of training."""
+
+
+@dataclass(frozen=True)
+class _Entry:
+    place: str
+    summary: str
+    options: Mapping[str, Any] = field(default_factory=dict)
+    fixed: Mapping[str, Any] = field(default_factory=dict)
+    same_time: Mapping[str, Any] = field(default_factory=dict)
+
+
+_S4 = {"channels": 128, "depth": 4, "state_size": 64, "dropout": 0.0, "residual": True}
+
+_ENTRIES: dict[str, _Entry] = {
+    "s4": _Entry(
+        "state_space.S4Denoiser",
+        "structured state space, HiPPO-LegS (the paper's model)",
+        {**_S4, "bidirectional": False},
+        {"kernel": "legs"},
+    ),
+    "s4d": _Entry(
+        "state_space.S4Denoiser",
+        "structured state space, diagonal",
+        {**_S4, "bidirectional": False},
+        {"kernel": "diagonal"},
+    ),
+    "s4-serial": _Entry(
+        "state_space.SerialS4Denoiser",
+        "the paper's literal form: all cells one after another, one channel; slow",
+        _S4,
+        {"kernel": "legs"},
+        {"channels": 8},
+    ),
+    "gru": _Entry(
+        "recurrent.GruDenoiser",
+        "gated recurrent network",
+        {"channels": 144, "depth": 2, "dropout": 0.0, "residual": True},
+    ),
+    "unet": _Entry(
+        "unet.UNetDenoiser",
+        "2D U-Net over windows of 72 frames",
+        {"channels": 12, "depth": 3, "dropout": 0.0, "residual": True},
+        same_time={"channels": 5},
+    ),
+    "swin": _Entry(
+        "swin.SwinDenoiser",
+        "Swin transformer over windows of 72 frames",
+        {"channels": 48, "depth": 2, "dropout": 0.0, "residual": True},
+        same_time={"channels": 16},
+    ),
+    "none": _Entry("filters.NoDenoiser", "no denoising"),
+    "median": _Entry(
+        "filters.MedianDenoiser", "median over frames and bins", {"frames": 5, "width": 3}
+    ),
+    "wiener": _Entry(
+        "filters.WienerDenoiser",
+        "linear filter of least squared error",
+        {"frames": 9, "width": 5},
+    ),
+}
+
+FILTERS = ("none", "median", "wiener")
+"""What needs no training, only :func:`fit_filter`."""
+
+MODELS = tuple(name for name in _ENTRIES if name not in FILTERS)
+"""What is trained."""
+
+_LARGEST = 4096
+"""No option is a larger number: a damaged file must not ask for all the memory."""
+
+
+def options(name: str, match: Match = "parameters") -> dict[str, Any]:
+    """Options of a model with their defaults.
+
+    Parameters
+    ----------
+    name : str
+    match : {"parameters", "time"}
+        In what it is to be comparable to the S4.
+
+    Raises
+    ------
+    Sd2Error
+        When there is no such model.
+    """
+    entry = _entry(name)
+    return {**entry.options, **(entry.same_time if match == "time" else {})}
+
+
+def summary(name: str) -> str:
+    """What a model is, in a few words."""
+    return _entry(name).summary
+
+
+def build(name: str, bins: int = 32, **given: Any) -> Denoiser:
+    """A model with fresh weights.
+
+    Parameters
+    ----------
+    name : str
+        One of :data:`MODELS` or :data:`FILTERS`.
+    bins : int
+        Velocity bins.
+    **given
+        Options in place of :func:`options`.
+
+    Raises
+    ------
+    Sd2Error
+        When there is no such model or option, or an option is not of its kind.
+    """
+    entry = _entry(name)
+    for option, value in given.items():
+        _check(name, option, value, entry.options)
+    module, _, class_name = entry.place.partition(".")
+    found = getattr(import_module(f"sd2core.denoise.{module}"), class_name)
+    model: Denoiser = found(bins, **entry.fixed, **{**entry.options, **given})
+    return model
+
+
+def fit_filter(
+    name: str,
+    inputs: Sequence[NDArray[np.float32]],
+    targets: Sequence[NDArray[np.float32]],
+    null_bins: Sequence[int] = (),
+) -> tuple[Denoiser, dict[str, Any]]:
+    """One of :data:`FILTERS`, fitted, and its options.
+
+    Parameters
+    ----------
+    name : str
+    inputs, targets : sequence of float32 arrays, shape (frames, bins)
+        Compressed values of the takes to learn from.
+    null_bins : sequence of int
+        Bins that do not count.
+    """
+    from sd2core.denoise import filters
+
+    if name == "none":
+        return filters.NoDenoiser(inputs[0].shape[1]), {}
+    if name not in FILTERS:
+        raise Sd2Error(f"{name} is not a filter", f"one of {', '.join(FILTERS)}")
+    fit = filters.fit_median if name == "median" else filters.fit_wiener
+    fitted = fit(inputs, targets, null_bins)
+    return fitted, {"frames": fitted.frames, "width": fitted.width}
+
+
+def _entry(name: str) -> _Entry:
+    if name not in _ENTRIES:
+        raise Sd2Error(f"There is no model {name!r}", f"one of {', '.join(_ENTRIES)}")
+    return _ENTRIES[name]
+
+
+def _check(name: str, option: str, value: Any, known: Mapping[str, Any]) -> None:
+    if option not in known:
+        raise Sd2Error(
+            f"The model {name} has no option {option!r}",
+            f"one of {', '.join(known)}" if known else "no options",
+        )
+    if isinstance(known[option], bool):
+        if not isinstance(value, bool):
+            raise Sd2Error(f"{name}: {option} is {value!r}", "true or false")
+    elif isinstance(known[option], int):
+        if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= _LARGEST:
+            raise Sd2Error(f"{name}: {option} is {value!r}", f"a whole number, 1 to {_LARGEST}")
+    elif isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value < 1:
+        raise Sd2Error(f"{name}: {option} is {value!r}", "a share from 0 to below 1")

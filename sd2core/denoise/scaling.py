@@ -1,0 +1,153 @@
+"""Compression between energies and the numbers that a network works with.
+
+Fixed per model and the same for every cell, so that live and batch agree and the
+strongest bin of a frame stays the strongest (docs/decisions/0024).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+
+Values = TypeVar("Values")
+"""A NumPy array or a torch tensor."""
+
+EXPONENT = 0.5
+"""Amplitude instead of power."""
+
+
+@dataclass(frozen=True)
+class Compression:
+    """y = (x / reference)^exponent, and back.
+
+    Parameters
+    ----------
+    reference : float
+        Energy that becomes 1.
+    exponent : float
+        Above 0, up to 1. 1/2 turns power into amplitude.
+    """
+
+    reference: float
+    exponent: float = EXPONENT
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.reference) and self.reference > 0):
+            raise Sd2Error(f"The reference energy is {self.reference}", "a finite number above 0")
+        if not 0 < self.exponent <= 1:
+            raise Sd2Error(f"The exponent is {self.exponent}", "above 0, up to 1")
+
+    @classmethod
+    def fitted(
+        cls,
+        stretches: Iterable[NDArray[np.float32]],
+        null_bins: Sequence[int] = (),
+        exponent: float = EXPONENT,
+    ) -> Compression:
+        """The compression whose output has a root mean square of 1.
+
+        In closed form: mean((x / r)^2p) = 1 for r = mean(x^2p)^(1/2p), which for the
+        amplitude (p = 1/2) is the mean energy. So an error of 1 on compressed values is
+        that of a denoiser which answers zero to everything.
+
+        Parameters
+        ----------
+        stretches : iterable of float arrays, shape (frames, bins)
+            Energies to learn from.
+        null_bins : sequence of int
+            Bins that are always zero and do not count.
+        exponent : float
+
+        Raises
+        ------
+        Sd2Error
+            When there is no energy at all.
+        """
+        total, cells = 0.0, 0
+        for values in stretches:
+            counted = np.delete(values, list(null_bins), axis=1).astype(np.float64)
+            total += float((counted ** (2 * exponent)).sum())
+            cells += counted.size
+        if not total > 0:
+            raise Sd2Error(
+                "There is no energy in the maps to learn from", "maps in which something moves"
+            )
+        return cls((total / cells) ** (1 / (2 * exponent)), exponent)
+
+    def compress(self, energy: Values) -> Values:
+        """Energies, zero or more, as compressed values."""
+        scaled: Any = energy
+        compressed: Values = (scaled / self.reference) ** self.exponent
+        return compressed
+
+    def expand(self, compressed: Values) -> Values:
+        """Compressed values as energies; what is negative becomes zero."""
+        scaled: Any = compressed
+        energy: Values = (scaled * (scaled > 0)) ** (1 / self.exponent) * self.reference
+        return energy
+
+
+@dataclass(frozen=True)
+class Scaling:
+    """How a model compresses what it gets, and what it is to answer.
+
+    Parameters
+    ----------
+    input : Compression
+        Of synthetic Doppler.
+    target : Compression
+        Of the radar's.
+    """
+
+    input: Compression
+    target: Compression
+
+    @classmethod
+    def fitted(
+        cls,
+        inputs: Iterable[NDArray[np.float32]],
+        targets: Iterable[NDArray[np.float32]],
+        null_bins: Sequence[int] = (),
+        *,
+        input_exponent: float = EXPONENT,
+        target_exponent: float = EXPONENT,
+    ) -> Scaling:
+        """Both fitted on the stretches to learn from, (frames, bins) each."""
+        return cls(
+            Compression.fitted(inputs, null_bins, input_exponent),
+            Compression.fitted(targets, null_bins, target_exponent),
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """As kept in a model file."""
+        return {
+            "law": "power",
+            **{
+                f"{name}_{part}": getattr(getattr(self, name), part)
+                for name in ("input", "target")
+                for part in ("reference", "exponent")
+            },
+        }
+
+    @classmethod
+    def from_json(cls, content: dict[str, Any]) -> Scaling:
+        """Read what :meth:`to_json` gave.
+
+        Raises
+        ------
+        KeyError, TypeError, ValueError, Sd2Error
+            When it is something else.
+        """
+        if content["law"] != "power":
+            raise ValueError(f"scaling law {content['law']!r}")
+        return cls(
+            Compression(float(content["input_reference"]), float(content["input_exponent"])),
+            Compression(float(content["target_reference"]), float(content["target_exponent"])),
+        )

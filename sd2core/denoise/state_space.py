@@ -1,0 +1,125 @@
+"""The paper's denoiser: structured state spaces between two linear layers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, Literal
+
+from torch import Tensor, nn
+
+from sd2core.denoise.model import Denoiser, State, head
+from sd2core.denoise.s4 import S4Layer
+
+
+class S4Denoiser(Denoiser):
+    """Each frame's bins, a linear layer, S4 layers along time, a linear layer.
+
+    Parameters
+    ----------
+    bins : int
+    channels : int
+        Width H of the layers.
+    depth : int
+        Number of S4 layers.
+    state_size : int
+        Numbers N that each channel remembers.
+    kernel : {"legs", "diagonal"}
+    bidirectional : bool
+        Also backwards in time: no longer causal, so not for live use.
+    dropout : float
+    residual : bool
+        See :class:`Denoiser`.
+    """
+
+    def __init__(
+        self,
+        bins: int,
+        *,
+        channels: int = 128,
+        depth: int = 4,
+        state_size: int = 64,
+        kernel: Literal["legs", "diagonal"] = "legs",
+        bidirectional: bool = False,
+        dropout: float = 0.0,
+        residual: bool = True,
+    ) -> None:
+        super().__init__(bins, residual)
+        self.causal = not bidirectional
+        self.window = 72 if bidirectional else None
+        self.lift = nn.Linear(bins, channels)
+        self.layers = nn.ModuleList(
+            S4Layer(
+                channels,
+                state_size,
+                kernel=kernel,
+                bidirectional=bidirectional,
+                dropout=dropout,
+            )
+            for _ in range(depth)
+        )
+        self.head = head(nn.Linear(channels, bins), residual)
+
+    def initial_state(self, batch: int = 1) -> State:
+        """One state per layer."""
+        return [layer.initial_state(batch) for layer in self.layers]
+
+    def correction(self, values: Tensor) -> Tensor:
+        """Whole stretches by convolution."""
+        hidden = self.lift(values)
+        for layer in self.layers:
+            hidden = layer(hidden)
+        return self.head(hidden)
+
+    def correction_chunk(self, values: Tensor, state: State) -> tuple[Tensor, State]:
+        """Convolution, and what the state still says."""
+        hidden, after = self.lift(values), []
+        for layer, one in zip(self.layers, state, strict=True):
+            hidden, one = layer.chunk(hidden, one)
+            after.append(one)
+        return self.head(hidden), after
+
+    def correction_step(self, frame: Tensor, state: State) -> tuple[Tensor, State]:
+        """By recurrence."""
+        hidden, after = self.lift(frame), []
+        for layer, one in zip(self.layers, state, strict=True):
+            hidden, one = layer.step(hidden, one)
+            after.append(one)
+        return self.head(hidden), after
+
+    def ssm_parameters(self) -> Iterator[nn.Parameter]:
+        """Those of all layers."""
+        for layer in self.layers:
+            yield from layer.ssm_parameters()
+
+
+class SerialS4Denoiser(S4Denoiser):
+    """The paper's literal form: 72 frames of 32 bins as 2,304 samples of one channel.
+
+    Cells come one after another, bin by bin and frame by frame; each is lifted to the
+    width of the layers by itself. A cell knows the bins below it in its own frame and
+    all earlier frames.
+
+    Parameters
+    ----------
+    bins, channels, depth, state_size, kernel, dropout, residual
+        As for :class:`S4Denoiser`.
+    """
+
+    def __init__(self, bins: int, *, channels: int = 128, residual: bool = True, **layers: Any):
+        super().__init__(bins, channels=channels, residual=residual, **layers)
+        self.lift = nn.Linear(1, channels)
+        self.head = head(nn.Linear(channels, 1), residual)
+
+    def correction(self, values: Tensor) -> Tensor:
+        """Cells in a row and back."""
+        return super().correction(values.flatten(1)[..., None]).view(values.shape)
+
+    def correction_chunk(self, values: Tensor, state: State) -> tuple[Tensor, State]:
+        """Whole frames, so the state stands between two frames."""
+        cells, state = super().correction_chunk(values.flatten(1)[..., None], state)
+        return cells.view(values.shape), state
+
+    def correction_step(self, frame: Tensor, state: State) -> tuple[Tensor, State]:
+        """One frame is a chunk of as many cells as there are bins."""
+        correction, state = self.correction_chunk(frame[:, None], state)
+        return correction[:, 0], state

@@ -1,0 +1,98 @@
+"""Filters find what they must where the answer is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from denoisers import energies
+
+from sd2core.denoise.filters import fit_median, fit_wiener
+from sd2core.denoise.registry import FILTERS, build, fit_filter
+
+NULLED = (14, 15, 16)
+
+
+def takes(count: int, frames: int = 200) -> list[np.ndarray]:
+    return [np.sqrt(energies(frames, seed)) for seed in range(count)]
+
+
+def filtered(values: np.ndarray) -> np.ndarray:
+    """0.5 of the frame before, 0.25 of the next higher bin, and a mean that falls."""
+    before = np.concatenate([values[:1], values[:-1]])
+    above = np.concatenate([values[:, 1:], values[:, -1:]], axis=1)
+    return (0.5 * before + 0.25 * above + np.linspace(1, 0, 32)).astype(np.float32)
+
+
+def test_wiener_recovers_a_linear_filter() -> None:
+    inputs = takes(3)
+    wiener = fit_wiener(inputs, [filtered(one) for one in inputs], NULLED, frames=4, width=3)
+    expected = np.zeros((4, 3))
+    expected[2, 1], expected[3, 2] = 0.5, 0.25
+    np.testing.assert_allclose(wiener.weight.view(4, 3), expected, atol=1e-4)
+    counted = np.delete(np.arange(32), NULLED)
+    np.testing.assert_allclose(wiener.mean[counted], np.linspace(1, 0, 32)[counted], atol=1e-3)
+    unseen = np.sqrt(energies(50, 99))
+    answer = wiener(torch.from_numpy(unseen)[None])[0].numpy()
+    np.testing.assert_allclose(answer[:, counted], filtered(unseen)[:, counted], atol=1e-3)
+
+
+def test_wiener_shrinks_towards_the_mean_as_the_closed_form_says() -> None:
+    # White input of variance s², target = input signal of variance p with p / s² of it left.
+    random = np.random.default_rng(0)
+    clean = random.normal(size=(20_000, 32)).astype(np.float32)
+    noisy = clean + 2.0 * random.normal(size=clean.shape).astype(np.float32)
+    wiener = fit_wiener([noisy], [clean], frames=3, width=3)
+    expected = np.zeros((3, 3))
+    expected[2, 1] = 1 / (1 + 2.0**2)
+    np.testing.assert_allclose(wiener.weight.view(3, 3), expected, atol=0.01)
+
+
+def test_wiener_without_fit_changes_nothing() -> None:
+    values = torch.from_numpy(energies(30))[None]
+    torch.testing.assert_close(build("wiener")(values), values)
+
+
+def test_nulled_bins_do_not_count_in_a_fit() -> None:
+    inputs = takes(2)
+    targets = [filtered(one) for one in inputs]
+    spoilt = [target.copy() for target in targets]
+    for target in spoilt:
+        target[:, list(NULLED)] = 1e3
+    for name in ("median", "wiener"):
+        one, other = (fit_filter(name, inputs, goal, NULLED) for goal in (targets, spoilt))
+        assert one[1] == other[1]
+        for a, b in zip(one[0].parameters(), other[0].parameters(), strict=True):
+            torch.testing.assert_close(a, b)
+
+
+def test_the_median_is_the_median() -> None:
+    values = energies(40)
+    median = build("median", frames=3, width=3)
+    answer = median(torch.from_numpy(values)[None])[0].numpy()
+    for frame, number in [(2, 1), (17, 30), (39, 12)]:
+        around = values[frame - 2 : frame + 1, number - 1 : number + 2]
+        assert answer[frame, number] == np.median(around)
+
+
+def test_the_median_that_made_the_targets_is_chosen() -> None:
+    inputs = takes(2)
+    maker = build("median", frames=5, width=3)
+    targets = [3.0 * maker(torch.from_numpy(one)[None])[0].numpy() for one in inputs]
+    median = fit_median(inputs, targets, NULLED)
+    assert (median.frames, median.width) == (5, 3)
+    assert float(median.level) == pytest.approx(3.0, rel=1e-5)
+
+
+def test_a_speck_is_removed_by_the_median() -> None:
+    values = np.full((20, 32), 0.1, np.float32)
+    values[9, 20] = 5.0
+    answer = build("median")(torch.from_numpy(values)[None])[0]
+    torch.testing.assert_close(answer, torch.full_like(answer, 0.1))
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_silence_stays_silent(name: str) -> None:
+    nothing = [np.zeros((30, 32), np.float32)]
+    network, _ = fit_filter(name, nothing, nothing)
+    assert not network(torch.zeros(1, 30, 32)).any()
