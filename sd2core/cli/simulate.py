@@ -8,6 +8,7 @@ from pathlib import Path
 from sd2core.cli.fit_truth import add_fit_truth
 from sd2core.cli.options import add_command
 from sd2core.cli.output import progress_bar
+from sd2core.cli.simulate_campaign import add_campaign
 from sd2core.cli.simulate_people import add_people
 from sd2core.cli.simulate_radar import add_radar
 
@@ -17,11 +18,12 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser = add_command(
         commands,
         "simulate",
-        "make recordings of a simulated body, or a radar's samples of any mesh",
+        "make recordings of a simulated body, radar samples of any mesh, pairs to train on",
         examples=(
             "  sd2 simulate sample swipes.sd2\n"
             "  sd2 simulate radar walk.npz walk-radar\n"
-            "  sd2 simulate fit-truth truth"
+            "  sd2 simulate fit-truth truth\n"
+            "  sd2 simulate campaign campaign.zarr"
         ),
     )
     kinds = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
@@ -40,6 +42,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     add_radar(kinds)
     add_fit_truth(kinds)
     add_people(kinds)
+    add_campaign(kinds)
     body = add_command(
         kinds,
         "export-body",

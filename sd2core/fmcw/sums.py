@@ -71,7 +71,7 @@ class Echoes:
 
 
 @dataclass(frozen=True, eq=False)
-class _Turns:
+class Turns:
     """Phase in turns: start + m chirp + n sample + m n migration, (k,) each."""
 
     start: NDArray[np.float64]
@@ -95,7 +95,7 @@ def direct(
     go_on : callable or None
         Called every few ten milliseconds; may raise to stop.
     """
-    turns = _turns(echoes, config)
+    turns = turns_of(echoes, config)
     shape = (chirps or config.chirps_per_frame, config.samples_per_chirp)
     total = np.zeros(shape, np.complex128)
     count, amplitude = echoes.count, np.ascontiguousarray(echoes.terms)
@@ -126,7 +126,7 @@ def recurrent(
 
     Nothing is left out; rounding adds some 1e-14 times the samples of a chirp.
     """
-    turns = _turns(echoes, config)
+    turns = turns_of(echoes, config)
     shape = (config.samples_per_chirp, chirps or config.chirps_per_frame)
     real, imaginary = np.zeros(shape), np.zeros(shape)
     recurrent_sum(
@@ -166,7 +166,7 @@ def nufft(
     tolerance : float
         Relative error of the sums.
     """
-    turns = _turns(echoes, config)
+    turns = turns_of(echoes, config)
     chirps = chirps or config.chirps_per_frame
     samples = config.samples_per_chirp
     total = np.zeros((chirps, samples), np.complex128)
@@ -229,13 +229,14 @@ def _transform(
     return found.reshape(len(strengths), *shape)
 
 
-def _turns(echoes: Echoes, config: RadarConfig) -> _Turns:
+def turns_of(echoes: Echoes, config: RadarConfig) -> Turns:
+    """Phases of echoes at every chirp and sample, as four numbers each."""
     per_metre = 2.0 / SPEED_OF_LIGHT_MPS
     carrier = 2.0 / config.wavelength_m
     per_sample_s = 1.0 / config.sample_rate_hz
     slope = per_metre * config.slope_hz_per_s * per_sample_s
     start = carrier * echoes.range_m
-    return _Turns(
+    return Turns(
         start - np.floor(start),
         carrier * config.chirp_repetition_s * echoes.rate_mps,
         slope * echoes.range_m + carrier * per_sample_s * echoes.rate_mps,

@@ -1,0 +1,1 @@
+"""Simulated campaigns: synthetic Doppler of disturbed bodies beside a simulated radar."""

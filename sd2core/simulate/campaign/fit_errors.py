@@ -1,0 +1,221 @@
+"""What is known of how fits from video err, on disk, and errors drawn anew from it.
+
+A fit errs as its evidence does: the same pose is misread in the same way, another pose
+in another, so that who stands still has no false velocity and who moves faster has more
+of it. So errors are a random function of the pose, not of time: for each group of
+:mod:`~sd2core.simulate.campaign.posture`
+
+    error = gain · (1, pose) + bias + f(pose)
+
+with the regression that all clips have in common (limbs that are drawn too short in
+depth), a constant per clip, and a Gaussian process over poses with a rational quadratic
+kernel (C. E. Rasmussen and C. K. I. Williams, "Gaussian Processes for Machine Learning",
+2006, eq. 4.19). It is drawn by random Fourier features (A. Rahimi and B. Recht, "Random
+features for large-scale kernel machines", NIPS 2007).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sd2core.atomic import atomic_write_text
+from sd2core.body.model import Skeleton
+from sd2core.body.rotations import Floats
+from sd2core.body.shape import BodyShape
+from sd2core.errors import Sd2Error
+from sd2core.resources import resource_path
+from sd2core.simulate.campaign.posture import Group, all_groups, held_otherwise, posture
+
+FORMAT = "sd2-fit-errors"
+VERSION = 1
+RESOURCE = "fit_errors.json"
+
+_WAVES = 96
+
+
+@dataclass(frozen=True, eq=False)
+class GroupErrors:
+    """Errors of one group of a posture; n of them, depending on m features.
+
+    Parameters
+    ----------
+    gain : float64 array, shape (n, 1 + m)
+    bias : float64 array, shape (n, n)
+        Covariance of what is constant within a clip.
+    spread : float64 array, shape (n, n)
+        Covariance of the Gaussian process.
+    length : float
+        Of its kernel, in the unit of the features.
+    mixing : float
+        Exponent of its kernel, (1 + h² / (2 · mixing · length²)) ** -mixing: the
+        smaller, the more lengths it mixes.
+    """
+
+    gain: Floats
+    bias: Floats
+    spread: Floats
+    length: float
+    mixing: float
+
+    def drawn(self, rng: np.random.Generator) -> ErrorFunction:
+        """Errors of one clip."""
+        count, features = len(self.gain), self.gain.shape[1] - 1
+        constant = _root(self.bias) @ rng.standard_normal(count)
+        # The kernel is a mixture of squared exponentials whose inverse squared lengths
+        # are gamma distributed; each of those has normally distributed frequencies.
+        precision = rng.gamma(self.mixing, 1.0 / self.mixing, (_WAVES, 1)) / self.length**2
+        frequency = np.sqrt(precision) * rng.standard_normal((_WAVES, features))
+        phase = rng.uniform(0.0, 2.0 * np.pi, _WAVES)
+        size = rng.standard_normal((_WAVES, count)) @ _root(self.spread).T
+        size *= np.sqrt(2.0 / _WAVES)
+        return ErrorFunction(self.gain, constant, frequency, phase, size)
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorFunction:
+    """Errors of one clip as a function of the pose."""
+
+    gain: Floats
+    constant: Floats
+    frequency: Floats
+    phase: Floats
+    size: Floats
+
+    def __call__(self, features: Floats) -> Floats:
+        """Errors (T, n) at features (T, m)."""
+        waves = np.cos(features @ self.frequency.T + self.phase)
+        shared = features @ self.gain[:, 1:].T + self.gain[:, 0]
+        return np.asarray(shared + self.constant + waves @ self.size)
+
+
+@dataclass(frozen=True, eq=False)
+class FitErrors:
+    """How fits err.
+
+    Parameters
+    ----------
+    groups : dict of str to GroupErrors
+        ``place``, ``trunk``, ``arm``, ``leg``.
+    shape_mean : float64 array, shape (K,)
+        Of the errors of the shape's coefficients.
+    shape_covariance : float64 array, shape (K, K)
+        Their mean square about that.
+    provenance : dict
+        What was measured, and how.
+    """
+
+    groups: Mapping[Group, GroupErrors]
+    shape_mean: Floats
+    shape_covariance: Floats
+    provenance: dict[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def load(cls, path: Path | None = None) -> FitErrors:
+        """Read what :meth:`save` wrote; the bundled ones by default.
+
+        Raises
+        ------
+        Sd2Error
+            When the file is missing, damaged or of a later version.
+        """
+        path = resource_path(RESOURCE) if path is None else Path(path)
+        try:
+            said = json.loads(path.read_text("utf-8"))
+            if said["format"] != FORMAT or said["version"] > VERSION:
+                raise Sd2Error(
+                    f"{path} is of format {said['format']!r} version {said['version']}",
+                    f"{FORMAT!r} up to version {VERSION}",
+                )
+            groups: dict[Group, GroupErrors] = {
+                name: GroupErrors(
+                    **{key: np.array(one[key], np.float64) for key in ("gain", "bias", "spread")},
+                    length=float(one["length"]),
+                    mixing=float(one["mixing"]),
+                )
+                for name, one in said["groups"].items()
+            }
+            wanted = {group for group, _ in all_groups()}
+            if set(groups) != wanted:
+                raise KeyError(", ".join(sorted(wanted - set(groups))))
+            return cls(
+                groups,
+                np.array(said["shape_mean"], np.float64),
+                np.array(said["shape_covariance"], np.float64),
+                said["provenance"],
+            )
+        except (OSError, KeyError, TypeError, ValueError) as error:
+            raise Sd2Error(
+                f"{path} cannot be read as errors of fits ({error})",
+                "a file written by `sd2 simulate fit-errors`",
+            ) from error
+
+    def as_dict(self) -> dict[str, Any]:
+        """What the file holds."""
+        return {
+            "format": FORMAT,
+            "version": VERSION,
+            "groups": {
+                name: {key: _plain(value) for key, value in asdict(group).items()}
+                for name, group in self.groups.items()
+            },
+            "shape_mean": _plain(self.shape_mean),
+            "shape_covariance": _plain(self.shape_covariance),
+            "provenance": self.provenance,
+        }
+
+    def save(self, path: Path) -> None:
+        """Write JSON, whole or not at all."""
+        atomic_write_text(Path(path), json.dumps(self.as_dict(), indent=1) + "\n")
+
+    def drawn(self, rng: np.random.Generator) -> Disturbance:
+        """The errors of one clip's fit."""
+        shape = self.shape_mean + _root(self.shape_covariance) @ rng.standard_normal(
+            len(self.shape_mean)
+        )
+        functions = {key: self.groups[key[0]].drawn(rng) for key in all_groups()}
+        return Disturbance(shape, functions)
+
+
+@dataclass(frozen=True, eq=False)
+class Disturbance:
+    """The errors of one clip's fit: see :meth:`FitErrors.drawn`."""
+
+    shape_error: Floats
+    functions: Mapping[tuple[Group, str], ErrorFunction]
+
+    def shape(self, true: BodyShape) -> BodyShape:
+        """The shape that is found; the stature is known."""
+        return BodyShape(true.coefficients + self.shape_error, true.stature_m)
+
+    def transforms(self, true: Skeleton, transforms: Floats, fitted: Skeleton) -> Floats:
+        """Transforms of the bones that are found.
+
+        Parameters
+        ----------
+        true, fitted : Skeleton
+            Of the true shape and of the one that is found.
+        transforms : float64 array, shape (T, B, 3, 4)
+            Of the true body in the camera frame.
+        """
+        held = posture(true, transforms)
+        change = {key: function(held.features(*key)) for key, function in self.functions.items()}
+        return held_otherwise(fitted, transforms, held, change)
+
+
+def _root(covariance: Floats) -> Floats:
+    """A matrix whose product with its transpose is a covariance, also a singular one."""
+    values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
+
+
+def _plain(value: Any) -> Any:
+    """Numbers for JSON, without digits that mean nothing."""
+    if isinstance(value, np.ndarray):
+        return [_plain(one) for one in value] if value.ndim else float(value)
+    return float(f"{float(value):.6g}")

@@ -1,0 +1,195 @@
+"""A campaign on disk, take by take, made by several processes: ``sd2 simulate campaign``."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import json
+import multiprocessing
+import multiprocessing.connection
+import os
+import threading
+from collections import deque
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+
+from sd2core import __version__
+from sd2core.errors import Sd2Error
+from sd2core.pairs import PairWriter, Take, TakeKey
+from sd2core.progress import Progress, silent
+from sd2core.simulate.campaign.fit_errors import FitErrors
+from sd2core.simulate.campaign.motion import LABELS
+from sd2core.simulate.campaign.people import subject_name
+from sd2core.simulate.campaign.takes import OPTIONS, Campaign, TakeMaker, take_name
+
+_AHEAD = 3
+"""Takes per process that are handed out before the first of them is written."""
+
+_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+_maker: TakeMaker | None = None
+
+
+def make_campaign(
+    out: Path,
+    campaign: Campaign,
+    *,
+    subjects: int = 6,
+    minutes: float = 90.0,
+    processes: int = 2,
+    errors: Path | None = None,
+    progress: Progress = silent,
+) -> int:
+    """Make the takes of a campaign that are not there yet.
+
+    Takes are written in order, one of each subject in turn, so that a campaign that is
+    stopped has as much of everybody; started again it goes on, and comes out as if it
+    had not been stopped. A longer one begins with a shorter one's takes.
+
+    Parameters
+    ----------
+    out : Path
+        Folder of the pairs.
+    campaign : Campaign
+    subjects : int
+    minutes : float
+        Of all subjects together; placements count once.
+    processes : int
+        1 works in this one.
+    errors : Path, optional
+        Errors of fits to use instead of the bundled ones.
+    progress : Progress
+        Counts takes.
+
+    Returns
+    -------
+    int
+        How many were made, a take of several placements counting once.
+
+    Raises
+    ------
+    Sd2Error
+        When the folder holds something else, or a campaign of other settings.
+    """
+    if subjects < 1:
+        raise Sd2Error(f"{subjects} subjects", "at least one")
+    known = FitErrors.load(errors)
+    writer = PairWriter(
+        Path(out),
+        kind="simulated",
+        axis=OPTIONS.axis,
+        null_bins=OPTIONS.null_bins,
+        frame_rate_hz=1.0 / campaign.radar.frame_repetition_s,
+        labels=LABELS,
+        provenance={
+            **campaign.provenance(),
+            "fit_errors": {**known.provenance, "sha256": digest(known)},
+            "version": __version__,
+        },
+    )
+    numbers = take_numbers(campaign, subjects, minutes)
+    missing = [number for number in numbers if not _written(writer, campaign, *number)]
+    done = len(numbers) - len(missing)
+    progress(done, len(numbers))
+    made = (
+        _here(campaign, known, missing)
+        if processes == 1
+        else _elsewhere(campaign, errors, missing, processes)
+    )
+    for takes in made:
+        there = writer.done
+        for take in takes:
+            if take.key not in there:
+                writer.append(take)
+        done += 1
+        progress(done, len(numbers))
+    return len(missing)
+
+
+def take_numbers(campaign: Campaign, subjects: int, minutes: float) -> list[tuple[int, int]]:
+    """Numbers of subject and take, in the order in which they are made."""
+    each = max(1, round(60.0 * minutes / campaign.take_seconds / subjects))
+    return [(subject, take) for take, subject in itertools.product(range(each), range(subjects))]
+
+
+def digest(errors: FitErrors) -> str:
+    """Tells errors of fits apart."""
+    text = json.dumps(errors.as_dict(), sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _written(writer: PairWriter, campaign: Campaign, subject: int, number: int) -> bool:
+    name = subject_name(subject)
+    wanted = {TakeKey(name, take_name(number), k) for k in range(campaign.placements)}
+    return wanted <= writer.done
+
+
+def _here(
+    campaign: Campaign, errors: FitErrors, numbers: Sequence[tuple[int, int]]
+) -> Iterator[list[Take]]:
+    maker = TakeMaker(campaign, errors)
+    for subject, number in numbers:
+        yield maker.make(subject, number)
+
+
+def _elsewhere(
+    campaign: Campaign, errors: Path | None, numbers: Sequence[tuple[int, int]], processes: int
+) -> Iterator[list[Take]]:
+    """Takes in order, made by processes that are a few takes ahead."""
+    waiting = deque(numbers)
+    context = multiprocessing.get_context("spawn")
+    with (
+        _one_thread_each(),
+        ProcessPoolExecutor(
+            processes, mp_context=context, initializer=_start, initargs=(campaign, errors)
+        ) as pool,
+    ):
+        running: deque[Future[list[Take]]] = deque()
+        try:
+            while waiting or running:
+                while waiting and len(running) < _AHEAD * processes:
+                    running.append(pool.submit(_make, *waiting.popleft()))
+                yield running.popleft().result()
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+@contextmanager
+def _one_thread_each() -> Iterator[None]:
+    """Processes that are started meanwhile multiply matrices on one thread."""
+    before = {name: os.environ.get(name) for name in _ONE_THREAD}
+    os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+def _start(campaign: Campaign, errors: Path | None) -> None:
+    global _maker
+    _end_with_parent()
+    _maker = TakeMaker(campaign, FitErrors.load(errors))
+
+
+def _end_with_parent() -> None:
+    """A worker whose parent is killed would wait for work for ever."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+
+    def watch() -> None:
+        multiprocessing.connection.wait([parent.sentinel])
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+def _make(subject: int, number: int) -> list[Take]:
+    assert _maker is not None
+    return _maker.make(subject, number)

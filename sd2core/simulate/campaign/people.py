@@ -1,0 +1,90 @@
+"""Who takes part in a simulated campaign, and how each of them moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from sd2core.body.model import Skeleton
+from sd2core.body.shape import BodyShape, ShapeSpace
+
+_SUBJECT = 1  # takes have 0 in this place of the seed
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """One person.
+
+    Parameters
+    ----------
+    name : str
+    shape : BodyShape
+    hand : {"L", "R"}
+        That makes most gestures.
+    other_hand : float
+        Share of the gestures that the other one makes.
+    tempo : float
+        Time for a stroke over everybody's.
+    size : float
+        Width of a stroke over everybody's.
+    held_deg : (float, float)
+        Azimuth and elevation that are added to every pose of the arms.
+    follow : float
+        How much the torso goes with the arm, 1 on average.
+    sway_deg : float
+        Standard deviation of the lean about the ankles.
+    rests : float
+        How long pauses are, 1 on average.
+    """
+
+    name: str
+    shape: BodyShape
+    hand: Literal["L", "R"]
+    other_hand: float
+    tempo: float
+    size: float
+    held_deg: tuple[float, float]
+    follow: float
+    sway_deg: float
+    rests: float
+
+
+def subject_name(number: int) -> str:
+    """``s01``, ``s02`` … of the subjects from 0 on."""
+    return f"s{number + 1:02d}"
+
+
+def random_subject(space: ShapeSpace, seed: int, number: int) -> Subject:
+    """A person of a campaign; the same for the same seed and number."""
+    rng = np.random.default_rng([seed, _SUBJECT, number])
+    shape = space.random(rng)
+    right = bool(rng.random() < 0.85)
+    tempo, size, follow, rests = np.exp(rng.normal(0.0, [0.15, 0.1, 0.3, 0.3]))
+    azimuth, elevation = rng.normal(0.0, [4.0, 5.0])
+    return Subject(
+        subject_name(number),
+        shape,
+        "R" if right else "L",
+        float(rng.uniform(0.0, 0.35)),
+        float(tempo),
+        float(size),
+        (float(azimuth), float(elevation)),
+        float(follow),
+        float(np.exp(rng.normal(np.log(0.35), 0.4))),
+        float(rests),
+    )
+
+
+def arm_scale(skeleton: Skeleton, base: Skeleton) -> float:
+    """Length of one skeleton's arm to another's."""
+    return _arm_length_m(skeleton) / _arm_length_m(base)
+
+
+def _arm_length_m(skeleton: Skeleton) -> float:
+    heads, index = skeleton.heads_m, skeleton.index
+    shoulder, elbow, wrist = (
+        heads[index[f"{bone}.R"]] for bone in ("upperarm01", "lowerarm01", "wrist")
+    )
+    return float(np.linalg.norm(elbow - shoulder) + np.linalg.norm(wrist - elbow))

@@ -1,0 +1,92 @@
+"""Where a take happens: the camera, the sensors, what stands around."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sd2core.body.rotations import Floats, about
+from sd2core.fmcw.options import Reflector
+from sd2core.sensor import RadarConfig, Vector, VirtualSensor, aimed_at, position_from_spherical
+
+RANGES_M = (1.5, 4.0)
+"""Of the person from the camera, and of the person's chest from the other sensors."""
+
+_CAMERA_M = (0.8, 1.6)
+_BESIDE_M = 0.25
+_HEADING_DEG = (12.0, 30.0)  # spread, most
+_AZIMUTH_DEG, _ELEVATION_DEG = 45.0, (-10.0, 25.0)
+_CHEST = 0.75
+"""Height of the chest over the stature."""
+_REFLECTORS = (3, 8)
+_CROSS_SECTION_M2 = (0.05, 5.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """Where one take happens.
+
+    Parameters
+    ----------
+    place_m : float64 array, shape (3,)
+        Of the floor under the person, in the camera frame.
+    heading_deg : float
+        From facing along the camera's axis.
+    sensors : tuple of VirtualSensor
+        The take's own beside the camera, then others.
+    reflectors : tuple of Reflector
+    """
+
+    place_m: Floats
+    heading_deg: float
+    sensors: tuple[VirtualSensor, ...]
+    reflectors: tuple[Reflector, ...]
+
+    def placed(self, transforms: Floats) -> Floats:
+        """Transforms (T, B, 3, 4) of a body on the floor's origin, brought here."""
+        turn = about(np.array([0.0, 1.0, 0.0]), np.array([self.heading_deg]))[0]
+        placed = np.einsum("ij,tbjk->tbik", turn, transforms)
+        placed[..., 3] += self.place_m
+        return placed
+
+
+def random_setting(
+    rng: np.random.Generator, stature_m: float, placements: int, config: RadarConfig
+) -> Setting:
+    """A setting; the first sensor does not depend on how many there are."""
+    distance_m = float(rng.uniform(RANGES_M[0] + _BESIDE_M, RANGES_M[1]))
+    camera_m = float(rng.uniform(*_CAMERA_M))
+    across_m = float(rng.uniform(-0.1, 0.1)) * distance_m
+    heading = float(np.clip(rng.normal(0.0, _HEADING_DEG[0]), -_HEADING_DEG[1], _HEADING_DEG[1]))
+    x, y = rng.uniform(-_BESIDE_M, _BESIDE_M, 2)
+    chest = (across_m, camera_m - _CHEST * stature_m, distance_m)
+    reflectors = tuple(
+        _reflector(rng, distance_m, camera_m, config) for _ in range(rng.integers(*_REFLECTORS))
+    )
+    sensors = [aimed_at(VirtualSensor((float(x), float(y), 0.0)), chest)]
+    for _ in range(1, placements):
+        position = position_from_spherical(
+            chest,
+            float(rng.uniform(*RANGES_M)),
+            float(rng.uniform(-_AZIMUTH_DEG, _AZIMUTH_DEG)),
+            float(rng.uniform(*_ELEVATION_DEG)),
+        )
+        sensors.append(aimed_at(VirtualSensor(position), chest))
+    place = np.array([across_m, camera_m, distance_m])
+    return Setting(place, heading, tuple(sensors), reflectors)
+
+
+def _reflector(
+    rng: np.random.Generator, distance_m: float, camera_m: float, config: RadarConfig
+) -> Reflector:
+    """Something of the room beside or behind the person."""
+    position: Vector = (
+        float(rng.uniform(-2.0, 2.0)),
+        camera_m - float(rng.uniform(0.0, 2.2)),
+        distance_m + float(rng.uniform(0.3, 3.0)),
+    )
+    cross_section = float(np.exp(rng.uniform(*np.log(_CROSS_SECTION_M2))))
+    # A plate of area A has the cross section 4 π A² / λ².
+    area = config.wavelength_m * float(np.sqrt(cross_section / (4.0 * np.pi)))
+    return Reflector(position, area)

@@ -1,0 +1,180 @@
+"""One take of a simulated campaign: a motion, what a fit of its video would be, both maps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from sd2core.body.model import Body, Resolution
+from sd2core.body.rotations import Floats
+from sd2core.body.shape import BodyShape, ShapeSpace
+from sd2core.body.skinning import pose_vertices
+from sd2core.doppler import PRESETS, Synthesizer
+from sd2core.errors import Sd2Error
+from sd2core.mesh import MeshSequence
+from sd2core.pairs import Take
+from sd2core.sensor import PAPER_RADAR, RadarConfig
+from sd2core.simulate.campaign.fit_errors import FitErrors
+from sd2core.simulate.campaign.motion import perform
+from sd2core.simulate.campaign.people import random_subject
+from sd2core.simulate.campaign.radar import TargetOptions, radar_target
+from sd2core.simulate.campaign.scene import random_setting
+from sd2core.timebase import Timebase
+
+FITTED: Resolution = "medium"
+"""The surface that ``sd2 fit`` writes by default: shares of vertices depend on it."""
+
+TRUE: Resolution = "low"
+"""Echoes of a rough surface depend little on how finely it is cut (decision 26)."""
+
+OPTIONS = PRESETS["paper"]
+
+_TAKE = 0  # subjects have 1 in this place of the seed
+_MOTION, _SETTING, _FIT, _RADAR = range(4)
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """What all takes of a campaign share.
+
+    Parameters
+    ----------
+    seed : int
+    take_seconds : float
+    placements : int
+        Sensors that see every take.
+    radar : RadarConfig
+    target : TargetOptions
+    """
+
+    seed: int = 0
+    take_seconds: float = 15.0
+    placements: int = 1
+    radar: RadarConfig = PAPER_RADAR
+    target: TargetOptions = field(default_factory=TargetOptions)
+
+    def __post_init__(self) -> None:
+        if self.seed < 0:
+            raise Sd2Error(f"The seed is {self.seed}", "0 or more")
+        if not 2.0 <= self.take_seconds <= 600.0:
+            raise Sd2Error(f"A take of {self.take_seconds:g} s", "2 to 600 s")
+        if self.placements < 1:
+            raise Sd2Error(f"{self.placements} placements", "at least one")
+
+    @property
+    def frames(self) -> int:
+        """Of one take."""
+        return round(self.take_seconds / self.radar.frame_repetition_s)
+
+    def provenance(self) -> dict[str, Any]:
+        """How takes are made, without how many there are."""
+        return {
+            "made_by": "sd2 simulate campaign",
+            "simulated": True,
+            "seed": self.seed,
+            "take_seconds": self.take_seconds,
+            "radar": asdict(self.radar),
+            "target": asdict(self.target),
+            "surfaces": {"synthetic": FITTED, "radar": TRUE},
+            "synthesis": asdict(OPTIONS),
+        }
+
+
+class TakeMaker:
+    """Makes takes of one campaign; each depends on its numbers alone.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    errors : FitErrors
+        How fits of its videos err.
+    """
+
+    def __init__(self, campaign: Campaign, errors: FitErrors) -> None:
+        self._campaign = campaign
+        self._errors = errors
+        self._space = ShapeSpace()
+        self._bodies: dict[Resolution, tuple[Body, Floats]] = {
+            resolution: (Body.load(resolution), self._space.directions_m(resolution))
+            for resolution in (TRUE, FITTED)
+        }
+
+    def make(
+        self, subject_number: int, number: int, on_frame: Callable[[], None] = lambda: None
+    ) -> list[Take]:
+        """One take as every placement sees it.
+
+        Parameters
+        ----------
+        subject_number, number : int
+        on_frame : callable
+            Called before every radar frame; may raise to stop.
+        """
+        campaign = self._campaign
+        rngs = [
+            np.random.default_rng([campaign.seed, _TAKE, subject_number, number, part])
+            for part in range(_RADAR)
+        ]
+        subject = random_subject(self._space, campaign.seed, subject_number)
+        skeleton = self._space.skeleton(subject.shape)
+        times_s = campaign.radar.frame_repetition_s * np.arange(campaign.frames, dtype=np.float64)
+        performed = perform(rngs[_MOTION], subject, skeleton, self._space.base_skeleton, times_s)
+        setting = random_setting(
+            rngs[_SETTING], subject.shape.stature_m, campaign.placements, campaign.radar
+        )
+        transforms = setting.placed(skeleton.transforms(*performed.motion))
+        true = self._mesh(TRUE, subject.shape, transforms, times_s)
+        fitted = self._fitted(rngs[_FIT], subject.shape, transforms, times_s)
+        synthesizer = Synthesizer(fitted, OPTIONS, threads=1)
+        takes = []
+        for placement, sensor in enumerate(setting.sensors):
+            radar = radar_target(
+                true,
+                campaign.radar,
+                sensor,
+                OPTIONS.axis,
+                OPTIONS.null_bins,
+                reflectors=setting.reflectors,
+                seed=[campaign.seed, _TAKE, subject_number, number, _RADAR, placement],
+                options=campaign.target,
+                on_frame=on_frame,
+            )
+            takes.append(
+                Take(
+                    subject.name,
+                    take_name(number),
+                    np.ascontiguousarray(synthesizer.map(sensor).values.T),
+                    radar,
+                    times_s,
+                    performed.label,
+                    np.array(sensor.position_m),
+                    placement,
+                )
+            )
+        return takes
+
+    def _fitted(
+        self, rng: np.random.Generator, shape: BodyShape, transforms: Floats, times_s: Floats
+    ) -> MeshSequence:
+        """The mesh that a fit of this take's video might give."""
+        drawn = self._errors.drawn(rng)
+        found = drawn.shape(shape)
+        held = drawn.transforms(
+            self._space.skeleton(shape), transforms, self._space.skeleton(found)
+        )
+        return self._mesh(FITTED, found, held, times_s)
+
+    def _mesh(
+        self, resolution: Resolution, shape: BodyShape, transforms: Floats, times_s: Floats
+    ) -> MeshSequence:
+        body = self._space.shaped(*self._bodies[resolution], shape)
+        vertices = pose_vertices(body, transforms)
+        return MeshSequence(vertices, body.faces, Timebase(times_s), source="simulated body")
+
+
+def take_name(number: int) -> str:
+    """``take-0001``, ``take-0002`` … of a subject's takes from 0 on."""
+    return f"take-{number + 1:04d}"
