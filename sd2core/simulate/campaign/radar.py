@@ -97,7 +97,7 @@ class TargetOptions:
         How many standard deviations of the noise's power a cell must rise above its mean.
     """
 
-    looks: int = 8
+    looks: int = 12
     link: LinkBudget | None = LinkBudget()
     above_noise: float = 5.0
 
@@ -201,8 +201,12 @@ def _looks(scene: MeshScene, frame: int, phases: NDArray[np.complex64]) -> NDArr
     fast = _phasors(turns.sample, samples, np.zeros_like(first))
     # Phases go to the shorter of the two.
     right = phases[:, None, rows] * fast.astype(np.complex64)  # (looks, samples, facets)
-    product = slow.astype(np.complex64) @ right.reshape(-1, len(rows)).T
-    signal = product.real.reshape(chirps, len(phases), samples)
+    # Re(a b) is the product of conj(a) and b as pairs of real numbers.
+    pairs = [
+        np.ascontiguousarray(x).view(np.float32)
+        for x in (slow.conj().astype(np.complex64), right.reshape(-1, len(rows)))
+    ]
+    signal = (pairs[0] @ pairs[1].T).reshape(chirps, len(phases), samples)
     return np.ascontiguousarray(signal.transpose(1, 0, 2))
 
 
