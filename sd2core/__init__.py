@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from sd2core.denoise.files import load_model
     from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
     from sd2core.errors import Sd2Error
     from sd2core.fmcw import doppler_map
@@ -50,6 +51,7 @@ __all__ = [
     "doppler_map",
     "load_capture",
     "load_mesh",
+    "load_model",
     "open_recording",
     "open_video",
     "save_mesh",
@@ -74,6 +76,7 @@ _HOME = {
     "doppler_map": "fmcw",
     "load_capture": "io.radar",
     "load_mesh": "io.mesh",
+    "load_model": "denoise.files",
     "open_recording": "recording",
     "open_video": "io.video",
     "save_mesh": "io.mesh",

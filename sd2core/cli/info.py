@@ -1,4 +1,4 @@
-"""``sd2 info``: what is in a recording, video, mesh, capture, map or pairs."""
+"""``sd2 info``: what is in a recording, video, mesh, capture, map, pairs or denoiser."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser = add_command(
         commands,
         "info",
-        "what is in a recording, video, mesh, radar capture, Doppler map or pairs",
+        "what is in a recording, video, mesh, radar capture, Doppler map, pairs or denoiser",
         handler=_info,
         examples="  sd2 info walk.sd2\n  sd2 info walk.npz --json",
     )
@@ -96,6 +96,11 @@ def describe(path: Path, options: argparse.Namespace) -> Description:
         from sd2core.pairs import read_pairs
 
         return describe_pairs(path, read_pairs(path))
+    if kind == "model":
+        from sd2core.cli.info_model import describe_card
+        from sd2core.denoise.files import describe_model
+
+        return describe_card(path, describe_model(path))
     from sd2core.spectrum import DopplerMap
 
     return describe_map(path, DopplerMap.load(path))

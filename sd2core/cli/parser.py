@@ -7,6 +7,7 @@ import argparse
 from sd2core import __version__
 from sd2core.cli import (
     compare_meshes,
+    denoise,
     fetch_models,
     fit,
     importing,
@@ -34,6 +35,7 @@ examples:
   sd2 import walk.sd2 --video walk.mkv --mesh walk.npz
   sd2 synth walk.npz --out map.npz --sensor 0,0,1
   sd2 radar capture/ --out real.npz
+  sd2 denoise map.npz --out denoised.npz      what a radar would show
   sd2 ladder walk.npz --quick                 what accuracy this scene requires
 
 `sd2 COMMAND --help` explains one command.
@@ -56,6 +58,7 @@ def build_parser() -> tuple[argparse.ArgumentParser, argparse._SubParsersAction]
         fit,
         synth,
         radar,
+        denoise,
         ladder,
         compare_meshes,
         strip,

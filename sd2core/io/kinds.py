@@ -10,14 +10,14 @@ from sd2core.errors import Sd2Error
 from sd2core.pairs import is_pair_store
 from sd2core.relative_paths import is_pattern
 
-Kind = Literal["recording", "video", "mesh", "radar", "map", "pairs"]
+Kind = Literal["recording", "video", "mesh", "radar", "map", "pairs", "model"]
 
 VIDEO_SUFFIXES = frozenset({".mp4", ".mkv", ".mov", ".avi", ".webm", ".m4v", ".mpg", ".ts", ".wmv"})
 MESH_SUFFIXES = frozenset({".obj", ".ply", ".glb", ".pkl", ".pickle", ".joblib"})
 
 
 def kind_of(path: Path) -> Kind:
-    """Recognise a recording, video, mesh, radar capture, Doppler map or pairs.
+    """Recognise a recording, video, mesh, radar capture, Doppler map, pairs or trained denoiser.
 
     Raises
     ------
@@ -40,6 +40,8 @@ def kind_of(path: Path) -> Kind:
         return "mesh"
     if suffix == ".npy":
         return "radar"
+    if suffix == ".safetensors":
+        return "model"
     if suffix == ".npz":
         return "map" if _is_doppler_map(path) else "mesh"
     raise Sd2Error(

@@ -1,0 +1,62 @@
+"""``sd2 denoise``: synthetic Doppler to what a radar would show."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from sd2core.cli.options import add_command, add_json
+from sd2core.cli.output import progress_bar
+
+
+def add_commands(commands: argparse._SubParsersAction) -> None:
+    """Add ``denoise``."""
+    parser = add_command(
+        commands,
+        "denoise",
+        "turn a synthetic Doppler map into what a radar would show",
+        handler=_denoise,
+        description=(
+            "A trained model works out what a radar would have measured where `sd2 synth`\n"
+            "counted vertices. The map must be made as those that the model learnt from (same\n"
+            "bins, same emptied bins); `sd2 info MODEL` says how. Another frame rate is brought\n"
+            "to the model's and back. Frames without a person stay empty."
+        ),
+        examples=(
+            "  sd2 denoise map.npz --out denoised.npz\n"
+            "  sd2 denoise map.npz --out denoised.npz --model runs/first/best.safetensors"
+        ),
+    )
+    parser.add_argument("map", type=Path, metavar="MAP", help="a map from `sd2 synth`")
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="FILE.npz", help="the map to write"
+    )
+    parser.add_argument(
+        "--model",
+        metavar="FILE|NAME",
+        help="a model file from `sd2 train`, or the name of one that is installed (default: the"
+        " one that comes with SD² Studio)",
+    )
+    add_json(parser)
+
+
+def _denoise(options: argparse.Namespace) -> None:
+    from sd2core.cli.info import describe_map, show
+    from sd2core.cli.info_model import model_words
+    from sd2core.cli.reading import check_map_output
+    from sd2core.denoise.files import DEFAULT_NAME, describe_model, find_model, load_model
+    from sd2core.denoise.matching import check_map
+    from sd2core.spectrum import DopplerMap
+
+    check_map_output(options.out)
+    path = find_model(options.model or DEFAULT_NAME)
+    doppler = DopplerMap.load(options.map)
+    # Before torch is loaded, which takes seconds.
+    card = describe_model(path)
+    check_map(doppler, card)
+    with progress_bar("Denoising") as progress:
+        denoised = load_model(path).denoise(doppler, progress)
+    denoised.save(options.out)
+    description = describe_map(options.out, denoised)
+    description.facts = {"model": model_words(card)} | description.facts
+    show(description, as_json=options.json)

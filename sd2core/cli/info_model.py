@@ -1,0 +1,45 @@
+"""``sd2 info`` of a trained denoiser."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from sd2core.cli.info import Description, bins_in_words
+from sd2core.denoise.card import ModelCard
+from sd2core.denoise.registry import MODELS, summary
+
+
+def describe_card(path: Path, card: ModelCard) -> Description:
+    """Describe a model file without its weights."""
+    data = {"kind": "model", "path": str(path), **card.to_json()}
+    facts = {
+        "model": model_words(card),
+        "velocity": f"{card.axis.bins} bins of {card.axis.bin_width_mps:g} m/s over"
+        f" ±{card.axis.v_max_mps:g} m/s",
+        "nulled bins": bins_in_words(card.axis, card.null_bins),
+        "frame rate": f"{card.frame_rate_hz:g} frames/s",
+        "parameters": f"{card.parameters:,}",
+        **dict(_about(card.about)),
+    }
+    title = f"Denoiser {path}" + (f": {card.title}" if card.title else "")
+    return Description(title, data, facts)
+
+
+def model_words(card: ModelCard) -> str:
+    """What it is, and what it learnt from."""
+    words = f"{card.model}, {summary(card.model)}" if card.model in MODELS else card.model
+    source = "a simulated radar" if card.trained_on == "simulated" else "a real radar"
+    return f"{words}; learnt from {source}"
+
+
+def _about(about: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
+    for name, value in about.items():
+        label = f"{prefix}{name}".replace("_", " ")
+        if isinstance(value, Mapping):
+            yield from _about(value, f"{label}, ")
+        elif isinstance(value, float):
+            yield label, f"{value:.4g}"
+        elif not isinstance(value, list | tuple):
+            yield label, str(value)
