@@ -13,7 +13,7 @@ from sd2app.icons import transport_icon
 if TYPE_CHECKING:
     from sd2app.views.window import MainWindow
 
-_MENUS = ("File", "Edit", "View", "Play", "Help")
+_MENUS = ("File", "Edit", "View", "Play", "Model", "Help")
 
 
 class ActionSet:
@@ -34,13 +34,17 @@ class ActionSet:
     def __getitem__(self, name: str) -> QAction:
         return self._actions[name]
 
-    def fill_menu_bar(self) -> QMenu:
-        """Make the menus; returns the one for recent files, which the window fills."""
+    def fill_menu_bar(self, models: QMenu) -> QMenu:
+        """Make the menus; returns the one for recent files, which the window fills.
+
+        ``models`` is put into the menu of models.
+        """
         bar = self._window.menuBar()
         menus = {name: bar.addMenu(f"&{name}") for name in _MENUS}
         for menu in menus.values():
             menu.setToolTipsVisible(True)
         recent = QMenu("Open recent", menus["File"])
+        menus["Model"].addMenu(models)
         for row in ACTIONS:
             if row.separator_before:
                 menus[row.menu].addSeparator()

@@ -114,6 +114,18 @@ ACTIONS: tuple[Action, ...] = (
         lambda c: c.synthesis.complete,
     ),
     Action(
+        "export_denoised", "File", "Export denoised map…", (),
+        "Write the denoised Doppler map with its provenance (.npz)",
+        lambda w: w.dialogs.export_denoised(),
+        lambda c: c.denoise.can_export,
+    ),
+    Action(
+        "export_maps", "File", "Export figure of the maps…", (),
+        "Write the Doppler maps one above the other, as they are shown (.png, .svg, .pdf)",
+        lambda w: w.dialogs.export_maps(),
+        lambda c: any(track.map is not None for track in c.tracks),
+    ),
+    Action(
         "export_strip", "File", "Export strip of frames…", ("Ctrl+Shift+E",),
         "Write frames side by side, the video above its mesh (.png, .svg, .pdf)",
         lambda w: w.dialogs.export_strip(),
@@ -292,6 +304,42 @@ ACTIONS: tuple[Action, ...] = (
         "loop", "Play", "Loop", ("L",), "Start again at the end",
         lambda w: w.context.playback.set_loop(not w.context.playback.loop),
         checked=lambda c: c.playback.loop, icon="loop",
+    ),
+    Action(
+        "open_model", "Model", "Open model file…", (),
+        "Denoise this recording with a model of your own (.safetensors)",
+        lambda w: w.dialogs.open_model(), _has_content, separator_before=True,
+    ),
+    Action(
+        "model_card", "Model", "About this model…", (),
+        "What it learned from, what was measured of it, and its limits",
+        lambda w: w.dialogs.show_model_card(),
+        lambda c: c.denoise.card is not None,
+    ),
+    Action(
+        "difference", "Model", "Difference to the radar", ("X",),
+        "Show denoised minus real, in signed colours, below the maps",
+        lambda w: w.context.difference.set_wanted(not w.context.difference.wanted),
+        lambda c: not c.difference.why_not,
+        lambda c: c.difference.shown,
+        separator_before=True,
+        why_not=lambda c: c.difference.why_not,
+    ),
+    Action(
+        "compare_models", "Model", "Compare with the model before", ("B",),
+        "Show the map of the model that was in use before below that of this one",
+        lambda w: w.context.denoise.set_comparing(not w.context.denoise.comparing),
+        lambda c: c.denoise.before is not None,
+        lambda c: c.denoise.comparing,
+        why_not=lambda c: (
+            "" if c.denoise.before is not None else "No other model has been in use here yet"
+        ),
+    ),
+    Action(
+        "live", "Model", "Denoise live while playing", ("V",),
+        "Frame by frame as the clock reaches them, knowing the past only, as beside a radar",
+        lambda w: w.context.live.set_wanted(not w.context.live.wanted),
+        checked=lambda c: c.live.wanted,
     ),
     Action(
         "sample", "Help", "Open the sample recording", (), "A simulated person, four gestures",

@@ -27,6 +27,18 @@ def uncertain_table(name: str) -> NDArray[np.uint32]:
 
 
 @cache
+def signed_table(negative: str, middle: str, positive: str) -> NDArray[np.uint32]:
+    """255 opaque colours from one to another (``#rrggbb``), by way of a third at number 127."""
+    ends = [np.array([int(name[at : at + 2], 16) for at in (1, 3, 5)]) for name in
+            (negative, middle, positive)]  # fmt: skip
+    # A little more than proportional near the middle, where differences are told apart.
+    share = np.linspace(0.0, 1.0, 128)[:, None] ** 0.8
+    down, up = (ends[1] + share * (end - ends[1]) for end in (ends[0], ends[2]))
+    rgb = np.rint(np.concatenate([down[:0:-1], up])).astype(np.uint32)  # (255, 3)
+    return (0xFF000000 | rgb[:, 0] << 16 | rgb[:, 1] << 8 | rgb[:, 2]).astype(np.uint32)
+
+
+@cache
 def lookup_table(name: str) -> NDArray[np.uint32]:
     """256 opaque colours of a matplotlib map as 0xAARRGGBB, shape (256,)."""
     from matplotlib import colormaps

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from PySide6.QtGui import QUndoCommand
 
+from sd2app.models.denoise_choice import DenoiserChoice
 from sd2app.models.document import DocumentModel
 from sd2app.models.sensor import SensorModel
 from sd2core.sensor import Vector, VirtualSensor, aimed_at
@@ -113,6 +114,14 @@ class Edits:
         before = self._document.clutter
         self._document.set_clutter(clutter)
         self._push("Choose clutter removal", self._document.set_clutter, before, clutter)
+
+    # --- denoising ------------------------------------------------------------------------
+
+    def choose_denoiser(self, choice: DenoiserChoice) -> None:
+        """Denoise the recording with another model, or with none."""
+        before = DenoiserChoice.of(self._document.recording)
+        self._document.set_denoiser(choice)
+        self._push("Choose denoiser", self._document.set_denoiser, before, choice)
 
     def _push(
         self, text: str, assign: Callable[[Any], None], before: object, after: object

@@ -9,6 +9,10 @@ from PySide6.QtCore import QObject
 
 from sd2app.commands import Edits
 from sd2app.models.content import reference_of
+from sd2app.models.denoise import DenoiseModel
+from sd2app.models.denoise_library import DenoiserLibrary, core_library
+from sd2app.models.denoise_live import LiveDenoiseModel
+from sd2app.models.difference import DifferenceModel
 from sd2app.models.display import DisplayModel
 from sd2app.models.document import DocumentModel
 from sd2app.models.fit import COMMAND, FitModel
@@ -44,19 +48,29 @@ class Context:
     span: VisibleSpanModel
     pointer: PointerModel
     synthetic: TrackModel
+    denoised: TrackModel
+    before: TrackModel
     real: TrackModel
     trade: TradeModel
     synthesis: SynthesisModel
     uncertainty: UncertaintyModel
+    denoise: DenoiseModel
+    live: LiveDenoiseModel
+    difference: DifferenceModel
     edits: Edits
     fit: FitModel
     fit_follower: FitFollower
     fit_offer: FitOffer
     fit_taker: FitTaker
 
+    @property
+    def tracks(self) -> tuple[TrackModel, ...]:
+        """All maps, from top to bottom."""
+        return (self.synthetic, self.denoised, self.before, self.real)
+
     def reset_references(self) -> None:
         """Make the strongest bin of each map 0 dB."""
-        for track in (self.synthetic, self.real):
+        for track in self.tracks:
             if track.map is not None:
                 track.set_reference(reference_of(track.map.values, track.map.null_bins))
 
@@ -65,6 +79,8 @@ class Context:
         self.playback.pause()
         self.fit.close()
         self.uncertainty.close()
+        self.live.close()
+        self.denoise.close()
         self.synthesis.close()
         self.trade.close()
         self.video.close()
@@ -76,10 +92,12 @@ def build_context(
     settings: Settings,
     ladder: Ladder | None = None,
     fit_command: Sequence[str] | None = None,
+    denoisers: DenoiserLibrary | None = None,
 ) -> Context:
     """Make the models and let them follow the document.
 
-    The ladder is the library's and the command that fits ``sd2`` itself by default.
+    Ladder and denoisers are the library's and the command that fits ``sd2`` itself by
+    default.
     """
     jobs = JobsModel(parent)
     document = DocumentModel(jobs, parent)
@@ -87,11 +105,25 @@ def build_context(
     sensor = SensorModel(parent)
     span = VisibleSpanModel(parent)
     synthetic = TrackModel("Synthetic", parent)
+    denoised, before = TrackModel("Denoised", parent), TrackModel("Denoised before", parent)
     real = TrackModel("Real", parent)
     trade = TradeModel(jobs, settings, ladder or CORE, parent)
     fit = FitModel(settings, parent, fit_command or COMMAND)
     follower = FitFollower(fit, document, playback, parent)
     synthesis = SynthesisModel(document, sensor, playback, span, synthetic, jobs, trade, parent)
+    display, edits = DisplayModel(parent), Edits(document, sensor)
+    denoise = DenoiseModel(
+        document,
+        synthesis,
+        span,
+        synthetic,
+        denoised,
+        before,
+        jobs,
+        denoisers or core_library(),
+        edits.choose_denoiser,
+        parent,
+    )
     context = Context(
         settings=settings,
         jobs=jobs,
@@ -99,16 +131,21 @@ def build_context(
         playback=playback,
         video=VideoModel(playback, parent),
         sensor=sensor,
-        display=DisplayModel(parent),
+        display=display,
         overlay=OverlayModel(settings, parent),
         span=span,
         pointer=PointerModel(parent),
         synthetic=synthetic,
+        denoised=denoised,
+        before=before,
         real=real,
         trade=trade,
         synthesis=synthesis,
         uncertainty=UncertaintyModel(document, synthesis, trade, synthetic, jobs, settings, parent),
-        edits=Edits(document, sensor),
+        denoise=denoise,
+        live=LiveDenoiseModel(playback, synthetic, denoise, settings, parent),
+        difference=DifferenceModel(denoised, real, display, settings, parent),
+        edits=edits,
         fit=fit,
         fit_follower=follower,
         fit_offer=FitOffer(document, fit, parent),

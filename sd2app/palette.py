@@ -18,7 +18,10 @@ class Palette:
     accent: str
     accent_text: str
     synthetic: str
+    denoised: str
+    before: str
     real: str
+    level: str
     hatch: str
     warning: str
     overlay: str
@@ -34,7 +37,10 @@ LIGHT = Palette(
     accent="#1f66d1",
     accent_text="#ffffff",
     synthetic="#1f66d1",
+    denoised="#0b7a5b",
+    before="#8a4bb0",
     real="#b4520b",
+    level="#f7f8f9",
     hatch="#9aa1ab",
     warning="#a33a00",
     overlay="#2fc6a8",
@@ -49,7 +55,10 @@ DARK = Palette(
     accent="#79b0ff",
     accent_text="#0e1116",
     synthetic="#79b0ff",
+    denoised="#4fd0a2",
+    before="#cfa2ee",
     real="#f5a45a",
+    level="#17191d",
     hatch="#5a616c",
     warning="#ffb07a",
     overlay="#2fc6a8",

@@ -62,6 +62,7 @@ def _style_sheet(c: Palette) -> str:
     QToolButton:hover {{ background: {c.well}; }}
     QToolButton:checked {{ background: {c.well}; border-color: {c.border}; }}
     QToolButton#outlined {{ border-color: {c.border}; padding: 2px 8px; }}
+    QToolButton#model {{ border-color: {c.border}; padding: 1px 18px 1px 6px; }}
     QToolButton#preset {{ border-color: {c.border}; padding: 3px 0; }}
     QToolButton#preset:checked {{ border-color: {c.accent}; background: {c.well}; }}
     QTabWidget::pane {{ border: none; border-top: 1px solid {c.border}; }}

@@ -23,9 +23,12 @@ from PySide6.QtWidgets import (
 import sd2core
 from sd2app.actions import ACTIONS, MOUSE
 from sd2app.dialogs.comparison import ComparisonWindow
+from sd2app.dialogs.model_card import ModelCardDialog
 from sd2app.dialogs.new_from_video import VIDEOS, NewFromVideoDialog
 from sd2app.dialogs.strip import StripDialog
 from sd2app.models.comparison import ComparisonModel
+from sd2app.models.denoise_words import denoised_words
+from sd2app.models.figure import save_figure
 from sd2app.models.fit_setup import FitSetupModel
 from sd2app.models.strip import StripModel
 from sd2core.errors import Sd2Error
@@ -41,6 +44,9 @@ _FILES = (
     " recording.json);;All files (*)"
 )
 
+
+_MODELS = "Model (*.safetensors);;All files (*)"
+_FIGURES = "PNG (*.png);;SVG (*.svg);;PDF (*.pdf)"
 
 _MESHES = (
     "Mesh or recording (*.npz *.zip zarr.json *.pkl *.obj *.ply *.glb recording.json);;"
@@ -223,6 +229,54 @@ class Dialogs:
         )
         if name:
             self.attempt(lambda: self._context.synthesis.export(Path(name)))
+
+    def export_denoised(self) -> None:
+        """Ask for a file and write the denoised map."""
+        name, _ = QFileDialog.getSaveFileName(
+            self._parent, "Export denoised map", "denoised.npz", "Doppler map (*.npz)"
+        )
+        if name:
+            self.attempt(lambda: self._context.denoise.export(Path(name)))
+
+    def export_maps(self) -> None:
+        """Ask for a file and draw the maps into it."""
+        name, _ = QFileDialog.getSaveFileName(
+            self._parent, "Export figure of the maps", "doppler-maps.png", _FIGURES
+        )
+        if name:
+            self.attempt(lambda: self._save_figure(Path(name)))
+
+    def _save_figure(self, path: Path) -> None:
+        c = self._context
+        titles = {c.denoised: denoised_words(c.denoise.card), c.before: c.before.status}
+        about = {
+            "recording": c.document.title,
+            "simulated": c.document.simulated,
+            "sensor_position_m": list(c.sensor.sensor.position_m),
+            "denoiser": denoised_words(c.denoise.card),
+            "synthetic": c.synthetic.status,
+        }
+        tracks = [(track, titles.get(track, "")) for track in c.tracks]
+        save_figure(
+            tracks, c.difference, c.display.levels, (c.span.start_s, c.span.end_s), about, path
+        )
+
+    def open_model(self) -> None:
+        """Choose a model file, and use it."""
+        start = str(self._context.denoise.path or "")
+        name, _ = QFileDialog.getOpenFileName(self._parent, "Open model file", start, _MODELS)
+        if name:
+            self.use_model(Path(name))
+
+    def use_model(self, path: Path | None) -> None:
+        """Denoise with a model file, or with none."""
+        self.attempt(lambda: self._context.denoise.use(path))
+
+    def show_model_card(self) -> None:
+        """What the model in use says about itself."""
+        card = self._context.denoise.card
+        if card is not None:
+            ModelCardDialog(card, self._parent).exec()
 
     def export_strip(self) -> None:
         """Choose frames and write them side by side."""

@@ -12,6 +12,7 @@ from PySide6.QtGui import QUndoStack
 
 from sd2app.jobs.latest import Emit, LatestRunner
 from sd2app.models.content import Content, load_content, recording_of
+from sd2app.models.denoise_choice import DenoiserChoice
 from sd2app.models.jobs import Job, JobsModel
 from sd2core.body.camera import PinholeCamera
 from sd2core.mesh import MeshSequence
@@ -206,6 +207,13 @@ class DocumentModel(QObject):
         recording = self.recording
         if recording is not None and offset_s != recording.radar_offset_s:
             recording.radar_offset_s = offset_s
+            self.changed.emit()
+
+    def set_denoiser(self, choice: DenoiserChoice) -> None:
+        """Denoise with another model."""
+        recording = self.recording
+        if recording is not None and choice != DenoiserChoice.of(recording):
+            choice.put_into(recording)
             self.changed.emit()
 
     def set_clutter(self, clutter: Clutter) -> None:

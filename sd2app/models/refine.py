@@ -42,8 +42,9 @@ class Way:
     visibility: Visibility | None = None
 
 
-Companion = Callable[[NDArray[np.float32]], Any]
-"""Makes something more of a stretch (bins, frames), in the same background task."""
+Companion = Callable[[int, NDArray[np.float32]], Any]
+"""Makes something more of a stretch, given its first frame and its values (bins, frames), in
+the same background task."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +78,7 @@ def worked_out(
     if way.visibility == "frozen" and stretch.quality == "facing":
         # No mask is kept.
         rank, words = ROUGH, _ROUGH_WORDS
-    more = companion(stretch.values) if companion is not None else None
+    more = companion(start, stretch.values) if companion is not None else None
     return Part(sensor, start, stretch, rank, words, synthesizer.unit, more)
 
 

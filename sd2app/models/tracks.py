@@ -26,7 +26,8 @@ _SHOWS_SHARE = 0.1
 class Reading:
     """One cell of a map under the pointer.
 
-    ``deviation`` is how far from the value the truth may be, where that is known.
+    ``deviation`` is how far from the value the truth may be, where that is known;
+    ``text`` stands in place of level and value.
     """
 
     track: str
@@ -37,6 +38,7 @@ class Reading:
     level_db: float
     note: str = ""
     deviation: float | None = None
+    text: str = ""
 
 
 class TrackModel(QObject):

@@ -19,7 +19,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from sd2app.colour_maps import lookup_table
 from sd2app.models.display import DisplayModel
 from sd2app.models.playback import PlaybackModel
-from sd2app.models.tracks import UNCERTAIN_SHARE, PointerModel, TrackModel
+from sd2app.models.tracks import UNCERTAIN_SHARE, PointerModel, Reading, TrackModel
 from sd2app.models.visible_span import VisibleSpanModel
 from sd2app.views.map_widget import MapWidget, paint_cursor
 from sd2app.views.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, signed_text, ticks
@@ -57,6 +57,7 @@ class HeatmapView(MapWidget):
         self._alignable = alignable
         self._grab: tuple[str, float] | None = None
         self._hint = ""
+        self._button: QWidget | None = None
         self.setMinimumHeight(96)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         span.changed.connect(self.invalidate)
@@ -71,6 +72,33 @@ class HeatmapView(MapWidget):
         """What to say while there is no map."""
         self._hint = hint
         self.update()
+
+    def set_button(self, button: QWidget) -> None:
+        """Put a button beside the title."""
+        self._button = button
+        button.setParent(self)
+        self.update()
+
+    def title(self) -> str:
+        """What is shown."""
+        return self._track.title
+
+    def null_colour(self) -> QColor:
+        """Colour of nothing."""
+        return QColor.fromRgb(int(lookup_table(self._display.levels.colour_map)[0]))
+
+    def hatch_colour(self) -> QColor:
+        """Of the lines over bins that say nothing."""
+        return QColor(255, 255, 255, 80)
+
+    def marked_bins(self) -> tuple[tuple[tuple[int, ...], Qt.BrushStyle], ...]:
+        """Bins that say nothing, and how they are hatched."""
+        doppler_map = self._track.map
+        assert doppler_map is not None
+        return (
+            (doppler_map.null_bins, Qt.BrushStyle.BDiagPattern),
+            (doppler_map.unseen_bins, Qt.BrushStyle.DiagCrossPattern),
+        )
 
     def plot_rect(self) -> QRectF:
         """Where the map is drawn."""
@@ -128,21 +156,37 @@ class HeatmapView(MapWidget):
         painter.setPen(QColor(colours.text))
         box = QRectF(8, 0, self.width() - 16, _HEADER_PX)
         centred = Qt.AlignmentFlag.AlignVCenter
-        painter.drawText(box, centred | Qt.AlignmentFlag.AlignLeft, self._track.title)
-        left = 8 + painter.fontMetrics().horizontalAdvance(self._track.title) + 12
+        painter.drawText(box, centred | Qt.AlignmentFlag.AlignLeft, self.title())
+        left = 8 + painter.fontMetrics().horizontalAdvance(self.title()) + 12
         font.setBold(False)
         painter.setFont(font)
         painter.setPen(QColor(colours.muted))
-        right = "approaching +  /  receding −   m/s"
-        room = self.width() - 16 - left - painter.fontMetrics().horizontalAdvance(right)
+        left += self._place_button(left)
+        room = self.width() - 16 - left - self._paint_corner(painter, box, left)
         status = painter.fontMetrics().elidedText(
             self._status(), Qt.TextElideMode.ElideRight, int(max(room - 16, 40))
         )
         painter.drawText(
             QRectF(left, 0, self.width(), _HEADER_PX), centred | Qt.AlignmentFlag.AlignLeft, status
         )
-        if room > 60:
-            painter.drawText(box, centred | Qt.AlignmentFlag.AlignRight, right)
+
+    def _place_button(self, left: int) -> int:
+        """Room that the button takes."""
+        if self._button is None or self._button.isHidden():
+            return 0
+        size = self._button.sizeHint()
+        height = min(size.height(), _HEADER_PX - 2)
+        self._button.setGeometry(left - 4, (_HEADER_PX - height) // 2, size.width(), height)
+        return size.width() + 4
+
+    def _paint_corner(self, painter: QPainter, box: QRectF, left: float) -> float:
+        """What stands on the right of the header; returns its width."""
+        text = "approaching +  /  receding −   m/s"
+        width = painter.fontMetrics().horizontalAdvance(text)
+        if self.width() - 16 - left - width <= 60:
+            return 0.0
+        painter.drawText(box, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight, text)
+        return width
 
     def _status(self) -> str:
         """What the map is worth, and why nothing shows where nothing shows."""
@@ -166,15 +210,12 @@ class HeatmapView(MapWidget):
             self.scale.x_of(time_s + self._track.offset_s)
             for time_s in (doppler_map.timebase.start_s, doppler_map.timebase.end_s)
         )
-        nothing = QColor.fromRgb(int(lookup_table(self._display.levels.colour_map)[0]))
-        hatch = QColor(255, 255, 255, 80)
+        nothing = self.null_colour()
+        hatch = self.hatch_colour()
         painter.save()
         painter.setClipRect(plot)
         painter.setPen(Qt.PenStyle.NoPen)
-        for bins, pattern in (
-            (doppler_map.null_bins, Qt.BrushStyle.BDiagPattern),
-            (doppler_map.unseen_bins, Qt.BrushStyle.DiagCrossPattern),
-        ):
+        for bins, pattern in self.marked_bins():
             for index in bins:
                 top, bottom = self.y_of(edges[index + 1]), self.y_of(edges[index])
                 band = QRectF(left, top, right - left, bottom - top)
@@ -282,4 +323,8 @@ class HeatmapView(MapWidget):
             self._pointer.leave()
             return
         time_s, velocity_mps = self.scale.time_of(position.x()), self.velocity_of(position.y())
-        self._pointer.point_at(time_s, velocity_mps, self._track.read(time_s, velocity_mps))
+        self._pointer.point_at(time_s, velocity_mps, self.read(time_s, velocity_mps))
+
+    def read(self, time_s: float, velocity_mps: float) -> Reading | None:
+        """What stands at a time and velocity."""
+        return self._track.read(time_s, velocity_mps)

@@ -40,15 +40,14 @@ class MapWidget(QWidget):
     def paint_map(self, painter: QPainter, plot: QRectF, start_s: float, end_s: float) -> None:
         """The map from ``start_s`` to ``end_s``, one column per device pixel."""
         if self._image is None:
-            self._image = heatmap_image(
-                self._track,
-                self._display.levels,
-                start_s,
-                end_s,
-                max(round(plot.width() * self.devicePixelRatioF()), 1),
-                QColor(self._display.palette.well).rgb(),
-            )
+            columns = max(round(plot.width() * self.devicePixelRatioF()), 1)
+            self._image = self.make_image(start_s, end_s, columns)
         painter.drawImage(plot, self._image)
+
+    def make_image(self, start_s: float, end_s: float, columns: int) -> QImage:
+        """The stretch in view, one pixel per column and bin."""
+        background = QColor(self._display.palette.well).rgb()
+        return heatmap_image(self._track, self._display.levels, start_s, end_s, columns, background)
 
     def paint_gaps(self, painter: QPainter, plot: QRectF, scale: TimeScale) -> None:
         """Where there was no person nothing was measured: hatched, not the colour of nothing."""

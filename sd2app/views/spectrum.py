@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QBrush, QColor, QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtGui import QBrush, QColor, QFontMetrics, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QWidget
 
 from sd2app.models.display import DisplayModel
@@ -15,7 +15,8 @@ from sd2app.models.tracks import PointerModel, TrackModel
 from sd2app.views.time_axis import signed_text, ticks
 from sd2core.spectrum import DopplerMap
 
-_LEFT_PX, _TOP_PX, _RIGHT_PX, _BOTTOM_PX = 48, 50, 12, 40
+_LEFT_PX, _TOP_PX, _RIGHT_PX, _BOTTOM_PX = 48, 30, 12, 40
+_LEGEND_PX = 20
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,11 @@ class SpectrumView(QWidget):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         colours = self._display.palette
         painter.fillRect(self.rect(), QColor(colours.panel))
-        plot = QRectF(self.rect()).adjusted(_LEFT_PX, _TOP_PX, -_RIGHT_PX, -_BOTTOM_PX)
+        legend = self._legend(painter.fontMetrics(), self._shown())
+        rows = 1 + max((row for _, row, _, _ in legend), default=0)
+        plot = QRectF(self.rect()).adjusted(
+            _LEFT_PX, _TOP_PX + _LEGEND_PX * rows, -_RIGHT_PX, -_BOTTOM_PX
+        )
         font = painter.font()
         font.setBold(True)
         painter.setFont(font)
@@ -93,7 +98,7 @@ class SpectrumView(QWidget):
             painter.setPen(QPen(QColor(colours.muted), 1, Qt.PenStyle.DotLine))
             painter.drawLine(QPointF(plot.left(), y), QPointF(plot.right(), y))
         painter.restore()
-        self._paint_legend(painter, shown)
+        self._paint_legend(painter, legend)
 
     def _paint_axes(self, painter: QPainter, plot: QRectF, v_max: float) -> None:
         colours, levels = self._display.palette, self._display.levels
@@ -184,19 +189,32 @@ class SpectrumView(QWidget):
         painter.setBrush(QBrush(colour, Qt.BrushStyle.Dense4Pattern))
         painter.drawPolygon(band)
 
-    def _paint_legend(self, painter: QPainter, shown: list[Curve]) -> None:
-        x = 8.0
+    def _paint_legend(self, painter: QPainter, entries: list[tuple[float, int, str, str]]) -> None:
+        for x, row, text, colour in entries:
+            top = 24.0 + _LEGEND_PX * row
+            painter.setPen(QPen(QColor(getattr(self._display.palette, colour)), 2))
+            painter.drawLine(QPointF(x, top + 10), QPointF(x + 13, top + 10))
+            painter.setPen(QColor(self._display.palette.muted))
+            box = QRectF(x + 18, top, self.width() - x - 18, 20)
+            painter.drawText(box, Qt.AlignmentFlag.AlignVCenter, text)
+
+    def _legend(
+        self, metrics: QFontMetrics, shown: list[Curve]
+    ) -> list[tuple[float, int, str, str]]:
+        """Place, row, text and colour of every entry; what does not fit begins a new row."""
+        entries: list[tuple[float, int, str, str]] = []
+        x, row = 8.0, 0
         for curve in shown:
             text = curve.track.title.lower()
             frame, doppler_map = curve.track.frame_at(self._playback.time_s), curve.track.map
             if frame is not None and doppler_map is not None and _nobody_in(doppler_map, frame):
                 text += ": no person"
-            painter.setPen(QPen(QColor(getattr(self._display.palette, curve.colour)), 2))
-            painter.drawLine(QPointF(x, 34), QPointF(x + 13, 34))
-            width = painter.fontMetrics().horizontalAdvance(text)
-            painter.setPen(QColor(self._display.palette.muted))
-            painter.drawText(QRectF(x + 18, 24, width + 2, 20), Qt.AlignmentFlag.AlignVCenter, text)
-            x += width + 30
+            width = 20 + metrics.horizontalAdvance(text)
+            if entries and x + width > self.width() - 4:
+                x, row = 8.0, row + 1
+            entries.append((x, row, text, curve.colour))
+            x += width + 12
+        return entries
 
 
 def _nobody_in(doppler_map: DopplerMap, frame: int) -> bool:

@@ -119,7 +119,7 @@ def reading_text(reading: Reading) -> str:
         clock_text(reading.time_s),
         f"frame {reading.frame}",
         f"{velocity} m/s ({direction})",
-        f"{level} ({_value_text(reading)})",
+        reading.text or f"{level} ({_value_text(reading)})",
     ]
     if reading.note:
         parts.append(reading.note)

@@ -29,6 +29,7 @@ from sd2app.views.frames import fill, panel, splitter
 if TYPE_CHECKING:
     from sd2app.context import Context
     from sd2app.dialogs.dialogs import Dialogs
+    from sd2app.models.denoise_library import DenoiserLibrary
     from sd2app.models.ladder import Ladder
     from sd2app.views.scene3d import SceneView
     from sd2app.views.side_panel import SidePanel
@@ -52,11 +53,13 @@ class MainWindow(QMainWindow):
         settings: Settings,
         ladder: Ladder | None = None,
         fit_command: Sequence[str] | None = None,
+        denoisers: DenoiserLibrary | None = None,
     ) -> None:
         super().__init__()
         self._settings = settings
         self._ladder = ladder
         self._fit_command = fit_command
+        self._denoisers = denoisers
         self._scene: SceneView | None = None
         self._ready = False
         self._painted = False
@@ -81,6 +84,7 @@ class MainWindow(QMainWindow):
             self._scene is not None
             and not self.context.jobs.jobs
             and not self.context.synthesis.busy
+            and not self.context.denoise.busy
             and not self.context.video.busy
         )
 
@@ -114,16 +118,21 @@ class MainWindow(QMainWindow):
         from sd2app.context import build_context
         from sd2app.dialogs.dialogs import Dialogs
         from sd2app.views.message_bar import MessageBar
+        from sd2app.views.model_menu import ModelMenu
         from sd2app.views.status import StatusLine
         from sd2app.views.transport import TransportBar
 
-        self.context = build_context(self, self._settings, self._ladder, self._fit_command)
+        self.context = build_context(
+            self, self._settings, self._ladder, self._fit_command, self._denoisers
+        )
         context = self.context
         context.display.set_dark(is_dark(self._settings))
         self.messages = MessageBar(self)
         self.dialogs = Dialogs(self, context, self.messages.warn)
         self._actions = ActionSet(self)
-        self._recent_menu = self._actions.fill_menu_bar()
+        below = [self._actions[name] for name in ("open_model", "model_card")]
+        self._models = ModelMenu(context.denoise, self.dialogs.use_model, below, self)
+        self._recent_menu = self._actions.fill_menu_bar(self._models)
         self._recent_menu.aboutToShow.connect(self._list_recent)
         self._fill_panels()
         self._column.insertWidget(0, self.messages)
@@ -146,12 +155,8 @@ class MainWindow(QMainWindow):
         self._importer.submit(lambda emit: import_module("sd2app.views.scene3d"))
 
     def _fill_panels(self) -> None:
-        from sd2app.views.heatmap import HeatmapView
-        from sd2app.views.level_bar import LevelBar
         from sd2app.views.sensor_panel import SensorPanel
         from sd2app.views.side_panel import SidePanel
-        from sd2app.views.spectrum import Curve, SpectrumView
-        from sd2app.views.timeline import Overview, SpanStrip, TimeRuler
         from sd2app.views.trade_panel import TradePanel
         from sd2app.views.video_bar import VideoBar
 
@@ -165,30 +170,25 @@ class MainWindow(QMainWindow):
         trade = TradePanel(c.trade, c.display, self._actions["measure"])
         self.side = SidePanel({"Sensor": sensor, "Trade": trade})
         fill(self._panels["sensor"], self.side)
-        self._synthetic_view = HeatmapView(c.synthetic, c.span, c.playback, c.display, c.pointer)
-        self._real_view = HeatmapView(
-            c.real, c.span, c.playback, c.display, c.pointer, alignable=True
-        )
-        self._real_view.setToolTip("Drag the title to align the capture in time")
-        self._real_view.offset_grabbed.connect(c.edits.begin_offset_drag)
-        self._real_view.offset_dragged.connect(c.edits.drag_offset)
-        self._real_view.offset_released.connect(c.edits.end_offset_drag)
-        self._spans = SpanStrip(c.span, c.display)
-        self._overview = Overview(c.synthetic, c.span, c.playback, c.display)
-        tracks = QVBoxLayout()
-        for view, stretch in (
-            (self._synthetic_view, 1),
-            (self._real_view, 1),
-            (self._spans, 0),
-            (TimeRuler(c.span, c.playback, c.display), 0),
-            (self._overview, 0),
-        ):
-            tracks.addWidget(view, stretch)
-        fill(self._panels["tracks"], tracks)
+        self._fill_tracks()
+
+    def _fill_tracks(self) -> None:
+        from sd2app.views.level_bar import LevelBar
+        from sd2app.views.spectrum import Curve, SpectrumView
+        from sd2app.views.tracks import Tracks
+
+        c = self.context
+        self._tracks = Tracks(c, self._models)
+        fill(self._panels["tracks"], self._tracks)
         side = QVBoxLayout()
-        curves = (Curve(c.synthetic, "synthetic"), Curve(c.real, "real"))
+        curves = tuple(
+            Curve(track, colour)
+            for track, colour in zip(
+                c.tracks, ("synthetic", "denoised", "before", "real"), strict=True
+            )
+        )
         side.addWidget(SpectrumView(curves, c.playback, c.display, c.pointer), 1)
-        side.addWidget(LevelBar(c.display, (c.synthetic, c.real), self._actions["uncertain"]))
+        side.addWidget(LevelBar(c.display, c.tracks, self._actions["uncertain"]))
         fill(self._panels["spectrum"], side)
 
     def _video_view(self) -> QWidget:
@@ -244,6 +244,8 @@ class MainWindow(QMainWindow):
         c.synthesis.failed.connect(self.messages.warn)
         c.trade.failed.connect(self.messages.warn)
         c.uncertainty.failed.connect(self.messages.warn)
+        c.denoise.failed.connect(self.messages.warn)
+        c.denoise.noted.connect(self.messages.note)
         c.trade.noted.connect(self.messages.note)
         c.video.failed.connect(self.messages.warn)
         c.document.undo_stack.indexChanged.connect(self._refresh)
@@ -254,6 +256,9 @@ class MainWindow(QMainWindow):
             c.display.mesh_changed,
             c.overlay.changed,
             c.uncertainty.changed,
+            c.denoise.changed,
+            c.live.changed,
+            c.difference.changed,
             c.fit.state_changed,
             c.synthesis.completed,
             c.trade.plan_changed,
@@ -264,32 +269,13 @@ class MainWindow(QMainWindow):
         c.synthesis.target_changed.connect(lambda: self._actions.refresh_one("aim_sensor"))
         c.display.theme_changed.connect(self._restyle)
         c.display.theme_changed.connect(self._refresh)
-        for track in (c.synthetic, c.real):
-            track.changed.connect(self._show_tracks)
-        self._show_tracks()
 
     # --- following the models -------------------------------------------------------------
 
     def _show_document(self) -> None:
         self.messages.hide()
-        for view in (self._spans, self._overview):
-            view.set_labels(self.context.document.spans)
-        self._show_tracks()
+        self._tracks.show_document()
         self._refresh()
-
-    def _show_tracks(self) -> None:
-        c = self.context
-        has_any = c.synthetic.map is not None or c.real.map is not None
-        self._synthetic_view.setVisible(c.synthetic.map is not None or not has_any)
-        self._real_view.setVisible(c.real.map is not None)
-        self._overview.set_track(c.synthetic if c.synthetic.map is not None else c.real)
-        self._synthetic_view.set_hint(
-            "Add a mesh to see its synthetic Doppler: File → Add to this recording…\n\n"
-            "From a video alone: File → New from video… fits a body to the person in it."
-            if c.document.content is not None
-            else "Drop a recording, video, mesh or radar capture here, or press Ctrl+O.\n\n"
-            "Help → Open the sample recording shows what it looks like."
-        )
 
     def _refresh(self) -> None:
         document = self.context.document

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import trimesh
+from fake_denoisers import FakeDenoisers
 from fake_ladder import COUNTING, EXACT, FACING, FakeLadder
 
 from sd2app.context import build_context
@@ -44,7 +45,9 @@ def context(qapp, fake):
 
     warm_up()
     parent = QObject()
-    context = build_context(parent, Settings.forgetful(), fake.ladder)
+    context = build_context(
+        parent, Settings.forgetful(), fake.ladder, None, FakeDenoisers().library
+    )
     yield context
     fake.gate.set()
     context.close()
@@ -333,7 +336,7 @@ def test_the_library_chooses_for_a_small_scene(qapp, qtbot, ball):
 
     warm_up()
     parent = QObject()
-    context = build_context(parent, Settings.forgetful())
+    context = build_context(parent, Settings.forgetful(), denoisers=FakeDenoisers().library)
     try:
         open_ball(context, qtbot, ball)
         qtbot.waitUntil(lambda: context.trade.in_use is not None, timeout=60_000)

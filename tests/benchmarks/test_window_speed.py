@@ -112,7 +112,8 @@ def play(window, qtbot, every_tick=lambda: None):
     from sd2app.views.scene3d.image_backend import ImageBackend
     from sd2app.views.video import VideoView
 
-    views = [window.findChild(VideoView), *window.findChildren(HeatmapView)]
+    heatmaps = [view for view in window.findChildren(HeatmapView) if view.isVisible()]
+    views = [window.findChild(VideoView), *heatmaps]
     counter = PaintCounter([*views, *window.findChildren(ImageBackend)])
     context = window.context
     shown = {"pictures": 0, "maps": 0}

@@ -8,6 +8,7 @@ import av
 import numpy as np
 import pytest
 import trimesh
+from fake_denoisers import FakeDenoisers
 from fake_ladder import FakeLadder
 from PySide6.QtCore import QCoreApplication, QEvent
 
@@ -97,12 +98,18 @@ def fake() -> FakeLadder:
 
 
 @pytest.fixture
-def empty_window(qtbot, compiled_kernels, fake):
+def fake_models() -> FakeDenoisers:
+    """No model, unless a test adds some."""
+    return FakeDenoisers()
+
+
+@pytest.fixture
+def empty_window(qtbot, compiled_kernels, fake, fake_models):
     """The window without a recording, all views in place."""
     from sd2app.settings import Settings
     from sd2app.views.window import MainWindow
 
-    window = MainWindow(Settings.forgetful(), fake.ladder)
+    window = MainWindow(Settings.forgetful(), fake.ladder, None, fake_models.library)
     window.resize(1280, 800)
     window.show()
     window.populate()

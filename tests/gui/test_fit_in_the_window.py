@@ -46,7 +46,9 @@ def made(qtbot, compiled_kernels, fake):
 
     def make(*options: object, settings: Settings | None = None) -> MainWindow:
         command = [sys.executable, "-u", str(FAKE), *map(str, options)]
-        window = MainWindow(settings or Settings.forgetful(), fake.ladder, command)
+        window = MainWindow(
+            settings or Settings.forgetful(), fake.ladder, command, FakeDenoisers().library
+        )
         windows.append(window)
         window.resize(1280, 800)
         window.show()

@@ -47,7 +47,7 @@ def colours(widget, area=None):
 
 
 def test_the_map_is_empty_there_and_says_so_under_the_pointer(window, qtbot):
-    view, real = window.findChildren(HeatmapView)
+    view, real = window._tracks.synthetic, window._tracks.real
     c = window.context
     assert not c.synthetic.map.values[:, slice(*GONE)].any()
     assert c.synthetic.map.values[:, : GONE[0]].any()

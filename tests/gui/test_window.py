@@ -10,7 +10,6 @@ from PySide6.QtWidgets import QApplication, QMessageBox
 
 from sd2app.actions import ACTIONS
 from sd2app.dialogs.dialogs import KeysDialog
-from sd2app.views.heatmap import HeatmapView
 from sd2app.views.timeline import Overview, TimeRuler
 from sd2app.views.video import VideoView
 from sd2core.ladder.rungs import Plan
@@ -19,7 +18,7 @@ from sd2core.spectrum import DopplerMap
 
 
 def heatmaps(window):
-    synthetic, real = window.findChildren(HeatmapView)
+    synthetic, real = window._tracks.synthetic, window._tracks.real
     return synthetic, real
 
 

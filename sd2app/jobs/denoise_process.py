@@ -1,0 +1,155 @@
+"""Denoisers that work in a process of their own, where torch is; the window never loads it."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2app.jobs.denoise_messages import (
+    Message,
+    packed_map,
+    read_message,
+    unpacked_map,
+    unpacked_values,
+    write_message,
+)
+from sd2core.errors import Sd2Error
+from sd2core.spectrum import DopplerMap
+
+COMMAND = (sys.executable, "-m", "sd2app.jobs.denoise_worker")
+
+
+class DenoiseProcess:
+    """Started with the first model, started anew where it died; one request at a time.
+
+    Its methods wait for the answer: they belong into background threads.
+    """
+
+    def __init__(self, command: Sequence[str] = COMMAND) -> None:
+        self._command = list(command)
+        self._process: subprocess.Popen[bytes] | None = None
+        self._lock = threading.Lock()
+        self._closed = False
+
+    @property
+    def running(self) -> bool:
+        """Whether there is a process."""
+        return self._process is not None and self._process.poll() is None
+
+    def load(self, path: Path) -> RemoteDenoiser:
+        """Load a model; the first one takes as long as loading torch.
+
+        Raises
+        ------
+        Sd2Error
+            When it cannot be loaded.
+        """
+        content, _ = self.ask({"do": "load", "path": str(path)})
+        return RemoteDenoiser(self, content["model"], content["equals_batch"])
+
+    def ask(self, content: dict[str, Any], numbers: bytes = b"") -> Message:
+        """Ask, and wait for the answer.
+
+        Raises
+        ------
+        Sd2Error
+            What the other side says, or that it is gone.
+        """
+        with self._lock:
+            process = self._started()
+            assert process.stdin is not None
+            assert process.stdout is not None
+            try:
+                write_message(process.stdin, content, numbers)
+                answer = read_message(process.stdout)
+            except (OSError, ValueError):  # closed from another thread
+                answer = None
+            if answer is None:
+                process.kill()
+                process.wait()
+                self._process = None
+        if answer is None:
+            raise Sd2Error(
+                "The process that denoises has ended",
+                remedy="Choose the model again; if it ends again, there may be too little memory",
+            )
+        if "error" in answer[0]:
+            raise Sd2Error(*answer[0]["error"])
+        return answer
+
+    def close(self) -> None:
+        """End it, whatever it is doing."""
+        self._closed = True
+        process = self._process
+        if process is not None:
+            process.kill()
+            process.wait()
+            for stream in (process.stdin, process.stdout):
+                if stream is not None:
+                    # What was not written has nobody to read it.
+                    with contextlib.suppress(OSError):
+                        stream.close()
+
+    def _started(self) -> subprocess.Popen[bytes]:
+        if self._closed:
+            raise Sd2Error("The window is being closed")
+        if self._process is None or self._process.poll() is not None:
+            # One thread: the cores belong to synthesis, video and drawing as well.
+            environment = os.environ | {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+            self._process = subprocess.Popen(
+                self._command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                env=environment,
+                creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
+            )
+        return self._process
+
+
+class RemoteDenoiser:
+    """A model in that process; what it offers is what ``TrainedDenoiser`` does."""
+
+    def __init__(self, process: DenoiseProcess, number: int, equals_batch: bool) -> None:
+        self._process = process
+        self._number = number
+        self.equals_batch = equals_batch
+
+    def denoise(self, doppler: DopplerMap) -> DopplerMap:
+        """What a radar would show in place of a synthetic map."""
+        content, numbers = packed_map(doppler)
+        answer, numbers = self._process.ask(
+            {"do": "denoise", "model": self._number, "map": content}, numbers
+        )
+        return replace(unpacked_map(answer, numbers), timebase=doppler.timebase)
+
+    def live(self) -> RemoteLive:
+        """For frames as they come; the one before is forgotten."""
+        content, _ = self._process.ask({"do": "live", "model": self._number})
+        return RemoteLive(self._process, content["live"], self.equals_batch)
+
+
+class RemoteLive:
+    """Frame in, frame out."""
+
+    def __init__(self, process: DenoiseProcess, number: int, equals_batch: bool) -> None:
+        self._process = process
+        self._number = number
+        self.equals_batch = equals_batch
+
+    def step(self, energies: NDArray[np.float32], present: bool = True) -> NDArray[np.float32]:
+        """Answer to the next frame (bins,)."""
+        frame = np.ascontiguousarray(energies, np.float32)
+        content = {"do": "step", "live": self._number, "bins": len(frame), "present": bool(present)}
+        _, numbers = self._process.ask(content, frame.tobytes())
+        return unpacked_values(numbers, frame.shape)

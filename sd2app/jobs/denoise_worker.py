@@ -1,0 +1,100 @@
+"""The process that denoises for the window; it answers one request after another.
+
+Run as ``python -m sd2app.jobs.denoise_worker``; it ends when nobody writes to it any more.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from sd2app.jobs.denoise_messages import (
+    Message,
+    packed_map,
+    read_message,
+    unpacked_map,
+    unpacked_values,
+    write_message,
+)
+from sd2core.errors import Sd2Error
+
+_KEPT = 3
+"""Models: the one in use, the one before, and the one that is about to be."""
+
+
+class Worker:
+    """Holds models, and what they remember of frames that come one by one."""
+
+    def __init__(self) -> None:
+        self._models: dict[int, Any] = {}
+        self._live: dict[int, Any] = {}
+        self._next = 0
+
+    def answer(self, content: dict[str, Any], numbers: bytes) -> Message:
+        """One answer; what a user can cause is raised as :class:`Sd2Error`."""
+        reply: Message = getattr(self, f"_do_{content['do']}")(content, numbers)
+        return reply
+
+    def _do_load(self, content: dict[str, Any], numbers: bytes) -> Message:
+        from sd2core.denoise.files import load_model
+
+        model = load_model(Path(content["path"]))
+        self._models[number := self._number()] = model
+        while len(self._models) > _KEPT:
+            self._models.pop(next(iter(self._models)))
+        return {"model": number, "equals_batch": model.live().equals_batch}, b""
+
+    def _do_denoise(self, content: dict[str, Any], numbers: bytes) -> Message:
+        return packed_map(self._model(content).denoise(unpacked_map(content["map"], numbers)))
+
+    def _do_live(self, content: dict[str, Any], numbers: bytes) -> Message:
+        self._live = {(number := self._number()): self._model(content).live()}
+        return {"live": number}, b""
+
+    def _do_step(self, content: dict[str, Any], numbers: bytes) -> Message:
+        live = self._live.get(content["live"])
+        if live is None:
+            raise Sd2Error("Another clip is being denoised frame by frame")
+        frame = unpacked_values(numbers, (content["bins"],))
+        return {}, live.step(frame, content["present"]).tobytes()
+
+    def _model(self, content: dict[str, Any]) -> Any:
+        model = self._models.get(content["model"])
+        if model is None:
+            raise Sd2Error("The model is no longer loaded", remedy="Choose it again")
+        return model
+
+    def _number(self) -> int:
+        self._next += 1
+        return self._next
+
+
+def serve(source: BinaryIO, sink: BinaryIO) -> None:
+    """Answer until nobody asks any more."""
+    worker = Worker()
+    while (request := read_message(source)) is not None:
+        try:
+            content, numbers = worker.answer(*request)
+        except Sd2Error as error:
+            content = {"error": [error.found, error.expected, error.remedy]}
+            numbers = b""
+        except Exception as error:  # whatever a model does, the window goes on
+            content = {"error": [f"The model failed ({error!r})", "", ""]}
+            numbers = b""
+        write_message(sink, content, numbers)
+
+
+def main() -> int:
+    """Keep answers apart from whatever a library may print."""
+    sink = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+    with contextlib.suppress(BrokenPipeError, KeyboardInterrupt):
+        serve(sys.stdin.buffer, sink)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

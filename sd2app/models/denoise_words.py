@@ -1,0 +1,120 @@
+"""Models that denoise, in words, the same wherever they are shown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from sd2core.denoise.card import ModelCard
+
+_KINDS = {
+    "s4": "S4 (HiPPO-LegS)",
+    "s4d": "S4D (diagonal)",
+    "s4-serial": "S4, serialised",
+    "gru": "GRU",
+    "unet": "U-Net",
+    "swin": "Swin transformer",
+    "none": "No denoising",
+    "median": "Median filter",
+    "wiener": "Wiener filter",
+}
+_UNITS = {"mps": "m/s", "db": "dB", "s": "s", "hz": "Hz"}
+
+
+def model_title(card: ModelCard) -> str:
+    """What to call a model in a list."""
+    return card.title or card.name
+
+
+def kind_words(card: ModelCard) -> str:
+    """What sort of network it is."""
+    return _KINDS.get(card.model, card.model)
+
+
+def origin_words(card: ModelCard) -> str:
+    """What it learned from; simulation is called so."""
+    if card.trained_on == "simulated":
+        return "learned from simulated data only"
+    return "learned from real captures"
+
+
+def track_words(card: ModelCard) -> str:
+    """Beside the title of the denoised map."""
+    simulated = " (simulated data only)" if card.trained_on == "simulated" else ""
+    return f"{model_title(card)}{simulated}"
+
+
+def denoised_words(card: ModelCard | None) -> str:
+    """Of a map that this model made; nothing without one."""
+    return "" if card is None else track_words(card)
+
+
+def card_rows(card: ModelCard) -> Iterator[tuple[str, str]]:
+    """Facts of a model card, a name and a text each."""
+    axis = card.axis
+    yield "Kind", f"{kind_words(card)}, {card.parameters:,} parameters"
+    yield "Learned from", "simulated data only" if card.trained_on == "simulated" else "real data"
+    yield (
+        "Works on",
+        (f"{axis.bins} bins over ±{axis.v_max_mps:g} m/s, {card.frame_rate_hz:g} frames/s"),
+    )
+    if card.path is not None:
+        try:
+            size_kb = card.path.stat().st_size / 1000
+            yield "File", f"{card.path} ({size_kb:,.0f} kB)"
+        except OSError:
+            yield "File", f"{card.path} (not there any more)"
+
+
+def card_sections(card: ModelCard) -> Iterator[tuple[str, list[tuple[str, str]]]]:
+    """What its makers say of it, by heading: what they measured and where it fails first."""
+    about = dict(card.about)
+    for name in ("limits", "metrics", "data", "command"):
+        if name in about:
+            yield _heading(name), list(_lines(about.pop(name)))
+    for name, value in about.items():
+        yield _heading(name), list(_lines(value))
+
+
+def _heading(name: str) -> str:
+    text = name.replace("_", " ").strip()
+    return text[:1].upper() + text[1:]
+
+
+def _lines(value: Any, prefix: str = "") -> Iterator[tuple[str, str]]:
+    """A value that came from JSON, as rows."""
+    if isinstance(value, Mapping):
+        for name, inner in value.items():
+            label, unit = _unit_of(str(name))
+            full = f"{prefix}, {label}" if prefix else label
+            if isinstance(inner, Mapping | list | tuple):
+                yield from _lines(inner, full)
+            else:
+                yield full, f"{_text(inner)} {unit}".rstrip()
+    elif isinstance(value, list | tuple):
+        if value and all(isinstance(one, str | int | float) for one in value):
+            texts = [_text(one) for one in value]
+            joined = "\n".join(texts) if any(" " in text for text in texts) else ", ".join(texts)
+            yield prefix, joined
+        else:
+            for one in value:
+                yield from _lines(one, prefix)
+    else:
+        yield prefix, _text(value)
+
+
+def _unit_of(name: str) -> tuple[str, str]:
+    """``peak_mae_mps`` is ``peak mae`` in m/s."""
+    head, _, tail = name.rpartition("_")
+    if head and tail in _UNITS:
+        return head.replace("_", " "), _UNITS[tail]
+    return name.replace("_", " "), ""
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.4g}".replace("-", "−")
+    return "–" if value is None else str(value)

@@ -1,0 +1,83 @@
+"""The maps one above the other, what was labelled, and the time below them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+
+from sd2app.views.difference import DifferenceView
+from sd2app.views.heatmap import HeatmapView
+from sd2app.views.model_menu import ModelButton, ModelMenu
+from sd2app.views.timeline import Overview, SpanStrip, TimeRuler
+
+if TYPE_CHECKING:
+    from sd2app.context import Context
+
+_LOWEST_PX = {1: 96, 2: 96, 3: 76, 4: 68}
+"""Of one map, by how many there are."""
+
+
+class Tracks(QWidget):
+    """A track that has nothing to show is not drawn."""
+
+    def __init__(self, context: Context, models: ModelMenu, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._context = c = context
+        common = c.span, c.playback, c.display, c.pointer
+        self.synthetic = HeatmapView(c.synthetic, *common)
+        self.denoised = HeatmapView(c.denoised, *common)
+        self.before = HeatmapView(c.before, *common)
+        self.real = HeatmapView(c.real, *common, alignable=True)
+        self.difference = DifferenceView(c.difference, *common)
+        self.real.setToolTip("Drag the title to align the capture in time")
+        self.real.offset_grabbed.connect(c.edits.begin_offset_drag)
+        self.real.offset_dragged.connect(c.edits.drag_offset)
+        self.real.offset_released.connect(c.edits.end_offset_drag)
+        # Beside the map it makes, or beside the one it could be made of.
+        self._offer = ModelButton(c.denoise, models)
+        self.synthetic.set_button(self._offer)
+        self.denoised.set_button(ModelButton(c.denoise, models))
+        self.spans = SpanStrip(c.span, c.display)
+        self.overview = Overview(c.synthetic, c.span, c.playback, c.display)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        for view in (self.synthetic, self.denoised, self.before, self.real, self.difference):
+            column.addWidget(view, 1)
+        for below in (self.spans, TimeRuler(c.span, c.playback, c.display), self.overview):
+            column.addWidget(below)
+        for track in c.tracks:
+            track.changed.connect(self._follow)
+        c.difference.changed.connect(self._follow)
+        self._follow()
+
+    def show_document(self) -> None:
+        """Another recording is open."""
+        for view in (self.spans, self.overview):
+            view.set_labels(self._context.document.spans)
+        self._follow()
+
+    def _follow(self) -> None:
+        c = self._context
+        has_any = c.synthetic.map is not None or c.real.map is not None
+        shown = {
+            self.synthetic: c.synthetic.map is not None or not has_any,
+            self.denoised: c.denoised.map is not None,
+            self.before: c.before.map is not None,
+            self.real: c.real.map is not None,
+            self.difference: c.difference.shown,
+        }
+        lowest_px = _LOWEST_PX.get(sum(shown.values()), 60)
+        for view, there in shown.items():
+            view.setMinimumHeight(lowest_px)
+            view.setVisible(there)
+        self._offer.setVisible(c.synthetic.map is not None and c.denoised.map is None)
+        self.overview.set_track(c.synthetic if c.synthetic.map is not None else c.real)
+        self.synthetic.set_hint(
+            "Add a mesh to see its synthetic Doppler: File → Add to this recording…\n\n"
+            "From a video alone: File → New from video… fits a body to the person in it."
+            if c.document.content is not None
+            else "Drop a recording, video, mesh or radar capture here, or press Ctrl+O.\n\n"
+            "Help → Open the sample recording shows what it looks like."
+        )

@@ -1,0 +1,267 @@
+"""Doppler maps one above the other on one time axis, and the difference of two of them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+import sd2core
+from sd2core.atomic import atomic_write
+from sd2core.errors import Sd2Error
+from sd2core.figures.strip import check_figure
+from sd2core.presence import runs
+from sd2core.spectrum import DopplerMap
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Scale = Literal["dB", "linear"]
+
+_WIDTH_IN, _ROW_IN, _PIXELS_PER_INCH = 8.0, 1.55, 200
+_NOTHING, _MUTED = "#e9ebee", "#5a6370"
+
+
+@dataclass(frozen=True)
+class Levels:
+    """What the colours mean: levels relative to the reference of each map.
+
+    Parameters
+    ----------
+    scale : {"dB", "linear"}
+    low_db, high_db : float
+        First and last colour; on a linear scale zero and ``high_db``.
+    colour_map : str
+        Name of a matplotlib map.
+    """
+
+    scale: Scale = "dB"
+    low_db: float = -30.0
+    high_db: float = 0.0
+    colour_map: str = "viridis"
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Of the colour bar: dB, or per cent of the reference."""
+        if self.scale == "dB":
+            return self.low_db, self.high_db
+        return 0.0, 100.0 * 10.0 ** (self.high_db / 10.0)
+
+    @property
+    def unit(self) -> str:
+        """Of the colour bar."""
+        return "dB" if self.scale == "dB" else "% of 0 dB"
+
+    def of(self, values: NDArray[np.float32], reference: float) -> NDArray[np.float64]:
+        """Values as levels, held at both ends."""
+        share = np.asarray(values, np.float64) / reference
+        low, high = self.ends
+        if self.scale == "linear":
+            return np.clip(100.0 * share, low, high)
+        with np.errstate(divide="ignore"):
+            return np.clip(10.0 * np.log10(share), low, high)
+
+
+@dataclass(frozen=True, eq=False)
+class MapRow:
+    """One map of a figure.
+
+    Parameters
+    ----------
+    doppler : DopplerMap
+    title : str
+        What it is, with the word simulated where it is.
+    reference : float
+        Value shown as 0 dB.
+    offset_s : float
+        How much later its clock starts than that of the figure.
+    """
+
+    doppler: DopplerMap
+    title: str
+    reference: float
+    offset_s: float = 0.0
+
+
+def difference_of(
+    minuend: MapRow, subtrahend: MapRow, levels: Levels
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Level of one map minus that of another, on the clock of the first.
+
+    Each is relative to its own reference and held within the levels shown, so that the
+    difference is that of the two pictures.
+
+    Returns
+    -------
+    difference : float64 array, shape (bins, frames)
+    known : bool array, shape (bins, frames)
+        False where one of the two says nothing: no frame, no person, an emptied bin.
+    """
+    one, other = minuend.doppler, subtrahend.doppler
+    if one.axis != other.axis:
+        raise Sd2Error("The maps have different velocity axes", "the same, for their difference")
+    times_s = one.times_s + minuend.offset_s - subtrahend.offset_s
+    clock = other.timebase
+    frames = np.array([clock.frame_at(time_s) for time_s in times_s])
+    there = np.array([clock.covers(time_s) for time_s in times_s])
+    if one.present is not None:
+        there &= one.present
+    if other.present is not None:
+        there &= other.present[frames]
+    known = np.repeat(there[None], one.axis.bins, axis=0)
+    for doppler in (one, other):
+        known[[*doppler.null_bins, *doppler.unseen_bins]] = False
+    difference = levels.of(one.values, minuend.reference) - levels.of(
+        other.values[:, frames], subtrahend.reference
+    )
+    return np.where(known, difference, 0.0), known
+
+
+def draw_maps(
+    rows: Sequence[MapRow],
+    levels: Levels,
+    *,
+    start_s: float,
+    end_s: float,
+    difference: tuple[int, int] | None = None,
+    colours: tuple[str, str] = ("#b4520b", "#0b7a5b"),
+) -> Figure:
+    """Draw maps on one time axis.
+
+    Parameters
+    ----------
+    rows : sequence of MapRow
+        From top to bottom.
+    levels : Levels
+    start_s, end_s : float
+        Stretch that is shown.
+    difference : tuple of int, optional
+        Numbers of two rows: the level of the first minus that of the second as a last row.
+    colours : tuple of str
+        Of negative and positive differences.
+    """
+    from matplotlib.figure import Figure
+
+    if not rows:
+        raise Sd2Error("There is no Doppler map to draw", "at least one")
+    count = len(rows) + (difference is not None)
+    size = (_WIDTH_IN, _ROW_IN * count + 0.45)
+    figure = Figure(figsize=size, dpi=_PIXELS_PER_INCH / 2, layout="constrained")
+    figure.set_facecolor("white")
+    all_axes = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
+    shown: Any = None
+    for axes, row in zip(all_axes, rows, strict=False):
+        level = levels.of(row.doppler.values, row.reference)
+        low, high = levels.ends
+        shown = _draw(axes, row, level, levels.colour_map, low, high)
+        _title(axes, row.title, f"0 dB: {row.reference:.3g} {row.doppler.unit}".rstrip())
+    figure.colorbar(
+        shown, ax=list(all_axes[: len(rows)]), pad=0.01, aspect=12 * len(rows), fraction=0.05
+    ).set_label(f"level ({levels.unit})", fontsize=8)
+    if difference is not None:
+        first, second = (rows[number] for number in difference)
+        _draw_difference(figure, all_axes[-1], first, second, levels, colours)
+    for axes in all_axes:
+        axes.set_xlim(start_s, end_s)
+        axes.tick_params(labelsize=8)
+    all_axes[-1].set_xlabel("time (s)", fontsize=8)
+    figure.supylabel("velocity (m/s, approaching +)", fontsize=8)
+    return figure
+
+
+def save_maps(figure: Figure, path: Path, rows: Sequence[MapRow], about: dict[str, Any]) -> None:
+    """Write the figure as PNG, SVG or PDF by the name's ending, with its provenance.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+        Of :func:`draw_maps`.
+    path : Path
+    rows : sequence of MapRow
+    about : dict
+        What else is to be known, fit for JSON.
+    """
+    from matplotlib import rc_context
+
+    check_figure(path)
+    provenance = about | {
+        "maps": [
+            {"title": row.title, "kind": row.doppler.kind, "reference": row.reference}
+            | {"offset_s": row.offset_s, "provenance": row.doppler.meta}
+            for row in rows
+        ],
+        "version": sd2core.__version__,
+    }
+    description = json.dumps(provenance, ensure_ascii=False)
+    program, kind = f"SD² Studio {sd2core.__version__}", path.suffix.lower()
+    metadata: Any = {
+        ".png": {"Software": program, "Description": description},
+        # Without a date the same figure gives the same bytes.
+        ".svg": {"Creator": program, "Description": description, "Date": None},
+        ".pdf": {"Creator": program, "Subject": description, "CreationDate": None},
+    }[kind]
+    rules: Any = {"svg.fonttype": "none", "svg.hashsalt": "sd2", "pdf.fonttype": 42}
+    with rc_context(rules), atomic_write(path) as stream:
+        figure.savefig(stream, format=kind[1:], dpi=_PIXELS_PER_INCH, metadata=metadata)
+
+
+def _draw(
+    axes: Axes, row: MapRow, level: NDArray[np.float64], colours: Any, low: float, high: float
+) -> Any:
+    """The cells of a map; grey where it says nothing."""
+    doppler = row.doppler
+    times_s = np.append(doppler.times_s, doppler.timebase.end_s) + row.offset_s
+    axes.set_facecolor(_NOTHING)
+    shown = axes.pcolormesh(
+        times_s,
+        doppler.axis.edges_mps,
+        np.ma.masked_invalid(level),
+        cmap=colours,
+        vmin=low,
+        vmax=high,
+        rasterized=True,
+    )
+    for start, stop in () if doppler.present is None else runs(~doppler.present):
+        axes.axvspan(times_s[start], times_s[stop], facecolor=_NOTHING, edgecolor=_MUTED,
+                     hatch="////", linewidth=0)  # fmt: skip
+    return shown
+
+
+def _draw_difference(
+    figure: Figure,
+    axes: Axes,
+    first: MapRow,
+    second: MapRow,
+    levels: Levels,
+    colours: tuple[str, str],
+) -> None:
+    from matplotlib.colors import LinearSegmentedColormap
+
+    values, known = difference_of(first, second, levels)
+    table = LinearSegmentedColormap.from_list(
+        "difference", [colours[0], "#f7f8f9", colours[1]], N=255
+    )
+    low, high = levels.ends
+    limit = high - low
+    level = np.where(known, values, np.nan)
+    shown = _draw(axes, first, level, table, -limit, limit)
+    name = f"{_short(first.title)} − {_short(second.title).lower()}"
+    _title(axes, name, "each relative to its own 0 dB")
+    bar = figure.colorbar(shown, ax=axes, pad=0.01, aspect=12, fraction=0.05)
+    bar.set_label(f"difference ({levels.unit})", fontsize=8)
+    bar.ax.tick_params(labelsize=7)
+
+
+def _title(axes: Axes, left: str, right: str) -> None:
+    axes.set_title(left, loc="left", fontsize=8, fontweight="bold")
+    axes.set_title(right, loc="right", fontsize=7, color=_MUTED)
+
+
+def _short(title: str) -> str:
+    return title.partition(" · ")[0]

@@ -1,0 +1,89 @@
+"""Figures of Doppler maps: the difference of two, what is left out, what the file says."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from sd2core.errors import Sd2Error
+from sd2core.figures.maps import Levels, MapRow, difference_of, draw_maps, save_maps
+from sd2core.sensor import VelocityAxis
+from sd2core.spectrum import DopplerMap
+from sd2core.timebase import Timebase
+
+
+def row_of(values, reference=1.0, title="A map", offset_s=0.0, rate=10.0, **more):
+    values = np.asarray(values, np.float32)
+    doppler = DopplerMap(
+        values,
+        VelocityAxis(len(values), 2.0),
+        Timebase.regular(values.shape[1], rate),
+        "denoised",
+        unit="power",
+        **more,
+    )
+    return MapRow(doppler, title, reference, offset_s)
+
+
+def test_the_difference_is_that_of_levels_below_the_own_reference():
+    one = row_of([[1.0, 0.1], [0.01, 0.0]])
+    other = row_of([[50.0, 500.0], [500.0, 500.0]], reference=500.0)
+    difference, known = difference_of(one, other, Levels(low_db=-30.0, high_db=0.0))
+    np.testing.assert_allclose(difference, [[10.0, -10.0], [-20.0, -30.0]], atol=1e-5)
+    assert known.all()
+    difference, _ = difference_of(one, other, Levels(scale="linear"))
+    np.testing.assert_allclose(difference, [[90.0, -90.0], [-99.0, -100.0]], atol=1e-4)
+
+
+def test_maps_on_other_clocks_meet_at_the_same_moment():
+    one = row_of([[0.1, 0.1, 0.1, 1.0, 0.1, 0.1]] * 2)
+    # The same moment, 0.3 s, is frame 3 of a clock that starts 0.15 s later at 20 frames/s.
+    late = np.full((2, 6), 0.1)
+    late[:, 3] = 1.0
+    other = row_of(late, offset_s=0.15, rate=20.0)
+    difference, known = difference_of(one, other, Levels())
+    assert known[0].tolist() == [False, False, True, True, True, False]
+    np.testing.assert_allclose(difference, 0.0, atol=1e-5)
+
+
+def test_where_one_says_nothing_there_is_no_difference():
+    one = row_of(np.ones((4, 3)), null_bins=(1,), present=np.array([True, False, True]))
+    other = row_of(np.full((4, 3), 0.1), unseen_bins=(3,))
+    difference, known = difference_of(one, other, Levels())
+    assert known.tolist() == [[True, False, True], [False] * 3, [True, False, True], [False] * 3]
+    assert (difference[~known] == 0).all()
+    np.testing.assert_allclose(difference[known], 10.0, atol=1e-5)
+    with pytest.raises(Sd2Error, match="different velocity axes"):
+        difference_of(one, row_of(np.ones((5, 3))), Levels())
+
+
+def test_the_figure_shows_the_sign_and_carries_provenance(tmp_path):
+    loud, quiet = np.full((8, 10), 1.0), np.full((8, 10), 0.01)
+    rows = [
+        row_of(np.hstack([loud, quiet]), title="Denoised · a model", meta={"sensor": [1, 2, 3]}),
+        row_of(np.hstack([quiet, loud]), title="Real"),
+    ]
+    figure = draw_maps(rows, Levels(), start_s=0.0, end_s=2.0, difference=(0, 1))
+    titles = [axes.get_title("left") for axes in figure.axes if axes.get_title("left")]
+    assert titles == ["Denoised · a model", "Real", "Denoised − real"]
+    save_maps(figure, tmp_path / "maps.png", rows, {"recording": "walk"})
+    with Image.open(tmp_path / "maps.png") as picture:
+        told = json.loads(picture.info["Description"])
+        pixels = np.asarray(picture.convert("RGB"), int)
+    assert told["recording"] == "walk"
+    assert told["maps"][0]["provenance"] == {"sensor": [1, 2, 3]}
+    box = figure.axes[2].get_window_extent()
+    scale = pixels.shape[1] / figure.bbox.width
+    y = round(pixels.shape[0] - scale * (box.y0 + box.y1) / 2)
+    left, right = (round(scale * (box.x0 + share * box.width)) for share in (0.25, 0.75))
+    red, green, _ = pixels[y, left]
+    assert green > red  # more in the first: green
+    red, green, _ = pixels[y, right]
+    assert red > green
+    with pytest.raises(Sd2Error, match=r"ends in"):
+        save_maps(figure, tmp_path / "maps.gif", rows, {})
+    with pytest.raises(Sd2Error, match="no Doppler map"):
+        draw_maps([], Levels(), start_s=0.0, end_s=1.0)
