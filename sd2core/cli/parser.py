@@ -14,10 +14,12 @@ from sd2core.cli import (
     info,
     ladder,
     radar,
+    runs,
     score_fit,
     simulate,
     strip,
     synth,
+    train,
     warm_up,
 )
 
@@ -64,6 +66,8 @@ def build_parser() -> tuple[argparse.ArgumentParser, argparse._SubParsersAction]
         strip,
         score_fit,
         simulate,
+        train,
+        runs,
         warm_up,
         fetch_models,
     )

@@ -9,7 +9,7 @@ from __future__ import annotations
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -52,9 +52,9 @@ class Control:
         self._signal: signal.Signals | None = None
 
     @property
-    def signal(self) -> signal.Signals | None:
-        """The signal that asked for the end, if one did."""
-        return self._signal
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C asked for the end."""
+        return self._signal is signal.SIGINT
 
     def word(self) -> Word:
         """What to do now. A signal means ``stop``, unless the file says ``cancel``."""
@@ -63,7 +63,7 @@ class Control:
             return "stop"
         return word
 
-    def wait_while_paused(self, sleep: Callable[[float], None] = time.sleep) -> tuple[Word, float]:
+    def wait_while_paused(self) -> tuple[Word, float]:
         """Wait until the word is another than ``pause``.
 
         Returns
@@ -74,7 +74,7 @@ class Control:
         """
         begun_s = time.monotonic()
         while (word := self.word()) == "pause":
-            sleep(_PAUSED_POLL_S)
+            time.sleep(_PAUSED_POLL_S)
         return word, time.monotonic() - begun_s
 
     def take_signals(self) -> None:

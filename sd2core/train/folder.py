@@ -248,7 +248,9 @@ class RunFolder:
     def _write(self, about: dict[str, Any]) -> None:
         content = {"format": FORMAT, "version": VERSION, **about}
         content |= {"pid": os.getpid(), "made_by": f"SD² Studio {__version__}"}
-        atomic_write_text(self.path / RUN_NAME, json.dumps(content, indent=2) + "\n")
+        atomic_write_text(
+            self.path / RUN_NAME, json.dumps(content, indent=2, ensure_ascii=False) + "\n"
+        )
 
 
 def runs_in(folder: Path) -> list[RunFolder]:
@@ -305,7 +307,7 @@ def _status(
         left_s=newest.get("left_s") if state in LIVE else None,
         validation_rmse=best.get("validation_rmse"),
         validation_mae_mps=best.get("validation_mae_mps"),
-        resumable=state in ("stopped", "died", "failed") and folder.last_record.exists(),
+        resumable=state in ("stopped", "died", "failed") and folder.last.exists(),
         has_model=folder.best.exists(),
         error=str(Sd2Error(**error)) if isinstance(error, dict) else None,
     )

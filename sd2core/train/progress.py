@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, Self
 
@@ -25,10 +25,12 @@ class ProgressWriter:
     path : Path
         Made when it is not there. A last line that a kill tore off is ended, so that
         the next one begins anew.
+    watch : callable, optional
+        Told every line, too.
     """
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
+    def __init__(self, path: Path, watch: Callable[[Event], None] | None = None) -> None:
+        self._watch = watch
         torn = path.exists() and path.read_bytes()[-1:] not in (b"", b"\n")
         self._stream = path.open("a", encoding="utf-8")
         if torn:
@@ -39,6 +41,8 @@ class ProgressWriter:
         line = {"event": event, **{key: _plain(value) for key, value in content.items()}}
         self._stream.write(json.dumps(line, ensure_ascii=False) + "\n")
         self._stream.flush()
+        if self._watch is not None:
+            self._watch(line)
 
     def __enter__(self) -> Self:
         return self

@@ -86,7 +86,7 @@ class TestControl:
         path.write_bytes(b"\xff\xfe what")
         assert read_control(path) == "run"
 
-    def test_waits_while_paused(self, tmp_path: Path) -> None:
+    def test_waits_while_paused(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         path = tmp_path / "control"
         write_control(path, "pause")
         naps = []
@@ -96,7 +96,8 @@ class TestControl:
             if len(naps) == 3:
                 write_control(path, "cancel")
 
-        assert Control(path).wait_while_paused(nap)[0] == "cancel"
+        monkeypatch.setattr("sd2core.train.control.time.sleep", nap)
+        assert Control(path).wait_while_paused()[0] == "cancel"
         assert len(naps) == 3
 
 
@@ -140,7 +141,7 @@ class TestFolder:
         lock.release()
         assert run.state() == "died"
         assert not run.status().resumable
-        run.last_record.touch()
+        run.last.touch()
         assert run.status().resumable
         with pytest.raises(Sd2Error, match=r"lost its process.*sd2 train --resume"):
             run.tell("pause")

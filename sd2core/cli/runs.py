@@ -1,0 +1,159 @@
+"""``sd2 runs``: look at training runs and steer them."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sd2core.cli.options import add_command, add_json
+from sd2core.cli.output import print_facts, print_json
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    from sd2core.train.folder import RunFolder, RunStatus
+
+
+def add_commands(commands: argparse._SubParsersAction) -> None:
+    """Add ``runs``."""
+    parser = add_command(
+        commands,
+        "runs",
+        "list training runs, and pause, stop or cancel one",
+        handler=_runs,
+        description=(
+            "Lists the runs of `sd2 train` in a folder: how far they are, how good, and whether\n"
+            "their process is still there. A run that was stopped or lost its process is gone on\n"
+            "with by `sd2 train --resume RUN`."
+        ),
+        examples=(
+            "  sd2 runs\n"
+            "  sd2 runs runs/ --json\n"
+            "  sd2 runs runs/s4 --pause\n"
+            "  sd2 runs runs/s4 --resume\n"
+            "  sd2 runs runs/s4 --stop"
+        ),
+    )
+    parser.add_argument(
+        "folder",
+        type=Path,
+        nargs="?",
+        default=Path(),
+        metavar="FOLDER",
+        help="a run, or a folder of runs (default: this one)",
+    )
+    what = parser.add_mutually_exclusive_group()
+    for word, about in (
+        ("pause", "keep a checkpoint and wait"),
+        ("resume", "go on after --pause"),
+        ("stop", "end it, and keep the best model and a checkpoint"),
+        ("cancel", "end it, and delete what it made"),
+    ):
+        what.add_argument(f"--{word}", action="store_const", const=word, dest="word", help=about)
+    add_json(parser)
+
+
+def _runs(options: argparse.Namespace) -> None:
+    from sd2core.train.folder import RunFolder, runs_in
+
+    if options.word is not None:
+        _steer(RunFolder(options.folder), options.word)
+        return
+    runs = runs_in(options.folder)
+    if options.json:
+        print_json({"runs": [{"path": str(run.path), **asdict(run.status())} for run in runs]})
+    elif len(runs) == 1 and runs[0].path == options.folder:
+        _print_one(runs[0])
+    else:
+        _print_table(runs)
+
+
+def _steer(run: RunFolder, word: str) -> None:
+    state = run.state()
+    if word == "cancel" and state in ("stopped", "died", "failed"):
+        lock = run.lock()
+        lock.release()
+        run.discard()
+        print(f"{run.path} is deleted")
+        return
+    if word == "pause":
+        run.tell("pause")
+    elif word == "resume":
+        run.tell("run")
+    elif word == "stop":
+        run.tell("stop")
+    else:
+        run.tell("cancel")
+    said = {"pause": "to pause", "resume": "to go on", "stop": "to stop", "cancel": "to cancel"}
+    print(f"{run.path} is told {said[word]}")
+
+
+def _print_one(run: RunFolder) -> None:
+    status = run.status()
+    facts = {
+        "state": status.state,
+        "model": status.model,
+        "done": _done(status),
+        "time": _times(status),
+        "validation": _validation(status),
+        "file": str(run.best) if status.has_model else "",
+        "error": status.error or "",
+        "go on": f"sd2 train --resume {run.path}" if status.resumable else "",
+    }
+    print_facts(str(run.path), facts)
+
+
+def _print_table(runs: list[RunFolder]) -> None:
+    if not runs:
+        print("There are no runs here. `sd2 train DATA --out RUN` makes one.")
+        return
+    rows = [("run", "state", "model", "done", "time", "validation")]
+    for run in runs:
+        try:
+            status = run.status()
+        except Sd2Error as error:
+            rows.append((run.path.name, "damaged", "", "", "", error.found))
+            continue
+        rows.append(
+            (
+                run.path.name,
+                status.state,
+                status.model,
+                _done(status),
+                _times(status),
+                _validation(status),
+            )
+        )
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    for row in rows:
+        line = "  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True))
+        print(line.rstrip())
+
+
+def _done(status: RunStatus) -> str:
+    if status.epoch is None:
+        return ""
+    limit = f" of {status.epochs}" if status.epochs is not None else ""
+    return f"{status.epoch}{limit} epochs"
+
+
+def _times(status: RunStatus) -> str:
+    if status.elapsed_s is None:
+        return ""
+    left = f", {_duration(status.left_s)} left" if status.left_s is not None else ""
+    return f"{_duration(status.elapsed_s)}{left}"
+
+
+def _validation(status: RunStatus) -> str:
+    if status.validation_rmse is None:
+        return ""
+    mae_mps = status.validation_mae_mps
+    return f"{status.validation_rmse:.4f}" + ("" if mae_mps is None else f", {mae_mps:.3f} m/s")
+
+
+def _duration(seconds: float) -> str:
+    if seconds < 60:
+        return f"{seconds:.0f} s"
+    minutes = round(seconds / 60)
+    return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60:02d} min"

@@ -1,0 +1,362 @@
+"""``sd2 train``: pairs of synthetic and radar Doppler to a model that turns one into the other."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sd2core.cli.options import add_command, add_json, positive_float, positive_int
+from sd2core.cli.output import print_facts, print_json
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    from sd2core.train.config import TrainConfig
+    from sd2core.train.start import Ending, Watch
+
+_INTERRUPTED = 130
+_BACKGROUND_NICE = 10
+
+# Options that are settings: section, name.
+_SETTINGS = {
+    "validation_subjects": ("data", "validation_subjects"),
+    "test_subjects": ("data", "test_subjects"),
+    "segment_frames": ("data", "segment_frames"),
+    "overlap_frames": ("data", "overlap_frames"),
+    "placements": ("data", "placements"),
+    "range_factor": ("data", "range_factor"),
+    "model": ("model", "name"),
+    "epochs": ("training", "epochs"),
+    "minutes": ("training", "minutes"),
+    "batch_size": ("training", "batch_size"),
+    "learning_rate": ("training", "learning_rate"),
+    "ssm_learning_rate": ("training", "ssm_learning_rate"),
+    "early_stopping": ("training", "early_stopping_epochs"),
+    "select_by": ("training", "select_by"),
+    "seed": ("training", "seed"),
+    "device": ("machine", "device"),
+    "devices": ("machine", "devices"),
+    "precision": ("machine", "precision"),
+    "threads": ("machine", "threads"),
+    "nice": ("machine", "nice"),
+    "deterministic": ("machine", "deterministic"),
+}
+
+
+def add_commands(commands: argparse._SubParsersAction) -> None:
+    """Add ``train``."""
+    parser = add_command(
+        commands,
+        "train",
+        "train a denoiser that turns synthetic Doppler into what a radar would show",
+        handler=_train,
+        description=(
+            "Learns from pairs of synthetic and radar Doppler of the same movement, as\n"
+            "`sd2 simulate campaign` and `sd2 pairs` make them. By default as in the paper:\n"
+            "segments of 72 frames that overlap by 10, batches of 64, 500 epochs, root mean\n"
+            "square error. Some people are kept out to choose the best epoch by, some for\n"
+            "`sd2 eval`.\n\n"
+            "RUN is a folder. It can be stopped with Ctrl-C or killed at any moment;\n"
+            "`sd2 train --resume RUN` goes on, with the result that it would have had. `sd2 runs`\n"
+            "shows runs and steers them. RUN/best.safetensors is the model.\n\n"
+            "All settings may stand in a TOML file (docs/formats.md); options go before it.\n"
+            "`--show-settings` prints them."
+        ),
+        examples=(
+            "  sd2 train campaign.zarr --out runs/s4\n"
+            "  sd2 train campaign.zarr --model gru --minutes 30 --out runs/gru\n"
+            "  sd2 train campaign.zarr mars.zarr --test-subjects s6 --seed 1 --out runs/both\n"
+            "  sd2 train settings.toml --epochs 100 --out runs/short\n"
+            "  sd2 train --resume runs/s4\n"
+            "  sd2 train campaign.zarr --set channels=64 --set dropout=0.1 --show-settings"
+        ),
+    )
+    parser.add_argument(
+        "inputs",
+        nargs="*",
+        type=Path,
+        metavar="CONFIG.toml|DATA",
+        help="a file with settings, or one or several stores of pairs, which are mixed",
+    )
+    parser.add_argument("--out", type=Path, metavar="RUN", help="the folder of the run; new")
+    parser.add_argument(
+        "--resume", type=Path, metavar="RUN", help="go on with a run that was stopped or killed"
+    )
+    parser.add_argument(
+        "--show-settings", action="store_true", help="print all settings as TOML and train nothing"
+    )
+    _add_learning(parser)
+    _add_data(parser)
+    _add_machine(parser)
+    add_json(parser)
+
+
+def _add_learning(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("what learns, and how")
+    group.add_argument(
+        "--model",
+        metavar="NAME",
+        help="s4 (the paper's), s4d, s4-serial, gru, unet or swin (default: s4)",
+    )
+    group.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        type=_option,
+        metavar="NAME=VALUE",
+        help="an option of the model, e.g. channels=64; may be given several times",
+    )
+    group.add_argument(
+        "--epochs", type=positive_int, metavar="N", help="passes over all segments (default: 500)"
+    )
+    group.add_argument(
+        "--minutes",
+        type=positive_float,
+        metavar="M",
+        help="train for so long instead; the learning rate follows the clock",
+    )
+    group.add_argument("--batch-size", type=positive_int, metavar="N", help="default: 64")
+    group.add_argument(
+        "--learning-rate", type=positive_float, metavar="R", help="at its highest (default: 0.003)"
+    )
+    group.add_argument(
+        "--ssm-learning-rate",
+        type=positive_float,
+        metavar="R",
+        help="the same for the parameters of state spaces (default: 0.001)",
+    )
+    group.add_argument(
+        "--early-stopping",
+        type=positive_int,
+        metavar="N",
+        help="end after N epochs without a better one (default: never)",
+    )
+    group.add_argument(
+        "--select-by",
+        choices=("rmse", "mae"),
+        help="what makes an epoch the best: error of the map, or of the peak velocity"
+        " (default: rmse)",
+    )
+    group.add_argument("--seed", type=int, metavar="N", help="default: 0")
+
+
+def _add_data(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("what it learns from")
+    group.add_argument(
+        "--validation-subjects",
+        type=_names,
+        metavar="NAMES",
+        help="kept out to choose the best epoch by, separated by commas (default: a sixth of"
+        " all, at least one, from the end of the list)",
+    )
+    group.add_argument(
+        "--test-subjects",
+        type=_names,
+        metavar="NAMES",
+        help="kept out for `sd2 eval`, or none (default: as many)",
+    )
+    group.add_argument(
+        "--segment-frames", type=positive_int, metavar="N", help="length (default: 72)"
+    )
+    group.add_argument(
+        "--overlap-frames", type=int, metavar="N", help="of neighbours (default: 10)"
+    )
+    group.add_argument(
+        "--placements",
+        choices=("all", "first"),
+        help="range synthesis: learn from all places of the sensor, or the first only"
+        " (default: all)",
+    )
+    group.add_argument(
+        "--range-factor",
+        type=positive_float,
+        metavar="F",
+        help="range synthesis: scale input and target together, as if the person were up to F"
+        " times nearer or farther (default: 1, off)",
+    )
+
+
+def _add_machine(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("on what")
+    group.add_argument(
+        "--device", choices=("auto", "cpu", "cuda"), help="default: a GPU where there is one"
+    )
+    group.add_argument("--devices", type=positive_int, metavar="N", help="GPUs (default: 1)")
+    group.add_argument(
+        "--precision",
+        choices=("auto", "32", "bf16"),
+        help="of matrix products (default: bf16 on GPUs that have it, else 32)",
+    )
+    group.add_argument("--threads", type=positive_int, metavar="N", help="of the CPU")
+    group.add_argument("--nice", type=int, metavar="N", help="lower the priority, 0 to 19")
+    group.add_argument(
+        "--background",
+        action="store_true",
+        help=f"one thread and nice {_BACKGROUND_NICE}, to work beside it",
+    )
+    group.add_argument(
+        "--deterministic",
+        action="store_true",
+        default=None,
+        help="refuse operations whose result may differ from run to run (on GPUs; a CPU has none)",
+    )
+
+
+def _option(text: str) -> tuple[str, Any]:
+    name, sign, value = text.partition("=")
+    if not name or not sign or not value:
+        raise argparse.ArgumentTypeError(f"{text!r} is not NAME=VALUE, e.g. channels=64")
+    if value in ("true", "false"):
+        return name, value == "true"
+    for kind in (int, float):
+        try:
+            return name, kind(value)
+        except ValueError:
+            continue
+    return name, value
+
+
+def _names(text: str) -> tuple[str, ...]:
+    return () if text == "none" else tuple(name for name in text.split(",") if name)
+
+
+def _train(options: argparse.Namespace) -> int:
+    from sd2core.train.config import config_text
+    from sd2core.train.start import begin, check, go_on
+
+    if options.resume is not None:
+        _refuse_with_resume(options)
+        with _bar(f"Training {options.resume.name}") as watch:
+            ending = go_on(options.resume, watch=watch)
+        return _say_ending(options, options.resume, ending)
+    config = _config(options)
+    if options.show_settings:
+        check(config)
+        print(config_text(config, Path.cwd()), end="")
+        return 0
+    if options.out is None:
+        raise Sd2Error("No folder for the run is given", "sd2 train DATA --out RUN")
+    command = shlex.join(["sd2", *sys.argv[1:]])
+    with _bar(f"Training {options.out.name}") as watch:
+        ending = begin(config, options.out, command=command, watch=watch)
+    return _say_ending(options, options.out, ending)
+
+
+def _refuse_with_resume(options: argparse.Namespace) -> None:
+    given = [name for name in _SETTINGS if getattr(options, name) is not None]
+    given += ["set"] * bool(options.set) + ["background"] * options.background
+    given += ["out"] * (options.out is not None) + ["show_settings"] * options.show_settings
+    if options.inputs:
+        raise Sd2Error(f"--resume is given with {options.inputs[0]}", "the run alone")
+    if given:
+        raise Sd2Error(
+            f"--resume is given with --{given[0].replace('_', '-')}",
+            "the run alone, which goes on with its own settings",
+        )
+
+
+def _config(options: argparse.Namespace) -> TrainConfig:
+    from sd2core.train.config import DataConfig, TrainConfig, read_config
+
+    files = [path for path in options.inputs if path.suffix == ".toml"]
+    pairs = tuple(path for path in options.inputs if path.suffix != ".toml")
+    if len(files) > 1:
+        raise Sd2Error(f"{files[0]} and {files[1]} are given", "one file with settings")
+    if files:
+        config = read_config(files[0])
+        if pairs:
+            config = config.with_values({"data": {"pairs": pairs}})
+    elif pairs:
+        config = TrainConfig(DataConfig(pairs))
+    else:
+        raise Sd2Error(
+            "Nothing to learn from is given",
+            "a file with settings (.toml) or stores of pairs",
+            "Make some with `sd2 simulate campaign`",
+        )
+    values: dict[str, dict[str, Any]] = {}
+    if options.background:
+        values["machine"] = {"threads": 1, "nice": _BACKGROUND_NICE}
+    for option, (section, name) in _SETTINGS.items():
+        given = getattr(options, option)
+        if given is not None:
+            values.setdefault(section, {})[name] = given
+    if options.epochs is not None and options.minutes is None:
+        # Asked for now, it holds before a time limit of the file.
+        values["training"]["minutes"] = None
+    if options.set:
+        # Options of another architecture would not fit.
+        same = options.model in (None, config.model.name)
+        kept = dict(config.model.options) if same else {}
+        values.setdefault("model", {})["options"] = kept | dict(options.set)
+    elif options.model not in (None, config.model.name):
+        values["model"]["options"] = {}
+    return config.with_values(values)
+
+
+@contextmanager
+def _bar(what: str) -> Iterator[Watch]:
+    """Steps, or seconds where time is the limit, on standard error when that is a terminal."""
+    from tqdm import tqdm
+
+    with tqdm(desc=what, file=sys.stderr, disable=None, leave=False) as bar:
+        minutes: float | None = None
+
+        def watch(event: dict[str, Any]) -> None:
+            nonlocal minutes
+            kind = event["event"]
+            if kind == "start":
+                minutes = event["minutes"]
+                bar.unit = "step" if minutes is None else "s"
+                steps = (event["epochs"] or 0) * event["steps_per_epoch"]
+                bar.total = steps if minutes is None else round(60 * minutes)
+                bar.initial = event["steps_done"] if minutes is None else 0
+                bar.n = bar.initial
+                bar.refresh()
+            elif kind == "step":
+                done = event["step"] if minutes is None else round(event["elapsed_s"])
+                bar.update(min(done, bar.total) - bar.n)
+            elif kind == "epoch":
+                mae_mps = event["validation_mae_mps"]
+                shown = f", {mae_mps:.3f} m/s" if mae_mps is not None else ""
+                bar.set_postfix_str(f"validation {event['validation_rmse']:.4f}{shown}")
+            elif kind in ("paused", "resumed", "stopping", "cancelling"):
+                bar.set_postfix_str(kind)
+
+        yield watch
+
+
+def _say_ending(options: argparse.Namespace, run: Path, ending: Ending) -> int:
+    if options.json:
+        print_json(
+            {
+                "run": str(run),
+                "outcome": ending.outcome,
+                "best_epoch": ending.best_epoch,
+                "validation_rmse": ending.validation_rmse,
+                "validation_mae_mps": ending.validation_mae_mps,
+                "model": None if ending.model is None else str(ending.model),
+            }
+        )
+    else:
+        facts = {}
+        if ending.best_epoch is not None:
+            facts["best epoch"] = str(ending.best_epoch)
+            facts["validation"] = f"RMSE {ending.validation_rmse:.4f}"
+            if ending.validation_mae_mps is not None:
+                facts["validation"] += (
+                    f", peak velocity off by {ending.validation_mae_mps:.3f} m/s on average"
+                )
+        if ending.model is not None:
+            facts["model"] = str(ending.model)
+        if ending.outcome == "stopped":
+            facts["go on"] = f"sd2 train --resume {run}"
+        print_facts(f"{run} has {_WORDS[ending.outcome]}", facts)
+    return _INTERRUPTED if ending.interrupted else 0
+
+
+_WORDS = {"finished": "finished", "stopped": "been stopped", "cancelled": "been discarded"}

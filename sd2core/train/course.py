@@ -1,0 +1,310 @@
+"""What happens between the steps of a run: lines, validation, checkpoints, being steered."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Literal
+
+import torch
+
+from sd2core.denoise.scaling import Scaling
+from sd2core.errors import Sd2Error
+from sd2core.sensor import VelocityAxis
+from sd2core.train.checkpoint import Checkpoint, Position, write_checkpoint
+from sd2core.train.clock import Clock
+from sd2core.train.config import TrainConfig
+from sd2core.train.control import Control, Word
+from sd2core.train.data import Order
+from sd2core.train.folder import RunFolder, State
+from sd2core.train.optimiser import rate_factor
+from sd2core.train.progress import ProgressWriter, StepLines
+from sd2core.train.validate import Exam, Validation, validate
+
+if TYPE_CHECKING:
+    from sd2core.train.learner import Learner
+
+Outcome = Literal["finished", "stopped", "cancelled", "failed"]
+
+
+class Course:
+    """A run between its steps.
+
+    Parameters
+    ----------
+    config : TrainConfig
+    folder : RunFolder
+    writer : ProgressWriter
+    control : Control
+    order : Order
+    exam : Exam
+    scaling : Scaling
+    axis : VelocityAxis
+    counted : tuple of int
+        Bins that are not nulled.
+    position : Position
+        Where to begin.
+    about : dict
+        What a checkpoint says besides.
+    save_best : callable
+        ``save_best(validation, epoch)`` writes the model that is to be used.
+    """
+
+    def __init__(
+        self,
+        config: TrainConfig,
+        folder: RunFolder,
+        writer: ProgressWriter,
+        control: Control,
+        order: Order,
+        exam: Exam,
+        scaling: Scaling,
+        axis: VelocityAxis,
+        counted: tuple[int, ...],
+        position: Position,
+        about: dict[str, Any],
+        save_best: Callable[[Validation, int], None],
+    ) -> None:
+        self.config, self.scaling, self.counted = config, scaling, counted
+        self.position = position
+        self.outcome: Outcome = "stopped"
+        self.rate = 0.0
+        self._folder, self._writer, self._control = folder, writer, control
+        self.order, self._exam, self._axis = order, exam, axis
+        self._about, self._save_best = about, save_best
+        self._lines = StepLines(writer)
+        self._counted: torch.Tensor | None = None
+        self._squares: torch.Tensor | None = None
+        self._line_squares, self._line_segments = position.squares, position.segments
+        self._clock = Clock(position.elapsed_s)
+        self._kept_s = self._clock.elapsed_s
+        self._share = 0.0
+
+    @property
+    def total_steps(self) -> int | None:
+        """Of the run; None where time limits it."""
+        if self.config.training.minutes is not None:
+            return None
+        return self.order.steps * self.config.training.epochs
+
+    @property
+    def over(self) -> bool:
+        """Whether nothing is left to do at this position."""
+        training, position = self.config.training, self.position
+        patience = training.early_stopping_epochs
+        if patience is not None and position.epochs_since_best >= patience:
+            return True
+        if training.minutes is not None:
+            return position.elapsed_s >= 60.0 * training.minutes
+        return position.epoch >= training.epochs
+
+    def begin(self, learner: Learner) -> None:
+        """Bring what is needed to the device, and take signals."""
+        self._control.take_signals()
+        self._learner = learner
+        self._exam = self._exam.on(learner.device)
+        self._squares = torch.tensor(
+            self.position.squares, dtype=torch.float64, device=learner.device
+        )
+        self._clock = Clock(self.position.elapsed_s)
+        self._kept_s = self._clock.elapsed_s
+        self._clock.left_s(self._share_done())
+        self._set_state("running")
+
+    def counted_on(self, device: torch.device) -> torch.Tensor:
+        """Bins that are not nulled, as an index on a device."""
+        if self._counted is None or self._counted.device != device:
+            self._counted = torch.tensor(self.counted, device=device)
+        return self._counted
+
+    def agreed_rate_factor(self) -> float:
+        """Share of the highest learning rate for the step to come."""
+        training = self.config.training
+        total = self.total_steps
+        done = self._share if total is None else (self.position.steps_done + 1) / total
+        return rate_factor(done, training.warm_up, training.final_rate)
+
+    def note(self, square: torch.Tensor, segments: int) -> None:
+        """Add the mean square error of a batch; nothing waits for the device here."""
+        assert self._squares is not None
+        self._squares += square.double() * segments
+        self.position.segments += segments
+
+    def after_step(self) -> bool:
+        """Count a step and do what is due; False when the run is over."""
+        position = self.position
+        position.step += 1
+        position.steps_done += 1
+        word, self._share = self._agreed(self._control.word(), self._share_done())
+        over = self.total_steps is None and self._share >= 1.0
+        whole = position.step == self.order.steps
+        if self._lines.due or whole or over:
+            self._say_step()
+        if (whole or over) and word != "cancel":
+            over = self._end_epoch() or over
+            if over:
+                self.outcome = "finished"
+            word, _ = self._agreed(self._control.word(), 0.0)
+        if word == "pause" and not over:
+            word = self._pause()
+        if word == "cancel":
+            self._writer.say("cancelling")
+            self.outcome = "cancelled"
+            return False
+        if over:
+            self._keep()
+            return False
+        if word == "stop":
+            self._writer.say("stopping")
+            self._keep()
+            if position.best is None:
+                self._keep_what_there_is()
+            self.outcome = "stopped"
+            return False
+        if self._clock.elapsed_s - self._kept_s >= self.config.training.checkpoint_s:
+            self._keep()
+        return True
+
+    def _share_done(self) -> float:
+        """How much of the run is done, 0 to 1."""
+        minutes, total = self.config.training.minutes, self.total_steps
+        if total is None:
+            assert minutes is not None
+            return self._clock.elapsed_s / (60.0 * minutes)
+        return self.position.steps_done / total
+
+    def _say_step(self) -> None:
+        position = self.position
+        squares = self._finite_squares()
+        segments = max(1, position.segments - self._line_segments)
+        # Sums of floating-point numbers: the difference of equal ones may be a hair below 0.
+        since = max(0.0, squares - self._line_squares)
+        self._line_squares, self._line_segments = squares, position.segments
+        self._lines.say(
+            epoch=position.epoch + 1,
+            step=position.steps_done,
+            steps=self.total_steps,
+            train_rmse=math.sqrt(since / segments),
+            learning_rate=self.rate,
+            **self._times(),
+        )
+
+    def _end_epoch(self) -> bool:
+        """Validate and keep the best; whether the run is over."""
+        position = self.position
+        position.squares = self._finite_squares()
+        found = validate(
+            self._learner.network,
+            self._exam,
+            self.scaling,
+            self._axis,
+            self.counted,
+            lambda: self._control.word() != "cancel",
+        )
+        if found is None:
+            return False
+        training = self.config.training
+        score = found.rmse if training.select_by == "rmse" else found.mae_mps
+        if not math.isfinite(found.rmse):
+            raise _diverged(position.steps_done)
+        best = position.best is None or score < position.best["score"]
+        if best:
+            position.best = {
+                "epoch": position.epoch + 1,
+                "score": score,
+                "validation_rmse": found.rmse,
+                "validation_mae_mps": found.mae_mps,
+            }
+            self._write_best(found, position.epoch + 1)
+        position.epochs_since_best = 0 if best else position.epochs_since_best + 1
+        self._writer.say(
+            "epoch",
+            epoch=position.epoch + 1,
+            step=position.steps_done,
+            train_rmse=math.sqrt(position.squares / max(1, position.segments)),
+            validation_rmse=found.rmse,
+            validation_mae_mps=found.mae_mps,
+            best=best,
+            **self._times(),
+        )
+        position.epoch, position.step = position.epoch + 1, 0
+        position.squares, position.segments = 0.0, 0
+        self._line_squares, self._line_segments = 0.0, 0
+        assert self._squares is not None
+        self._squares.zero_()
+        position.elapsed_s = self._clock.elapsed_s
+        return self.over
+
+    def _pause(self) -> Word:
+        self._keep()
+        self._writer.say("paused")
+        self._set_state("paused")
+        word, seconds = self._control.wait_while_paused()
+        word, seconds = self._agreed(word, seconds)
+        self._clock.leave_out(seconds)
+        self._writer.say("resumed")
+        self._set_state("running")
+        return word
+
+    def _keep(self) -> None:
+        """Write a checkpoint."""
+        position = self.position
+        position.squares = self._finite_squares()
+        position.elapsed_s = self._clock.elapsed_s
+        self._kept_s = position.elapsed_s
+        if self._leads:
+            weights, moments = self._learner.checkpoint_tensors()
+            checkpoint = Checkpoint(weights, moments, position, self._about)
+            write_checkpoint(self._folder.last, self._folder.last_record, checkpoint)
+
+    def _keep_what_there_is(self) -> None:
+        """A model of a run that is stopped in its first epoch.
+
+        It is no epoch's, so the position does not know of it: the run, resumed, goes the
+        way it would have gone.
+        """
+        found = validate(self._learner.network, self._exam, self.scaling, self._axis, self.counted)
+        if found is not None and math.isfinite(found.rmse):
+            self._write_best(found, self.position.epoch)
+
+    def _write_best(self, found: Validation, epoch: int) -> None:
+        if self._leads:
+            self._save_best(found, epoch)
+
+    def _set_state(self, state: State) -> None:
+        if self._leads:
+            self._folder.set_state(state)
+
+    def _finite_squares(self) -> float:
+        assert self._squares is not None
+        squares = float(self._squares)
+        if not math.isfinite(squares):
+            raise _diverged(self.position.steps_done)
+        return squares
+
+    def _times(self) -> dict[str, float | None]:
+        return {
+            "elapsed_s": self._clock.elapsed_s,
+            "left_s": self._clock.left_s(min(1.0, self._share_done())),
+        }
+
+    @property
+    def _leads(self) -> bool:
+        """Of several processes one writes."""
+        return bool(self._learner.trainer.is_global_zero)
+
+    def _agreed(self, word: Word, number: float) -> tuple[Word, float]:
+        """The same in all processes, as the first has it: or they would wait for each other."""
+        trainer = self._learner.trainer
+        if trainer.world_size == 1:
+            return word, number
+        agreed: tuple[Word, float] = trainer.strategy.broadcast((word, number))
+        return agreed
+
+
+def _diverged(step: int) -> Sd2Error:
+    return Sd2Error(
+        f"Around step {step} the error is no finite number any more",
+        "a training that converges",
+        "Choose a lower learning rate, or clip gradients to a smaller norm",
+    )

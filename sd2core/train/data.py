@@ -1,0 +1,295 @@
+"""Pairs to segments: what is learnt from, what chooses, what stays unseen."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+from sd2core.pairs import PairSet, Take, read_pairs
+from sd2core.segments import cut, segment_starts
+from sd2core.train.config import DataConfig
+
+RANGE_LAW = 4.0
+"""Echo power falls with the fourth power of the range (radar equation)."""
+
+
+@dataclass(frozen=True)
+class Split:
+    """Who is learnt from, who chooses the best epoch, who stays unseen.
+
+    Parameters
+    ----------
+    training, validation, test : tuple of str
+        Subjects. They share nobody.
+    by_take : bool
+        True where there is one subject only: then the last fifth of their takes
+        validates, and what is measured there says nothing about other people.
+    """
+
+    training: tuple[str, ...]
+    validation: tuple[str, ...]
+    test: tuple[str, ...]
+    by_take: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Segments:
+    """Windows of equal length.
+
+    Parameters
+    ----------
+    inputs, targets : float32 array, shape (segments, length, bins)
+        Synthetic Doppler and the radar's.
+    """
+
+    inputs: NDArray[np.float32]
+    targets: NDArray[np.float32]
+
+    def __len__(self) -> int:
+        return len(self.inputs)
+
+
+@dataclass(frozen=True, eq=False)
+class TrainingData:
+    """What a run learns from.
+
+    Parameters
+    ----------
+    pairs : PairSet
+        All of it, the unseen subjects as well.
+    split : Split
+    training, validation : Segments
+    learnt_takes : tuple of Take
+        Those that the training segments are from.
+    """
+
+    pairs: PairSet
+    split: Split
+    training: Segments
+    validation: Segments
+    learnt_takes: tuple[Take, ...]
+
+    @property
+    def digest(self) -> str:
+        """The same for the same segments, whatever their files are called."""
+        sums = hashlib.blake2b(digest_size=16)
+        for segments in (self.training, self.validation):
+            for values in (segments.inputs, segments.targets):
+                sums.update(str(values.shape).encode())
+                sums.update(np.ascontiguousarray(values).data)
+        return sums.hexdigest()
+
+
+def read_mixed(paths: Sequence[Path]) -> PairSet:
+    """Read one or several stores of pairs as one.
+
+    Subjects of the same name in different stores are different people: they are then
+    called ``STORE:NAME``. Labels are those of all stores. What holds anything simulated
+    is called simulated.
+
+    Raises
+    ------
+    Sd2Error
+        When axes, frame rates or null bins differ.
+    """
+    sets = [read_pairs(path) for path in paths]
+    first = sets[0]
+    if len(sets) == 1:
+        return first
+    for path, other in zip(paths[1:], sets[1:], strict=True):
+        for what, mine, theirs in (
+            ("velocity axis", _axis_words(first), _axis_words(other)),
+            ("frame rate", f"{first.frame_rate_hz:g} Hz", f"{other.frame_rate_hz:g} Hz"),
+            ("null bins", str(list(first.null_bins)), str(list(other.null_bins))),
+        ):
+            if mine != theirs:
+                raise Sd2Error(
+                    f"The pairs cannot be mixed: the {what} of {paths[0]} is {mine}, that of"
+                    f" {path} is {theirs}",
+                    "the same in all of them",
+                    "Make one of them again with the settings of the other",
+                )
+    labels = tuple(dict.fromkeys(label for one in sets for label in one.labels))
+    names = [subject for one in sets for subject in one.subjects]
+    shared = {name for name in names if names.count(name) > 1}
+    takes = tuple(
+        replace(
+            take,
+            subject=f"{path.stem}:{take.subject}" if take.subject in shared else take.subject,
+            label=_relabelled(take.label, one.labels, labels),
+        )
+        for path, one in zip(paths, sets, strict=True)
+        for take in one.takes
+    )
+    simulated = any(one.kind == "simulated" for one in sets)
+    return replace(
+        first,
+        kind="simulated" if simulated else "real",
+        labels=labels,
+        takes=takes,
+        provenance={"mixed": [one.provenance for one in sets]},
+    )
+
+
+def split_subjects(
+    subjects: Sequence[str],
+    validation: Sequence[str] | None = None,
+    test: Sequence[str] | None = None,
+) -> Split:
+    """Who is learnt from and who is kept out.
+
+    By default a sixth of the subjects, at least one, is kept for the test (where there
+    are three or more) and as many for validation, from the end of the list.
+
+    Raises
+    ------
+    Sd2Error
+        When a subject is unknown or named twice, or nobody is left to learn from.
+    """
+    subjects = list(subjects)
+    for key, named in (("validation", validation), ("test", test)):
+        for name in named or ():
+            if name not in subjects:
+                raise Sd2Error(
+                    f"{name!r} is to be a {key} subject and has no takes",
+                    f"some of {', '.join(subjects)}",
+                )
+    both = sorted(set(validation or ()) & set(test or ()))
+    if both:
+        raise Sd2Error(
+            f"{', '.join(both)} is to validate and to test", "subjects that do one of the two"
+        )
+    share = max(1, len(subjects) // 6)
+    free = [name for name in subjects if name not in {*(validation or ()), *(test or ())}]
+    if test is None:
+        # Two people are needed to learn and to choose.
+        spare = len(free) - (2 if validation is None else 1)
+        test = free[len(free) - max(0, min(share, spare)) :]
+        free = free[: len(free) - len(test)]
+    if validation is None:
+        spare = len(free) - 1
+        validation = free[len(free) - max(0, min(share, spare)) :]
+        free = free[: len(free) - len(validation)]
+    if not free:
+        raise Sd2Error(
+            f"Of the subjects {', '.join(subjects)} nobody is left to learn from",
+            "somebody who neither validates nor tests",
+        )
+    return Split(tuple(free), tuple(validation), tuple(test), by_take=not validation)
+
+
+def prepare(pairs: PairSet, config: DataConfig) -> TrainingData:
+    """Cut pairs into segments to learn from and to choose by.
+
+    Segments to choose by overlap only where a take's length makes them, so that every
+    frame counts about once, and are of the takes' own sensors.
+
+    Raises
+    ------
+    Sd2Error
+        When the subjects cannot be split, or no take is as long as a segment.
+    """
+    split = split_subjects(pairs.subjects, config.validation_subjects, config.test_subjects)
+    learnt = pairs.of(split.training).takes
+    chosen_by = pairs.of(split.validation).takes if split.validation else ()
+    if split.by_take:
+        learnt, chosen_by = _by_take(learnt)
+    if config.placements == "first":
+        learnt = tuple(take for take in learnt if take.placement == 0)
+    own = tuple(take for take in chosen_by if take.placement == 0) or chosen_by
+    return TrainingData(
+        pairs,
+        split,
+        segments_of(learnt, config.segment_frames, config.overlap_frames),
+        segments_of(own, config.segment_frames, 0),
+        learnt,
+    )
+
+
+def segments_of(takes: Sequence[Take], length: int, overlap: int) -> Segments:
+    """All segments of some takes, in their order.
+
+    Raises
+    ------
+    Sd2Error
+        When there is none.
+    """
+    inputs, targets = [], []
+    for take in takes:
+        starts = segment_starts(len(take.times_s), length, overlap)
+        inputs.append(cut(take.synthetic, starts, length))
+        targets.append(cut(take.radar, starts, length))
+    if not sum(map(len, inputs)):
+        longest = max((len(take.times_s) for take in takes), default=0)
+        raise Sd2Error(
+            f"Segments are to be {length} frames long, and the longest of {len(takes)} takes has"
+            f" {longest}",
+            "takes that are at least as long as a segment",
+            "Choose shorter segments with --segment-frames",
+        )
+    return Segments(np.concatenate(inputs), np.concatenate(targets))
+
+
+@dataclass(frozen=True)
+class Order:
+    """In which order segments are learnt from; depends on seed and epoch alone.
+
+    Parameters
+    ----------
+    segments, batch_size, seed : int
+    range_factor : float
+        Gains are drawn for ranges up to this factor nearer or farther.
+    """
+
+    segments: int
+    batch_size: int
+    seed: int
+    range_factor: float = 1.0
+
+    @property
+    def steps(self) -> int:
+        """Batches per epoch; the last may be smaller."""
+        return -(-self.segments // self.batch_size)
+
+    def epoch(self, number: int) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+        """Numbers of segments (segments,), and the power gain of each, in that order."""
+        rng = np.random.default_rng([self.seed, number])
+        indices = rng.permutation(self.segments)
+        exponent = rng.uniform(-1.0, 1.0, self.segments)
+        return indices, (self.range_factor ** (-RANGE_LAW * exponent)).astype(np.float32)
+
+    def part(self, step: int) -> slice:
+        """Where in :meth:`epoch` a batch stands."""
+        return slice(step * self.batch_size, (step + 1) * self.batch_size)
+
+
+def _axis_words(pairs: PairSet) -> str:
+    return f"{pairs.axis.bins} bins over ±{pairs.axis.v_max_mps:g} m/s"
+
+
+def _relabelled(
+    label: NDArray[np.int8], labels: tuple[str, ...], of_all: tuple[str, ...]
+) -> NDArray[np.int8]:
+    table = np.array([of_all.index(name) for name in labels], np.int8)
+    return table[label]
+
+
+def _by_take(takes: tuple[Take, ...]) -> tuple[tuple[Take, ...], tuple[Take, ...]]:
+    """The last fifth of the motions, with all their placements, apart from the others."""
+    motions = list(dict.fromkeys((take.subject, take.name) for take in takes))
+    if len(motions) < 2:
+        raise Sd2Error(
+            "There is one take of one subject",
+            "at least two takes: one to learn from and one to choose the best epoch by",
+        )
+    kept = set(motions[-max(1, len(motions) // 5) :])
+    return (
+        tuple(take for take in takes if (take.subject, take.name) not in kept),
+        tuple(take for take in takes if (take.subject, take.name) in kept),
+    )

@@ -1,0 +1,152 @@
+"""The part of a run that Lightning drives: one step, and what comes after it.
+
+Lightning has the loop, the devices and the precision. Epochs are ours: to Lightning the
+whole run is one, so that a run can begin in the middle of an epoch, and so that nothing
+but a step happens between two steps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from lightning.pytorch import LightningModule
+
+from sd2core.denoise.model import Denoiser
+from sd2core.train.checkpoint import Checkpoint, moments_of, set_moments
+from sd2core.train.course import Course
+from sd2core.train.data import Order
+from sd2core.train.optimiser import optimiser_of, set_rate
+
+
+class Step(NamedTuple):
+    """One batch: which segments, and how much nearer each is."""
+
+    index: torch.Tensor  # (segments,) int64
+    gain: torch.Tensor  # (segments,) float32, of power
+    epoch: int
+    number: int
+
+
+class Steps:
+    """Batches without end, from a position on.
+
+    Parameters
+    ----------
+    order : Order
+    epoch, step : int
+        The first.
+    rank, ranks : int
+        Of several processes each takes its share of every batch.
+    """
+
+    def __init__(
+        self, order: Order, epoch: int = 0, step: int = 0, rank: int = 0, ranks: int = 1
+    ) -> None:
+        self._order = order
+        self._epoch, self._step = epoch, step
+        self._rank, self._ranks = rank, ranks
+
+    def __iter__(self) -> Iterator[Step]:
+        epoch, first = self._epoch, self._step
+        while True:
+            indices, gains = self._order.epoch(epoch)
+            for step in range(first, self._order.steps):
+                mine = self._order.part(step)
+                index, gain = indices[mine], gains[mine]
+                if self._ranks > 1:
+                    # All have as many, as a mean over processes wants it.
+                    rows = np.arange(self._rank, max(len(index), self._ranks), self._ranks)
+                    rows %= len(index)
+                    index, gain = index[rows], gain[rows]
+                yield Step(torch.from_numpy(index), torch.from_numpy(gain), epoch, step)
+            epoch, first = epoch + 1, 0
+
+
+class Learner(LightningModule):
+    """A denoiser with all that it learns from.
+
+    Parameters
+    ----------
+    network : Denoiser
+    inputs, targets : Tensor, shape (segments, length, bins)
+        Compressed.
+    course : Course
+    checkpoint : Checkpoint, optional
+        To go on from.
+    """
+
+    def __init__(
+        self,
+        network: Denoiser,
+        inputs: torch.Tensor,
+        targets: torch.Tensor,
+        course: Course,
+        checkpoint: Checkpoint | None = None,
+    ) -> None:
+        super().__init__()
+        self.network = network
+        # Not buffers: they belong to no checkpoint, and need not be broadcast.
+        self._inputs, self._targets = inputs, targets
+        self._course = course
+        self._moments = checkpoint.moments if checkpoint is not None else None
+
+    def configure_optimizers(self) -> torch.optim.Optimizer:
+        """AdamW, with its moments where a run goes on."""
+        optimiser = optimiser_of(self.network, self._course.config.training)
+        if self._moments is not None:
+            set_moments(optimiser, self._moments)
+            self._moments = None
+        return optimiser
+
+    def on_fit_start(self) -> None:
+        """Bring all segments to the device: they are a few hundred MB at most."""
+        self._inputs = self._inputs.to(self.device)
+        self._targets = self._targets.to(self.device)
+
+    def on_train_start(self) -> None:
+        """Begin, with signals handled as we want it: Lightning has put its own in place."""
+        self._course.begin(self)
+
+    def on_train_batch_start(self, batch: Step, batch_idx: int) -> None:
+        """Set the rate, and the state of chance, which so is a function of the position."""
+        course = self._course
+        course.rate = set_rate(self._optimiser, course.agreed_rate_factor())
+        seed = np.random.SeedSequence(
+            [course.config.training.seed, batch.epoch, batch.number, self.global_rank]
+        )
+        torch.manual_seed(int(seed.generate_state(1, np.uint64)[0]))
+
+    def training_step(self, batch: Step, batch_idx: int) -> torch.Tensor:
+        """Root mean square error of one batch."""
+        course = self._course
+        inputs = self._inputs.index_select(0, batch.index)
+        targets = self._targets.index_select(0, batch.index)
+        if course.config.data.range_factor > 1.0:
+            # (g·x / r)^p = g^p · (x / r)^p: gains are as well applied to compressed values.
+            scaling = course.scaling
+            inputs = inputs * (batch.gain**scaling.input.exponent)[:, None, None]
+            targets = targets * (batch.gain**scaling.target.exponent)[:, None, None]
+        difference = (self.network(inputs) - targets).float()
+        if len(course.counted) < difference.shape[-1]:
+            difference = difference.index_select(-1, course.counted_on(difference.device))
+        square = difference.square().mean()
+        course.note(square.detach(), len(batch.index))
+        # At zero the root has no slope.
+        return (square + 1e-12).sqrt()
+
+    def on_train_batch_end(self, outputs: Any, batch: Step, batch_idx: int) -> None:
+        """Let the course decide what comes next."""
+        if not self._course.after_step():
+            self.trainer.should_stop = True
+
+    def checkpoint_tensors(self) -> tuple[dict[str, torch.Tensor], dict[int, Any]]:
+        """Weights, and moments of the optimiser."""
+        return self.network.state_dict(), moments_of(self._optimiser)
+
+    @property
+    def _optimiser(self) -> torch.optim.Optimizer:
+        optimiser: torch.optim.Optimizer = self.trainer.optimizers[0]
+        return optimiser

@@ -1,0 +1,134 @@
+"""On what a run computes: device, precision, threads, priority."""
+
+from __future__ import annotations
+
+import logging
+import os
+import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, Literal
+
+import torch
+
+from sd2core.errors import Sd2Error
+from sd2core.train.config import MachineConfig
+
+Device = Literal["cpu", "cuda"]
+
+_BELOW_NORMAL = 0x4000  # Windows' BELOW_NORMAL_PRIORITY_CLASS
+
+# Nothing that a user could act on; whatever else is warned of is passed on.
+_BESIDE_THE_POINT = (
+    # Lightning 2.6 builds a class that torch 2.13 has deprecated.
+    r"`isinstance\(treespec, LeafSpec\)` is deprecated",
+    # A GPU that was declined on purpose.
+    r"GPU available but not used",
+)
+
+
+def device_of(machine: MachineConfig) -> Device:
+    """Where to compute.
+
+    Raises
+    ------
+    Sd2Error
+        When a GPU is asked for and there is none, or not so many.
+    """
+    found = torch.cuda.device_count() if torch.cuda.is_available() else 0
+    if machine.device == "cpu" or (machine.device == "auto" and not found):
+        return "cpu"
+    if found < machine.devices:
+        raise Sd2Error(
+            f"machine.device is {machine.device!r} with {machine.devices} devices, and torch"
+            f" {torch.__version__} finds {found} GPUs",
+            "as many as are asked for",
+            "Leave it to the program (--device auto), or train on the CPU (--device cpu)",
+        )
+    return "cuda"
+
+
+def precision_of(machine: MachineConfig, device: Device) -> Literal["32-true", "bf16-mixed"]:
+    """How matrices are multiplied. State-space kernels are in float32 and above in any case.
+
+    Half precision (fp16) is not offered: it needs its losses scaled by a factor that
+    would have to be kept with every checkpoint, and what has no bf16 is no faster with it
+    at these sizes.
+    """
+    if machine.precision == "bf16":
+        return "bf16-mixed"
+    if machine.precision == "auto" and device == "cuda" and torch.cuda.is_bf16_supported():
+        return "bf16-mixed"
+    return "32-true"
+
+
+def give_way(nice: int) -> None:
+    """Let other programs go first; where that is refused, go on as before."""
+    if nice <= 0:
+        return
+    try:
+        if sys.platform == "win32":
+            import ctypes
+
+            kernel = ctypes.windll.kernel32
+            kernel.SetPriorityClass(kernel.GetCurrentProcess(), _BELOW_NORMAL)
+        else:
+            missing = nice - os.nice(0)
+            if missing > 0:
+                os.nice(missing)
+    except OSError:
+        pass
+
+
+@contextmanager
+def settled(machine: MachineConfig, threads: int) -> Iterator[None]:
+    """Threads and determinism for the time of a run, and Lightning's chatter off."""
+    before_threads = torch.get_num_threads()
+    before_strict = torch.are_deterministic_algorithms_enabled()
+    before_warn = torch.is_deterministic_algorithms_warn_only_enabled()
+    before_rng = torch.get_rng_state()
+    loggers = [logging.getLogger(name) for name in ("lightning.pytorch", "lightning.fabric")]
+    levels = [logger.level for logger in loggers]
+    try:
+        torch.set_num_threads(threads)
+        if machine.deterministic:
+            # Read by cuBLAS when it starts; it has no other switch.
+            os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")
+            torch.use_deterministic_algorithms(True)
+        for logger in loggers:
+            logger.setLevel(logging.ERROR)
+        with warnings.catch_warnings():
+            for message in _BESIDE_THE_POINT:
+                warnings.filterwarnings("ignore", message=message)
+            yield
+    finally:
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.setLevel(level)
+        torch.use_deterministic_algorithms(before_strict, warn_only=before_warn)
+        torch.set_num_threads(before_threads)
+        torch.set_rng_state(before_rng)
+
+
+def machine_words(device: Device, precision: str, threads: int) -> dict[str, Any]:
+    """On what a model was trained, for its card."""
+    name = torch.cuda.get_device_name() if device == "cuda" else _processor()
+    return {
+        "device": name,
+        "precision": precision,
+        "threads": threads,
+        "torch": str(torch.__version__),
+    }
+
+
+def _processor() -> str:
+    import platform
+
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8") as stream:
+            for line in stream:
+                if line.startswith("model name"):
+                    return f"{line.partition(':')[2].strip()}, {os.cpu_count()} cores"
+    except OSError:
+        pass
+    return f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores"

@@ -1,0 +1,272 @@
+"""A run from settings to a model, or from a checkpoint on."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from lightning.pytorch import Trainer
+from lightning.pytorch.strategies import DDPStrategy
+
+from sd2core.denoise.card import ModelCard
+from sd2core.denoise.files import save_model
+from sd2core.denoise.live import TrainedDenoiser
+from sd2core.denoise.model import Denoiser, parameter_count
+from sd2core.denoise.registry import build, options
+from sd2core.denoise.scaling import Scaling
+from sd2core.errors import Sd2Error
+from sd2core.train.checkpoint import Checkpoint, Position, read_checkpoint
+from sd2core.train.config import TrainConfig
+from sd2core.train.control import Control, signals_kept
+from sd2core.train.course import Course, Outcome
+from sd2core.train.data import Order, TrainingData, prepare, read_mixed
+from sd2core.train.folder import RunFolder
+from sd2core.train.learner import Learner, Steps
+from sd2core.train.machine import device_of, give_way, machine_words, precision_of, settled
+from sd2core.train.progress import ProgressWriter
+from sd2core.train.validate import Exam, Validation
+
+
+def carry_out(
+    folder: RunFolder,
+    config: TrainConfig,
+    writer: ProgressWriter,
+    control: Control,
+    *,
+    resume: bool,
+    command: str,
+) -> tuple[Outcome, Position]:
+    """Train.
+
+    Parameters
+    ----------
+    folder : RunFolder
+        Made, and held by this process.
+    config : TrainConfig
+    writer : ProgressWriter
+    control : Control
+    resume : bool
+        Go on from the last checkpoint.
+    command : str
+        How it was asked for, for the model's card.
+
+    Raises
+    ------
+    Sd2Error
+        For what the user can mend.
+    """
+    give_way(config.machine.nice)
+    device = device_of(config.machine)
+    checkpoint = read_checkpoint(folder.last) if resume else None
+    threads = config.machine.threads or torch.get_num_threads()
+    if checkpoint is not None:
+        # Sums over other numbers of threads differ in their last digits.
+        threads = config.machine.threads or int(checkpoint.about["threads"])
+    data = prepare(read_mixed(config.data.pairs), config.data)
+    digest = data.digest
+    if checkpoint is not None and checkpoint.about["data_digest"] != digest:
+        raise Sd2Error(
+            "The pairs have changed since the run began: its segments are others",
+            "the same pairs and the same split",
+            "Start a new run with the new pairs",
+        )
+    precision = precision_of(config.machine, device)
+    with settled(config.machine, threads), signals_kept():
+        network = _network(config, data, checkpoint)
+        scaling = Scaling.fitted(
+            [take.synthetic for take in data.learnt_takes],
+            [take.radar for take in data.learnt_takes],
+            data.pairs.null_bins,
+        )
+        about = _About(config, data, scaling, command, machine_words(device, precision, threads))
+        course = Course(
+            config,
+            folder,
+            writer,
+            control,
+            order_of(config, data),
+            Exam.of(data.validation, scaling, data.pairs.axis, data.pairs.null_bins),
+            scaling,
+            data.pairs.axis,
+            _counted(data),
+            checkpoint.position if checkpoint is not None else Position(),
+            {"data_digest": digest, "threads": threads},
+            lambda found, epoch: about.save(folder.best, network, found, epoch),
+        )
+        learner = Learner(
+            network,
+            torch.from_numpy(scaling.input.compress(data.training.inputs)),
+            torch.from_numpy(scaling.target.compress(data.training.targets)),
+            course,
+            checkpoint,
+        )
+        _say_start(writer, course, data, network, device, resumed=checkpoint is not None)
+        if course.over:
+            # Killed between its last checkpoint and its last line.
+            return "finished", course.position
+        ranks = config.machine.devices
+        trainer = Trainer(
+            accelerator="gpu" if device == "cuda" else "cpu",
+            devices=ranks,
+            strategy=DDPStrategy(broadcast_buffers=False) if ranks > 1 else "auto",
+            precision=precision,
+            max_epochs=1,
+            gradient_clip_val=config.training.clip_norm or None,
+            # The course does all of this, between steps.
+            logger=False,
+            enable_checkpointing=False,
+            enable_progress_bar=False,
+            enable_model_summary=False,
+            num_sanity_val_steps=0,
+            limit_val_batches=0,
+            use_distributed_sampler=False,
+        )
+        position = course.position
+        trainer.fit(
+            learner, Steps(course.order, position.epoch, position.step, local_rank(), ranks)
+        )
+    return course.outcome, course.position
+
+
+def order_of(config: TrainConfig, data: TrainingData) -> Order:
+    """In which order a run learns."""
+    training = config.training
+    return Order(len(data.training), training.batch_size, training.seed, config.data.range_factor)
+
+
+def local_rank() -> int:
+    """Which of several processes this is; Lightning starts the others with a number."""
+    return int(os.environ.get("LOCAL_RANK", "0"))
+
+
+def _network(config: TrainConfig, data: TrainingData, checkpoint: Checkpoint | None) -> Denoiser:
+    torch.manual_seed(config.training.seed)
+    network = build(config.model.name, data.pairs.axis.bins, **config.model.options)
+    length = config.data.segment_frames
+    if network.window not in (None, length):
+        raise Sd2Error(
+            f"Segments are {length} frames long, and the model {config.model.name} looks at"
+            f" {network.window} frames together",
+            f"data.segment_frames = {network.window}",
+        )
+    if checkpoint is not None:
+        try:
+            network.load_state_dict(checkpoint.weights)
+        except RuntimeError as error:
+            raise Sd2Error(
+                "The last checkpoint is of another model than the settings say",
+                "the settings that the run began with",
+                "Put config.toml back as it was, or start a new run",
+            ) from error
+    return network
+
+
+def _counted(data: TrainingData) -> tuple[int, ...]:
+    nulled = set(data.pairs.null_bins)
+    return tuple(number for number in range(data.pairs.axis.bins) if number not in nulled)
+
+
+def _say_start(
+    writer: ProgressWriter,
+    course: Course,
+    data: TrainingData,
+    network: Denoiser,
+    device: str,
+    *,
+    resumed: bool,
+) -> None:
+    config, position, split = course.config, course.position, data.split
+    timed = config.training.minutes is not None
+    writer.say(
+        "start",
+        model=config.model.name,
+        parameters=parameter_count(network),
+        device=device,
+        epochs=None if timed else config.training.epochs,
+        minutes=config.training.minutes,
+        steps_per_epoch=course.order.steps,
+        train_segments=len(data.training),
+        validation_segments=len(data.validation),
+        training_subjects=list(split.training),
+        validation_subjects=list(split.validation),
+        test_subjects=list(split.test),
+        split_by_take=split.by_take,
+        kind=data.pairs.kind,
+        resumed=resumed,
+        epochs_done=position.epoch,
+        steps_done=position.steps_done,
+        unix_s=int(time.time()),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _About:
+    """What the model file says of the run."""
+
+    config: TrainConfig
+    data: TrainingData
+    scaling: Scaling
+    command: str
+    machine: dict[str, Any]
+
+    def save(self, path: Path, network: Denoiser, found: Validation, epoch: int) -> None:
+        training = network.training
+        try:
+            save_model(path, TrainedDenoiser(network, self.card(found, epoch)))
+        finally:
+            network.train(training)
+
+    def card(self, found: Validation, epoch: int) -> ModelCard:
+        config, pairs, split = self.config, self.data.pairs, self.data.split
+        name = config.model.name
+        mae_mps = found.mae_mps if math.isfinite(found.mae_mps) else None
+        return ModelCard(
+            model=name,
+            options={**options(name), **config.model.options},
+            scaling=self.scaling,
+            axis=pairs.axis,
+            null_bins=pairs.null_bins,
+            frame_rate_hz=pairs.frame_rate_hz,
+            trained_on=pairs.kind,
+            about={
+                "data": self._data_words(),
+                "command": self.command,
+                "metrics": {
+                    "validation_rmse": found.rmse,
+                    "validation_mae_mps": mae_mps,
+                    "epoch": epoch,
+                },
+                "limits": self._limits(),
+                "subjects": {
+                    "training": list(split.training),
+                    "validation": list(split.validation),
+                    "test": list(split.test),
+                },
+                "seed": config.training.seed,
+                "machine": self.machine,
+                "provenance": pairs.provenance,
+            },
+        )
+
+    def _data_words(self) -> str:
+        pairs, split = self.data.pairs, self.data.split
+        names = ", ".join(path.name for path in self.config.data.pairs)
+        frames = sum(len(take.times_s) for take in self.data.learnt_takes)
+        return (
+            f"{names}: {len(split.training)} people"
+            f" ({', '.join(split.training)}), {frames / pairs.frame_rate_hz / 60:.1f} min"
+            f" of {pairs.kind} radar at {pairs.frame_rate_hz:g} frames/s"
+        )
+
+    def _limits(self) -> str:
+        said = [f"Knows movements like those of {len(self.data.split.training)} people."]
+        if self.data.pairs.kind == "simulated":
+            said.append("Learnt from a simulated radar; nothing is said about a real one.")
+        if self.data.split.by_take:
+            said.append("Validated on other takes of the same person, not on other people.")
+        return " ".join(said)

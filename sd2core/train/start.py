@@ -1,0 +1,243 @@
+"""Begin a run, or go on with one; loads torch when all is in place.
+
+::
+
+    from sd2core.train.start import begin, go_on
+
+    begin(config, Path("runs/first"))
+    go_on(Path("runs/first"))        # after a kill or a stop
+"""
+
+from __future__ import annotations
+
+import os
+import time
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from sd2core.atomic import atomic_write_text
+from sd2core.errors import Sd2Error
+from sd2core.train.config import TrainConfig, config_text, read_config
+from sd2core.train.control import Control, signals_kept, write_control
+from sd2core.train.folder import LIVE, RunFolder
+from sd2core.train.progress import Event, ProgressWriter
+
+if TYPE_CHECKING:
+    from sd2core.train.checkpoint import Position
+
+Watch = Callable[[Event], None]
+"""Told every line of progress as it is written."""
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How a run ended.
+
+    Parameters
+    ----------
+    outcome : str
+    best_epoch : int or None
+    validation_rmse, validation_mae_mps : float or None
+        Of the best epoch.
+    model : Path or None
+        The best model, where there is one.
+    interrupted : bool
+        Whether Ctrl-C ended it.
+    """
+
+    outcome: Literal["finished", "stopped", "cancelled"]
+    best_epoch: int | None
+    validation_rmse: float | None
+    validation_mae_mps: float | None
+    model: Path | None
+    interrupted: bool = False
+
+
+def begin(
+    config: TrainConfig, out: Path, *, command: str = "", watch: Watch | None = None
+) -> Ending:
+    """Train a model.
+
+    Parameters
+    ----------
+    config : TrainConfig
+    out : Path
+        Folder of the run; new, empty, or of a run that failed before it had learnt
+        anything.
+    command : str
+        How it was asked for; kept with the model.
+    watch : callable, optional
+
+    Raises
+    ------
+    Sd2Error
+        For what the user can mend; the run's folder then says it, too, if it was made.
+    """
+    check(config)
+    folder = RunFolder(out)
+    if not _is_other_rank():
+        _clear_failed(folder)
+        folder.create(config.model.name)
+        atomic_write_text(folder.config, config_text(config, folder.path))
+        write_control(folder.control, "run")
+    return _trained(folder, config, command, watch, resume=False)
+
+
+def go_on(out: Path, *, command: str = "", watch: Watch | None = None) -> Ending:
+    """Go on with a run that was stopped, killed, or failed for a reason that is mended.
+
+    On a CPU, with the same version of torch and the same number of threads, it ends with
+    the very weights that it would have had otherwise, unless time limits it.
+
+    Raises
+    ------
+    Sd2Error
+        When there is nothing to go on with.
+    """
+    folder = RunFolder(out)
+    state = folder.state()
+    if state == "finished":
+        raise Sd2Error(
+            f"The run {out} has finished",
+            "one that was stopped or lost its process",
+            "Start a new one in another folder",
+        )
+    config = read_config(folder.config)
+    if not _is_other_rank() and state not in LIVE:
+        write_control(folder.control, "run")
+    return _trained(folder, config, command, watch, resume=folder.last.exists())
+
+
+def check(config: TrainConfig) -> None:
+    """Refuse at once what would fail when the work has begun.
+
+    Raises
+    ------
+    Sd2Error
+        For stores that are none, unknown models and their options.
+    """
+    from sd2core.denoise.registry import MODELS, options
+    from sd2core.pairs import is_pair_store
+
+    for path in config.data.pairs:
+        if not is_pair_store(path):
+            what = "holds no pairs" if path.exists() else "does not exist"
+            raise Sd2Error(
+                f"{path} {what}",
+                "a folder made by `sd2 simulate campaign` or `sd2 pairs`",
+            )
+    name = config.model.name
+    if name not in MODELS:
+        raise Sd2Error(f"model.name is {name!r}", f"one of {', '.join(MODELS)}")
+    known = options(name)
+    for option in config.model.options:
+        if option not in known:
+            raise Sd2Error(
+                f"The model {name} has no option {option!r}", f"one of {', '.join(known)}"
+            )
+
+
+def _trained(
+    folder: RunFolder, config: TrainConfig, command: str, watch: Watch | None, *, resume: bool
+) -> Ending:
+    if _is_other_rank():
+        return _beside(folder, config, command, resume)
+    lock = folder.lock()
+    control = Control(folder.control)
+    try:
+        with ProgressWriter(folder.progress, watch) as writer, signals_kept():
+            control.take_signals()
+            folder.set_state("starting")
+            try:
+                from sd2core.train.run import carry_out
+
+                outcome, position = carry_out(
+                    folder, config, writer, control, resume=resume, command=command
+                )
+            except BaseException as error:
+                _note_failure(folder, writer, error)
+                raise
+            writer.say("end", **_end_line(folder, outcome, position))
+            folder.set_state(outcome)
+    finally:
+        lock.release()
+    if outcome == "cancelled":
+        folder.discard()
+    assert outcome != "failed"
+    best = position.best or {}
+    return Ending(
+        outcome=outcome,
+        best_epoch=best.get("epoch"),
+        validation_rmse=best.get("validation_rmse"),
+        validation_mae_mps=best.get("validation_mae_mps"),
+        model=folder.best if folder.best.exists() else None,
+        interrupted=control.interrupted,
+    )
+
+
+def _beside(folder: RunFolder, config: TrainConfig, command: str, resume: bool) -> Ending:
+    """Another of several processes: it computes, and the first one writes."""
+    from sd2core.train.run import carry_out
+
+    with ProgressWriter(Path(os.devnull)) as writer:
+        outcome, _ = carry_out(
+            folder, config, writer, Control(folder.control), resume=resume, command=command
+        )
+    assert outcome != "failed"
+    return Ending(outcome, None, None, None, None)
+
+
+def _end_line(folder: RunFolder, outcome: str, position: Position) -> dict[str, Any]:
+    best = position.best or {}
+    return {
+        "outcome": outcome,
+        "best_epoch": best.get("epoch"),
+        "validation_rmse": best.get("validation_rmse"),
+        "validation_mae_mps": best.get("validation_mae_mps"),
+        "model": folder.best.name if folder.best.exists() else None,
+        "error": None,
+    }
+
+
+def _note_failure(folder: RunFolder, writer: ProgressWriter, error: BaseException) -> None:
+    """Say it in words in the lines, and in full in the log."""
+    with folder.log.open("a", encoding="utf-8") as log:
+        log.write(time.strftime("%Y-%m-%d %H:%M:%S\n"))
+        log.write("".join(traceback.format_exception(error)) + "\n")
+    if isinstance(error, Sd2Error):
+        said = {"found": error.found, "expected": error.expected, "remedy": error.remedy}
+    elif isinstance(error, MemoryError):
+        said = {
+            "found": "There is not enough memory for this",
+            "expected": "",
+            "remedy": "Choose a smaller batch or a smaller model",
+        }
+    else:
+        found = f"This should not happen ({type(error).__name__}: {error})"
+        remedy = f"Please report it, with {folder.log.name}"
+        said = {"found": found, "expected": "", "remedy": remedy}
+    writer.say(
+        "end",
+        outcome="failed",
+        best_epoch=None,
+        validation_rmse=None,
+        validation_mae_mps=None,
+        model=folder.best.name if folder.best.exists() else None,
+        error=said,
+    )
+    folder.set_state("failed")
+
+
+def _clear_failed(folder: RunFolder) -> None:
+    """A run that failed before it had learnt anything makes way for the next attempt."""
+    learnt = folder.last.exists() or folder.best.exists()
+    if folder.exists and folder.state() == "failed" and not learnt:
+        folder.discard()
+
+
+def _is_other_rank() -> bool:
+    """Whether Lightning started this process beside the one that the user started."""
+    return os.environ.get("LOCAL_RANK", "0") != "0"

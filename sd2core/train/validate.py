@@ -1,0 +1,115 @@
+"""How good a model is on segments that it does not learn from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from sd2core.denoise.metrics import peak_velocity_mps, velocity_error
+from sd2core.denoise.model import Denoiser
+from sd2core.denoise.scaling import Scaling
+from sd2core.sensor import VelocityAxis
+from sd2core.train.data import Segments
+
+_BATCH = 256
+
+
+@dataclass(frozen=True)
+class Validation:
+    """Errors on segments.
+
+    Parameters
+    ----------
+    rmse : float
+        Of compressed values, over bins that are not nulled; what the loss is, too.
+    mae_mps : float
+        Of the peak velocity per frame, as :mod:`sd2core.denoise.metrics` defines it. The
+        frames are those of segments, each of which a model begins knowing nothing; so
+        `sd2 eval`, which gives it whole takes, finds less.
+    """
+
+    rmse: float
+    mae_mps: float
+
+
+@dataclass(frozen=True, eq=False)
+class Exam:
+    """What a model is validated on.
+
+    Parameters
+    ----------
+    inputs, targets : Tensor, shape (segments, length, bins)
+        Compressed.
+    peaks_mps : float64 array, shape (segments · length,)
+        Of the targets.
+    """
+
+    inputs: torch.Tensor
+    targets: torch.Tensor
+    peaks_mps: NDArray[np.float64]
+
+    def on(self, device: torch.device) -> Exam:
+        """The same on a device."""
+        return Exam(self.inputs.to(device), self.targets.to(device), self.peaks_mps)
+
+    @classmethod
+    def of(
+        cls, segments: Segments, scaling: Scaling, axis: VelocityAxis, null_bins: tuple[int, ...]
+    ) -> Exam:
+        """Of segments of energies."""
+        energies = segments.targets.reshape(-1, axis.bins).copy()
+        energies[:, list(null_bins)] = 0.0
+        return cls(
+            torch.from_numpy(scaling.input.compress(segments.inputs)),
+            torch.from_numpy(scaling.target.compress(segments.targets)),
+            peak_velocity_mps(energies, axis),
+        )
+
+
+def validate(
+    model: Denoiser,
+    exam: Exam,
+    scaling: Scaling,
+    axis: VelocityAxis,
+    counted: tuple[int, ...],
+    keep_on: Callable[[], bool] = lambda: True,
+) -> Validation | None:
+    """Measure a model.
+
+    Parameters
+    ----------
+    model : Denoiser
+    exam : Exam
+    scaling : Scaling
+    axis : VelocityAxis
+    counted : tuple of int
+        Bins that are not nulled.
+    keep_on : callable
+        Asked between batches; False ends it without a result.
+    """
+    training = model.training
+    model.eval()
+    squares, cells = 0.0, 0
+    found_mps = []
+    nulled = [number for number in range(axis.bins) if number not in set(counted)]
+    try:
+        with torch.no_grad():
+            for start in range(0, len(exam.inputs), _BATCH):
+                if not keep_on():
+                    return None
+                batch = slice(start, start + _BATCH)
+                answer = model(exam.inputs[batch]).float()
+                difference = (answer - exam.targets[batch])[..., list(counted)]
+                squares += float(difference.double().square().sum())
+                cells += difference.numel()
+                energies = scaling.target.expand(answer.cpu().numpy())
+                energies[..., nulled] = 0.0
+                found_mps.append(peak_velocity_mps(energies.reshape(-1, axis.bins), axis))
+    finally:
+        model.train(training)
+    error = velocity_error(np.concatenate(found_mps), exam.peaks_mps)
+    return Validation((squares / cells) ** 0.5, error.mae_mps)

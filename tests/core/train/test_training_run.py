@@ -1,0 +1,337 @@
+"""A run learns, and whatever interrupts it, it ends with the same weights."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+from safetensors.torch import load_file
+from small_pairs import write_pairs
+
+from sd2core.denoise.files import describe_model, load_model
+from sd2core.errors import Sd2Error
+from sd2core.train.config import (
+    DataConfig,
+    MachineConfig,
+    ModelConfig,
+    TrainConfig,
+    TrainingConfig,
+    config_text,
+)
+from sd2core.train.control import write_control
+from sd2core.train.folder import RunFolder
+from sd2core.train.progress import Event, read_events, standing
+from sd2core.train.start import Ending, begin, go_on
+from sd2core.train.validate import Validation
+
+REPOSITORY = Path(__file__).resolve().parents[3]
+SMALL: dict[str, dict[str, Any]] = {
+    "gru": {"channels": 12, "depth": 1},
+    "s4": {"channels": 8, "depth": 2, "state_size": 8, "dropout": 0.2},
+}
+
+
+@pytest.fixture(scope="module")
+def pairs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_pairs(tmp_path_factory.mktemp("pairs") / "small.zarr", null_bins=(3,))
+
+
+def settings(pairs: Path, model: str = "gru", **training: Any) -> TrainConfig:
+    return TrainConfig(
+        DataConfig((pairs,), segment_frames=24, overlap_frames=4, range_factor=1.3),
+        ModelConfig(model, SMALL[model]),
+        TrainingConfig(**{"batch_size": 5, "epochs": 6, "seed": 3, **training}),
+        MachineConfig(device="cpu", threads=1, deterministic=True),
+    )
+
+
+def weights(run: Path, name: str) -> dict[str, torch.Tensor]:
+    return load_file(run / name)
+
+
+def same(one: Path, other: Path) -> bool:
+    """All tensors of the last checkpoint and of the best model, bit by bit."""
+    for name in ("last.safetensors", "best.safetensors"):
+        mine, theirs = weights(one, name), weights(other, name)
+        if mine.keys() != theirs.keys():
+            return False
+        if not all(torch.equal(mine[key], theirs[key]) for key in mine):
+            return False
+    return True
+
+
+def curve(run: Path) -> list[tuple[Any, ...]]:
+    """What is to be drawn, without the times."""
+    return [
+        (event["epoch"], event["train_rmse"], event["validation_rmse"], event["best"])
+        for event in standing(read_events(run / "progress.jsonl"))
+        if event["event"] == "epoch"
+    ]
+
+
+def at(step: int, action: Callable[[], None]) -> Callable[[Event], None]:
+    """Do something once, when the run has said that it is at a step."""
+    done = []
+
+    def watch(event: Event) -> None:
+        if event["event"] in ("step", "epoch") and event["step"] >= step and not done:
+            done.append(True)
+            action()
+
+    return watch
+
+
+class TestLearning:
+    def test_it_beats_what_it_is_given(self, pairs: Path, tmp_path: Path) -> None:
+        config = settings(pairs, epochs=30, learning_rate=0.03)
+        ending = begin(config, tmp_path / "run", command="sd2 train")
+        epochs = curve(tmp_path / "run")
+        assert ending.outcome == "finished"
+        assert len(epochs) == 30
+        best = min(one[2] for one in epochs)
+        assert ending.validation_rmse == pytest.approx(best, rel=1e-6)
+        assert best < 0.5 * epochs[0][2]
+        assert ending.model is not None
+        card = describe_model(ending.model)
+        assert (card.model, card.trained_on, card.null_bins) == ("gru", "simulated", (3,))
+        assert card.about["subjects"] == {
+            "training": ["s1"],
+            "validation": ["s2"],
+            "test": ["s3"],
+        }
+        assert card.about["metrics"]["validation_rmse"] == ending.validation_rmse
+        assert "simulated" in card.about["limits"]
+        assert load_model(ending.model).denoise_values(torch.rand(10, 8).numpy()).shape == (10, 8)
+
+    def test_seeds_differ_and_repeat(self, pairs: Path, tmp_path: Path) -> None:
+        for name, seed in (("a", 1), ("b", 1), ("c", 2)):
+            begin(settings(pairs, epochs=2, seed=seed), tmp_path / name)
+        assert same(tmp_path / "a", tmp_path / "b")
+        assert not same(tmp_path / "a", tmp_path / "c")
+
+    def test_early_stopping(
+        self, pairs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        errors = iter([0.5, 0.4, 0.6, 0.4, 0.5, 0.1])
+        monkeypatch.setattr(
+            "sd2core.train.course.validate", lambda *_: Validation(next(errors), 1.0)
+        )
+        ending = begin(settings(pairs, early_stopping_epochs=3, epochs=6), tmp_path / "run")
+        assert (ending.outcome, ending.best_epoch) == ("finished", 2)
+        assert [one[3] for one in curve(tmp_path / "run")] == [True, True, False, False, False]
+
+    def test_time_limits(self, pairs: Path, tmp_path: Path) -> None:
+        ending = begin(settings(pairs, minutes=0.01), tmp_path / "run")
+        events = read_events(tmp_path / "run" / "progress.jsonl")
+        assert ending.outcome == "finished"
+        assert (events[0]["epochs"], events[0]["minutes"]) == (None, 0.01)
+        last = [event for event in events if event["event"] == "step"][-1]
+        assert last["elapsed_s"] >= 0.6
+        assert last["left_s"] == 0.0
+        # The cosine has come down with the clock.
+        assert last["learning_rate"] < 0.05 * settings(pairs).training.learning_rate
+
+
+class TestSteering:
+    @pytest.mark.parametrize("model", ["gru", "s4"])
+    def test_stopped_and_gone_on_with(self, pairs: Path, tmp_path: Path, model: str) -> None:
+        config = settings(pairs, model)
+        whole = begin(config, tmp_path / "whole")
+        run = RunFolder(tmp_path / "run")
+        stop = at(4, lambda: run.tell("stop"))
+        stopped = begin(config, run.path, watch=stop)
+        assert stopped.outcome == "stopped"
+        assert stopped.model is not None
+        assert run.status().state == "stopped"
+        assert run.status().resumable
+        assert not same(tmp_path / "whole", run.path)
+        again = go_on(run.path)
+        assert again == replace(whole, model=again.model)
+        assert same(tmp_path / "whole", run.path)
+        assert curve(tmp_path / "whole") == curve(run.path)
+
+    def test_paused(self, pairs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        config = settings(pairs)
+        begin(config, tmp_path / "whole")
+        run = RunFolder(tmp_path / "run")
+        states = []
+
+        def nap(seconds: float) -> None:
+            states.append(run.state())
+            run.tell("run")
+
+        monkeypatch.setattr("sd2core.train.control.time.sleep", nap)
+        pause = at(5, lambda: run.tell("pause"))
+        assert begin(config, run.path, watch=pause).outcome == "finished"
+        assert states == ["paused"]
+        assert same(tmp_path / "whole", run.path)
+        said = [event["event"] for event in read_events(run.progress)]
+        assert said.index("paused") < said.index("resumed") < said.index("end")
+
+    def test_cancelled(self, pairs: Path, tmp_path: Path) -> None:
+        run = RunFolder(tmp_path / "run")
+        said: list[Event] = []
+        cancel = at(4, lambda: run.tell("cancel"))
+
+        def watch(event: Event) -> None:
+            said.append(event)
+            cancel(event)
+
+        assert begin(settings(pairs), run.path, watch=watch).outcome == "cancelled"
+        assert not run.path.exists()
+        assert [event["event"] for event in said][-2:] == ["cancelling", "end"]
+        assert said[-1]["outcome"] == "cancelled"
+
+    def test_a_signal_stops_and_handlers_come_back(self, pairs: Path, tmp_path: Path) -> None:
+        before = [signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGINT)]
+        interrupt = at(3, lambda: os.kill(os.getpid(), signal.SIGINT))
+        ending = begin(settings(pairs), tmp_path / "run", watch=interrupt)
+        assert (ending.outcome, ending.interrupted) == ("stopped", True)
+        assert before == [signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGINT)]
+
+    def test_stopped_before_the_first_epoch_ends(self, pairs: Path, tmp_path: Path) -> None:
+        run = RunFolder(tmp_path / "run")
+        ending = begin(settings(pairs), run.path, watch=at(1, lambda: run.tell("stop")))
+        assert ending.outcome == "stopped"
+        assert ending.best_epoch is None
+        assert load_model(run.best).card.model == "gru"
+
+
+def process(*words: str) -> subprocess.Popen[bytes]:
+    return subprocess.Popen(
+        [sys.executable, "-W", "error", "-m", "sd2core.cli", "train", *words],
+        env=os.environ | {"PYTHONPATH": str(REPOSITORY), "OMP_NUM_THREADS": "1"},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+    )
+
+
+def wait_for(run: RunFolder, step: int, training: subprocess.Popen[bytes]) -> None:
+    """Until the last line of this process is of that step or later."""
+    while True:
+        events = read_events(run.progress)
+        starts = [number for number, event in enumerate(events) if event["event"] == "start"]
+        if len(starts) and any(event.get("step", 0) >= step for event in events[starts[-1] :]):
+            return
+        if training.poll() is not None:
+            assert training.stderr is not None
+            pytest.fail(f"ended too early: {training.stderr.read().decode()}")
+        time.sleep(0.01)
+
+
+def test_terminated_and_killed(pairs: Path, tmp_path: Path) -> None:
+    """As a user's machine may do it: first a polite end, then a power cut."""
+    config = settings(pairs, epochs=60, checkpoint_s=0.2)
+    toml = tmp_path / "settings.toml"
+    toml.write_text(config_text(config, tmp_path))
+    run = RunFolder(tmp_path / "run")
+    first = process(str(toml), "--out", str(run.path))
+    wait_for(run, 30, first)
+    first.send_signal(signal.SIGTERM)
+    errors = first.communicate()[1]
+    assert (first.returncode, errors) == (0, b"")
+    assert run.status().state == "stopped"
+    assert run.status().resumable
+
+    second = process("--resume", str(run.path))
+    wait_for(run, 120, second)
+    second.kill()
+    second.communicate()
+    assert run.status().state == "died"
+
+    begin(config, tmp_path / "whole")
+    ending = go_on(run.path)
+    assert ending.outcome == "finished"
+    assert same(tmp_path / "whole", run.path)
+    assert curve(tmp_path / "whole") == curve(run.path)
+
+
+class TestFailure:
+    def failing(self, config: TrainConfig, run: Path) -> tuple[Sd2Error, Event]:
+        with pytest.raises(Sd2Error) as raised:
+            begin(config, run)
+        return raised.value, read_events(run / "progress.jsonl")[-1]
+
+    def test_it_says_why(self, pairs: Path, tmp_path: Path) -> None:
+        config = settings(pairs, learning_rate=1.0, clip_norm=0.0, epochs=300)
+        config = replace(config, data=replace(config.data, segment_frames=400))
+        error, end = self.failing(config, tmp_path / "run")
+        assert end["outcome"] == "failed"
+        assert end["error"]["found"] == error.found
+        assert "400 frames long" in error.found
+        status = RunFolder(tmp_path / "run").status()
+        assert (status.state, status.resumable, status.error) == ("failed", False, str(error))
+        assert "Traceback" in (tmp_path / "run" / "log.txt").read_text()
+
+    def test_nothing_learnt_makes_way(self, pairs: Path, tmp_path: Path) -> None:
+        config = settings(pairs, epochs=1)
+        long = replace(config, data=replace(config.data, segment_frames=400))
+        self.failing(long, tmp_path / "run")
+        assert begin(config, tmp_path / "run").outcome == "finished"
+        with pytest.raises(Sd2Error, match="is a run already"):
+            begin(config, tmp_path / "run")
+        with pytest.raises(Sd2Error, match="has finished"):
+            go_on(tmp_path / "run")
+
+    def test_what_diverges_is_said(
+        self, pairs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        from sd2core.denoise.recurrent import GruDenoiser
+
+        monkeypatch.setattr(
+            GruDenoiser, "forward", lambda self, values: values * self.gain * float("inf")
+        )
+        error, end = self.failing(settings(pairs), tmp_path / "run")
+        assert "no finite number" in error.found
+        assert end["error"]["remedy"].startswith("Choose a lower learning rate")
+        assert not (tmp_path / "run" / "last.safetensors").exists()
+
+    def test_other_pairs(self, pairs: Path, tmp_path: Path) -> None:
+        own = write_pairs(tmp_path / "own.zarr")
+        run = RunFolder(tmp_path / "run")
+        begin(settings(own), run.path, watch=at(3, lambda: run.tell("stop")))
+        for path in sorted(own.rglob("*"), reverse=True):
+            path.unlink() if path.is_file() else path.rmdir()
+        own.rmdir()
+        write_pairs(own, frames=160)
+        with pytest.raises(Sd2Error, match="pairs have changed"):
+            go_on(run.path)
+        # What was there to go on with is there still.
+        assert run.status().state == "failed"
+        assert run.status().resumable
+
+    @pytest.mark.parametrize(
+        ("changed", "said"),
+        [
+            ({"name": "s5"}, r"model\.name is 's5'. Expected: one of s4, s4d"),
+            ({"options": {"width": 3}}, "The model gru has no option 'width'. Expected: one of ch"),
+        ],
+    )
+    def test_at_once(self, pairs: Path, tmp_path: Path, changed: dict[str, Any], said: str) -> None:
+        config = settings(pairs).with_values({"model": changed})
+        with pytest.raises(Sd2Error, match=said):
+            begin(config, tmp_path / "run")
+        assert not (tmp_path / "run").exists()
+
+    def test_no_gpu(self, pairs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+        config = settings(pairs).with_values({"machine": {"device": "cuda"}})
+        with pytest.raises(Sd2Error, match="finds 0 GPUs"):
+            begin(config, tmp_path / "run")
+
+
+def test_control_of_a_run_that_is_over(pairs: Path, tmp_path: Path) -> None:
+    ending: Ending = begin(settings(pairs, epochs=1), tmp_path / "run")
+    assert ending.outcome == "finished"
+    write_control(tmp_path / "run" / "control", "stop")
+    with pytest.raises(Sd2Error, match="has finished"):
+        RunFolder(tmp_path / "run").tell("stop")
