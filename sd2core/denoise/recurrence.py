@@ -19,7 +19,7 @@ BLOCK = 32
 
 
 class Recurrence(NamedTuple):
-    """x′ = D x + v·drive, y = x·watch₀ + v·direct with v = (u, −x·watch₁).
+    """y = x·w + D u, x′ = Λ̄ x + (u, −x·s) (B̄, q).
 
     Everything is real, pairs (Re, Im) interleaved; N is twice the number of pairs and k is 2 for
     a system with a loop, otherwise 1.
@@ -27,11 +27,13 @@ class Recurrence(NamedTuple):
     Attributes
     ----------
     poles : (H, 1, N/2) complex128
-        D.
+        Λ̄, the diagonal of Ā.
     watch : (H, N, k) float64
-        What the state adds to this output, and what it feeds around the loop.
+        w, what the state adds to this output (C Ā), and −s, what it feeds around the loop.
     drive : (H, k, N) float64
-    direct : (H, k, 1) float64
+        B̄ and q.
+    direct : (H, 1) float64
+        D and what passes the state at once, C B̄.
     """
 
     poles: Tensor
@@ -45,12 +47,14 @@ class Recurrence(NamedTuple):
         return self.watch.new_zeros(channels, batch, states)
 
     def step(self, signal: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
-        """One frame: (H, B, 1) and (H, B, N) → (H, B, 1), next state; float64."""
+        """One frame: (H, B) and (H, B, N) → (H, B), next state; all float64."""
         seen = torch.bmm(state, self.watch)  # (H, B, k)
-        into = signal if seen.shape[-1] == 1 else torch.cat((signal, -seen[..., 1:]), -1)
-        out = torch.baddbmm(seen[..., :1], into, self.direct)
-        turned = _interleaved(torch.view_as_complex(state.unflatten(-1, (-1, 2))) * self.poles)
-        return out, torch.baddbmm(turned, into, self.drive)
+        out = torch.addcmul(seen[..., 0], signal, self.direct)
+        into = signal[..., None]
+        if seen.shape[-1] > 1:
+            into = torch.cat((into, seen[..., 1:]), -1)
+        turned = torch.view_as_complex(state.view(*state.shape[:2], -1, 2)) * self.poles
+        return out, torch.baddbmm(torch.view_as_real(turned).flatten(2), into, self.drive)
 
 
 class Block(NamedTuple):
@@ -79,16 +83,6 @@ class Block(NamedTuple):
         return out, torch.baddbmm(torch.bmm(signal, self.drive), state, self.across)
 
 
-def _interleaved(values: Tensor) -> Tensor:
-    """(…, n) complex → (…, 2n) real."""
-    return torch.view_as_real(values).flatten(-2)
-
-
-def _twice_real(values: Tensor) -> Tensor:
-    """The row that gives 2 Re Σ values x from an interleaved x."""
-    return 2.0 * _interleaved(values.conj().resolve_conj())
-
-
 def low_rank_recurrence(matrix: StateMatrix, C: Tensor, dt: Tensor, skip: Tensor) -> Recurrence:
     """Bilinear; `skip` (H,) is added to what passes at once. Shapes as `low_rank_kernel`."""
     dt = dt.double()[..., None]
@@ -96,13 +90,10 @@ def low_rank_recurrence(matrix: StateMatrix, C: Tensor, dt: Tensor, skip: Tensor
     inverse = 1.0 / (1.0 - half * matrix.poles)
     C = C.to(torch.complex128)
     looped = matrix.low_rank * inverse
-    around = half * (2.0 * (matrix.low_rank * looped).real.sum(-1, keepdim=True))
-    fed_back = dt / (1.0 + around) * looped
-    driven = dt * inverse * matrix.inputs
-    heard = 2.0 * (looped * dt * matrix.inputs).real.sum(-1, keepdim=True)
-    inputs = driven - 0.5 * heard * fed_back
-    poles = 2.0 * inverse - 1.0
-    return _recurrence(poles, C, (inputs, fed_back), (looped,), skip)
+    fed_back = dt / (1.0 + half * _sum(matrix.low_rank * looped)) * looped
+    inputs = dt * inverse * matrix.inputs - half * _sum(looped * matrix.inputs) * fed_back
+    poles = (1.0 + half * matrix.poles) * inverse
+    return _recurrence(poles, C, inputs, skip, (looped, fed_back))
 
 
 def diagonal_recurrence(A: Tensor, B: Tensor, C: Tensor, dt: Tensor, skip: Tensor) -> Recurrence:
@@ -110,31 +101,47 @@ def diagonal_recurrence(A: Tensor, B: Tensor, C: Tensor, dt: Tensor, skip: Tenso
     dt = dt.double()[..., None]
     exponent = dt * A.to(torch.complex128)
     inputs = B * (dt * expm1_ratio(exponent))
-    return _recurrence(torch.exp(exponent), C.to(torch.complex128), (inputs,), (), skip)
+    return _recurrence(torch.exp(exponent), C.to(torch.complex128), inputs, skip, None)
 
 
 def _recurrence(
-    poles: Tensor, C: Tensor, drives: tuple[Tensor, ...], loops: tuple[Tensor, ...], skip: Tensor
+    poles: Tensor, C: Tensor, inputs: Tensor, skip: Tensor, loop: tuple[Tensor, Tensor] | None
 ) -> Recurrence:
-    direct = torch.stack([2.0 * (C * drive).real.sum(-1) for drive in drives], -1)  # (H, k)
-    direct[:, 0] += skip.double()
+    """`loop` holds s and q."""
+    direct = skip.double()[:, None] + _sum(C * inputs)
+    onwards = C * poles
+    watch, drive = [onwards], [inputs]
+    if loop is not None:
+        heard, fed_back = loop
+        watch = [onwards - _sum(C * fed_back) * heard, -heard]
+        drive = [inputs, fed_back]
     return Recurrence(
         poles[:, None],
-        torch.stack([_twice_real(row) for row in (C * poles, *loops)], -1).contiguous(),
-        torch.stack([_interleaved(drive) for drive in drives], 1),
-        direct[..., None],
+        torch.stack([2.0 * _interleaved(row.conj().resolve_conj()) for row in watch], -1),
+        torch.stack([_interleaved(row) for row in drive], 1),
+        direct,
     )
+
+
+def _sum(values: Tensor) -> Tensor:
+    """Over pairs, (H, N/2) → (H, 1) real."""
+    return 2.0 * values.real.sum(-1, keepdim=True)
+
+
+def _interleaved(values: Tensor) -> Tensor:
+    """(…, n) complex → (…, 2n) real."""
+    return torch.view_as_real(values).flatten(-2)
 
 
 def block_of(recurrence: Recurrence) -> Block:
     """`BLOCK` frames in one, by doubling."""
     channels, states, _ = recurrence.watch.shape
     unit = torch.eye(states, dtype=torch.float64, device=recurrence.watch.device)
-    silence = recurrence.watch.new_zeros(channels, states, 1)
-    watch, across = recurrence.step(silence, unit.expand(channels, states, states))
-    response, drive = recurrence.step(
-        recurrence.watch.new_ones(channels, 1, 1), recurrence.initial_state(1)
-    )
+    silence = recurrence.watch.new_zeros(channels, states)
+    watch, across = recurrence.step(silence, unit.expand(channels, -1, -1).contiguous())
+    pulse = recurrence.watch.new_ones(channels, 1)
+    response, drive = recurrence.step(pulse, recurrence.initial_state(1))
+    watch, response = watch[..., None], response[..., None]  # (H, N, 1), (H, 1, 1)
     frames = 1
     while frames < BLOCK:
         later = torch.bmm(drive, watch)  # first half's inputs on the second half's outputs

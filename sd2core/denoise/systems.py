@@ -1,0 +1,178 @@
+"""State spaces that learn: what their parameters are, and what follows from them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from typing import Any, Literal, TypeAlias
+
+import torch
+from torch import Tensor, nn
+
+from sd2core.denoise.recurrence import (
+    Block,
+    Recurrence,
+    block_of,
+    diagonal_recurrence,
+    low_rank_recurrence,
+)
+from sd2core.denoise.ssm import (
+    StateMatrix,
+    diagonal_kernel,
+    legs_kernel,
+    legs_state_matrix,
+    to_normal_basis,
+)
+from sd2core.errors import Sd2Error
+
+Kernel = Literal["legs", "diagonal"]
+State: TypeAlias = Tensor
+"""(H, B, N) float64: what a layer remembers of the frames so far."""
+
+# Poles stay at least this far left of the imaginary axis, whatever is learned.
+SLOWEST_DECAY = 1e-4
+# exp(±100) and its square are still numbers in double precision.
+LARGEST_LOG = 100.0
+STEP_RANGE = (1e-7, 1e2)
+FIRST_STEPS = (1e-3, 1e-1)
+MOST_KEPT = 8
+
+
+class StateSpace(nn.Module):
+    """H systems of one input and one output, their parameters, and what follows from them.
+
+    Learned per channel: the step Δ (as its logarithm), the poles Λ (the decay as the logarithm of
+    what exceeds `SLOWEST_DECAY`, and the frequency), the output C and the skip D; with "legs" also
+    the low-rank vector p (real, without loss: the phases of the basis are free) and the input B.
+    A = Λ − p pᵀ then has every eigenvalue left of −`SLOWEST_DECAY`, whatever is learned, because
+    its Hermitian part has. "diagonal" has no p, and B = 1: only its product with C counts there.
+
+    Parameters
+    ----------
+    channels : int
+        H.
+    state_size : int
+        N, even.
+    kernel : {"legs", "diagonal"}
+        Starts as HiPPO-LegS with random C (real, in the dense basis), or as S4D-Lin, λ = −1/2 +
+        i π n (Gu et al. 2022, S4D, section 4).
+    """
+
+    def __init__(self, channels: int, state_size: int, kernel: Kernel) -> None:
+        super().__init__()
+        if kernel not in ("legs", "diagonal"):
+            raise Sd2Error(
+                found=f"the kernel {kernel!r}", expected='"legs" or "diagonal"', remedy=""
+            )
+        first = legs_state_matrix(state_size)
+        self.kernel_name = kernel
+        self._kept: dict[int | str, Any] = {}
+        self._stamp: tuple[tuple[int, int], ...] = ()
+        pairs = state_size // 2
+        low, high = (math.log(step) for step in FIRST_STEPS)
+        self.log_dt = nn.Parameter(torch.empty(channels).uniform_(low, high))
+        self.log_decay = nn.Parameter(torch.full((channels, pairs), math.log(0.5 - SLOWEST_DECAY)))
+        self.skip = nn.Parameter(torch.randn(channels))
+        if kernel == "legs":
+            self.frequency = _per_channel(first.poles.imag, channels)
+            self.low_rank = _per_channel(first.low_rank, channels)
+            self.inputs = _per_channel(torch.view_as_real(first.inputs), channels)
+            self.outputs = nn.Parameter(torch.randn(channels, state_size))
+        else:
+            self.frequency = _per_channel(torch.pi * torch.arange(pairs), channels)
+            self.outputs = nn.Parameter(torch.randn(channels, pairs, 2) * math.sqrt(0.5))
+
+    def ssm_parameters(self) -> Iterator[nn.Parameter]:
+        """Those that shape the dynamics: all but C and D."""
+        for name, parameter in self.named_parameters():
+            if name not in ("outputs", "skip"):
+                yield parameter
+
+    def dt(self) -> Tensor:
+        """Δ, (H,) float64, within `STEP_RANGE`."""
+        low, high = (math.log(step) for step in STEP_RANGE)
+        return self.log_dt.double().clamp(low, high).exp()
+
+    def poles(self) -> Tensor:
+        """Λ, (H, N/2) complex128."""
+        decay = self.log_decay.double().clamp(-LARGEST_LOG, LARGEST_LOG).exp()
+        return torch.complex(-(decay + SLOWEST_DECAY), self.frequency.double())
+
+    def matrix(self) -> StateMatrix:
+        """Λ, p and B of "legs"."""
+        inputs = torch.view_as_complex(self.inputs.double())
+        return StateMatrix(self.poles(), self.low_rank.double(), inputs)
+
+    # What follows from the parameters alone is kept while nothing is being learned.
+
+    def kernel(self, length: int) -> Tensor:
+        """(H, length), D included, of the parameters' type."""
+        kernel: Tensor = self._keep(length, lambda: self._made_kernel(length))
+        return kernel
+
+    def recurrence(self) -> Recurrence:
+        """The same systems, one frame at a time."""
+        recurrence: Recurrence = self._keep("recurrence", self._made_recurrence)
+        return recurrence
+
+    def block(self) -> Block:
+        """The same systems, some frames at a time."""
+        block: Block = self._keep("block", lambda: block_of(self.recurrence()))
+        return block
+
+    def _made_kernel(self, length: int) -> Tensor:
+        if self.kernel_name == "legs":
+            kernel = legs_kernel(self.outputs, self.dt(), length, self.matrix())
+        else:
+            outputs = torch.view_as_complex(self.outputs)
+            ones = torch.ones_like(outputs)
+            kernel = diagonal_kernel(self.poles(), ones, outputs, self.dt(), length)
+        return torch.cat((kernel[:, :1] + self.skip[:, None], kernel[:, 1:]), 1)
+
+    def _made_recurrence(self) -> Recurrence:
+        if self.kernel_name == "legs":
+            outputs = to_normal_basis(self.outputs)
+            return low_rank_recurrence(self.matrix(), outputs, self.dt(), self.skip)
+        outputs = torch.view_as_complex(self.outputs.double())
+        ones = torch.ones_like(outputs)
+        return diagonal_recurrence(self.poles(), ones, outputs, self.dt(), self.skip)
+
+    def _keep(self, key: int | str, make: Callable[[], Any]) -> Any:
+        if self.training or torch.is_grad_enabled():
+            return make()
+        # Parameters count what is done to them in place; all else that can change them goes
+        # through the methods below.
+        stamp = tuple(
+            (id(p), 0 if p.is_inference() else p._version) for p in self._parameters.values()
+        )
+        if self._stamp != stamp or len(self._kept) > MOST_KEPT:
+            self._forget()
+            self._stamp = stamp
+        if key not in self._kept:
+            self._kept[key] = make()
+        return self._kept[key]
+
+    def _forget(self) -> None:
+        self._kept, self._stamp = {}, ()
+
+    def train(self, mode: bool = True) -> StateSpace:
+        """As of `nn.Module`."""
+        self._forget()
+        super().train(mode)
+        return self
+
+    def _apply(self, *args: Any, **options: Any) -> Any:
+        self._forget()
+        return super()._apply(*args, **options)
+
+    def _load_from_state_dict(self, *args: Any, **options: Any) -> None:
+        self._forget()
+        super()._load_from_state_dict(*args, **options)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_kept": {}, "_stamp": ()}
+
+
+def _per_channel(values: Tensor, channels: int) -> nn.Parameter:
+    """The same start for all channels, each free to leave it."""
+    return nn.Parameter(values.float().expand(channels, *values.shape).clone())
