@@ -1,0 +1,61 @@
+"""``sd2 simulate campaign`` and ``fit-errors`` on the command line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from cli_outcome import Sd2
+
+from sd2core.compare.truth import FORMAT, VERSION
+from sd2core.pairs import read_pairs
+
+
+def test_a_campaign_is_made_and_told(sd2: Sd2, tmp_path: Path) -> None:
+    out = tmp_path / "small.zarr"
+    options = ["--subjects", 1, "--minutes", 0.03, "--take-seconds", 2, "--processes", 1]
+    outcome = sd2("simulate", "campaign", out, *options, "--json")
+    assert outcome.code == 0, outcome.err
+    said = json.loads(outcome.out)
+    assert (said["takes"], said["made"], said["frames"]) == (1, 1, 60)
+    assert said["simulated"] is True
+    assert said["labels"] == list(read_pairs(out).labels)
+    again = sd2("simulate", "campaign", out, *options)
+    assert again.code == 0
+    assert "Made 0 takes" in again.out
+    assert "1 simulated takes of 1 people" in again.out
+
+
+@pytest.mark.parametrize(
+    "options", [["--seed", "-1"], ["--minutes", "0"], ["--subjects", "none"], ["--placements", "0"]]
+)
+def test_numbers_that_make_no_sense_are_usage(sd2: Sd2, tmp_path: Path, options: list[str]) -> None:
+    assert sd2("simulate", "campaign", tmp_path / "x.zarr", *options).code == 2
+    assert not (tmp_path / "x.zarr").exists()
+
+
+def test_other_things_are_not_written_over(sd2: Sd2, tmp_path: Path) -> None:
+    (tmp_path / "mine.txt").write_text("mine")
+    outcome = sd2("simulate", "campaign", tmp_path, "--minutes", 0.03, "--take-seconds", 2)
+    assert outcome.code == 1
+    assert "holds no pairs" in outcome.err
+
+
+def test_fits_that_are_missing_are_named(sd2: Sd2, tmp_path: Path) -> None:
+    for folder in (tmp_path / "truth" / "walk", tmp_path / "fits"):
+        folder.mkdir(parents=True)
+    meta = {"format": FORMAT, "version": VERSION, "clip": {"name": "walk"}}
+    (tmp_path / "truth" / "walk" / "truth.json").write_text(json.dumps(meta))
+    outcome = sd2(
+        "simulate",
+        "fit-errors",
+        tmp_path / "truth",
+        tmp_path / "fits",
+        "--out",
+        tmp_path / "e.json",
+    )
+    assert outcome.code == 1
+    assert "no landmarks of the clip 'walk'" in outcome.err
+    assert "sd2 score-fit" in outcome.err
+    assert not (tmp_path / "e.json").exists()

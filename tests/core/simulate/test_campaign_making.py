@@ -1,0 +1,182 @@
+"""A campaign on disk: the same however it is made, and goes on where it was."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sd2core.errors import Sd2Error
+from sd2core.pairs import PairSet, PairWriter, Take, read_pairs
+from sd2core.progress import Cancelled
+from sd2core.simulate.campaign.making import make_campaign, take_numbers
+from sd2core.simulate.campaign.radar import TargetOptions
+from sd2core.simulate.campaign.takes import Campaign
+
+SHORT = Campaign(seed=3, take_seconds=2.0, target=TargetOptions(looks=1))
+MINUTES = 4 * 2.0 / 60.0
+"""Four takes."""
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("campaign") / "whole.zarr"
+    assert make_campaign(out, SHORT, subjects=2, minutes=MINUTES, processes=1) == 4
+    return out
+
+
+def same(one: PairSet, other: PairSet) -> bool:
+    return [take.key for take in one.takes] == [take.key for take in other.takes] and all(
+        getattr(a, name).tobytes() == getattr(b, name).tobytes()
+        for a, b in zip(one.takes, other.takes, strict=True)
+        for name in ("synthetic", "radar", "times_s", "label", "sensor_position_m")
+    )
+
+
+def test_takes_are_of_everybody_in_turn(whole: Path) -> None:
+    pairs = read_pairs(whole)
+    assert pairs.kind == "simulated"
+    assert [tuple(take.key) for take in pairs.takes] == [
+        ("s01", "take-0001", 0),
+        ("s02", "take-0001", 0),
+        ("s01", "take-0002", 0),
+        ("s02", "take-0002", 0),
+    ]
+    assert pairs.frame_rate_hz == pytest.approx(30.0)
+    for take in pairs.takes:
+        assert take.synthetic.shape == (60, 32)
+        for values in (take.synthetic, take.radar):
+            assert not values[:, list(pairs.null_bins)].any()
+    assert any(take.synthetic.any() and take.radar.any() for take in pairs.takes)
+
+
+def test_stopped_and_continued_is_as_if_it_had_not_been(
+    whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "stopped.zarr"
+
+    def stop(done: int, total: int) -> None:
+        if done == 1:
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        make_campaign(out, SHORT, subjects=2, minutes=MINUTES, processes=1, progress=stop)
+    # Killed in the middle of writing the next: its rows are there, its line is not.
+    append = PairWriter.append
+
+    def killed(self: PairWriter, take: Take) -> None:
+        append(self, take)
+        index = out / "takes.jsonl"
+        index.write_bytes(index.read_bytes()[:-20])
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(PairWriter, "append", killed)
+    with pytest.raises(KeyboardInterrupt):
+        make_campaign(out, SHORT, subjects=2, minutes=MINUTES, processes=1)
+    monkeypatch.undo()
+    assert make_campaign(out, SHORT, subjects=2, minutes=MINUTES, processes=1) == 3
+    assert same(read_pairs(out), read_pairs(whole))
+
+
+def test_several_processes_make_the_same_and_a_longer_one_begins_alike(
+    whole: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "both.zarr"
+    assert make_campaign(out, SHORT, subjects=2, minutes=0.5 * MINUTES, processes=2) == 2
+    assert make_campaign(out, SHORT, subjects=2, minutes=MINUTES, processes=1) == 2
+    assert same(read_pairs(out), read_pairs(whole))
+
+
+def test_other_places_see_the_same_take(whole: Path, tmp_path: Path) -> None:
+    out = tmp_path / "places.zarr"
+    several = Campaign(SHORT.seed, SHORT.take_seconds, 2, target=SHORT.target)
+    make_campaign(out, several, subjects=1, minutes=2.0 / 60.0, processes=1)
+    own, other = read_pairs(out).takes
+    first = read_pairs(whole).takes[0]
+    assert (own.placement, other.placement) == (0, 1)
+    assert own.radar.tobytes() == first.radar.tobytes()
+    assert own.synthetic.tobytes() == first.synthetic.tobytes()
+    np.testing.assert_array_equal(own.label, other.label)
+    assert np.linalg.norm(own.sensor_position_m) < 0.4
+    assert not np.allclose(own.sensor_position_m, other.sensor_position_m)
+    assert own.radar.tobytes() != other.radar.tobytes()
+
+
+def test_subjects_and_seeds_differ(whole: Path, tmp_path: Path) -> None:
+    takes = read_pairs(whole).takes
+    assert len({take.synthetic.tobytes() for take in takes}) == len(takes)
+    out = tmp_path / "other.zarr"
+    other = Campaign(4, SHORT.take_seconds, target=SHORT.target)
+    make_campaign(out, other, subjects=1, minutes=2.0 / 60.0, processes=1)
+    assert read_pairs(out).takes[0].radar.tobytes() != takes[0].radar.tobytes()
+
+
+def test_another_campaign_does_not_go_on_with_this_one(whole: Path) -> None:
+    other = Campaign(SHORT.seed + 1, SHORT.take_seconds, target=SHORT.target)
+    with pytest.raises(Sd2Error, match="provenance"):
+        make_campaign(whole, other, subjects=2, minutes=MINUTES, processes=1)
+
+
+def test_minutes_are_of_all_subjects_together() -> None:
+    numbers = take_numbers(Campaign(take_seconds=15.0), subjects=6, minutes=90.0)
+    assert len(numbers) == 360
+    assert numbers[:7] == [(0, 0), (1, 0), (2, 0), (3, 0), (4, 0), (5, 0), (0, 1)]
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"seed": -1}, {"take_seconds": 0.5}, {"take_seconds": 1e6}, {"placements": 0}]
+)
+def test_what_makes_no_campaign_is_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(Sd2Error):
+        Campaign(**wrong)  # type: ignore[arg-type]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc").is_dir(), reason="looks for processes in /proc")
+def test_workers_end_with_a_parent_that_is_killed(tmp_path: Path) -> None:
+    """And what is there is whole."""
+    out = tmp_path / "killed.zarr"
+    command = [sys.executable, "-m", "sd2core.cli", "simulate", "campaign", str(out)]
+    with subprocess.Popen([*command, "--take-seconds", "2"]) as parent:
+        _until(lambda: (out / "takes.jsonl").exists(), 120.0)
+        workers = _children(parent.pid)
+        assert workers
+        parent.send_signal(signal.SIGKILL)
+        parent.wait()
+    _until(lambda: not any(_lives(pid) for pid in workers), 30.0)
+    assert read_pairs(out).takes
+
+
+def _until(done: object, limit_s: float) -> None:
+    assert callable(done)
+    end = time.monotonic() + limit_s
+    while not done():
+        assert time.monotonic() < end
+        time.sleep(0.1)
+
+
+def _children(parent: int) -> list[int]:
+    found = []
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            try:
+                fields = (entry / "stat").read_text().rsplit(")", 1)[1].split()
+            except OSError:
+                continue
+            if int(fields[1]) == parent:
+                found.append(int(entry.name))
+    return found
+
+
+def _lives(pid: int) -> bool:
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
+    except OSError:
+        return False
+    return state != "Z" and os.path.exists(f"/proc/{pid}")
