@@ -25,13 +25,13 @@ class NoDenoiser(Denoiser):
     """Hands on what it gets: synthetic energy, brought to the level of the radar's."""
 
     def __init__(self, bins: int) -> None:
-        super().__init__(bins, residual=False)
+        super().__init__(bins)
 
     def initial_state(self, batch: int = 1) -> State:
         """Nothing."""
         return None
 
-    def correction_chunk(self, values: Tensor, state: State) -> tuple[Tensor, State]:
+    def chunk(self, values: Tensor, state: State) -> tuple[Tensor, State]:
         """The values."""
         return values, state
 
@@ -40,7 +40,7 @@ class _Neighbourhood(Denoiser):
     """Looks at each cell with the frames before it and the bins beside it."""
 
     def __init__(self, bins: int, frames: int, width: int) -> None:
-        super().__init__(bins, residual=False)
+        super().__init__(bins)
         self.frames = frames
         self.width = width
 
@@ -73,7 +73,7 @@ class MedianDenoiser(_Neighbourhood):
         super().__init__(bins, frames, width)
         self.level = nn.Parameter(torch.ones(()), requires_grad=False)
 
-    def correction_chunk(self, values: Tensor, state: State) -> tuple[Tensor, State]:
+    def chunk(self, values: Tensor, state: State) -> tuple[Tensor, State]:
         """Median of the neighbours."""
         around, state = self.neighbours(values, state)
         return self.level * around.median(-1).values, state
@@ -99,7 +99,7 @@ class WienerDenoiser(_Neighbourhood):
         self.weight = nn.Parameter(here.flatten(), requires_grad=False)
         self.mean = nn.Parameter(torch.zeros(bins), requires_grad=False)
 
-    def correction_chunk(self, values: Tensor, state: State) -> tuple[Tensor, State]:
+    def chunk(self, values: Tensor, state: State) -> tuple[Tensor, State]:
         """Weighted sum of the neighbours."""
         around, state = self.neighbours(values, state)
         return around @ self.weight + self.mean, state

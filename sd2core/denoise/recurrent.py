@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from torch import Tensor, nn
 
-from sd2core.denoise.model import Denoiser, State, head
+from sd2core.denoise.model import Denoiser, State
 
 
 class GruDenoiser(Denoiser):
@@ -19,8 +19,6 @@ class GruDenoiser(Denoiser):
         Number of GRU layers.
     dropout : float
         Between layers, while training.
-    residual : bool
-        See :class:`Denoiser`.
     """
 
     def __init__(
@@ -30,9 +28,8 @@ class GruDenoiser(Denoiser):
         channels: int = 144,
         depth: int = 2,
         dropout: float = 0.0,
-        residual: bool = True,
     ) -> None:
-        super().__init__(bins, residual)
+        super().__init__(bins)
         self.lift = nn.Linear(bins, channels)
         self.recurrent = nn.GRU(
             channels,
@@ -41,14 +38,14 @@ class GruDenoiser(Denoiser):
             batch_first=True,
             dropout=dropout if depth > 1 else 0.0,
         )
-        self.head = head(nn.Linear(channels, bins), residual)
+        self.head = nn.Linear(channels, bins)
 
     def initial_state(self, batch: int = 1) -> State:
         """Zeros, (layers, batch, channels)."""
         weight = self.lift.weight
         return weight.new_zeros(self.recurrent.num_layers, batch, self.recurrent.hidden_size)
 
-    def correction_chunk(self, values: Tensor, state: State) -> tuple[Tensor, State]:
+    def chunk(self, values: Tensor, state: State) -> tuple[Tensor, State]:
         """Continue with the layers' last outputs."""
         hidden, state = self.recurrent(self.lift(values), state)
         return self.head(hidden), state

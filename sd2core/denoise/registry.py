@@ -28,7 +28,7 @@ class _Entry:
     same_time: Mapping[str, Any] = field(default_factory=dict)
 
 
-_S4 = {"channels": 128, "depth": 4, "state_size": 64, "dropout": 0.0, "residual": True}
+_S4 = {"channels": 128, "depth": 4, "state_size": 64, "dropout": 0.0}
 
 _ENTRIES: dict[str, _Entry] = {
     "s4": _Entry(
@@ -53,18 +53,18 @@ _ENTRIES: dict[str, _Entry] = {
     "gru": _Entry(
         "recurrent.GruDenoiser",
         "gated recurrent network",
-        {"channels": 144, "depth": 2, "dropout": 0.0, "residual": True},
+        {"channels": 144, "depth": 2, "dropout": 0.0},
     ),
     "unet": _Entry(
         "unet.UNetDenoiser",
         "2D U-Net over windows of 72 frames",
-        {"channels": 12, "depth": 3, "dropout": 0.0, "residual": True},
+        {"channels": 12, "depth": 3, "dropout": 0.0},
         same_time={"channels": 5},
     ),
     "swin": _Entry(
         "swin.SwinDenoiser",
         "Swin transformer over windows of 72 frames",
-        {"channels": 48, "depth": 2, "dropout": 0.0, "residual": True},
+        {"channels": 48, "depth": 2, "dropout": 0.0},
         same_time={"channels": 16},
     ),
     "none": _Entry("filters.NoDenoiser", "no denoising"),

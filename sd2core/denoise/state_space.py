@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from torch import Tensor, nn
 
-from sd2core.denoise.model import Denoiser, State, head
+from sd2core.denoise.model import Denoiser, State
 from sd2core.denoise.s4 import S4Layer
 
 
@@ -27,8 +27,6 @@ class S4Denoiser(Denoiser):
     bidirectional : bool
         Also backwards in time: no longer causal, so not for live use.
     dropout : float
-    residual : bool
-        See :class:`Denoiser`.
     """
 
     def __init__(
@@ -41,9 +39,8 @@ class S4Denoiser(Denoiser):
         kernel: Literal["legs", "diagonal"] = "legs",
         bidirectional: bool = False,
         dropout: float = 0.0,
-        residual: bool = True,
     ) -> None:
-        super().__init__(bins, residual)
+        super().__init__(bins)
         self.causal = not bidirectional
         self.window = 72 if bidirectional else None
         self.lift = nn.Linear(bins, channels)
@@ -57,20 +54,20 @@ class S4Denoiser(Denoiser):
             )
             for _ in range(depth)
         )
-        self.head = head(nn.Linear(channels, bins), residual)
+        self.head = nn.Linear(channels, bins)
 
     def initial_state(self, batch: int = 1) -> State:
         """One state per layer."""
         return [layer.initial_state(batch) for layer in self.layers]
 
-    def correction(self, values: Tensor) -> Tensor:
+    def forward(self, values: Tensor) -> Tensor:
         """Whole stretches by convolution."""
         hidden = self.lift(values)
         for layer in self.layers:
             hidden = layer(hidden)
         return self.head(hidden)
 
-    def correction_chunk(self, values: Tensor, state: State) -> tuple[Tensor, State]:
+    def chunk(self, values: Tensor, state: State) -> tuple[Tensor, State]:
         """Convolution, and what the state still says."""
         hidden, after = self.lift(values), []
         for layer, one in zip(self.layers, state, strict=True):
@@ -78,7 +75,7 @@ class S4Denoiser(Denoiser):
             after.append(one)
         return self.head(hidden), after
 
-    def correction_step(self, frame: Tensor, state: State) -> tuple[Tensor, State]:
+    def step(self, frame: Tensor, state: State) -> tuple[Tensor, State]:
         """By recurrence."""
         hidden, after = self.lift(frame), []
         for layer, one in zip(self.layers, state, strict=True):
@@ -101,25 +98,25 @@ class SerialS4Denoiser(S4Denoiser):
 
     Parameters
     ----------
-    bins, channels, depth, state_size, kernel, dropout, residual
+    bins, channels, depth, state_size, kernel, dropout
         As for :class:`S4Denoiser`.
     """
 
-    def __init__(self, bins: int, *, channels: int = 128, residual: bool = True, **layers: Any):
-        super().__init__(bins, channels=channels, residual=residual, **layers)
+    def __init__(self, bins: int, *, channels: int = 128, **layers: Any):
+        super().__init__(bins, channels=channels, **layers)
         self.lift = nn.Linear(1, channels)
-        self.head = head(nn.Linear(channels, 1), residual)
+        self.head = nn.Linear(channels, 1)
 
-    def correction(self, values: Tensor) -> Tensor:
+    def forward(self, values: Tensor) -> Tensor:
         """Cells in a row and back."""
-        return super().correction(values.flatten(1)[..., None]).view(values.shape)
+        return super().forward(values.flatten(1)[..., None]).view(values.shape)
 
-    def correction_chunk(self, values: Tensor, state: State) -> tuple[Tensor, State]:
+    def chunk(self, values: Tensor, state: State) -> tuple[Tensor, State]:
         """Whole frames, so the state stands between two frames."""
-        cells, state = super().correction_chunk(values.flatten(1)[..., None], state)
+        cells, state = super().chunk(values.flatten(1)[..., None], state)
         return cells.view(values.shape), state
 
-    def correction_step(self, frame: Tensor, state: State) -> tuple[Tensor, State]:
+    def step(self, frame: Tensor, state: State) -> tuple[Tensor, State]:
         """One frame is a chunk of as many cells as there are bins."""
-        correction, state = self.correction_chunk(frame[:, None], state)
-        return correction[:, 0], state
+        answer, state = self.chunk(frame[:, None], state)
+        return answer[:, 0], state

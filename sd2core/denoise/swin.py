@@ -10,7 +10,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from sd2core.denoise.model import Denoiser, head
+from sd2core.denoise.model import Denoiser
 from sd2core.denoise.unet import padded
 
 PATCH = 2
@@ -35,8 +35,6 @@ class SwinDenoiser(Denoiser):
     depth : int
         Blocks per level; every second one has its windows shifted.
     dropout : float
-    residual : bool
-        See :class:`Denoiser`.
     """
 
     causal = False
@@ -49,9 +47,8 @@ class SwinDenoiser(Denoiser):
         channels: int = 48,
         depth: int = 2,
         dropout: float = 0.0,
-        residual: bool = True,
     ) -> None:
-        super().__init__(bins, residual)
+        super().__init__(bins)
         self._frames_step, self._bins_step = (2 * PATCH * size for size in WINDOW)
         columns = (bins + -bins % self._bins_step) // PATCH
         self.embed = nn.Conv2d(1, channels, PATCH, stride=PATCH)
@@ -66,9 +63,9 @@ class SwinDenoiser(Denoiser):
         self.expand = nn.Linear(2 * channels, 4 * channels, bias=False)
         self.bridge = nn.Linear(2 * channels, channels)
         self.norm = nn.LayerNorm(channels)
-        self.head = head(nn.Linear(channels, PATCH * PATCH), residual)
+        self.head = nn.Linear(channels, PATCH * PATCH)
 
-    def correction(self, values: Tensor) -> Tensor:
+    def forward(self, values: Tensor) -> Tensor:
         """Any number of frames and bins; windows of 72 frames are what it learns from."""
         frames, bins = values.shape[1:]
         picture = padded(values[:, None], self._frames_step, self._bins_step)

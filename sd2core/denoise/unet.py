@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from sd2core.denoise.model import Denoiser, head
+from sd2core.denoise.model import Denoiser
 
 _KERNEL = 3
 
@@ -25,8 +25,6 @@ class UNetDenoiser(Denoiser):
         Levels below the first.
     dropout : float
         At the lowest level.
-    residual : bool
-        See :class:`Denoiser`.
     """
 
     causal = False
@@ -39,9 +37,8 @@ class UNetDenoiser(Denoiser):
         channels: int = 12,
         depth: int = 3,
         dropout: float = 0.0,
-        residual: bool = True,
     ) -> None:
-        super().__init__(bins, residual)
+        super().__init__(bins)
         self._step = 2**depth
         widths = [channels * 2**level for level in range(depth + 1)]
         self.down = nn.ModuleList(
@@ -54,11 +51,11 @@ class UNetDenoiser(Denoiser):
             nn.ConvTranspose2d(2 * width, width, 2, stride=2) for width in widths[:-1]
         )
         self.up = nn.ModuleList(_two_convolutions(2 * width, width) for width in widths[:-1])
-        self.head = head(nn.Conv2d(channels, 1, 1), residual)
+        self.head = nn.Conv2d(channels, 1, 1)
         # Convolutions of few channels are half as long again in the other order.
         self.to(memory_format=torch.channels_last)
 
-    def correction(self, values: Tensor) -> Tensor:
+    def forward(self, values: Tensor) -> Tensor:
         """Any number of frames and bins; windows of 72 frames are what it learns from."""
         frames, bins = values.shape[1:]
         picture = padded(values[:, None], self._step, self._step)  # (B, 1, L', bins')

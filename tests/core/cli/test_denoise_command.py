@@ -29,7 +29,7 @@ def model(tmp_path: Path) -> Path:
     torch.manual_seed(0)
     card = ModelCard(
         model="gru",
-        options={"channels": 4, "residual": False},
+        options={"channels": 4},
         scaling=Scaling(Compression(0.01), Compression(1e-6)),
         axis=VelocityAxis(),
         null_bins=NULLED,
@@ -39,7 +39,7 @@ def model(tmp_path: Path) -> Path:
         about={"data": "noise", "metrics": {"mae_mps": 0.123456}, "limits": ["none"]},
     )
     path = tmp_path / "tiny.safetensors"
-    save_model(path, TrainedDenoiser(build("gru", channels=4, residual=False), card))
+    save_model(path, TrainedDenoiser(build("gru", channels=4), card))
     return path
 
 

@@ -26,15 +26,6 @@ def no_gradients() -> None:
 
 
 @pytest.mark.parametrize("name", TRAINED)
-@pytest.mark.parametrize("residual", [True, False])
-def test_untrained_the_input_passes_or_not(name: str, residual: bool) -> None:
-    values = torch.rand(2, 72, 32)
-    answer = build(name, residual=residual, **SMALL[name]).eval()(values)
-    assert answer.shape == values.shape
-    assert torch.equal(answer, values) == residual
-
-
-@pytest.mark.parametrize("name", TRAINED)
 def test_all_parameters_learn(name: str) -> None:
     model = trained(name).network.train()
     loss = (model(torch.rand(2, 72, 32)) - torch.rand(2, 72, 32)).square().mean()
@@ -52,7 +43,7 @@ def test_causal_models_do_not_know_the_future(name: str) -> None:
     other[:, 40:] = torch.rand(1, 20, 32)
     with torch.no_grad():
         before, after = model(values), model(other)
-    torch.testing.assert_close(before[:, :40], after[:, :40], rtol=0, atol=1e-6)
+    torch.testing.assert_close(before[:, :40], after[:, :40], rtol=1e-5, atol=1e-5)
     assert not torch.allclose(before[:, 40:], after[:, 40:])
 
 
@@ -172,8 +163,8 @@ def test_the_level_of_a_map_is_not_normalised_away() -> None:
     for name in TRAINED:
         model = network(name)
         with torch.no_grad():
-            faint, strong = (model.correction(level * values) for level in (0.5, 1.0))
-        assert (faint - strong).abs().max() > 1e-3
+            faint, strong = (model(level * values) for level in (0.5, 1.0))
+        assert (faint - strong).abs().max() > 1e-3, name
 
 
 def test_sizes_are_comparable() -> None:
@@ -196,7 +187,7 @@ def test_every_model_says_what_it_is(name: str) -> None:
         ("gru", {"channels": 2.5}, "channels is 2.5"),
         ("gru", {"channels": True}, "channels is True"),
         ("gru", {"dropout": 1.0}, "dropout is 1.0"),
-        ("gru", {"residual": 1}, "residual is 1"),
+        ("s4", {"bidirectional": 1}, "bidirectional is 1"),
         ("none", {"channels": 8}, "no option 'channels'"),
     ],
 )
