@@ -252,6 +252,11 @@ ACTIONS: tuple[Action, ...] = (
         lambda w: w.side.bring_up("Trade"),
     ),
     Action(
+        "show_train", "View", "Train panel", ("Shift+T",),
+        "Train a denoiser beside the window, watch it, and use it",
+        lambda w: w.side.bring_up("Train"),
+    ),
+    Action(
         "measure", "View", "Measure this scene", ("Ctrl+M",),
         "Measure error and cost of every plan with the sensor where it is; takes a while",
         lambda w: w.measure_scene(),

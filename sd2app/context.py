@@ -27,10 +27,14 @@ from sd2app.models.sensor import SensorModel
 from sd2app.models.synthesis import SynthesisModel
 from sd2app.models.tracks import PointerModel, TrackModel
 from sd2app.models.trade import TradeModel
+from sd2app.models.training import COMMAND as TRAIN_COMMAND
+from sd2app.models.training import TrainingModel
+from sd2app.models.training_use import TrainingUse
 from sd2app.models.uncertainty import UncertaintyModel
 from sd2app.models.video import VideoModel
 from sd2app.models.visible_span import VisibleSpanModel
 from sd2app.settings import Settings
+from sd2core.denoise.files import user_models_folder
 
 
 @dataclass(frozen=True)
@@ -62,6 +66,8 @@ class Context:
     fit_follower: FitFollower
     fit_offer: FitOffer
     fit_taker: FitTaker
+    training: TrainingModel
+    training_use: TrainingUse
 
     @property
     def tracks(self) -> tuple[TrackModel, ...]:
@@ -78,6 +84,7 @@ class Context:
         """Stop every thread and let go of the files."""
         self.playback.pause()
         self.fit.close()
+        self.training.close()
         self.uncertainty.close()
         self.live.close()
         self.denoise.close()
@@ -93,11 +100,12 @@ def build_context(
     ladder: Ladder | None = None,
     fit_command: Sequence[str] | None = None,
     denoisers: DenoiserLibrary | None = None,
+    train_command: Sequence[str] | None = None,
 ) -> Context:
     """Make the models and let them follow the document.
 
-    Ladder and denoisers are the library's and the command that fits ``sd2`` itself by
-    default.
+    Ladder and denoisers are the library's and the commands that fit and train ``sd2``
+    itself by default.
     """
     jobs = JobsModel(parent)
     document = DocumentModel(jobs, parent)
@@ -124,6 +132,7 @@ def build_context(
         edits.choose_denoiser,
         parent,
     )
+    training = TrainingModel(settings, parent, train_command or TRAIN_COMMAND)
     context = Context(
         settings=settings,
         jobs=jobs,
@@ -150,6 +159,10 @@ def build_context(
         fit_follower=follower,
         fit_offer=FitOffer(document, fit, parent),
         fit_taker=FitTaker(fit, follower, document, settings, parent),
+        training=training,
+        training_use=TrainingUse(
+            training, denoise, synthetic, before, denoised, real, user_models_folder, parent
+        ),
     )
     document.opened.connect(lambda: _take_over(context))
     document.changed.connect(lambda: _follow_capture(context))

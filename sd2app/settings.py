@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 from PySide6.QtCore import QByteArray, QSettings
+
+T = TypeVar("T")
 
 _RECENT = 10
 DEFAULT_TOLERANCE = 0.05
@@ -46,14 +48,12 @@ class Settings:
     @property
     def recent(self) -> list[Path]:
         """Recently opened paths, the newest first."""
-        value = self._store.value("recent", [])
-        paths = [value] if isinstance(value, str) else list(value or [])
-        return [Path(path) for path in paths]
+        return self.paths("recent")
 
     def add_recent(self, path: Path) -> None:
         """Remember a path as the newest."""
         paths = [path, *(known for known in self.recent if known != path)]
-        self._store.setValue("recent", [str(known) for known in paths[:_RECENT]])
+        self.set_paths("recent", paths[:_RECENT])
 
     def flag(self, name: str, default: bool) -> bool:
         """A yes or no; it may have been stored as text."""
@@ -67,6 +67,24 @@ class Settings:
         except (TypeError, ValueError):
             return default
         return share if 0 <= share <= 1 else default
+
+    def stored(self, name: str, default: T) -> T:
+        """A value of the default's type; the default where what is stored is none."""
+        value = self._store.value(name)
+        try:
+            return default if value is None else type(default)(value)  # type: ignore[call-arg]
+        except (TypeError, ValueError):
+            return default
+
+    def paths(self, name: str) -> list[Path]:
+        """A list of paths."""
+        value = self._store.value(name, [])
+        paths = [value] if isinstance(value, str) and value else list(value or [])
+        return [Path(path) for path in paths]
+
+    def set_paths(self, name: str, paths: list[Path]) -> None:
+        """Remember a list of paths."""
+        self._store.setValue(name, [str(path) for path in paths])
 
     def set_value(self, name: str, value: object) -> None:
         """Remember a value."""

@@ -63,6 +63,16 @@ def _style_sheet(c: Palette) -> str:
     QToolButton:checked {{ background: {c.well}; border-color: {c.border}; }}
     QToolButton#outlined {{ border-color: {c.border}; padding: 2px 8px; }}
     QToolButton#model {{ border-color: {c.border}; padding: 1px 18px 1px 6px; }}
+    QToolButton#primary {{
+        background: {c.accent}; color: {c.accent_text}; border-color: {c.accent}; padding: 2px 10px;
+    }}
+    QToolButton#primary:hover {{ background: {c.accent}; border-color: {c.text}; }}
+    QToolButton#primary:focus {{ border-color: {c.text}; }}
+    QToolButton#primary:disabled {{
+        background: {c.well}; color: {c.hatch}; border-color: {c.border};
+    }}
+    QToolButton#fold {{ padding: 2px 4px 2px 0; }}
+    QToolButton#fold:checked {{ background: transparent; border-color: transparent; }}
     QToolButton#preset {{ border-color: {c.border}; padding: 3px 0; }}
     QToolButton#preset:checked {{ border-color: {c.accent}; background: {c.well}; }}
     QTabWidget::pane {{ border: none; border-top: 1px solid {c.border}; }}

@@ -23,6 +23,13 @@ class SidePanel(QTabWidget):
         """Name of the panel in front."""
         return self._names[self.currentIndex()]
 
+    def set_mark(self, name: str, mark: str) -> None:
+        """Say a word about a panel beside its name, or none."""
+        index = self._names.index(name)
+        text = f"{name} · {mark}" if mark else name
+        if text != self.tabText(index):
+            self.setTabText(index, text)
+
     def bring_up(self, name: str) -> None:
         """Show a panel."""
         self.setCurrentIndex(self._names.index(name))

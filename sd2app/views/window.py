@@ -29,6 +29,7 @@ from sd2app.views.frames import fill, panel, splitter
 if TYPE_CHECKING:
     from sd2app.context import Context
     from sd2app.dialogs.dialogs import Dialogs
+    from sd2app.dialogs.training import TrainingDialogs
     from sd2app.models.denoise_library import DenoiserLibrary
     from sd2app.models.ladder import Ladder
     from sd2app.views.scene3d import SceneView
@@ -46,6 +47,7 @@ class MainWindow(QMainWindow):
 
     context: Context
     dialogs: Dialogs
+    train_dialogs: TrainingDialogs
     side: SidePanel
 
     def __init__(
@@ -54,12 +56,14 @@ class MainWindow(QMainWindow):
         ladder: Ladder | None = None,
         fit_command: Sequence[str] | None = None,
         denoisers: DenoiserLibrary | None = None,
+        train_command: Sequence[str] | None = None,
     ) -> None:
         super().__init__()
         self._settings = settings
         self._ladder = ladder
         self._fit_command = fit_command
         self._denoisers = denoisers
+        self._train_command = train_command
         self._scene: SceneView | None = None
         self._ready = False
         self._painted = False
@@ -123,7 +127,12 @@ class MainWindow(QMainWindow):
         from sd2app.views.transport import TransportBar
 
         self.context = build_context(
-            self, self._settings, self._ladder, self._fit_command, self._denoisers
+            self,
+            self._settings,
+            self._ladder,
+            self._fit_command,
+            self._denoisers,
+            self._train_command,
         )
         context = self.context
         context.display.set_dark(is_dark(self._settings))
@@ -149,15 +158,18 @@ class MainWindow(QMainWindow):
                 getattr(self, f"_{name}").restoreState(state)
         self._ready = True
         context.fit.look_for_unfinished()
+        context.training.look_for_runs()
         # VTK last, imported in a thread: everything else is usable while it loads.
         self._importer = LatestRunner("import", self)
         self._importer.finished.connect(self._add_scene)
         self._importer.submit(lambda emit: import_module("sd2app.views.scene3d"))
 
     def _fill_panels(self) -> None:
+        from sd2app.dialogs.training import TrainingDialogs
         from sd2app.views.sensor_panel import SensorPanel
         from sd2app.views.side_panel import SidePanel
         from sd2app.views.trade_panel import TradePanel
+        from sd2app.views.training_panel import TrainingPanel
         from sd2app.views.video_bar import VideoBar
 
         c = self.context
@@ -168,7 +180,9 @@ class MainWindow(QMainWindow):
         to_camera, aim = self._actions["sensor_to_camera"], self._actions["aim_sensor"]
         sensor = SensorPanel(c.sensor, c.document, c.synthesis, c.edits, to_camera, aim)
         trade = TradePanel(c.trade, c.display, self._actions["measure"])
-        self.side = SidePanel({"Sensor": sensor, "Trade": trade})
+        self.train_dialogs = TrainingDialogs(self, c.training, c.training_use, self.messages.warn)
+        train = TrainingPanel(c.training, c.training_use, c.display, self.train_dialogs)
+        self.side = SidePanel({"Sensor": sensor, "Trade": trade, "Train": train})
         fill(self._panels["sensor"], self.side)
         self._fill_tracks()
 
@@ -247,6 +261,10 @@ class MainWindow(QMainWindow):
         c.denoise.failed.connect(self.messages.warn)
         c.denoise.noted.connect(self.messages.note)
         c.trade.noted.connect(self.messages.note)
+        for model in (c.training, c.training_use):
+            model.noted.connect(self.messages.note)
+            model.failed.connect(self.messages.warn)
+        c.training.changed.connect(lambda: self.side.set_mark("Train", c.training.mark))
         c.video.failed.connect(self.messages.warn)
         c.document.undo_stack.indexChanged.connect(self._refresh)
         c.document.undo_stack.cleanChanged.connect(self._refresh)
@@ -378,7 +396,8 @@ class MainWindow(QMainWindow):
         if not self._ready:
             event.accept()
             return
-        if not (self.dialogs.may_discard() and self.dialogs.may_stop_fit()):
+        asked = (self.dialogs.may_discard, self.dialogs.may_stop_fit, self.train_dialogs.may_leave)
+        if not all(may_close() for may_close in asked):
             event.ignore()
             return
         self._settings.set_layout("window", self.saveGeometry())

@@ -83,6 +83,14 @@ def recording_copy(small_recording, tmp_path) -> Path:
     return Path(shutil.copytree(small_recording, tmp_path / small_recording.name))
 
 
+@pytest.fixture(autouse=True)
+def own_data(tmp_path_factory, monkeypatch) -> Path:
+    """Runs and models of whoever runs the tests are left alone."""
+    folder = tmp_path_factory.mktemp("data")
+    monkeypatch.setenv("XDG_DATA_HOME", str(folder))
+    return folder
+
+
 @pytest.fixture(scope="session")
 def compiled_kernels() -> None:
     """Machine code on disk, as after set-up."""

@@ -1,0 +1,58 @@
+"""Training runs as ``sd2`` commands."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+import time
+from dataclasses import fields
+from pathlib import Path
+
+from sd2core.train.config import DataConfig, TrainConfig, TrainingConfig
+
+_OPTIONS = {"early_stopping_epochs": "--early-stopping"}
+"""Options that are not called as their setting is."""
+
+
+def output_of(run: Path) -> Path:
+    """What the process of a run writes besides; it may end before it has a folder."""
+    return run.with_name(f".{run.name}.out")
+
+
+def new_run_folder(folder: Path, config: TrainConfig) -> Path:
+    """A name that is free: kind of model, pairs, and when."""
+    pairs = "+".join(path.stem for path in config.data.pairs)
+    when = time.strftime("%Y-%m-%d %H.%M")
+    name = f"{config.model.name} {pairs[:40]} {when}"
+    path, number = folder / name, 2
+    while path.exists() or output_of(path).exists():
+        path, number = folder / f"{name} {number}", number + 1
+    return path
+
+
+def train_arguments(config: TrainConfig, run: Path) -> list[str]:
+    """``sd2 train`` with all that is not as it is by default."""
+    # The model is named even where it is the default: it is what one looks for.
+    words = ["train", *map(str, config.data.pairs), "--model", config.model.name, "--background"]
+    for section, plain in (("data", DataConfig(config.data.pairs)), ("training", TrainingConfig())):
+        mine = getattr(config, section)
+        for one in fields(mine):
+            value = getattr(mine, one.name)
+            if value != getattr(plain, one.name):
+                words += [_OPTIONS.get(one.name, f"--{one.name.replace('_', '-')}"), f"{value}"]
+    return [*words, "--out", str(run)]
+
+
+def resume_arguments(run: Path) -> list[str]:
+    """``sd2 train`` that goes on with a run."""
+    return ["train", "--resume", str(run)]
+
+
+def quoted(arguments: list[str]) -> str:
+    """As typed into a terminal."""
+    words = ["sd2", *arguments]
+    if sys.platform == "win32":
+        import subprocess
+
+        return subprocess.list2cmdline(words)
+    return shlex.join(words)

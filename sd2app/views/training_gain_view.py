@@ -1,0 +1,63 @@
+"""What a trained model gains over what was there before, on the recording that is open."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QSignalBlocker, Qt
+from PySide6.QtWidgets import QCheckBox, QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+
+from sd2app.models.training_use import TrainingUse
+from sd2app.models.training_words import gain_rows, gain_summary
+from sd2app.views.training_parts import muted, outlined, title
+
+
+class TrainingGainView(QWidget):
+    """A view of :class:`TrainingUse`."""
+
+    def __init__(self, use: TrainingUse, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._use = use
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(4)
+        layout.addWidget(title("In use"))
+        self._summary = muted("")
+        layout.addWidget(self._summary)
+        self._table = QWidget(self)
+        grid = QGridLayout(self._table)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setHorizontalSpacing(12)
+        grid.setVerticalSpacing(2)
+        grid.setColumnStretch(0, 1)
+        self._cells: list[tuple[QLabel, QLabel]] = []
+        for row in range(3):
+            name, value = muted(""), QLabel(self)
+            value.setAlignment(Qt.AlignmentFlag.AlignRight)
+            grid.addWidget(name, row, 0)
+            grid.addWidget(value, row, 1)
+            self._cells.append((name, value))
+        layout.addWidget(self._table)
+        self._both = QCheckBox("Show the map from before", self)
+        self._both.setToolTip("Draw the map of the model before under that of this one")
+        self._both.toggled.connect(use.set_comparing)
+        self._back = outlined("Go back", "Denoise with what was in use before", use.go_back, self)
+        row = QHBoxLayout()
+        row.addWidget(self._both)
+        row.addStretch(1)
+        row.addWidget(self._back)
+        layout.addLayout(row)
+        use.changed.connect(self._refresh)
+        self._refresh()
+
+    def _refresh(self) -> None:
+        use = self._use
+        self._summary.setText(gain_summary(use.gain, use.has_radar))
+        rows = gain_rows(use.gain) if use.gain is not None else []
+        self._table.setVisible(bool(rows))
+        for (name, value), row in zip(self._cells, [*rows, *[("", "")] * 3], strict=False):
+            name.setText(row[0])
+            value.setText(row[1])
+            name.setVisible(bool(row[0]))
+            value.setVisible(bool(row[0]))
+        with QSignalBlocker(self._both):
+            self._both.setChecked(use.comparing)
+        self._both.setVisible(use.can_compare)

@@ -1,0 +1,124 @@
+"""The Train panel: a new run to be set up, or one that is under way or has ended."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Protocol
+
+from PySide6.QtCore import QSignalBlocker
+from PySide6.QtGui import QHideEvent, QShowEvent
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
+
+from sd2app.models.display import DisplayModel
+from sd2app.models.training import TrainingModel
+from sd2app.models.training_use import TrainingUse
+from sd2app.views.inputs import Choice
+from sd2app.views.training_gain_view import TrainingGainView
+from sd2app.views.training_parts import outlined
+from sd2app.views.training_run_view import TrainingRunView
+from sd2app.views.training_setup_view import TrainingSetupView
+
+_NEW = "New training"
+_TIP = "Runs: those under way, and those that have ended"
+
+
+class Asks(Protocol):
+    """What the panel leaves to dialogs."""
+
+    def ask_store(self) -> None:
+        """Let the user choose a store of pairs."""
+
+    def start(self) -> None:
+        """Begin as it is set up."""
+
+    def copy_command(self) -> None:
+        """Put the command on the clipboard."""
+
+    def use(self) -> None:
+        """Use the model of the run in view."""
+
+    def resume(self) -> None:
+        """Go on with the run in view."""
+
+    def delete(self) -> None:
+        """Ask, then delete the run in view."""
+
+
+class TrainingPanel(QWidget):
+    """The list of runs on top, the one in view below."""
+
+    def __init__(
+        self,
+        training: TrainingModel,
+        use: TrainingUse,
+        display: DisplayModel,
+        asks: Asks,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self.setObjectName("page")
+        self._training = training
+        self._paths: list[Path | None] = []
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(8, 6, 8, 6)
+        layout.setSpacing(8)
+        self._runs = Choice(_TIP, self)
+        self._runs.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        self._runs.activated.connect(lambda index: training.select(self._paths[index]))
+        self._new = outlined("New", "Set up another training", lambda: training.select(None), self)
+        self._head = QWidget(self)
+        row = QHBoxLayout(self._head)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(6)
+        row.addWidget(self._runs, 1)
+        row.addWidget(self._new)
+        layout.addWidget(self._head)
+        self._setup = TrainingSetupView(
+            training, asks.ask_store, asks.start, asks.copy_command, self
+        )
+        self._run = TrainingRunView(training, display, asks.use, asks.resume, asks.delete, self)
+        self._gain = TrainingGainView(use, self)
+        for widget in (self._setup, self._run, self._gain):
+            layout.addWidget(widget)
+        layout.addStretch(1)
+        training.changed.connect(self._refresh)
+        use.changed.connect(self._refresh)
+        self._use = use
+        self._refresh()
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Look again at what lies on disk, and time a step where that is not known."""
+        super().showEvent(event)
+        self._training.set_watched(True)
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        """Nobody looks."""
+        super().hideEvent(event)
+        self._training.set_watched(False)
+
+    def _refresh(self) -> None:
+        run = self._training.run
+        self._setup.setVisible(run is None)
+        self._run.setVisible(run is not None)
+        self._new.setVisible(run is not None)
+        self._gain.setVisible(run is not None and self._use.run == run.folder.path)
+        self._list_runs()
+
+    def _list_runs(self) -> None:
+        runs, run = self._training.library.runs, self._training.run
+        here = run.folder.path if run is not None else None
+        paths: list[Path | None] = [None, *(known.path for known in runs)]
+        texts = [_NEW, *(known.title for known in runs)]
+        if here not in paths:
+            # Just begun: it is not in the list yet.
+            paths.insert(1, here)
+            texts.insert(1, here.name if here is not None else _NEW)
+        self._runs.setToolTip(str(here) if here is not None else _TIP)
+        if texts != [self._runs.itemText(index) for index in range(self._runs.count())]:
+            with QSignalBlocker(self._runs):
+                self._runs.clear()
+                self._runs.addItems(texts)
+        self._paths = paths
+        with QSignalBlocker(self._runs):
+            self._runs.setCurrentIndex(paths.index(here))
+        self._head.setVisible(len(paths) > 1)

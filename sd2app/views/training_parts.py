@@ -1,0 +1,38 @@
+"""Labels and buttons of the Train panel."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QLabel, QToolButton, QWidget
+
+
+def title(text: str) -> QLabel:
+    """A heading."""
+    label = QLabel(text)
+    label.setObjectName("title")
+    return label
+
+
+def muted(text: str, role: str = "") -> QLabel:
+    """A sentence that wraps and can be selected."""
+    label = QLabel(text)
+    label.setObjectName(role or "muted")
+    label.setWordWrap(True)
+    label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+    return label
+
+
+def outlined(text: str, tip: str, run: Callable[[], object] | None, parent: QWidget) -> QToolButton:
+    """A button with a border."""
+    button = QToolButton(parent)
+    button.setObjectName("outlined")
+    button.setText(text)
+    button.setToolTip(tip)
+    button.setAccessibleName(text)
+    button.setAccessibleDescription(tip)
+    button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+    if run is not None:
+        button.clicked.connect(lambda: run())
+    return button

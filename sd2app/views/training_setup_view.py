@@ -1,0 +1,277 @@
+"""What is to be trained: pairs, kind of model, settings, and how long it will take."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtCore import QSignalBlocker, Qt
+from PySide6.QtWidgets import (
+    QGridLayout,
+    QHBoxLayout,
+    QLabel,
+    QMenu,
+    QSizePolicy,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from sd2app.models.training import TrainingModel
+from sd2app.models.training_setup import MODELS, Store
+from sd2app.models.training_words import (
+    MODEL_WORDS,
+    division_text,
+    estimate_source_text,
+    estimate_text,
+    store_text,
+)
+from sd2app.views.elided import ElidedLabel
+from sd2app.views.inputs import Choice, NumberBox
+from sd2app.views.training_parts import muted, outlined, title
+
+_FIELDS = (
+    # name, text, low, high, decimals, step, tip
+    ("epochs", "Epochs", 1, 100_000, 0, 50, "Passes over all segments; the paper's is 500"),
+    ("batch_size", "Batch", 1, 10_000, 0, 16, "Segments per step; the paper's is 64"),
+)
+_MORE = (
+    (
+        "early_stopping_epochs", "Stop early after", 0, 100_000, 0, 10,
+        "End when the validation has not become better for so many epochs",
+    ),
+    ("learning_rate", "Learning rate", 1e-5, 1.0, 5, 5e-4, "At its highest; it warms up and falls"),
+    (
+        "range_factor", "Range factor", 1.0, 4.0, 1, 0.5,
+        "Learn as if the person were up to this many times nearer or farther; 1 is off",
+    ),
+    ("seed", "Seed", 0, 2**31 - 1, 0, 1, "Of weights, order and dropout"),
+)  # fmt: skip
+
+
+class TrainingSetupView(QWidget):
+    """A form over :class:`TrainingSetupModel`.
+
+    Parameters
+    ----------
+    training : TrainingModel
+    ask_store : callable
+        Lets the user choose a store of pairs.
+    start, copy_command : callable
+    """
+
+    def __init__(
+        self,
+        training: TrainingModel,
+        ask_store: Callable[[], None],
+        start: Callable[[], None],
+        copy_command: Callable[[], None],
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._training = training
+        self._setup = training.setup
+        self._ask_store = ask_store
+        self._shown_stores: tuple[Store, ...] | None = None
+        self._boxes: dict[str, NumberBox] = {}
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(6)
+        self._add_pairs(layout)
+        self._add_model(layout)
+        self._add_settings(layout)
+        self._add_start(layout, start, copy_command)
+        training.changed.connect(self._refresh)
+        self._refresh()
+
+    # --- building -------------------------------------------------------------------------
+
+    def _add_pairs(self, layout: QVBoxLayout) -> None:
+        self._add = outlined("Add pairs", "Choose pairs of synthetic and radar Doppler", None, self)
+        self._add.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        menu = QMenu(self._add)
+        menu.setToolTipsVisible(True)
+        menu.aboutToShow.connect(self._list_known)
+        self._add.setMenu(menu)
+        head = QHBoxLayout()
+        head.addWidget(title("Pairs"))
+        head.addStretch(1)
+        head.addWidget(self._add)
+        layout.addLayout(head)
+        self._nothing = muted(
+            "A denoiser learns from pairs: a synthetic map, and what a radar saw of the same"
+            " movement. Make some with sd2 simulate campaign or sd2 pairs, then add their"
+            " folder."
+        )
+        layout.addWidget(self._nothing)
+        self._rows = QVBoxLayout()
+        self._rows.setSpacing(4)
+        layout.addLayout(self._rows)
+        self._division = muted("")
+        layout.addWidget(self._division)
+
+    def _add_model(self, layout: QVBoxLayout) -> None:
+        self._model = Choice("Kind of model", self)
+        for name in MODELS:
+            self._model.addItem(MODEL_WORDS[name][0], name)
+        self._model.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self._model.currentIndexChanged.connect(
+            lambda index: self._setup.set_value("model", MODELS[index])
+        )
+        row = QHBoxLayout()
+        row.setSpacing(8)
+        row.addWidget(title("Model"))
+        row.addWidget(self._model, 1)
+        layout.addLayout(row)
+        self._about = muted("")
+        layout.addWidget(self._about)
+
+    def _add_settings(self, layout: QVBoxLayout) -> None:
+        layout.addWidget(self._form(_FIELDS))
+        self._more = QToolButton(self)
+        self._more.setObjectName("fold")
+        self._more.setCheckable(True)
+        self._more.setText("More settings")
+        self._more.setToolTip("Learning rate, early stopping, range, seed")
+        self._more.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+        self._more.setArrowType(Qt.ArrowType.RightArrow)
+        self._more.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        self._more.toggled.connect(self._unfold)
+        self._reset = outlined(
+            "Reset", "Put all settings back to the paper's", self._setup.reset, self
+        )
+        row = QHBoxLayout()
+        row.addWidget(self._more)
+        row.addStretch(1)
+        row.addWidget(self._reset)
+        layout.addLayout(row)
+        self._rest = self._form(_MORE)
+        self._boxes["early_stopping_epochs"].setSpecialValueText("never")
+        self._boxes["range_factor"].setPrefix("× ")
+        self._rest.hide()
+        layout.addWidget(self._rest)
+
+    def _form(self, fields: tuple[tuple, ...]) -> QWidget:
+        form = QWidget(self)
+        grid = QGridLayout(form)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setHorizontalSpacing(8)
+        grid.setVerticalSpacing(4)
+        grid.setColumnStretch(0, 1)
+        for row, (name, text, low, high, decimals, step, tip) in enumerate(fields):
+            suffix = " epochs" if name == "early_stopping_epochs" else ""
+            box = NumberBox(low, high, suffix, tip, decimals=decimals, step=step, parent=self)
+            box.setMinimumWidth(112)
+            box.setGroupSeparatorShown(decimals == 0 and name != "seed")
+            box.valueChanged.connect(lambda value, name=name: self._setup.set_value(name, value))
+            label = QLabel(text, self)
+            label.setToolTip(tip)
+            grid.addWidget(label, row, 0)
+            grid.addWidget(box, row, 1)
+            self._boxes[name] = box
+        return form
+
+    def _add_start(
+        self, layout: QVBoxLayout, start: Callable[[], None], copy_command: Callable[[], None]
+    ) -> None:
+        self._estimate = QLabel(self)
+        self._estimate.setObjectName("title")
+        self._estimate.setWordWrap(True)
+        self._estimate.setAccessibleName("How long it will take")
+        self._source = muted("")
+        self._problem = muted("", "warning")
+        self._start = outlined("Start training", "Train beside the window", start, self)
+        self._start.setObjectName("primary")
+        self._copy = outlined(
+            "Copy command", "The same as a command for a terminal", copy_command, self
+        )
+        row = QHBoxLayout()
+        row.setSpacing(6)
+        row.addWidget(self._start)
+        row.addWidget(self._copy)
+        row.addStretch(1)
+        for widget in (self._estimate, self._source, self._problem):
+            layout.addWidget(widget)
+        layout.addLayout(row)
+
+    # --- showing --------------------------------------------------------------------------
+
+    def _refresh(self) -> None:
+        if self._training.run is not None:
+            return
+        setup = self._setup
+        if setup.stores != self._shown_stores:
+            self._list_stores()
+        self._nothing.setVisible(not setup.stores)
+        division = setup.division
+        self._division.setText(division_text(division) if division is not None else "")
+        self._division.setVisible(division is not None)
+        with QSignalBlocker(self._model):
+            self._model.setCurrentIndex(MODELS.index(setup.value("model")))
+        self._about.setText(MODEL_WORDS[setup.value("model")][1])
+        for name, box in self._boxes.items():
+            box.show_value(setup.value(name))
+        self._reset.setVisible(setup.differs)
+        self._refresh_start()
+
+    def _refresh_start(self) -> None:
+        setup, why_not = self._setup, self._training.why_not_start
+        estimate = setup.estimate
+        self._estimate.setVisible(bool(estimate.segments))
+        self._source.setVisible(bool(estimate.segments))
+        self._estimate.setText(estimate_text(estimate))
+        times = self._training.step_times
+        self._source.setText(
+            estimate_source_text(estimate, setup.step_key, times, setup.value("epochs"))
+        )
+        # That there are no pairs is said above.
+        self._problem.setText(why_not if setup.stores else "")
+        self._problem.setVisible(bool(setup.stores) and bool(why_not))
+        self._problem.setObjectName("muted" if setup.reading else "warning")
+        self._start.setEnabled(not why_not)
+        self._start.setToolTip(why_not or "Train beside the window, in a process of its own")
+        self._copy.setEnabled(not setup.problem)
+
+    def _list_stores(self) -> None:
+        self._shown_stores = self._setup.stores
+        while (item := self._rows.takeAt(0)) is not None:
+            if (widget := item.widget()) is not None:
+                widget.hide()
+                widget.deleteLater()
+        for store in self._setup.stores:
+            self._rows.addWidget(self._store_row(store))
+
+    def _store_row(self, store: Store) -> QWidget:
+        row = QWidget(self)
+        name = ElidedLabel(row)
+        name.setText(store.path.name)
+        name.setToolTip(str(store.path))
+        facts = muted(store.problem or store_text(store.facts), "warning" if store.problem else "")
+        remove = QToolButton(row)
+        remove.setText("✕")
+        remove.setToolTip(f"Do not learn from {store.path.name}")
+        remove.setAccessibleName(remove.toolTip())
+        remove.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        remove.clicked.connect(lambda: self._setup.remove_store(store.path))
+        grid = QGridLayout(row)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setSpacing(0)
+        grid.addWidget(name, 0, 0)
+        grid.addWidget(remove, 0, 1, 2, 1, Qt.AlignmentFlag.AlignTop)
+        grid.addWidget(facts, 1, 0)
+        grid.setColumnStretch(0, 1)
+        return row
+
+    def _list_known(self) -> None:
+        menu = self._add.menu()
+        menu.clear()
+        for path in self._setup.known_stores:
+            action = menu.addAction(path.name)
+            action.setToolTip(str(path))
+            action.triggered.connect(lambda _=False, path=path: self._setup.add_store(path))
+        if not menu.isEmpty():
+            menu.addSeparator()
+        menu.addAction("Choose a folder…").triggered.connect(lambda: self._ask_store())
+
+    def _unfold(self, shown: bool) -> None:
+        self._rest.setVisible(shown)
+        self._more.setArrowType(Qt.ArrowType.DownArrow if shown else Qt.ArrowType.RightArrow)

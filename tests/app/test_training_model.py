@@ -1,0 +1,265 @@
+"""Training from the window without a window; the training itself is pretended."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from pathlib import Path
+
+import pytest
+from training_pairs import write_pairs
+
+from sd2app.models import training_follower
+from sd2app.models.training import TrainingModel
+from sd2app.settings import Settings
+from sd2core.errors import Sd2Error
+from sd2core.train.control import read_control
+from sd2core.train.folder import RunFolder
+
+FAKE = Path(__file__).resolve().parent.parent / "fake_train.py"
+TIMING = (sys.executable, "-c", "print('{\"step_s\": 0.25}')")
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch) -> None:
+    """Look more often than a person would."""
+    monkeypatch.setattr(training_follower, "POLL_MS", 40)
+    monkeypatch.setattr(training_follower, "SLOW_POLL_MS", 40)
+
+
+@pytest.fixture
+def pairs(tmp_path) -> Path:
+    """300 frames of each of six people: 5 segments each, four of them learnt from."""
+    return write_pairs(tmp_path / "campaign.zarr")
+
+
+@pytest.fixture
+def made(qtbot, tmp_path, pairs):
+    """Makes models; options are those of ``fake_train.py``."""
+    models: list[TrainingModel] = []
+
+    def make(*options: object, settings: Settings | None = None, epochs: int = 3) -> TrainingModel:
+        command = [sys.executable, "-u", str(FAKE), *map(str, options)]
+        model = TrainingModel(
+            settings or Settings.forgetful(), None, command, TIMING, tmp_path / "runs"
+        )
+        models.append(model)
+        if not model.setup.stores:
+            model.setup.add_store(pairs)
+            model.setup.set_value("epochs", epochs)
+        qtbot.waitUntil(lambda: not model.setup.problem, timeout=5_000)
+        return model
+
+    yield make
+    for model in models:
+        if model.run is not None and model.run.under_way:
+            pid = model.run.folder.status().pid if model.run.folder.exists else None
+            if pid:
+                os.kill(pid, signal.SIGKILL)
+        model.close()
+
+
+def wait_for(qtbot, model, *phases: str) -> None:
+    qtbot.waitUntil(lambda: model.run is not None and model.run.phase in phases, timeout=15_000)
+
+
+def test_a_run_from_start_to_end(made, qtbot) -> None:
+    model = made()
+    said = []
+    model.noted.connect(said.append)
+    model.start()
+    assert model.run.phase == "starting"
+    wait_for(qtbot, model, "finished")
+    run = model.run
+    assert said == [f"{run.folder.path.name} is trained. The Train panel puts its model to use."]
+    assert [point.epoch for point in run.history.epoch_points] == [1, 2, 3]
+    assert run.history.best.validation_rmse == pytest.approx(0.4)
+    assert run.history.share == 1.0
+    assert run.folder.best.exists()
+    # What a step took is what the next estimate is made of: 2 s an epoch of 4 steps.
+    assert model.setup.estimate.step.seconds == pytest.approx(0.5)
+    assert model.setup.estimate.step.source == "run"
+    assert run.config.data.pairs == (model.setup.stores[0].path,)
+    assert not list(run.folder.path.parent.glob(".*"))
+
+
+def test_one_at_a_time(made, qtbot) -> None:
+    model = made("--rest-at", 1)
+    model.start()
+    wait_for(qtbot, model, "running")
+    qtbot.waitUntil(lambda: model.library.live is not None)
+    assert "is being trained" in model.why_not_start
+    with pytest.raises(Sd2Error, match="is being trained"):
+        model.start()
+    model.stop()
+    wait_for(qtbot, model, "stopped")
+    qtbot.waitUntil(lambda: not model.why_not_start)
+
+
+def test_pausing_and_going_on(made, qtbot) -> None:
+    model = made("--step-s", 0.05, epochs=50)
+    model.start()
+    wait_for(qtbot, model, "running")
+    model.pause()
+    assert model.run.phase == "pausing"
+    assert read_control(model.run.folder.control) == "pause"
+    wait_for(qtbot, model, "paused")
+    model.go_on()
+    assert model.run.phase == "resuming"
+    wait_for(qtbot, model, "running")
+
+
+def test_stopping_keeps_the_best(made, qtbot) -> None:
+    model = made("--rest-at", 2)
+    model.start()
+    qtbot.waitUntil(lambda: model.run.history.epoch == 2, timeout=15_000)
+    model.stop()
+    assert model.run.phase == "stopping"
+    # What was said last does not count after that, unless it is to be discarded.
+    model.pause()
+    assert model.run.phase == "stopping"
+    wait_for(qtbot, model, "stopped")
+    assert model.run.folder.best.exists()
+    assert len(model.run.history.epoch_points) == 2
+    model.resume()
+    wait_for(qtbot, model, "starting", "running")
+    # It continues after the second epoch and, this time, has nothing to rest at.
+    wait_for(qtbot, model, "finished")
+    assert [point.epoch for point in model.run.history.epoch_points] == [1, 2, 3]
+
+
+def test_cancelling_is_said_at_once_and_leaves_nothing(made, qtbot) -> None:
+    model = made("--rest-at", 1)
+    model.start()
+    wait_for(qtbot, model, "running")
+    folder = model.run.folder
+    model.cancel()
+    assert model.run.phase == "cancelling"
+    qtbot.waitUntil(lambda: model.run is None, timeout=15_000)
+    assert not folder.path.exists()
+    assert not list(folder.path.parent.iterdir())
+
+
+def test_cancelling_before_there_is_a_folder(made, qtbot) -> None:
+    model = made("--slow-start-s", 30)
+    model.start()
+    path = model.run.folder.path
+    model.cancel()
+    assert model.run.phase == "cancelling"
+    qtbot.waitUntil(lambda: model.run is None, timeout=15_000)
+    assert not path.exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="nothing can refuse there")
+def test_one_that_does_not_hear_is_ended(made, qtbot) -> None:
+    model = made("--rest-at", 1, "--deaf")
+    model.start()
+    wait_for(qtbot, model, "running")
+    folder, run = model.run.folder, model.run
+    model.cancel()
+    real = run._clock_s
+    run._clock_s = lambda: real() + 31.0
+    qtbot.waitUntil(lambda: model.run is None, timeout=15_000)
+    assert not folder.path.exists()
+
+
+def test_a_refusal_is_told_in_its_words(made, qtbot) -> None:
+    model = made("--refuse", "The disk is full. Make room.")
+    model.start()
+    wait_for(qtbot, model, "failed")
+    assert model.run.text == "The disk is full. Make room."
+
+
+def test_a_failure_is_told_in_its_words(made, qtbot) -> None:
+    model = made("--fail-at", 2)
+    model.start()
+    wait_for(qtbot, model, "failed")
+    assert model.run.text == (
+        "The loss is not a number. Expected: finite errors. Choose a lower learning rate."
+    )
+    assert model.run.history.best.epoch == 1
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="the pretended run kills itself as Unix does")
+def test_a_killed_run_has_died_and_goes_on(made, qtbot) -> None:
+    model = made("--die-at", 1)
+    model.start()
+    wait_for(qtbot, model, "died")
+    qtbot.waitUntil(lambda: not model.why_not_start)
+    model.resume()
+    wait_for(qtbot, model, "finished")
+    assert [point.epoch for point in model.run.history.epoch_points] == [1, 2, 3]
+
+
+def test_the_next_window_finds_the_run(made, qtbot) -> None:
+    first = made("--rest-at", 1)
+    first.start()
+    wait_for(qtbot, first, "running")
+    path = first.run.folder.path
+    first.close()
+    assert RunFolder(path).live
+    second = made()
+    with qtbot.waitSignal(second.noted, timeout=5_000) as said:
+        second.look_for_runs()
+    assert said.args == [f"{path.name} is being trained. The Train panel shows it."]
+    assert second.run.folder.path == path
+    wait_for(qtbot, second, "running")
+    assert second.run.history.best.epoch == 1
+    second.stop()
+    wait_for(qtbot, second, "stopped")
+
+
+def test_the_next_window_shows_what_ended_meanwhile(made, qtbot) -> None:
+    settings = Settings.forgetful()
+    first = made(settings=settings)
+    first.start()
+    path = first.run.folder.path
+    qtbot.waitUntil(lambda: RunFolder(path).exists, timeout=15_000)
+    first.close()
+    qtbot.waitUntil(lambda: not RunFolder(path).live, timeout=15_000)
+    second = made(settings=settings)
+    second.look_for_runs()
+    wait_for(qtbot, second, "finished")
+    assert second.run.folder.path == path
+    # Not shown again once it was put away.
+    second.select(None)
+    third = made(settings=settings)
+    with qtbot.waitSignal(third.library.refreshed):
+        third.look_for_runs()
+    assert third.run is None
+    assert [run.path for run in third.library.runs] == [path]
+    third.select(path)
+    wait_for(qtbot, third, "finished")
+    third.delete()
+    assert third.run is None
+    assert not path.exists()
+
+
+def test_a_torn_line_waits_and_a_damaged_one_is_left_out(made, qtbot, tmp_path) -> None:
+    model = made("--rest-at", 1)
+    model.start()
+    qtbot.waitUntil(lambda: model.run and len(model.run.history.epoch_points) == 1, timeout=15_000)
+    line = (
+        '{"event": "epoch", "epoch": 2, "step": 8, "train_rmse": 0.3, "validation_rmse": 0.2,'
+        ' "validation_mae_mps": 0.1, "best": true, "elapsed_s": 9, "left_s": 1}\n'
+    )
+    with model.run.folder.progress.open("a") as progress:
+        progress.write('{"event": "epoch", "epoch": "many"}\n[1]\nnonsense\n' + line[:40])
+        progress.flush()
+        with qtbot.waitSignal(model.run._runner.finished):
+            model.run.look()
+        assert len(model.run.history.epoch_points) == 1
+        progress.write(line[40:])
+    qtbot.waitUntil(lambda: len(model.run.history.epoch_points) == 2)
+    assert model.run.history.best.validation_rmse == 0.2
+    model.cancel()
+    qtbot.waitUntil(lambda: model.run is None, timeout=15_000)
+
+
+def test_a_run_deleted_by_somebody_else_is_put_away(made, qtbot) -> None:
+    model = made()
+    model.start()
+    wait_for(qtbot, model, "finished")
+    RunFolder(model.run.folder.path).discard()
+    qtbot.waitUntil(lambda: model.run is None, timeout=5_000)
