@@ -27,7 +27,7 @@ def progress_bar(what: str, unit: str = "frame") -> Iterator[Progress]:
 
 def print_json(content: Mapping[str, Any]) -> None:
     """Print one JSON object; NaN and infinities become null."""
-    print(json.dumps(_finite(content), indent=2, ensure_ascii=False))
+    print(json.dumps(finite(content), indent=2, ensure_ascii=False))
 
 
 def print_facts(title: str, facts: Mapping[str, str]) -> None:
@@ -39,11 +39,12 @@ def print_facts(title: str, facts: Mapping[str, str]) -> None:
         print(f"  {name:<{width}}  {value}")
 
 
-def _finite(value: Any) -> Any:
+def finite(value: Any) -> Any:
+    """The same for JSON: NaN and infinities become None."""
     if isinstance(value, Mapping):
-        return {str(key): _finite(inner) for key, inner in value.items()}
+        return {str(key): finite(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple):
-        return [_finite(inner) for inner in value]
+        return [finite(inner) for inner in value]
     if isinstance(value, float) and (value != value or abs(value) == float("inf")):
         return None
     return value

@@ -8,6 +8,7 @@ from sd2core import __version__
 from sd2core.cli import (
     compare_meshes,
     denoise,
+    eval,
     fetch_models,
     fit,
     importing,
@@ -68,6 +69,7 @@ def build_parser() -> tuple[argparse.ArgumentParser, argparse._SubParsersAction]
         simulate,
         train,
         runs,
+        eval,
         warm_up,
         fetch_models,
     )

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.denoise.metrics import stands_out
 from sd2core.errors import Sd2Error
 from sd2core.pairs import PairSet, Take, read_pairs
 from sd2core.segments import cut, segment_starts
@@ -46,10 +47,13 @@ class Segments:
     ----------
     inputs, targets : float32 array, shape (segments, length, bins)
         Synthetic Doppler and the radar's.
+    moving : bool array, shape (segments, length)
+        Frames in which the radar shows more than noise.
     """
 
     inputs: NDArray[np.float32]
     targets: NDArray[np.float32]
+    moving: NDArray[np.bool_]
 
     def __len__(self) -> int:
         return len(self.inputs)
@@ -206,13 +210,15 @@ def prepare(pairs: PairSet, config: DataConfig) -> TrainingData:
     return TrainingData(
         pairs,
         split,
-        segments_of(learnt, config.segment_frames, config.overlap_frames),
-        segments_of(own, config.segment_frames, 0),
+        segments_of(learnt, config.segment_frames, config.overlap_frames, pairs.null_bins),
+        segments_of(own, config.segment_frames, 0, pairs.null_bins),
         learnt,
     )
 
 
-def segments_of(takes: Sequence[Take], length: int, overlap: int) -> Segments:
+def segments_of(
+    takes: Sequence[Take], length: int, overlap: int, null_bins: Sequence[int] = ()
+) -> Segments:
     """All segments of some takes, in their order.
 
     Raises
@@ -220,11 +226,13 @@ def segments_of(takes: Sequence[Take], length: int, overlap: int) -> Segments:
     Sd2Error
         When there is none.
     """
-    inputs, targets = [], []
+    inputs, targets, moving = [], [], []
     for take in takes:
         starts = segment_starts(len(take.times_s), length, overlap)
         inputs.append(cut(take.synthetic, starts, length))
         targets.append(cut(take.radar, starts, length))
+        moves = stands_out(take.radar, tuple(null_bins))
+        moving.append(moves[starts[:, None] + np.arange(length)])
     if not sum(map(len, inputs)):
         longest = max((len(take.times_s) for take in takes), default=0)
         raise Sd2Error(
@@ -233,7 +241,7 @@ def segments_of(takes: Sequence[Take], length: int, overlap: int) -> Segments:
             "takes that are at least as long as a segment",
             "Choose shorter segments with --segment-frames",
         )
-    return Segments(np.concatenate(inputs), np.concatenate(targets))
+    return Segments(*(np.concatenate(parts) for parts in (inputs, targets, moving)))
 
 
 @dataclass(frozen=True)

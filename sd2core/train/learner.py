@@ -58,8 +58,8 @@ class Steps:
                 index, gain = indices[mine], gains[mine]
                 if self._ranks > 1:
                     # All have as many, as a mean over processes wants it.
-                    rows = np.arange(self._rank, max(len(index), self._ranks), self._ranks)
-                    rows %= len(index)
+                    each = -(-len(index) // self._ranks)
+                    rows = (np.arange(each) * self._ranks + self._rank) % len(index)
                     index, gain = index[rows], gain[rows]
                 yield Step(torch.from_numpy(index), torch.from_numpy(gain), epoch, step)
             epoch, first = epoch + 1, 0

@@ -27,9 +27,9 @@ class Validation:
     rmse : float
         Of compressed values, over bins that are not nulled; what the loss is, too.
     mae_mps : float
-        Of the peak velocity per frame, as :mod:`sd2core.denoise.metrics` defines it. The
-        frames are those of segments, each of which a model begins knowing nothing; so
-        `sd2 eval`, which gives it whole takes, finds less.
+        Of the peak velocity per frame, as :mod:`sd2core.denoise.metrics` defines it, in
+        frames in which something moves. They are those of segments, each of which a
+        model begins knowing nothing; `sd2 eval`, which gives it whole takes, finds less.
     """
 
     rmse: float
@@ -45,7 +45,7 @@ class Exam:
     inputs, targets : Tensor, shape (segments, length, bins)
         Compressed.
     peaks_mps : float64 array, shape (segments · length,)
-        Of the targets.
+        Of the targets; NaN in frames in which nothing moves.
     """
 
     inputs: torch.Tensor
@@ -66,7 +66,7 @@ class Exam:
         return cls(
             torch.from_numpy(scaling.input.compress(segments.inputs)),
             torch.from_numpy(scaling.target.compress(segments.targets)),
-            peak_velocity_mps(energies, axis),
+            np.where(segments.moving.ravel(), peak_velocity_mps(energies, axis), np.nan),
         )
 
 

@@ -1,0 +1,128 @@
+"""``sd2 eval``: how good denoisers are, beside what needs no training."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sd2core.cli.options import add_command
+from sd2core.cli.output import finite, progress_bar
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    from sd2core.denoise.live import TrainedDenoiser
+
+_PLOTS = (".png", ".svg", ".pdf")
+_STANDARD_OUTPUT = Path("-")
+
+
+def add_commands(commands: argparse._SubParsersAction) -> None:
+    """Add ``eval``."""
+    parser = add_command(
+        commands,
+        "eval",
+        "measure denoisers on people that they have not learnt from",
+        handler=_eval,
+        description=(
+            "Denoises whole takes and compares them with the radar's: the velocity of the\n"
+            "strongest bin per frame (mean absolute error and standard deviation in m/s), the\n"
+            "mean velocity, and the map itself; in all, per gesture and per person. Beside the\n"
+            "models stand `none`, and a median and a Wiener filter fitted to the training.\n"
+            "Several models of one architecture, trained with different seeds, make one row:\n"
+            "mean ± standard deviation."
+        ),
+        examples=(
+            "  sd2 eval runs/s4 --data campaign.zarr\n"
+            "  sd2 eval runs/s4-0 runs/s4-1 runs/s4-2 runs/gru-0 --data campaign.zarr\n"
+            "  sd2 eval denoiser --data mars.zarr --subjects subject4 --json scores.json\n"
+            "  sd2 eval runs/s4 runs/unet --data campaign.zarr --plot scores.png"
+        ),
+    )
+    parser.add_argument(
+        "models",
+        nargs="+",
+        metavar="MODEL",
+        help="a run, a model file, or the name of a model that is installed",
+    )
+    parser.add_argument(
+        "--data", type=Path, nargs="+", required=True, metavar="PAIRS", help="stores of pairs"
+    )
+    parser.add_argument(
+        "--subjects",
+        metavar="NAMES",
+        help="who is judged, separated by commas, or `all` (default: those that the first model's"
+        " run kept for the test, or all)",
+    )
+    parser.add_argument(
+        "--all-placements",
+        action="store_true",
+        help="judge also what other places of the sensor saw, not each take's own only",
+    )
+    parser.add_argument(
+        "--json", type=Path, metavar="FILE", help="write all numbers, or - to print them"
+    )
+    parser.add_argument(
+        "--plot", type=Path, metavar="FILE", help="draw the errors, as .png, .svg or .pdf"
+    )
+    parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the tables")
+
+
+def _eval(options: argparse.Namespace) -> None:
+    from sd2core.atomic import atomic_write_text
+    from sd2core.cli.reading import check_output
+
+    if options.plot is not None:
+        suffix = options.plot.suffix.lower()
+        check_output(options.plot, suffix if suffix in _PLOTS else ".png")
+    if options.json not in (None, _STANDARD_OUTPUT):
+        check_output(options.json, ".json")
+    if options.markdown is not None:
+        check_output(options.markdown, ".md")
+    from sd2core.train.data import read_mixed
+    from sd2core.train.evaluate import evaluate
+    from sd2core.train.evaluate_words import as_markdown, as_text, save_figure
+
+    pairs = read_mixed(options.data)
+    with progress_bar("Denoising", unit="take") as progress:
+        evaluation = evaluate(
+            [_loaded(model) for model in options.models],
+            pairs,
+            _subjects(options.subjects, pairs.subjects),
+            first_only=not options.all_placements,
+            progress=progress,
+        )
+    content = json.dumps(finite(evaluation.to_json()), indent=2, ensure_ascii=False)
+    if options.json == _STANDARD_OUTPUT:
+        print(content)
+    else:
+        print(as_text(evaluation))
+    if options.json not in (None, _STANDARD_OUTPUT):
+        atomic_write_text(options.json, content + "\n")
+    if options.plot is not None:
+        save_figure(evaluation, options.plot)
+    if options.markdown is not None:
+        atomic_write_text(options.markdown, as_markdown(evaluation))
+
+
+def _subjects(text: str | None, everybody: tuple[str, ...]) -> tuple[str, ...] | None:
+    if text is None:
+        return None
+    return everybody if text == "all" else tuple(name for name in text.split(",") if name)
+
+
+def _loaded(model: str) -> TrainedDenoiser:
+    from sd2core.denoise.files import load_model
+    from sd2core.train.folder import RunFolder
+
+    run = RunFolder(Path(model))
+    if not run.exists:
+        return load_model(model)
+    if not run.best.exists():
+        raise Sd2Error(
+            f"The run {model} has no model yet",
+            "a run that came as far as the end of its first epoch",
+            f"See how far it is: `sd2 runs {model}`",
+        )
+    return load_model(run.best)

@@ -1,0 +1,426 @@
+"""How good models are on people that they have not learnt from.
+
+Every take is denoised whole, from its first frame on. Velocities are compared frame by
+frame; :mod:`sd2core.denoise.metrics` defines how. Two sets of frames are judged:
+
+- those in which something moves: the strongest bin of the radar's map lies 10 dB above the
+  noise of its take (:func:`sd2core.denoise.metrics.stands_out`). This is the measure that
+  models are ranked by;
+- all frames. Where nothing moves, the strongest bin of a radar's map is that of its noise,
+  which nobody can foretell, so this measure has a floor well above zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.denoise.card import ModelCard
+from sd2core.denoise.live import TrainedDenoiser
+from sd2core.denoise.metrics import (
+    MapError,
+    VelocityError,
+    map_error,
+    mean_velocity_mps,
+    peak_velocity_mps,
+    stands_out,
+    velocity_error,
+)
+from sd2core.denoise.registry import FILTERS, fit_filter, options
+from sd2core.denoise.scaling import Compression, Scaling
+from sd2core.errors import Sd2Error
+from sd2core.pairs import PairSet
+from sd2core.progress import Progress, silent
+
+Energies = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Score:
+    """Errors on some frames.
+
+    Parameters
+    ----------
+    frames : int
+        All of them.
+    peak : VelocityError
+        Of the peak velocity, where something moves.
+    peak_all : VelocityError
+        The same of all frames.
+    mean : VelocityError
+        Of the energy-weighted mean velocity, where something moves.
+    map : MapError
+        Of all cells of all frames.
+    """
+
+    frames: int
+    peak: VelocityError
+    peak_all: VelocityError
+    mean: VelocityError
+    map: MapError
+
+    def to_json(self) -> dict[str, Any]:
+        """By name."""
+        parts = {name: getattr(self, name).to_json() for name in _PARTS}
+        return {"frames": self.frames, **parts}
+
+
+_PARTS = ("peak", "peak_all", "mean", "map")
+
+
+@dataclass(frozen=True)
+class Report:
+    """Errors of one model.
+
+    Parameters
+    ----------
+    name : str
+        To tell it from others of its group: the file, or the filter.
+    card : ModelCard
+    seed : int or None
+    all : Score
+    by_label, by_subject : dict of Score
+    """
+
+    name: str
+    card: ModelCard
+    seed: int | None
+    all: Score
+    by_label: Mapping[str, Score]
+    by_subject: Mapping[str, Score]
+
+
+@dataclass(frozen=True)
+class Group:
+    """Models of one architecture that differ in their seeds.
+
+    Parameters
+    ----------
+    name : str
+    reports : tuple of Report
+        At least one.
+    trained : bool
+        False for what needs no training.
+    """
+
+    name: str
+    reports: tuple[Report, ...]
+    trained: bool
+
+    def values(
+        self, part: str, number: str, label: str | None = None, subject: str | None = None
+    ) -> NDArray[np.float64]:
+        """One number of every model, e.g. ``values("peak", "mae_mps")``."""
+        scores = [_score_of(report, label, subject) for report in self.reports]
+        return np.array([getattr(getattr(score, part), number) for score in scores], np.float64)
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Errors of all groups on the same takes.
+
+    Parameters
+    ----------
+    kind : str
+        ``simulated`` or ``real`` radar.
+    subjects, labels : tuple of str
+        Labels that occur.
+    frames, moving : int
+        All, and those in which something moves.
+    groups : tuple of Group
+        The filters first.
+    notes : tuple of str
+        What one should know before believing it.
+    """
+
+    kind: str
+    subjects: tuple[str, ...]
+    labels: tuple[str, ...]
+    frames: int
+    moving: int
+    groups: tuple[Group, ...]
+    notes: tuple[str, ...] = field(default=())
+
+    def to_json(self) -> dict[str, Any]:
+        """All numbers of all models, and mean and sd over the models of a group."""
+        return {
+            "format": "sd2-evaluation",
+            "version": 1,
+            "kind": self.kind,
+            "subjects": list(self.subjects),
+            "labels": list(self.labels),
+            "frames": self.frames,
+            "moving_frames": self.moving,
+            "notes": list(self.notes),
+            "groups": [
+                {
+                    "name": group.name,
+                    "model": group.reports[0].card.model,
+                    "trained": group.trained,
+                    "parameters": group.reports[0].card.parameters,
+                    "peak_mae_mps": _spread(group.values("peak", "mae_mps")),
+                    "peak_sd_mps": _spread(group.values("peak", "sd_mps")),
+                    "peak_all_mae_mps": _spread(group.values("peak_all", "mae_mps")),
+                    "mean_mae_mps": _spread(group.values("mean", "mae_mps")),
+                    "mean_correlation": _spread(group.values("mean", "correlation")),
+                    "map_rmse": _spread(group.values("map", "rmse_compressed")),
+                    "models": [_report_json(report) for report in group.reports],
+                }
+                for group in self.groups
+            ],
+        }
+
+
+def evaluate(
+    models: Sequence[TrainedDenoiser],
+    pairs: PairSet,
+    subjects: Iterable[str] | None = None,
+    *,
+    first_only: bool = True,
+    progress: Progress = silent,
+) -> Evaluation:
+    """Measure models, and beside them what needs no training.
+
+    The filters are fitted on the subjects that the first model learnt from, as far as
+    they are there; else on all that are not judged.
+
+    Parameters
+    ----------
+    models : sequence of TrainedDenoiser
+    pairs : PairSet
+    subjects : iterable of str, optional
+        Who is judged; by default the test subjects of the first model, or everybody.
+    first_only : bool
+        Judge only what every take's own sensor saw.
+    progress : callable
+        Called with takes.
+
+    Raises
+    ------
+    Sd2Error
+        When a model does not fit the pairs, or a subject has no take.
+    """
+    for model in models:
+        _check_fits(model.card, pairs)
+    judged_subjects = _judged_subjects(models, pairs, subjects)
+    judged = pairs.of(judged_subjects).placements(first_only=first_only)
+    if not judged.takes:
+        raise Sd2Error("No take is left to judge", "takes of a sensor of their own")
+    truth = _Truth.of(judged)
+    filters = _filters(models, pairs, judged_subjects)
+    total = len(judged.takes) * (len(filters) + len(models))
+
+    reports = []
+    for number, (name, model) in enumerate(
+        [*filters, *((_title(model.card), model) for model in models)]
+    ):
+        estimate = _estimated(model, judged, progress, number * len(judged.takes), total)
+        reports.append(_report(name, model.card, estimate, truth))
+    progress(total, total)
+    groups = [Group(report.name, (report,), False) for report in reports[: len(filters)]]
+    return Evaluation(
+        kind=pairs.kind,
+        subjects=judged.subjects,
+        labels=tuple(truth.labels),
+        frames=len(truth.energies),
+        moving=int(truth.moving.sum()),
+        groups=(*groups, *_grouped(reports[len(filters) :])),
+        notes=_notes(models, judged_subjects, pairs),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Truth:
+    """All judged takes one after another."""
+
+    pairs: PairSet
+    energies: Energies  # (frames, bins)
+    moving: NDArray[np.bool_]  # (frames,)
+    labels: dict[str, NDArray[np.bool_]]
+    subjects: dict[str, NDArray[np.bool_]]
+    compression: Compression
+
+    @classmethod
+    def of(cls, pairs: PairSet) -> _Truth:
+        takes, nulled = pairs.takes, list(pairs.null_bins)
+        energies = np.concatenate([take.radar for take in takes])
+        energies[:, nulled] = 0.0
+        label = np.concatenate([take.label for take in takes])
+        subject = np.concatenate(
+            [np.full(len(take.label), pairs.subjects.index(take.subject)) for take in takes]
+        )
+        return cls(
+            pairs,
+            energies,
+            np.concatenate([stands_out(take.radar, pairs.null_bins) for take in takes]),
+            {name: label == n for n, name in enumerate(pairs.labels) if (label == n).any()},
+            {name: subject == n for n, name in enumerate(pairs.subjects)},
+            Compression.fitted([energies], pairs.null_bins),
+        )
+
+
+def _estimated(
+    model: TrainedDenoiser, pairs: PairSet, progress: Progress, done: int, total: int
+) -> Energies:
+    found = []
+    for number, take in enumerate(pairs.takes):
+        progress(done + number, total)
+        found.append(model.denoise_values(take.synthetic))
+    return np.concatenate(found)
+
+
+def _report(name: str, card: ModelCard, estimate: Energies, truth: _Truth) -> Report:
+    everywhere = np.ones(len(estimate), bool)
+    axis, seed = truth.pairs.axis, card.about.get("seed")
+    peaks_mps = peak_velocity_mps(estimate, axis), peak_velocity_mps(truth.energies, axis)
+    means_mps = mean_velocity_mps(estimate, axis), mean_velocity_mps(truth.energies, axis)
+
+    def score(frames: NDArray[np.bool_]) -> Score:
+        return Score(
+            frames=int(frames.sum()),
+            peak=velocity_error(*peaks_mps, frames & truth.moving),
+            peak_all=velocity_error(*peaks_mps, frames),
+            mean=velocity_error(*means_mps, frames & truth.moving),
+            map=map_error(
+                estimate[frames], truth.energies[frames], truth.compression, truth.pairs.null_bins
+            ),
+        )
+
+    return Report(
+        name=name,
+        card=card,
+        seed=seed if isinstance(seed, int) else None,
+        all=score(everywhere),
+        by_label={label: score(frames) for label, frames in truth.labels.items()},
+        by_subject={subject: score(frames) for subject, frames in truth.subjects.items()},
+    )
+
+
+def _filters(
+    models: Sequence[TrainedDenoiser], pairs: PairSet, judged: Sequence[str]
+) -> list[tuple[str, TrainedDenoiser]]:
+    learnt = _learnt(models[0].card, "training") if models else []
+    fitted_on = [name for name in pairs.subjects if name in learnt and name not in judged]
+    fitted_on = fitted_on or [name for name in pairs.subjects if name not in judged]
+    takes = pairs.of(fitted_on or judged).placements(first_only=True).takes
+    takes = takes or pairs.of(fitted_on or judged).takes
+    scaling = Scaling.fitted(
+        [take.synthetic for take in takes], [take.radar for take in takes], pairs.null_bins
+    )
+    inputs = [scaling.input.compress(take.synthetic) for take in takes]
+    targets = [scaling.target.compress(take.radar) for take in takes]
+    made = []
+    for name in FILTERS:
+        network, chosen = fit_filter(name, inputs, targets, pairs.null_bins)
+        card = ModelCard(
+            model=name,
+            options=chosen,
+            scaling=scaling,
+            axis=pairs.axis,
+            null_bins=pairs.null_bins,
+            frame_rate_hz=pairs.frame_rate_hz,
+            trained_on=pairs.kind,
+        )
+        made.append((name, TrainedDenoiser(network, card)))
+    return made
+
+
+def _grouped(reports: Sequence[Report]) -> list[Group]:
+    """By architecture, in the order of the first of each."""
+    groups: dict[str, list[Report]] = {}
+    for report in reports:
+        groups.setdefault(_architecture(report.card), []).append(report)
+    return [Group(name, tuple(members), True) for name, members in groups.items()]
+
+
+def _architecture(card: ModelCard) -> str:
+    """The model's name, with the options that are not its defaults."""
+    usual = options(card.model)
+    other = [f"{name}={value}" for name, value in card.options.items() if usual.get(name) != value]
+    return card.model + (f" ({', '.join(other)})" if other else "")
+
+
+def _title(card: ModelCard) -> str:
+    if card.path is None:
+        return card.title or card.model
+    # All best models have one name; their runs tell them apart.
+    return card.path.parent.name if card.path.stem == "best" else card.path.stem
+
+
+def _judged_subjects(
+    models: Sequence[TrainedDenoiser], pairs: PairSet, subjects: Iterable[str] | None
+) -> tuple[str, ...]:
+    if subjects is not None:
+        return pairs.of(subjects).subjects
+    unseen = _learnt(models[0].card, "test") if models else []
+    return tuple(name for name in pairs.subjects if name in unseen) or pairs.subjects
+
+
+def _learnt(card: ModelCard, part: str) -> list[str]:
+    subjects = card.about.get("subjects")
+    return list(subjects.get(part, ())) if isinstance(subjects, Mapping) else []
+
+
+def _notes(
+    models: Sequence[TrainedDenoiser], judged: Sequence[str], pairs: PairSet
+) -> tuple[str, ...]:
+    notes = []
+    for model in models:
+        seen = {*_learnt(model.card, "training"), *_learnt(model.card, "validation")}
+        known = [name for name in judged if name in seen]
+        if known:
+            notes.append(
+                f"{_title(model.card)} has learnt from, or was chosen by, subjects called"
+                f" {', '.join(known)}: its errors there say nothing about other people"
+            )
+        if model.card.trained_on != pairs.kind:
+            notes.append(
+                f"{_title(model.card)} has learnt from {model.card.trained_on} radar, and is"
+                f" judged by {pairs.kind} radar"
+            )
+    if not set(pairs.subjects) - set(judged):
+        notes.append("the filters were fitted on the very takes that they are judged by")
+    return tuple(dict.fromkeys(notes))
+
+
+def _check_fits(card: ModelCard, pairs: PairSet) -> None:
+    for what, mine, theirs in (
+        ("velocity axis", card.axis, pairs.axis),
+        ("null bins", card.null_bins, tuple(pairs.null_bins)),
+        ("frame rate", card.frame_rate_hz, pairs.frame_rate_hz),
+    ):
+        if mine != theirs:
+            raise Sd2Error(
+                f"The {what} of the model {_title(card)} is {mine}, that of the pairs {theirs}",
+                "the same",
+                "Judge it by pairs like those that it learnt from",
+            )
+
+
+def _score_of(report: Report, label: str | None, subject: str | None) -> Score:
+    if label is not None:
+        return report.by_label[label]
+    return report.by_subject[subject] if subject is not None else report.all
+
+
+def _spread(values: NDArray[np.float64]) -> dict[str, Any]:
+    """Mean over models, and their standard deviation (of the sample) where there are two."""
+    return {
+        "mean": float(values.mean()),
+        "sd": float(values.std(ddof=1)) if len(values) > 1 else None,
+        "models": len(values),
+    }
+
+
+def _report_json(report: Report) -> dict[str, Any]:
+    return {
+        "name": report.name,
+        "seed": report.seed,
+        "all": report.all.to_json(),
+        "by_label": {name: score.to_json() for name, score in report.by_label.items()},
+        "by_subject": {name: score.to_json() for name, score in report.by_subject.items()},
+    }

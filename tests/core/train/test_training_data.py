@@ -1,0 +1,233 @@
+"""Who is learnt from, what segments hold, in which order they come."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+from small_pairs import write_pairs
+
+from sd2core.denoise.registry import MODELS, build
+from sd2core.errors import Sd2Error
+from sd2core.pairs import read_pairs
+from sd2core.sensor import VelocityAxis
+from sd2core.train.config import DataConfig, TrainingConfig
+from sd2core.train.data import Order, prepare, read_mixed, segments_of, split_subjects
+from sd2core.train.learner import Steps
+from sd2core.train.optimiser import optimiser_of, rate_factor, set_rate
+
+
+class TestSplit:
+    @pytest.mark.parametrize(
+        ("subjects", "expected"),
+        [
+            ("abcdef", ("abcd", "e", "f")),
+            ("abc", ("a", "b", "c")),
+            ("ab", ("a", "b", "")),
+            ("a", ("a", "", "")),
+            ("abcdefghijkl", ("abcdefgh", "ij", "kl")),
+        ],
+    )
+    def test_by_default(self, subjects: str, expected: tuple[str, str, str]) -> None:
+        split = split_subjects(subjects)
+        assert tuple(map("".join, (split.training, split.validation, split.test))) == expected
+        assert split.by_take is (len(subjects) == 1)
+
+    def test_as_told(self) -> None:
+        split = split_subjects("abcd", ["a"], [])
+        assert (split.training, split.validation, split.test) == (("b", "c", "d"), ("a",), ())
+        assert split_subjects("abcd", None, ["c"]).validation == ("d",)
+        assert split_subjects("abcd", ["d"], None).test == ("c",)
+
+    @given(
+        st.lists(st.text("abc", min_size=1), unique=True, min_size=1, max_size=30),
+        st.data(),
+    )
+    def test_nobody_is_in_two_parts(self, subjects: list[str], data: st.DataObject) -> None:
+        test = data.draw(st.none() | st.lists(st.sampled_from(subjects), unique=True))
+        if test is not None and len(test) == len(subjects):
+            return
+        split = split_subjects(subjects, None, test)
+        parts = [*split.training, *split.validation, *split.test]
+        assert sorted(parts) == sorted(subjects)
+        assert split.training
+
+    @pytest.mark.parametrize(
+        ("validation", "test", "said"),
+        [
+            (["x"], None, "'x' is to be a validation subject and has no takes"),
+            (["a"], ["a"], "a is to validate and to test"),
+            (["a"], ["b"], "nobody is left"),
+        ],
+    )
+    def test_refused(self, validation: Any, test: Any, said: str) -> None:
+        with pytest.raises(Sd2Error, match=said):
+            split_subjects("ab", validation, test)
+
+
+class TestMixed:
+    def test_namesakes_of_different_stores_are_different_people(self, tmp_path: Path) -> None:
+        one = write_pairs(tmp_path / "one.zarr", ("s1", "s2"), kind="real")
+        labels = ("background", "wave", "swipe")
+        two = write_pairs(tmp_path / "two.zarr", ("s2", "s3"), labels=labels)
+        mixed = read_mixed([one, two])
+        assert mixed.subjects == ("s1", "one:s2", "two:s2", "s3")
+        assert mixed.kind == "simulated"
+        assert mixed.labels == ("background", "swipe", "wave")
+        # The second store calls wave what the first calls swipe.
+        before = read_pairs(two).takes[0].label
+        after = mixed.of(["two:s2"]).takes[0].label
+        assert np.array_equal(after == 2, before == 1)
+        assert (after == 2).any()
+
+    @pytest.mark.parametrize(
+        ("other", "said"),
+        [
+            ({"rate_hz": 10.0}, r"frame rate of .*one\.zarr is 30 Hz, that of .* is 10 Hz"),
+            ({"null_bins": (3,)}, r"null bins of .* is \[\], that of .* is \[3\]"),
+            ({"axis": VelocityAxis(8, 3.0)}, r"velocity axis .* is 8 bins over ±2 m/s, that"),
+        ],
+    )
+    def test_what_does_not_fit_is_not_mixed(
+        self, tmp_path: Path, other: dict[str, Any], said: str
+    ) -> None:
+        one = write_pairs(tmp_path / "one.zarr")
+        two = write_pairs(tmp_path / "two.zarr", **other)
+        with pytest.raises(Sd2Error, match=said):
+            read_mixed([one, two])
+
+
+class TestSegments:
+    def test_range_synthesis_by_placements(self, tmp_path: Path) -> None:
+        path = write_pairs(tmp_path / "p.zarr", placements=3)
+        counts = {}
+        for placements in ("all", "first"):
+            config = DataConfig((path,), segment_frames=30, overlap_frames=0, placements=placements)
+            data = prepare(read_pairs(path), config)
+            counts[placements] = len(data.training), len(data.validation)
+        # 2 takes of 150 frames; models are chosen by what the takes' own sensors saw.
+        assert counts == {"all": (30, 10), "first": (10, 10)}
+
+    def test_one_subject_is_split_by_motions(self, tmp_path: Path) -> None:
+        path = write_pairs(tmp_path / "p.zarr", ("s1",), takes=5, placements=2)
+        data = prepare(read_pairs(path), DataConfig((path,)))
+        assert data.split.by_take
+        assert {take.name for take in data.learnt_takes} == {"t0", "t1", "t2", "t3"}
+        lone = write_pairs(tmp_path / "lone.zarr", ("s1",), takes=1)
+        with pytest.raises(Sd2Error, match="one take of one subject"):
+            prepare(read_pairs(lone), DataConfig((lone,)))
+
+    def test_inputs_and_targets_are_of_the_same_frames(self, tmp_path: Path) -> None:
+        pairs = read_pairs(write_pairs(tmp_path / "p.zarr", ("s1",), takes=1))
+        segments = segments_of(pairs.takes, 40, 10)
+        take = pairs.takes[0]
+        assert [len(segments), *segments.inputs.shape[1:]] == [5, 40, 8]
+        for number, start in enumerate((0, 30, 60, 90, 110)):
+            assert np.array_equal(segments.inputs[number], take.synthetic[start : start + 40])
+            assert np.array_equal(segments.targets[number], take.radar[start : start + 40])
+
+    def test_takes_that_are_too_short(self, tmp_path: Path) -> None:
+        pairs = read_pairs(write_pairs(tmp_path / "p.zarr", ("s1",), frames=50))
+        with pytest.raises(Sd2Error, match="72 frames long, and the longest of 2 takes has 50"):
+            segments_of(pairs.takes, 72, 10)
+
+    def test_other_pairs_have_another_digest(self, tmp_path: Path) -> None:
+        one = write_pairs(tmp_path / "a.zarr")
+        two = write_pairs(tmp_path / "b.zarr", takes=3)
+        digests = {
+            prepare(read_pairs(path), DataConfig((path,))).digest for path in (one, two, one)
+        }
+        assert len(digests) == 2
+
+
+class TestOrder:
+    @given(st.integers(1, 60), st.integers(1, 20), st.integers(0, 5), st.integers(0, 1000))
+    def test_every_segment_once(self, segments: int, size: int, seed: int, epoch: int) -> None:
+        order = Order(segments, size, seed)
+        indices, gains = order.epoch(epoch)
+        batches = [indices[order.part(step)] for step in range(order.steps)]
+        assert sorted(np.concatenate(batches)) == list(range(segments))
+        assert all(len(batch) for batch in batches)
+        assert (gains == 1.0).all()
+
+    def test_it_depends_on_seed_and_epoch_alone(self) -> None:
+        first = Order(50, 8, 7, range_factor=2.0).epoch(3)
+        again = Order(50, 8, 7, range_factor=2.0).epoch(3)
+        assert all(np.array_equal(*two) for two in zip(first, again, strict=True))
+        assert not np.array_equal(first[0], Order(50, 8, 8).epoch(3)[0])
+        assert not np.array_equal(first[0], Order(50, 8, 7).epoch(4)[0])
+
+    def test_gains_follow_the_range_law(self) -> None:
+        gains = Order(20_000, 64, 0, range_factor=1.5).epoch(0)[1]
+        # Half again as near or as far: 1.5⁴ in power. Logarithms are spread evenly.
+        assert 1.5**-4 <= gains.min() < 1.02 * 1.5**-4
+        assert 0.98 * 1.5**4 < gains.max() <= 1.5**4 * (1 + 1e-6)
+        assert abs(np.log(gains).mean()) < 0.05
+
+    def test_steps_from_a_position_on(self) -> None:
+        order = Order(10, 4, 1)
+        whole = iter(Steps(order))
+        taken = [next(whole) for _ in range(7)]
+        later = iter(Steps(order, 1, 2))
+        for expected in taken[5:]:
+            found = next(later)
+            assert (found.epoch, found.number) == (expected.epoch, expected.number)
+            assert torch.equal(found.index, expected.index)
+        assert [(step.epoch, step.number, len(step.index)) for step in taken[:4]] == [
+            (0, 0, 4),
+            (0, 1, 4),
+            (0, 2, 2),
+            (1, 0, 4),
+        ]
+
+    @pytest.mark.parametrize("ranks", [2, 3])
+    def test_processes_share_a_batch(self, ranks: int) -> None:
+        order = Order(11, 6, 1)
+        parts = [iter(Steps(order, rank=rank, ranks=ranks)) for rank in range(ranks)]
+        for _ in range(order.steps):
+            steps = [next(part) for part in parts]
+            assert len({len(step.index) for step in steps}) == 1
+            indices = order.epoch(0)[0][order.part(steps[0].number)]
+            assert set(torch.cat([step.index for step in steps]).tolist()) == set(indices)
+
+
+class TestOptimiser:
+    @pytest.mark.parametrize("name", [name for name in MODELS if name != "s4-serial"])
+    def test_every_parameter_once_and_state_spaces_apart(self, name: str) -> None:
+        model = build(name, 32)
+        config = TrainingConfig(learning_rate=0.5, ssm_learning_rate=0.25, weight_decay=0.125)
+        groups = optimiser_of(model, config).param_groups
+        grouped = [id(parameter) for group in groups for parameter in group["params"]]
+        assert sorted(grouped) == sorted(map(id, model.parameters()))
+        spaces = {id(parameter) for parameter in model.ssm_parameters()}
+        assert bool(spaces) is name.startswith("s4")
+        for group in groups:
+            for parameter in group["params"]:
+                if id(parameter) in spaces:
+                    assert (group["lr"], group["weight_decay"]) == (0.25, 0.0)
+                else:
+                    decay = 0.125 if parameter.ndim > 1 else 0.0
+                    assert (group["lr"], group["weight_decay"]) == (0.5, decay)
+
+    def test_the_rate_rises_and_falls(self) -> None:
+        factors = [rate_factor(done, 0.1, 0.01) for done in np.linspace(0, 1, 101)]
+        assert factors[0] == 0.0
+        assert factors[5] == pytest.approx(0.5)
+        assert factors[10] == pytest.approx(1.0)
+        assert factors[55] == pytest.approx((1 + 0.01) / 2)
+        assert factors[100] == pytest.approx(0.01)
+        assert np.all(np.diff(factors[10:]) < 0)
+        assert rate_factor(0.0, 0.0, 0.5) == 1.0
+        assert rate_factor(1.7, 0.0, 0.5) == 0.5
+
+    def test_all_groups_keep_their_ratio(self) -> None:
+        optimiser = optimiser_of(build("s4", 32), TrainingConfig())
+        assert set_rate(optimiser, 0.5) == pytest.approx(0.5 * TrainingConfig().learning_rate)
+        rates = {group["lr"] for group in optimiser.param_groups}
+        config = TrainingConfig()
+        assert rates == {0.5 * config.learning_rate, 0.5 * config.ssm_learning_rate}
