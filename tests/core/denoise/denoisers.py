@@ -41,7 +41,7 @@ def trained(name: str, seed: int = 0, bins: int = 32, **card: Any) -> TrainedDen
         for parameter in network.parameters():
             parameter += 0.3 * torch.randn_like(parameter)
         if hasattr(network, "head"):
-            network.head.bias += 1.0  # negative answers are no energy
+            network.head.bias += 5.0  # negative answers are no energy
     about = {
         "model": name,
         "options": SMALL[name],
