@@ -69,6 +69,18 @@ class _ByTransform(torch.autograd.Function):
         return by_signal[..., :length], by_kernel[..., :length]
 
 
+def by_product(signal: Tensor, kernel: Tensor) -> Tensor:
+    """As `causal_convolution`, by one matrix product per channel."""
+    convolved: Tensor = _ByProduct.apply(signal, kernel)
+    return convolved
+
+
+def by_transform(signal: Tensor, kernel: Tensor) -> Tensor:
+    """As `causal_convolution`, by Fourier transforms padded so that nothing wraps around."""
+    convolved: Tensor = _ByTransform.apply(signal, kernel)
+    return convolved
+
+
 def causal_convolution(signal: Tensor, kernel: Tensor) -> Tensor:
     """y[h, b, t] = Σ kernel[h, l] signal[h, b, t − l] for l = 0 … t.
 
@@ -83,6 +95,4 @@ def causal_convolution(signal: Tensor, kernel: Tensor) -> Tensor:
     """
     _, signals, length = signal.shape
     short = length < _LONGEST_PRODUCT and signals >= _FEWEST_SIGNALS
-    way = _ByProduct if short else _ByTransform
-    convolved: Tensor = way.apply(signal, kernel)
-    return convolved
+    return by_product(signal, kernel) if short else by_transform(signal, kernel)

@@ -4,12 +4,15 @@ import copy
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
 import pytest
 import torch
 from torch import Tensor
 
+from sd2core.denoise.convolution import causal_convolution
 from sd2core.denoise.s4 import S4Layer
 from sd2core.denoise.ssm import legs_kernel
+from sd2core.denoise.systems import SLOWEST_DECAY, StateSpace
 from sd2core.errors import Sd2Error
 
 KERNELS = ("legs", "diagonal")
@@ -43,18 +46,21 @@ def test_no_frame_knows_of_later_ones(kernel: str) -> None:
 
 
 @pytest.mark.parametrize("kernel", KERNELS)
-@pytest.mark.parametrize("dt", [1e-4, 1e-3, 1e-2, 0.1, 1.0])
-def test_frame_by_frame_is_the_convolution(kernel: str, dt: float) -> None:
-    layer = layer_of(kernel, 3, 64)
+def test_frame_by_frame_is_the_convolution(kernel: str) -> None:
+    space = layer_of(kernel, 5, 64).past
     with torch.no_grad():
-        layer.past.log_dt.fill_(torch.log(torch.tensor(dt)))
-        x = torch.randn(1, 2304, 3)
-        at_once = layer(x)
-        state, frames = layer.initial_state(1), []
-        for t in range(x.shape[1]):
-            frame, state = layer.step(x[:, t], state)
-            frames.append(frame)
-    assert largest(torch.stack(frames, 1) - at_once) <= 2e-5 * largest(at_once)
+        space.log_dt.copy_(torch.tensor([1e-4, 1e-3, 1e-2, 0.1, 1.0]).log())
+        signal = torch.randn(5, 1, 2304)
+        at_once = causal_convolution(signal, space.kernel(2304))
+        recurrence, frames = space.recurrence(), []
+        state = recurrence.initial_state(1)
+        for frame in signal.double().unbind(-1):
+            out, state = recurrence.step(frame, state)
+            frames.append(out)
+    one_by_one = torch.stack(frames, -1)
+    for channel in range(5):
+        limit = 2e-5 * largest(at_once[channel])
+        assert largest(one_by_one[channel] - at_once[channel]) <= limit
 
 
 @pytest.mark.parametrize("kernel", KERNELS)
@@ -67,7 +73,12 @@ def test_chunks_are_the_whole(kernel: str) -> None:
             part, state = layer.chunk(chunk, state)
             parts.append(part)
         whole = layer(x)
+        state, frames = layer.initial_state(3), []
+        for t in range(x.shape[1]):
+            frame, state = layer.step(x[:, t], state)
+            frames.append(frame)
     assert largest(torch.cat(parts, 1) - whole) < 5e-6
+    assert largest(torch.stack(frames, 1) - whole) < 5e-6
 
 
 def test_two_directions_see_both_and_cannot_run_live() -> None:
@@ -103,3 +114,165 @@ def test_starts_as_hippo_legs() -> None:
         made[:, 0] -= layer.past.skip
         true = legs_kernel(layer.past.outputs, layer.past.dt(), 72)
     assert largest(made - true) < 1e-5 * largest(true)
+
+
+def shaken(layer: S4Layer, size: float) -> S4Layer:
+    with torch.no_grad():
+        for parameter in layer.past.parameters():
+            parameter += size * torch.randn_like(parameter)
+    return layer
+
+
+@pytest.mark.parametrize("size", [0.1, 1.0, 10.0, 100.0])
+def test_no_noise_on_the_parameters_makes_it_unstable(size: float) -> None:
+    layer = shaken(layer_of("legs", 50), size)
+    matrix = layer.past.matrix()
+    poles, p = (values.detach().numpy() for values in (matrix.poles, matrix.low_rank))
+    for channel in range(50):
+        full = np.concatenate((poles[channel], poles[channel].conj()))
+        both = np.concatenate((p[channel], p[channel]))
+        # Its Hermitian part is below −SLOWEST_DECAY; eigenvalues lie in its numerical range.
+        A = np.diag(full) - np.outer(both, both)
+        rounding = 1e-14 * np.abs(A).max()
+        assert np.linalg.eigvals(A).real.max() <= -SLOWEST_DECAY + rounding
+    assert layer_of("diagonal").past.poles().real.max() < 0
+    assert shaken(layer_of("diagonal"), size).past.poles().real.max() <= -SLOWEST_DECAY
+
+
+@pytest.mark.parametrize("kernel", KERNELS)
+@pytest.mark.parametrize("log_dt", [-200.0, 0.0, 200.0])
+@pytest.mark.parametrize("log_decay", [-200.0, 0.0, 200.0])
+def test_no_logarithm_is_too_large(kernel: str, log_dt: float, log_decay: float) -> None:
+    for length in (1, 72):
+        layer = layer_of(kernel, 3)
+        with torch.no_grad():
+            layer.past.log_dt.fill_(log_dt)
+            layer.past.log_decay.fill_(log_decay)
+        x = torch.randn(17, length, 3)
+        out = layer(x)
+        out.square().sum().backward()
+        assert out.isfinite().all()
+        for parameter in layer.parameters():
+            assert parameter.grad is not None
+            assert parameter.grad.isfinite().all()
+        with torch.no_grad():
+            frame, state = layer.step(x[:, 0], layer.initial_state(17))
+        assert largest(frame - out[:, 0]) <= 1e-5 * largest(out[:, 0])
+        assert state.isfinite().all()
+
+
+@pytest.mark.parametrize("kernel", KERNELS)
+@pytest.mark.parametrize("bidirectional", [False, True])
+def test_derivatives_of_the_layer(kernel: str, bidirectional: bool) -> None:
+    layer = layer_of(kernel, 2, 4, bidirectional=bidirectional).double()
+    names = [name for name, _ in layer.named_parameters()]
+    values = [parameter.detach().requires_grad_() for parameter in layer.parameters()]
+    x = torch.randn(2, 5, 2, dtype=torch.float64, requires_grad=True)
+
+    def made(x: Tensor, *values: Tensor) -> Tensor:
+        return torch.func.functional_call(layer, dict(zip(names, values, strict=True)), (x,))
+
+    assert torch.autograd.gradcheck(made, (x, *values))
+
+
+def test_all_but_outputs_and_skip_are_dynamics() -> None:
+    layer = layer_of("legs", bidirectional=True)
+    given = {id(parameter) for parameter in layer.ssm_parameters()}
+    rest = {name for name, parameter in layer.named_parameters() if id(parameter) not in given}
+    assert rest == {
+        *("mixing.weight", "mixing.bias"),
+        *(f"{part}.{name}" for part in ("past", "future") for name in ("outputs", "skip")),
+    }
+
+
+def test_dropout_leaves_out_whole_channels_while_learning_only() -> None:
+    layer = layer_of("legs", dropout=0.5)
+    x = torch.randn(4, 20, 6)
+    with torch.no_grad():
+        whole = layer(x)
+        assert torch.equal(layer(x), whole)
+        layer.train()
+        first, second = layer(x), layer(x)
+        assert largest(first - second) > 1e-2
+        layer.mixing.weight.zero_()
+        layer.mixing.weight[0, 0] = 1.0  # a = what channel 0 lets through, the gate is half open
+        layer.mixing.bias.zero_()
+        through = 2 * (layer(x) - x)[..., 0]
+        layer.eval()
+        kept = 2 * (layer(x) - x)[..., 0]
+    ratio = through / kept
+    for row in ratio:
+        assert largest(row - row[0]) < 1e-3
+        assert round(float(row[0]), 2) in (0.0, 2.0)
+
+
+class TestKept:
+    """What follows from the parameters is kept while nothing is learned, and no longer."""
+
+    @pytest.fixture
+    def made(self, monkeypatch: pytest.MonkeyPatch) -> list[int]:
+        lengths: list[int] = []
+        true = StateSpace._made_kernel
+
+        def counted(self: StateSpace, length: int) -> Tensor:
+            lengths.append(length)
+            return true(self, length)
+
+        monkeypatch.setattr(StateSpace, "_made_kernel", counted)
+        return lengths
+
+    def test_made_once(self, made: list[int]) -> None:
+        layer, x = layer_of("legs"), torch.randn(1, 20, 6)
+        with torch.no_grad():
+            first = layer(x)
+            assert torch.equal(layer(x), first)
+        assert made == [20]
+        with torch.inference_mode():
+            layer(x)
+        assert made == [20]
+        layer(x).sum().backward()  # where derivatives are wanted a kept kernel has none
+        assert layer.past.outputs.grad is not None
+
+    @pytest.mark.parametrize("kernel", KERNELS)
+    def test_dropped_when_parameters_change(self, kernel: str) -> None:
+        layer, other = layer_of(kernel), shaken(layer_of(kernel), 0.3)
+        x = torch.randn(1, 40, 6)
+
+        def as_if_new() -> None:
+            fresh = layer_of(kernel).to(x.dtype)
+            fresh.load_state_dict(layer.state_dict())
+            with torch.no_grad():
+                assert torch.equal(layer(x), fresh(x))
+                frame = layer.step(x[:, 0], layer.initial_state(1))[0]
+                assert torch.equal(frame, fresh.step(x[:, 0], fresh.initial_state(1))[0])
+                chunk = layer.chunk(x, layer.initial_state(1))[0]
+                assert torch.equal(chunk, fresh.chunk(x, fresh.initial_state(1))[0])
+
+        as_if_new()
+        layer.load_state_dict(other.state_dict())
+        as_if_new()
+        shaken(layer, 0.1)
+        as_if_new()
+        layer.train()
+        optimiser = torch.optim.SGD(layer.parameters(), 0.1)
+        layer(x).square().mean().backward()
+        optimiser.step()
+        layer.eval()
+        as_if_new()
+        layer.train()
+        layer.past.outputs.data += 1.0  # behind autograd's back
+        layer.eval()
+        as_if_new()
+        layer.past.log_dt = torch.nn.Parameter(layer.past.log_dt.detach() - 1.0)
+        as_if_new()
+        x = x.double()
+        layer.double()
+        as_if_new()
+
+    def test_copies_keep_nothing(self) -> None:
+        layer, x = layer_of("legs"), torch.randn(1, 20, 6)
+        with torch.no_grad():
+            true = layer(x)
+            copied = copy.deepcopy(layer)
+            assert not copied.past._kept
+            assert torch.equal(copied(x), true)

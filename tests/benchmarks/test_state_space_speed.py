@@ -1,0 +1,165 @@
+"""Kernels of state spaces against the published algorithms, and what a stack of layers takes.
+
+One torch thread where one is compared with the other; H = 128 channels, N = 64. What a run
+measures is printed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+import torch
+from published_kernels import PublishedDiagonal, PublishedLayer, PublishedLegs
+from timing import best_s
+from torch import Tensor, nn
+
+from sd2core.denoise.convolution import by_product, by_transform
+from sd2core.denoise.s4 import S4Layer
+from sd2core.denoise.systems import StateSpace
+
+CHANNELS, STATE_SIZE = 128, 64
+PUBLISHED = {"legs": PublishedLegs, "diagonal": PublishedDiagonal}
+
+
+@contextmanager
+def threads(count: int) -> Iterator[None]:
+    before = torch.get_num_threads()
+    torch.set_num_threads(count)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
+
+
+def in_turn_ms(works: list[Any], rounds: int) -> list[float]:
+    """Best of each, one after the other every round, so that a busy machine is so for all."""
+    spent = [[best_s(work, 1) for work in works] for _ in range(rounds)]
+    return [1e3 * min(times) for times in zip(*spent, strict=True)]
+
+
+@pytest.mark.benchmark(group="state spaces, kernels")
+@pytest.mark.parametrize(
+    ("kernel", "length", "least"),
+    [("legs", 72, 4), ("diagonal", 72, 3), ("legs", 2304, 8), ("diagonal", 2304, 15)],
+)
+def test_kernel_forward_and_backward(
+    benchmark: Any, kernel: str, length: int, least: float, capsys: pytest.CaptureFixture[str]
+) -> None:
+    space = StateSpace(CHANNELS, STATE_SIZE, kernel)  # type: ignore[arg-type]
+    published = PUBLISHED[kernel](CHANNELS, STATE_SIZE, length)
+    gradient = torch.randn(CHANNELS, length)
+
+    def both_ways(made: Any, learned: list[Tensor]) -> Any:
+        return lambda: torch.autograd.grad(made(), learned, gradient)
+
+    works = [
+        both_ways(lambda: space.kernel(length), list(space.parameters())),
+        both_ways(published.kernel, published.learned),
+    ]
+    with threads(1):
+        rounds = 40 if length < 500 else 6
+        ours_ms, theirs_ms = benchmark.pedantic(in_turn_ms, args=(works, rounds), rounds=1)
+    with capsys.disabled():
+        print(
+            f"\n{kernel}, {length} frames, forward and backward: {ours_ms:.1f} ms, "
+            f"as published {theirs_ms:.0f} ms, {theirs_ms / ours_ms:.1f} times"
+        )
+    assert theirs_ms / ours_ms >= least
+
+
+class Stack(nn.Module):
+    def __init__(self, layers: list[nn.Module]) -> None:
+        super().__init__()
+        self.lift = nn.Linear(32, CHANNELS)
+        self.layers = nn.ModuleList(layers)
+        self.head = nn.Linear(CHANNELS, 32)
+
+    def forward(self, x: Tensor) -> Tensor:
+        x = self.lift(x)
+        for layer in self.layers:
+            x = layer(x)
+        return self.head(x)
+
+
+def ours(kernel: str) -> Stack:
+    return Stack([S4Layer(CHANNELS, STATE_SIZE, kernel) for _ in range(4)])  # type: ignore[arg-type]
+
+
+def theirs(kernel: str) -> Stack:
+    made = PUBLISHED[kernel]
+    return Stack([PublishedLayer(made(CHANNELS, STATE_SIZE, 72), CHANNELS) for _ in range(4)])
+
+
+def training_step(stack: Stack) -> Any:
+    optimiser = torch.optim.AdamW(stack.parameters(), 1e-3, fused=True)
+    given, wanted = torch.randn(2, 64, 72, 32)
+
+    def step() -> None:
+        optimiser.zero_grad()
+        (stack(given) - wanted).square().mean().sqrt().backward()
+        optimiser.step()
+
+    return step
+
+
+@pytest.mark.benchmark(group="state spaces, stack of layers")
+@pytest.mark.parametrize("kernel", ["legs", "diagonal"])
+def test_four_layers(benchmark: Any, kernel: str, capsys: pytest.CaptureFixture[str]) -> None:
+    stack = ours(kernel)
+    steps = [training_step(stack), training_step(theirs(kernel))]
+    with threads(1):
+        ours_ms, theirs_ms = benchmark.pedantic(in_turn_ms, args=(steps, 20), rounds=1)
+    stack.eval()
+    clip, frame = torch.randn(1, 450, 32), torch.randn(1, 32)
+    states = [layer.initial_state(1) for layer in stack.layers]
+
+    def live_frame() -> Tensor:
+        x = stack.lift(frame)
+        for place, layer in enumerate(stack.layers):
+            x, states[place] = layer.step(x, states[place])
+        return stack.head(x)
+
+    with torch.inference_mode():
+        with threads(1):
+            stack.layers[0].step(torch.randn(1, CHANNELS), states[0])
+            frame_s = best_s(live_frame, 300)
+        with threads(2):
+            stack(clip)
+            clip_s = best_s(lambda: stack(clip), 25)
+    with capsys.disabled():
+        print(
+            f"\n{kernel}: training step of 64 × 72 frames {ours_ms:.0f} ms, as published "
+            f"{theirs_ms:.0f} ms, {theirs_ms / ours_ms:.1f} times; one live frame "
+            f"{1e3 * frame_s:.2f} ms; 450 frames at once {1e3 * clip_s:.1f} ms"
+        )
+    # 0.51 and 0.33 s were measured of the reference implementation where 0.20 s is the limit.
+    assert theirs_ms / ours_ms >= {"legs": 2.5, "diagonal": 1.6}[kernel]
+    assert frame_s <= 1e-3
+    assert clip_s <= 40e-3
+
+
+@pytest.mark.benchmark(group="state spaces, convolution")
+def test_product_or_transform(benchmark: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    def compared(signals: int, length: int) -> list[float]:
+        signal = torch.randn(CHANNELS, signals, length, requires_grad=True)
+        kernel = torch.randn(CHANNELS, length, requires_grad=True)
+        gradient = torch.randn(CHANNELS, signals, length)
+        return in_turn_ms(
+            [
+                lambda way=way: torch.autograd.grad(way(signal, kernel), (signal, kernel), gradient)
+                for way in (by_product, by_transform)
+            ],
+            12,
+        )
+
+    with threads(1):
+        sizes = [(signals, length) for signals in (1, 16, 64) for length in (72, 144, 288)]
+        found = benchmark.pedantic(lambda: {size: compared(*size) for size in sizes}, rounds=1)
+    with capsys.disabled():
+        print("\nsignals, frames: by product, by transform, ms forward and backward")
+        for (signals, length), (product, transform) in found.items():
+            print(f"{signals}, {length}: {product:.1f}, {transform:.1f}")
+    assert found[64, 72][0] < found[64, 72][1]
