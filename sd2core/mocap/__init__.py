@@ -1,1 +1,1 @@
-"""A body driven by a recorded skeleton."""
+"""Bodies that move as a recorded skeleton did."""

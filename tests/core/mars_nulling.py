@@ -22,11 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
+from sd2core.io.radar.mars import FRAMES_PER_S, read_mars
 from sd2core.mesh import MeshSequence
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 
-FRAMES_PER_S = 10.0
 PARTS = ("test", "validate")
 LAGS = (-3, -2, -1, 0, 1, 2, 3)
 
@@ -60,27 +60,14 @@ class Segment:
 
 
 def read_part(folder: Path, part: str) -> list[Segment]:
-    """Segments of one part, cut where the radar's frame number jumps."""
-    kinect = folder / f"kinect_data_{part}.csv"
-    heading = kinect.read_text().split("\n", 1)[0].split(",")
-    table = np.loadtxt(kinect, delimiter=",", skiprows=1)  # (rows, 75)
-    x, depth, height = (
-        table[:, [name.endswith(suffix) for name in heading]] for suffix in ("_X", "_Y", "_Z")
-    )
-    joints = np.stack([x, -height, depth], axis=2)  # right, down, forward
-
-    points = np.loadtxt(folder / f"radar_data_{part}.csv", delimiter=",", skiprows=1)
-    frame, first, inverse = np.unique(points[:, 0], return_index=True, return_inverse=True)
-    assert (np.diff(first) > 0).all()
-    assert len(frame) == len(joints)
-    receding_mps, intensity = points[:, 5], points[:, 6]
-    radar_mps = -np.bincount(inverse, intensity * receding_mps) / np.bincount(inverse, intensity)
-    moving = np.bincount(inverse, receding_mps != 0.0).astype(np.int64)
-
-    cuts = np.flatnonzero(np.diff(frame) > 10) + 1
+    """Segments of one part, row by row as the file has them."""
     return [
-        Segment(joints[rows].astype(np.float32), radar_mps[rows], moving[rows])
-        for rows in np.split(np.arange(len(frame)), cuts)
+        Segment(
+            stretch.joints_m.astype(np.float32),
+            stretch.mean_velocity_mps(),
+            np.bincount(stretch.point_rows, stretch.point_mps != 0.0).astype(np.int64),
+        )
+        for stretch in read_mars(folder, part).stretches
     ]
 
 

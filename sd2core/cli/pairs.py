@@ -1,0 +1,128 @@
+"""``sd2 pairs``: synthetic Doppler beside what a real radar saw, to learn from."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sd2core.cli.options import add_axis, add_command, add_json, bin_list
+from sd2core.cli.output import print_facts, print_json, progress_bar
+
+if TYPE_CHECKING:
+    from sd2core.mocap.mars_pairs import MarsChoices
+
+
+def add_commands(commands: argparse._SubParsersAction) -> None:
+    """Add ``pairs``."""
+    parser = add_command(
+        commands, "pairs", "make pairs of synthetic and real Doppler to learn from"
+    )
+    kinds = parser.add_subparsers(title="recordings", metavar="COMMAND", required=True)
+    _add_mars(kinds)
+
+
+def _add_mars(kinds: argparse._SubParsersAction) -> None:
+    parser = add_command(
+        kinds,
+        "mars",
+        "pairs from MARS recordings: a Kinect skeleton and a radar's points",
+        handler=_mars,
+        description=(
+            "A body of the person's size moves as the Kinect saw it; its synthetic Doppler is\n"
+            "the input, the Doppler of the radar's points the target. Person and part make\n"
+            "the subject (1-test), so that training and test can be kept apart.\n\n"
+            "It can be stopped at any moment; the same command goes on from there."
+        ),
+        examples=(
+            "  sd2 pairs mars mars_subject1 mars_subject4 --out mars.zarr\n"
+            "  sd2 pairs mars mars_subject1 --out nulled.zarr --null-bins 14,15,16"
+        ),
+    )
+    parser.add_argument(
+        "folders",
+        type=Path,
+        nargs="+",
+        metavar="FOLDER",
+        help="a person's kinect_data_PART.csv and radar_data_PART.csv",
+    )
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="PAIRS", help="the store to write (.zarr)"
+    )
+    add_axis(parser)
+    parser.add_argument(
+        "--null-bins",
+        type=bin_list,
+        metavar="LIST",
+        help="bins to empty in input and target, e.g. 14,15,16 (default: none)",
+    )
+    parser.add_argument(
+        "--visibility",
+        choices=("none", "facing", "depth", "exact"),
+        help="which vertices count (default: facing)",
+    )
+    parser.add_argument(
+        "--weight",
+        choices=("count", "area", "projected"),
+        help="what a vertex counts (default: count)",
+    )
+    parser.add_argument(
+        "--target",
+        choices=("share", "intensity"),
+        help="whether each frame of the radar holds shares that add up to 1, or intensities"
+        " (default: share)",
+    )
+    add_json(parser)
+
+
+def _choices(options: argparse.Namespace) -> MarsChoices:
+    from sd2core.mocap.mars_pairs import MarsChoices
+    from sd2core.sensor import VelocityAxis
+
+    choices = MarsChoices()
+    synthesis = choices.synthesis
+    axis = VelocityAxis(
+        options.bins or synthesis.axis.bins, options.v_max or synthesis.axis.v_max_mps
+    )
+    changes = {
+        name: getattr(options, name)
+        for name in ("null_bins", "visibility", "weight")
+        if getattr(options, name) is not None
+    }
+    choices = replace(choices, synthesis=replace(synthesis, axis=axis, **changes))
+    return replace(choices, target=options.target) if options.target else choices
+
+
+def _mars(options: argparse.Namespace) -> None:
+    from sd2core.mocap.mars_pairs import make_mars_pairs
+
+    with progress_bar("Making pairs") as progress:
+        made = make_mars_pairs(options.folders, options.out, _choices(options), progress)
+    if options.json:
+        print_json(
+            {
+                "pairs": str(options.out),
+                "kind": "real",
+                "subjects": {
+                    subject: {
+                        "takes": takes,
+                        "frames": frames,
+                        "stature_m": made.stature_m.get(subject),
+                        "residual_m": made.residual_m.get(subject),
+                    }
+                    for subject, (takes, frames) in made.subjects.items()
+                },
+            }
+        )
+        return
+    facts = {"radar": "real"}
+    for subject, (takes, frames) in made.subjects.items():
+        line = f"{takes} takes, {frames:,} frames"
+        if subject in made.stature_m:
+            line += (
+                f"; a body of {made.stature_m[subject]:.2f} m, its joints"
+                f" {100 * made.residual_m[subject]:.1f} cm from the skeleton's"
+            )
+        facts[subject] = line
+    print_facts(str(options.out), facts)
