@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,9 @@ import torch
 from denoisers import CAUSAL, SMALL, WINDOWED, energies, synthetic_map, trained
 
 from sd2core.denoise import live, matching
+from sd2core.denoise.files import load_model, save_model
+from sd2core.denoise.live import TrainedDenoiser
+from sd2core.denoise.registry import build
 from sd2core.errors import Sd2Error
 from sd2core.progress import Cancelled
 from sd2core.sensor import VelocityAxis
@@ -96,6 +100,19 @@ def test_live_forgets_where_nobody_is(name: str) -> None:
     assert not stream.step(values[0], present=False).any()
     for frame in values[:5]:
         np.testing.assert_array_equal(stream.step(frame), fresh.step(frame))
+
+
+def test_a_state_space_that_looks_ahead_works_in_windows(tmp_path: Path) -> None:
+    options = {"channels": 4, "depth": 1, "state_size": 4, "bidirectional": True}
+    card = replace(trained("s4").card, options=options)
+    save_model(tmp_path / "both.safetensors", TrainedDenoiser(build("s4", **options), card))
+    denoiser, values = load_model(tmp_path / "both.safetensors"), energies(72)
+    assert not denoiser.network.causal
+    assert not denoiser.live().equals_batch
+    other = values.copy()
+    other[60] *= 4.0
+    moved = np.abs(denoiser.denoise_values(values) - denoiser.denoise_values(other))
+    assert moved[:60].any()
 
 
 @pytest.mark.parametrize("name", WINDOWED)
