@@ -51,6 +51,7 @@ class ModelCardDialog(QDialog):
 
     def _head(self, card: ModelCard) -> QHBoxLayout:
         row = QHBoxLayout()
+        row.setSpacing(12)
         title = QLabel(model_title(card), self)
         title.setObjectName("title")
         row.addWidget(title)

@@ -33,6 +33,11 @@ class DenoiseProcess:
     """Started with the first model, started anew where it died; one request at a time.
 
     Its methods wait for the answer: they belong into background threads.
+
+    Attributes
+    ----------
+    generation : int
+        How often it was started: a new one knows nothing of what the others had loaded.
     """
 
     def __init__(self, command: Sequence[str] = COMMAND) -> None:
@@ -40,6 +45,7 @@ class DenoiseProcess:
         self._process: subprocess.Popen[bytes] | None = None
         self._lock = threading.Lock()
         self._closed = False
+        self.generation = 0
 
     @property
     def running(self) -> bool:
@@ -54,8 +60,7 @@ class DenoiseProcess:
         Sd2Error
             When it cannot be loaded.
         """
-        content, _ = self.ask({"do": "load", "path": str(path)})
-        return RemoteDenoiser(self, content["model"], content["equals_batch"])
+        return RemoteDenoiser(self, path)
 
     def ask(self, content: dict[str, Any], numbers: bytes = b"") -> Message:
         """Ask, and wait for the answer.
@@ -75,9 +80,8 @@ class DenoiseProcess:
             except (OSError, ValueError):  # closed from another thread
                 answer = None
             if answer is None:
-                process.kill()
-                process.wait()
                 self._process = None
+                _let_go(process)
         if answer is None:
             raise Sd2Error(
                 "The process that denoises has ended",
@@ -90,20 +94,21 @@ class DenoiseProcess:
     def close(self) -> None:
         """End it, whatever it is doing."""
         self._closed = True
-        process = self._process
-        if process is not None:
-            process.kill()
-            process.wait()
-            for stream in (process.stdin, process.stdout):
-                if stream is not None:
-                    # What was not written has nobody to read it.
-                    with contextlib.suppress(OSError):
-                        stream.close()
+        busy = self._process
+        if busy is not None:
+            busy.kill()  # a thread that waits for its answer goes on
+        with self._lock:
+            process, self._process = self._process, None
+            if process is not None:
+                _let_go(process)
 
     def _started(self) -> subprocess.Popen[bytes]:
         if self._closed:
             raise Sd2Error("The window is being closed")
-        if self._process is None or self._process.poll() is not None:
+        if self._process is not None and self._process.poll() is not None:
+            _let_go(self._process)
+            self._process = None
+        if self._process is None:
             # One thread: the cores belong to synthesis, video and drawing as well.
             environment = os.environ | {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
             self._process = subprocess.Popen(
@@ -114,29 +119,52 @@ class DenoiseProcess:
                 env=environment,
                 creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
             )
+            self.generation += 1
         return self._process
+
+
+def _let_go(process: subprocess.Popen[bytes]) -> None:
+    process.kill()
+    process.wait()
+    for stream in (process.stdin, process.stdout):
+        if stream is not None:
+            # What was not written has nobody to read it.
+            with contextlib.suppress(OSError):
+                stream.close()
 
 
 class RemoteDenoiser:
     """A model in that process; what it offers is what ``TrainedDenoiser`` does."""
 
-    def __init__(self, process: DenoiseProcess, number: int, equals_batch: bool) -> None:
+    def __init__(self, process: DenoiseProcess, path: Path) -> None:
         self._process = process
-        self._number = number
-        self.equals_batch = equals_batch
+        self._path = path
+        self._load()
 
     def denoise(self, doppler: DopplerMap) -> DopplerMap:
         """What a radar would show in place of a synthetic map."""
         content, numbers = packed_map(doppler)
         answer, numbers = self._process.ask(
-            {"do": "denoise", "model": self._number, "map": content}, numbers
+            {"do": "denoise", "model": self._ready(), "map": content}, numbers
         )
         return replace(unpacked_map(answer, numbers), timebase=doppler.timebase)
 
     def live(self) -> RemoteLive:
         """For frames as they come; the one before is forgotten."""
-        content, _ = self._process.ask({"do": "live", "model": self._number})
+        content, _ = self._process.ask({"do": "live", "model": self._ready()})
         return RemoteLive(self._process, content["live"], self.equals_batch)
+
+    def _load(self) -> None:
+        content, _ = self._process.ask({"do": "load", "path": str(self._path)})
+        self._number: int = content["model"]
+        self.equals_batch: bool = content["equals_batch"]
+        self._generation = self._process.generation
+
+    def _ready(self) -> int:
+        """Its number, loaded again where the process that had it is gone."""
+        if not self._process.running or self._process.generation != self._generation:
+            self._load()
+        return self._number
 
 
 class RemoteLive:

@@ -65,6 +65,7 @@ class Worker:
         model = self._models.get(content["model"])
         if model is None:
             raise Sd2Error("The model is no longer loaded", remedy="Choose it again")
+        self._models[content["model"]] = self._models.pop(content["model"])  # the newest in use
         return model
 
     def _number(self) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -96,16 +97,26 @@ class TrackModel(QObject):
     @property
     def gaps_s(self) -> tuple[tuple[float, float], ...]:
         """Stretches without a person, half-open on the recording's clock."""
+        return self._seconds(self._gaps)
+
+    @property
+    def covered_s(self) -> tuple[tuple[float, float], ...]:
+        """Stretches that are computed already, half-open on the recording's clock."""
         if self._map is None:
             return ()
-        timebase = self._map.timebase
+        whole = ((0, len(self._map.timebase)),)
+        return self._seconds(whole if self._covered is None else runs(self._covered))
+
+    def _seconds(self, stretches: Iterable[tuple[int, int]]) -> tuple[tuple[float, float], ...]:
+        if self._map is None:
+            return ()
+        timebase, offset_s = self._map.timebase, self._offset_s
         return tuple(
             (
-                timebase.time_of(start) + self._offset_s,
-                (timebase.time_of(stop) if stop < len(timebase) else timebase.end_s)
-                + self._offset_s,
+                timebase.time_of(start) + offset_s,
+                (timebase.time_of(stop) if stop < len(timebase) else timebase.end_s) + offset_s,
             )
-            for start, stop in self._gaps
+            for start, stop in stretches
         )
 
     @property

@@ -206,10 +206,10 @@ class HeatmapView(MapWidget):
         doppler_map = self._track.map
         assert doppler_map is not None
         edges = doppler_map.axis.edges_mps
-        left, right = (
-            self.scale.x_of(time_s + self._track.offset_s)
-            for time_s in (doppler_map.timebase.start_s, doppler_map.timebase.end_s)
-        )
+        stretches = [
+            (self.scale.x_of(start_s), self.scale.x_of(end_s))
+            for start_s, end_s in self._track.covered_s
+        ]
         nothing = self.null_colour()
         hatch = self.hatch_colour()
         painter.save()
@@ -218,9 +218,10 @@ class HeatmapView(MapWidget):
         for bins, pattern in self.marked_bins():
             for index in bins:
                 top, bottom = self.y_of(edges[index + 1]), self.y_of(edges[index])
-                band = QRectF(left, top, right - left, bottom - top)
-                painter.fillRect(band, nothing)
-                painter.fillRect(band, QBrush(hatch, pattern))
+                for left, right in stretches:
+                    band = QRectF(left, top, right - left, bottom - top)
+                    painter.fillRect(band, nothing)
+                    painter.fillRect(band, QBrush(hatch, pattern))
         painter.restore()
 
     def _paint_axis(self, painter: QPainter, plot: QRectF) -> None:

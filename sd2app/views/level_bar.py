@@ -8,7 +8,6 @@ from PySide6.QtGui import QAction, QColor, QImage, QPainter, QPaintEvent
 from PySide6.QtWidgets import (
     QGridLayout,
     QHBoxLayout,
-    QLabel,
     QVBoxLayout,
     QWidget,
 )
@@ -16,6 +15,7 @@ from PySide6.QtWidgets import (
 from sd2app.colour_maps import lookup_table, uncertain_table
 from sd2app.models.display import COLOUR_MAPS, DisplayModel
 from sd2app.models.tracks import TrackModel
+from sd2app.views.elided import ElidedLabel
 from sd2app.views.inputs import Choice, NumberBox, action_button
 
 _STRIP_PX = 14
@@ -82,9 +82,8 @@ class LevelBar(QWidget):
         self._colours = Choice("Colour map of all heatmaps", self)
         self._colours.addItems(list(COLOUR_MAPS))
         self._colours.currentTextChanged.connect(lambda text: display.set_levels(colour_map=text))
-        self._reference = QLabel(self)
-        self._reference.setObjectName("muted")
-        self._reference.setWordWrap(True)
+        # One line each: the plot above needs the height.
+        self._references = [ElidedLabel(self) for _ in tracks]
         layout = QVBoxLayout(self)
         layout.setContentsMargins(8, 4, 8, 8)
         layout.setSpacing(4)
@@ -100,7 +99,9 @@ class LevelBar(QWidget):
         choices.addWidget(self._scale, 0, 0)
         choices.addWidget(self._colours, 0, 1)
         layout.addLayout(choices)
-        layout.addWidget(self._reference)
+        for label in self._references:
+            label.setObjectName("muted")
+            layout.addWidget(label)
         display.levels_changed.connect(self._refresh)
         for track in tracks:
             track.changed.connect(self._refresh)
@@ -114,10 +115,8 @@ class LevelBar(QWidget):
         for combo, text in ((self._scale, levels.scale), (self._colours, levels.colour_map)):
             with QSignalBlocker(combo):
                 combo.setCurrentText(text)
-        self._reference.setText(
-            "\n".join(
-                f"0 dB {track.title.lower()}: {track.reference:.3g} {track.map.unit}"
-                for track in self._tracks
-                if track.map is not None
-            )
-        )
+        for label, track in zip(self._references, self._tracks, strict=True):
+            label.setVisible(track.map is not None)
+            if track.map is not None:
+                text = f"0 dB {track.title.lower()}: {track.reference:.3g} {track.map.unit}"
+                label.setText(text.rstrip())

@@ -14,7 +14,7 @@ from sd2app.views.timeline import Overview, SpanStrip, TimeRuler
 if TYPE_CHECKING:
     from sd2app.context import Context
 
-_LOWEST_PX = {1: 96, 2: 96, 3: 76, 4: 68}
+_LOWEST_PX = {1: 96, 2: 96, 3: 84, 4: 72}
 """Of one map, by how many there are."""
 
 

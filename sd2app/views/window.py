@@ -381,12 +381,14 @@ class MainWindow(QMainWindow):
             event.acceptProposedAction()
 
     def dropEvent(self, event: QDropEvent) -> None:
-        """Open what was dropped; with Shift, add it to what is open."""
+        """Open what was dropped; with Shift, add it to what is open. A model is used."""
         paths = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
         if not paths:
             return
         event.acceptProposedAction()
-        if event.modifiers() & Qt.KeyboardModifier.ShiftModifier:
+        if len(paths) == 1 and paths[0].suffix == ".safetensors":
+            self.dialogs.use_model(paths[0])
+        elif event.modifiers() & Qt.KeyboardModifier.ShiftModifier:
             self.context.document.add(paths)
         elif self.dialogs.may_discard():
             self.open_paths(paths)

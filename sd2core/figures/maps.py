@@ -161,9 +161,11 @@ def draw_maps(
         low, high = levels.ends
         shown = _draw(axes, row, level, levels.colour_map, low, high)
         _title(axes, row.title, f"0 dB: {row.reference:.3g} {row.doppler.unit}".rstrip())
-    figure.colorbar(
+    bar = figure.colorbar(
         shown, ax=list(all_axes[: len(rows)]), pad=0.01, aspect=12 * len(rows), fraction=0.05
-    ).set_label(f"level ({levels.unit})", fontsize=8)
+    )
+    bar.set_label(f"level ({levels.unit})", fontsize=8)
+    bar.ax.tick_params(labelsize=7)
     if difference is not None:
         first, second = (rows[number] for number in difference)
         _draw_difference(figure, all_axes[-1], first, second, levels, colours)

@@ -1,0 +1,140 @@
+"""Denoising in another process: what comes back, and what happens when it dies."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from sd2app.jobs.denoise_process import DenoiseProcess
+from sd2core.denoise.card import ModelCard
+from sd2core.denoise.live import TrainedDenoiser
+from sd2core.denoise.registry import build
+from sd2core.denoise.scaling import Compression, Scaling
+from sd2core.errors import Sd2Error
+from sd2core.sensor import VelocityAxis
+from sd2core.spectrum import DopplerMap
+from sd2core.timebase import Timebase
+
+
+def trained(kind, **options):
+    import torch
+
+    torch.manual_seed(3)
+    network = build(kind, 32, **options)
+    with torch.no_grad():
+        for parameter in network.parameters():
+            parameter += 0.3 * torch.randn_like(parameter)
+    card = ModelCard(
+        model=kind,
+        options=options,
+        scaling=Scaling(Compression(0.01), Compression(1e-4)),
+        axis=VelocityAxis(32, 2.0),
+        null_bins=(14, 15, 16),
+        frame_rate_hz=30.0,
+        trained_on="simulated",
+    )
+    return TrainedDenoiser(network, card)
+
+
+def a_map(frames=120, rate=30.0, **more):
+    values = 0.02 * np.random.default_rng(1).exponential(size=(32, frames)).astype(np.float32)
+    values[14:17] = 0.0
+    about = {"null_bins": (14, 15, 16), "unit": "share of vertices"} | more
+    return DopplerMap(
+        values, VelocityAxis(32, 2.0), Timebase.regular(frames, rate, 1.5), "synthetic", **about
+    )
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    from sd2core.denoise.files import save_model
+
+    folder = tmp_path_factory.mktemp("models")
+    save_model(folder / "gru.safetensors", trained("gru", channels=8))
+    save_model(folder / "unet.safetensors", trained("unet", channels=2))
+    (folder / "text.safetensors").write_text("no model")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def process():
+    process = DenoiseProcess()
+    yield process
+    process.close()
+    assert not process.running
+
+
+def test_the_answer_is_that_of_the_library(process, folder):
+    from sd2core.denoise.files import load_model
+
+    present = np.ones(120, bool)
+    present[40:55] = False
+    given = a_map(present=present, meta={"sensor": {"position_m": [1, 0, 0]}})
+    made = process.load(folder / "gru.safetensors").denoise(given)
+    expected = load_model(folder / "gru.safetensors").denoise(given)
+    np.testing.assert_allclose(made.values, expected.values, rtol=1e-5, atol=1e-10)
+    assert made.values.any()
+    assert (made.kind, made.unit, made.null_bins) == ("denoised", expected.unit, (14, 15, 16))
+    assert made.meta == expected.meta
+    np.testing.assert_array_equal(made.present, present)
+    np.testing.assert_array_equal(made.times_s, given.times_s)
+
+
+def test_frame_by_frame_it_is_the_same_where_the_model_is_causal(process, folder):
+    given, answers = a_map(), {}
+    for name in ("gru", "unet"):
+        model = process.load(folder / f"{name}.safetensors")
+        live = model.live()
+        answers[name] = live.equals_batch
+        stepped = np.stack([live.step(frame) for frame in given.values.T], axis=1)
+        whole = model.denoise(given).values
+        same = np.allclose(stepped, whole, rtol=1e-3, atol=1e-3 * whole.max())
+        assert same == live.equals_batch
+    assert answers == {"gru": True, "unet": False}
+
+
+def test_what_is_wrong_is_said_and_the_process_goes_on(process, folder):
+    with pytest.raises(Sd2Error, match=r"text.safetensors"):
+        process.load(folder / "text.safetensors")
+    with pytest.raises(Sd2Error, match=r"gone.safetensors"):
+        process.load(folder / "gone.safetensors")
+    model = process.load(folder / "gru.safetensors")
+    with pytest.raises(Sd2Error, match="500 frames/s"):
+        model.denoise(a_map(rate=500.0))
+    assert model.denoise(a_map()).values.any()
+
+
+def test_one_that_died_is_started_again(process, folder):
+    model = process.load(folder / "gru.safetensors")
+    before = model.denoise(a_map()).values
+    process._process.kill()
+    process._process.wait()
+    np.testing.assert_array_equal(model.denoise(a_map()).values, before)
+
+
+def test_what_is_closed_stays_closed(folder):
+    process = DenoiseProcess()
+    process.close()
+    with pytest.raises(Sd2Error, match="closed"):
+        process.load(folder / "gru.safetensors")
+
+
+def test_a_process_that_ends_at_once_is_an_error_in_words(folder):
+    process = DenoiseProcess([sys.executable, "-c", "pass"])
+    with pytest.raises(Sd2Error, match="has ended"):
+        process.load(folder / "gru.safetensors")
+    process.close()
+
+
+def test_the_window_itself_never_loads_torch():
+    code = (
+        "import sys\n"
+        "import sd2app.context, sd2app.models.denoise, sd2app.models.denoise_library as library\n"
+        "library.core_library().available()\n"
+        "assert 'torch' not in sys.modules, 'torch'\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
