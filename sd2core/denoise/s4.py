@@ -64,6 +64,10 @@ class S4Layer(nn.Module):
         In memory channels come first, as convolution and mixing want them: what comes out is a
         view of an (H, B, L) array, and a stack of layers moves nothing.
         """
+        if torch.is_autocast_enabled(x.device.type):
+            # Half precision would cost the kernel its tail and save little: products are small.
+            with torch.autocast(x.device.type, enabled=False):
+                return self(x.to(self.mixing.weight.dtype))
         batch, length, channels = x.shape
         signal = x.permute(2, 0, 1).contiguous()  # (H, B, L)
         normed = normalise(signal)

@@ -46,7 +46,9 @@ def legs_state_matrix(state_size: int, device: torch.device | str | None = None)
     )
 
 
-def legs_kernel(C: Tensor, dt: Tensor, length: int, matrix: StateMatrix | None = None) -> Tensor:
+def legs_kernel(
+    C: Tensor, dt: Tensor | float, length: int, matrix: StateMatrix | None = None
+) -> Tensor:
     """Kernel of S4: k[l] = C Āˡ B̄ of the HiPPO-LegS matrix, discretised bilinearly.
 
     x′ = A x + B u, y = C x with (Gu et al. 2022, S4, equation 2)::
@@ -84,11 +86,12 @@ def to_normal_basis(C: Tensor) -> Tensor:
     return torch.view_as_complex((C.double() @ basis).unflatten(-1, (-1, 2)))
 
 
-def low_rank_kernel(matrix: StateMatrix, C: Tensor, dt: Tensor, length: int) -> Tensor:
+def low_rank_kernel(matrix: StateMatrix, C: Tensor, dt: Tensor | float, length: int) -> Tensor:
     """Kernel of any normal matrix less one of rank one, discretised bilinearly.
 
     With z for the shift by one frame and R = (1 − Δ/2 Λ − z (1 + Δ/2 Λ))⁻¹ (Gu et al. 2022,
-    S4, lemma C.4, before its division by 1 + z)::
+    S4, appendix C.3: generating function and Woodbury's identity, with P = Q = p and 1 + z left
+    in the numerator)::
 
         Σ k[l] zˡ = a − (1 + z) b c / (1 + (1 + z) d)
         a = Δ C R B,  b = C R p,  c = Δ²/2 pᵀ R B,  d = Δ/2 pᵀ R p
@@ -113,10 +116,10 @@ def low_rank_kernel(matrix: StateMatrix, C: Tensor, dt: Tensor, length: int) -> 
 
 
 def _low_rank_kernel(
-    matrix: StateMatrix, C: Tensor, dt: Tensor, length: int, precision: torch.dtype
+    matrix: StateMatrix, C: Tensor, dt: Tensor | float, length: int, precision: torch.dtype
 ) -> Tensor:
     check_length(length)
-    dt = dt.to(torch.float64)[..., None]
+    dt = torch.as_tensor(dt, dtype=torch.float64, device=C.device)[..., None]
     poles = matrix.poles.to(torch.complex128)
     low_rank = matrix.low_rank.to(torch.float64)
     inputs = matrix.inputs.to(torch.complex128)
@@ -138,10 +141,10 @@ def _low_rank_kernel(
     return kernel.to(precision).reshape(*shape[:-1], length)
 
 
-def diagonal_kernel(A: Tensor, B: Tensor, C: Tensor, dt: Tensor, length: int) -> Tensor:
+def diagonal_kernel(A: Tensor, B: Tensor, C: Tensor, dt: Tensor | float, length: int) -> Tensor:
     """Kernel of S4D: k[l] = 2 Re Σₙ C[n] Āˡ[n] B̄[n], zero-order hold.
 
-    Ā = exp(Δ A), B̄ = (exp(Δ A) − 1) / A · B (Gu et al. 2022, S4D, equations 2 and 3), whose
+    Ā = exp(Δ A), B̄ = (exp(Δ A) − 1) / A · B (Gu et al. 2022, S4D: zero-order hold), whose
     limit Δ B is taken at A → 0.
 
     Parameters
@@ -157,7 +160,7 @@ def diagonal_kernel(A: Tensor, B: Tensor, C: Tensor, dt: Tensor, length: int) ->
     """
     check_length(length)
     precision = C.real.dtype
-    dt = dt.to(torch.float64)[..., None]
+    dt = torch.as_tensor(dt, dtype=torch.float64, device=C.device)[..., None]
     exponent = dt * A.to(torch.complex128)
     weights = C * B * (dt * expm1_ratio(exponent))
     poles = torch.exp(exponent).expand(weights.shape)

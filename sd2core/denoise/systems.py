@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable, Iterator
 from typing import Any, Literal, TypeAlias
 
@@ -55,7 +56,7 @@ class StateSpace(nn.Module):
         N, even.
     kernel : {"legs", "diagonal"}
         Starts as HiPPO-LegS with random C (real, in the dense basis), or as S4D-Lin, λ = −1/2 +
-        i π n (Gu et al. 2022, S4D, section 4).
+        i π n (Gu et al. 2022, S4D).
     """
 
     def __init__(self, channels: int, state_size: int, kernel: Kernel) -> None:
@@ -67,7 +68,8 @@ class StateSpace(nn.Module):
         first = legs_state_matrix(state_size)
         self.kernel_name = kernel
         self._kept: dict[int | str, Any] = {}
-        self._stamp: tuple[tuple[int, int], ...] = ()
+        self._held: tuple[Tensor, ...] = ()
+        self._counts: tuple[int, ...] = ()
         pairs = state_size // 2
         low, high = (math.log(step) for step in FIRST_STEPS)
         self.log_dt = nn.Parameter(torch.empty(channels).uniform_(low, high))
@@ -142,18 +144,18 @@ class StateSpace(nn.Module):
             return make()
         # Parameters count what is done to them in place; all else that can change them goes
         # through the methods below.
-        stamp = tuple(
-            (id(p), 0 if p.is_inference() else p._version) for p in self._parameters.values()
-        )
-        if self._stamp != stamp or len(self._kept) > MOST_KEPT:
+        held = tuple(self._parameters.values())
+        counts = tuple(0 if p.is_inference() else p._version for p in held)
+        same = counts == self._counts and all(map(operator.is_, held, self._held))
+        if not same or len(self._kept) > MOST_KEPT:
             self._forget()
-            self._stamp = stamp
+            self._held, self._counts = held, counts
         if key not in self._kept:
             self._kept[key] = make()
         return self._kept[key]
 
     def _forget(self) -> None:
-        self._kept, self._stamp = {}, ()
+        self._kept, self._held, self._counts = {}, (), ()
 
     def train(self, mode: bool = True) -> StateSpace:
         """As of `nn.Module`."""
@@ -170,7 +172,7 @@ class StateSpace(nn.Module):
         super()._load_from_state_dict(*args, **options)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_kept": {}, "_stamp": ()}
+        return {**self.__dict__, "_kept": {}, "_held": (), "_counts": ()}
 
 
 def _per_channel(values: Tensor, channels: int) -> nn.Parameter:

@@ -175,6 +175,14 @@ def test_derivatives_of_the_layer(kernel: str, bidirectional: bool) -> None:
     assert torch.autograd.gradcheck(made, (x, *values))
 
 
+def test_mixed_precision_leaves_the_layer_in_single() -> None:
+    layer, x = layer_of("legs"), torch.randn(20, 30, 6)
+    true = layer(x)
+    with torch.autocast("cpu", dtype=torch.bfloat16):
+        assert torch.equal(layer(x), true)
+        assert layer(x.bfloat16()).dtype == torch.float32
+
+
 def test_all_but_outputs_and_skip_are_dynamics() -> None:
     layer = layer_of("legs", bidirectional=True)
     given = {id(parameter) for parameter in layer.ssm_parameters()}

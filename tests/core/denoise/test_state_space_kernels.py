@@ -121,7 +121,7 @@ def test_one_channel_and_shared_steps() -> None:
     one = legs_kernel(C[2], dt[2], 20)
     assert one.shape == (20,)
     torch.testing.assert_close(one, many[2])
-    torch.testing.assert_close(legs_kernel(C, dt[2], 20)[2], one)
+    torch.testing.assert_close(legs_kernel(C, float(dt[2]), 20)[2], one)
     A = -torch.rand(4, dtype=torch.complex128)
     B, D = torch.randn(2, 4, dtype=torch.complex128)
     many = diagonal_kernel(A, B, D, dt, 20)
