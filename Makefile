@@ -12,7 +12,7 @@ COMPILED := .venv/.compiled
 # Among them every module in KERNEL_MODULES of sd2core/compiled.py.
 KERNELS := $(wildcard sd2core/compiled.py sd2core/raster.py sd2core/body/*.py sd2core/scattering/*.py sd2core/doppler/*.py sd2core/fmcw/*.py sd2core/simulate/people/*.py)
 
-.PHONY: help setup demo test test-slow lint format bench wheel screenshots accuracy fitting clean
+.PHONY: help setup demo test test-slow lint format bench wheel screenshots accuracy fitting denoiser clean
 
 help:
 	@echo "make demo         set up, and open the sample recording in the window"
@@ -26,6 +26,7 @@ help:
 	@echo "make screenshots  the pictures in docs/"
 	@echo "make accuracy     docs/accuracy-and-speed.md, measured (some five minutes)"
 	@echo "make fitting      docs/fitting.md, measured (some ten minutes)"
+	@echo "make denoiser     docs/denoiser.md, trained and measured (hours)"
 	@echo "make clean        remove what the above made, .venv included"
 
 setup: system-packages $(COMPILED) landmark-models
@@ -84,6 +85,9 @@ accuracy: setup
 
 fitting: setup
 	$(BIN)/python docs/fitting.py
+
+denoiser: setup
+	$(BIN)/python docs/denoiser.py
 
 clean:
 	rm -rf .venv build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks \

@@ -1,0 +1,306 @@
+"""Makes ``denoiser.md`` and its pictures: ``make denoiser``, hours.
+
+Every figure is measured when this runs. Campaign, pairs and runs stay in
+``build/denoiser`` (or ``--folder``); what is there is not made again, a run that was
+broken off goes on. Runs are as many at once as the machine has cores, one thread each, and
+each gets the same time. The real pairs are left out where the recordings are not there
+(``SD2_SHARED_DATA``).
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from sd2core.atomic import atomic_write_text
+from sd2core.denoise.files import load_model
+from sd2core.denoise.registry import MODELS
+from sd2core.ladder.scene import this_machine
+from sd2core.pairs import PairSet, read_pairs
+from sd2core.train.config import read_config
+from sd2core.train.data import split_subjects
+from sd2core.train.folder import RunFolder
+from sd2core.train.progress import read_events, standing
+
+DOCS = Path(__file__).resolve().parent
+IMAGES = DOCS / "images"
+SHARED = Path(os.environ.get("SD2_SHARED_DATA", DOCS.parent.parent / "shared" / "data"))
+MARS = (SHARED / "paired" / "mars_subject1", SHARED / "paired" / "mars_subject4")
+
+COMPARED = ("s4", "s4d", "gru", "unet", "swin")
+SHOWN_FRAMES = 450
+
+PAGE = """\
+# The denoiser
+
+What it makes of synthetic Doppler, measured. Made by
+
+```
+make denoiser
+```
+
+on {machine}: {campaign_minutes} minutes of a simulated campaign
+([decision 26](decisions/0026-the-simulated-campaign.md)), every model trained {seeds} times with
+different seeds for {minutes:g} minutes on one thread each, as many at once as there are cores. The
+people that are judged were seen neither in training nor in choosing the best epoch. What the errors
+are is written in `sd2core/denoise/metrics.py`; models and scaling are
+[decision 24](decisions/0024-denoisers.md), the S4 itself
+[decision 23](decisions/0023-s4.md), training [decision 25](decisions/0025-training-runs.md).
+
+## Simulated campaign
+
+{campaign}
+![Error of every model, per gesture and per person](images/denoiser-campaign.png)
+
+Validation error of the same runs against the time they had trained:
+
+![Validation error against training time](images/denoiser-curves.png)
+
+One take of a person that no model has seen; the radar is simulated:
+
+![Synthetic, denoised and radar's map of one take](images/denoiser-triple.png)
+
+{variants}{real}"""
+
+VARIANTS = """\
+## Variants of the S4
+
+Range synthesis scales input and target of a segment together, as if the person were nearer or
+farther (`--range-factor 2`); `s4-serial` is the paper's literal form, 2,304 samples of one channel.
+Judged on the same takes.
+
+{tables}
+"""
+
+REAL = """\
+## Real pairs
+
+MARS: a body driven by a Kinect's skeleton, and what a real 77 GHz radar saw of the same person at
+10 frames/s ([decision 27](decisions/0027-real-pairs.md)). Each part is judged by models that have
+seen neither its person nor its part.
+
+{tables}
+"""
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run of ``sd2 train``."""
+
+    name: str
+    data: Path
+    options: tuple[str, ...]
+
+
+def main() -> None:
+    """Make what is missing, measure everything and write the page."""
+    options = _options()
+    folder: Path = options.folder
+    folder.mkdir(parents=True, exist_ok=True)
+    campaign = options.campaign or _campaign(folder, options.campaign_minutes)
+    mars = _mars(folder)
+    length = ("--minutes", f"{options.minutes:g}")
+    compared = [
+        Job(f"{name}-{seed}", campaign, ("--model", name, "--seed", str(seed), *length))
+        for seed in range(options.seeds)
+        for name in options.models
+    ]
+    variants = [
+        Job("s4-range", campaign, ("--model", "s4", "--range-factor", "2", *length)),
+        Job("s4-serial", campaign, ("--model", "s4-serial", *length)),
+    ]
+    real = _real_jobs(mars, options) if mars is not None else {}
+    _train(folder, [*compared, *variants, *(job for jobs in real.values() for job in jobs)])
+    pairs = read_pairs(campaign)
+    _curves(folder, compared)
+    _triple(folder / "s4-0", pairs)
+    page = PAGE.format(
+        machine=this_machine(),
+        campaign_minutes=round(pairs.frames / pairs.frame_rate_hz / 60),
+        seeds=options.seeds,
+        minutes=options.minutes,
+        campaign=_tables(folder, compared, campaign, IMAGES / "denoiser-campaign.png"),
+        variants=VARIANTS.format(
+            tables=_tables(folder, [Job("s4-0", campaign, ()), *variants], campaign)
+        ),
+        real="" if mars is None else REAL.format(tables=_real_tables(folder, mars, real)),
+    )
+    atomic_write_text(DOCS / "denoiser.md", page)
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--folder", type=Path, default=DOCS.parent / "build" / "denoiser")
+    parser.add_argument("--campaign", type=Path, help="a campaign that is there already")
+    parser.add_argument("--campaign-minutes", type=float, default=16, help="of every subject")
+    parser.add_argument("--minutes", type=float, default=20.0, help="of training, each run")
+    parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--models", nargs="+", default=COMPARED, choices=MODELS)
+    parser.add_argument("--real-minutes", type=float, default=4.0, help="of training, each run")
+    return parser.parse_args()
+
+
+def _campaign(folder: Path, minutes: float) -> Path:
+    path = folder / "campaign.zarr"
+    _sd2("simulate", "campaign", path, "--subjects", 6, "--minutes", minutes, "--seed", 1)
+    return path
+
+
+def _mars(folder: Path) -> Path | None:
+    if not all(part.exists() for part in MARS):
+        return None
+    path = folder / "mars.zarr"
+    if not path.exists():
+        _sd2("pairs", "mars", *MARS, "--out", path)
+    return path
+
+
+def _real_jobs(mars: Path, options: argparse.Namespace) -> dict[str, list[Job]]:
+    """For every part the runs that have seen neither its person nor its part."""
+    jobs = {}
+    everybody = read_pairs(mars).subjects
+    for judged in everybody:
+        others = [name for name in everybody if _strange(name, judged)]
+        if not others:
+            continue
+        kept_out = [name for name in everybody if name not in others]
+        jobs[judged] = [
+            Job(
+                f"mars-{judged}-{model}-{seed}",
+                mars,
+                (
+                    *("--model", model, "--seed", str(seed)),
+                    *("--minutes", f"{options.real_minutes:g}"),
+                    *("--validation-subjects", others[-1], "--test-subjects", ",".join(kept_out)),
+                ),
+            )
+            for model in ("s4", "gru")
+            for seed in range(options.seeds)
+        ]
+    return jobs
+
+
+def _strange(name: str, judged: str) -> bool:
+    """Whether two parts share neither person nor part, e.g. ``1-test`` and ``4-validate``."""
+    return not set(name.split("-")) & set(judged.split("-"))
+
+
+def _train(folder: Path, jobs: Iterable[Job]) -> None:
+    pending = [job for job in jobs if not _finished(folder / job.name)]
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        codes = pool.map(lambda job: _run(folder, job), pending)
+        failed = [job.name for job, code in zip(pending, codes, strict=True) if code]
+    if failed:
+        sys.exit(f"{', '.join(failed)} failed; what is done is kept")
+
+
+def _finished(run: Path) -> bool:
+    return RunFolder(run).exists and RunFolder(run).status().state == "finished"
+
+
+def _run(folder: Path, job: Job) -> int:
+    path = folder / job.name
+    how = (
+        ["--resume", str(path)]
+        if RunFolder(path).exists
+        else [str(job.data), *job.options, "--out", str(path), "--threads", "1"]
+    )
+    return subprocess.run([sys.executable, "-m", "sd2core.cli", "train", *how]).returncode
+
+
+def _tables(
+    folder: Path,
+    jobs: Sequence[Job],
+    data: Path,
+    plot: Path | None = None,
+    subjects: str | None = None,
+) -> str:
+    tables = folder / "tables.md"
+    _sd2(
+        "eval",
+        *(folder / job.name for job in jobs),
+        *("--data", data, "--markdown", tables),
+        *(("--plot", plot) if plot is not None else ()),
+        *(("--subjects", subjects) if subjects is not None else ()),
+    )
+    return tables.read_text("utf-8")
+
+
+def _real_tables(folder: Path, mars: Path, jobs: dict[str, list[Job]]) -> str:
+    return "\n".join(
+        f"### {judged}\n\n{_tables(folder, parts, mars, subjects=judged)}"
+        for judged, parts in jobs.items()
+    )
+
+
+def _sd2(*arguments: object) -> None:
+    command = [sys.executable, "-m", "sd2core.cli", *map(str, arguments)]
+    if code := subprocess.run(command).returncode:
+        sys.exit(code)
+
+
+def _curves(folder: Path, jobs: Sequence[Job]) -> None:
+    """Validation error of the map and of the peak velocity, against time."""
+    figure = Figure(figsize=(9.6, 3.6), dpi=110, layout="constrained")
+    axes = figure.subplots(1, 2)
+    names = list(dict.fromkeys(job.name.rpartition("-")[0] for job in jobs))
+    for job in jobs:
+        events = standing(read_events(RunFolder(folder / job.name).progress))
+        epochs = [event for event in events if event["event"] == "epoch"]
+        minutes = [event["elapsed_s"] / 60 for event in epochs]
+        name, _, seed = job.name.rpartition("-")
+        for axis, part in zip(axes, ("validation_rmse", "validation_mae_mps"), strict=True):
+            axis.plot(
+                minutes,
+                [event[part] for event in epochs],
+                color=f"C{names.index(name)}",
+                linewidth=1.0,
+                label=name if seed == "0" else None,
+            )
+    axes[0].set_ylabel("RMSE of compressed values")
+    axes[1].set_ylabel("mean error of the peak velocity (m/s)")
+    axes[0].legend(fontsize=8)
+    for axis in axes:
+        axis.set_yscale("log")
+        axis.set_xlabel("minutes of training")
+        axis.grid(alpha=0.25, which="both")
+    figure.savefig(IMAGES / "denoiser-curves.png")
+
+
+def _triple(run: Path, pairs: PairSet) -> None:
+    """The liveliest take of a test subject: input, output, target."""
+    model = load_model(RunFolder(run).best)
+    data = read_config(RunFolder(run).config).data
+    unseen = split_subjects(pairs.subjects, data.validation_subjects, data.test_subjects).test
+    take = max(pairs.of(unseen).takes, key=lambda take: int((take.label > 0).sum()))
+    maps = {
+        "synthetic": take.synthetic,
+        f"denoised ({model.card.model})": model.denoise_values(take.synthetic),
+        f"radar ({pairs.kind})": take.radar,
+    }
+    figure = Figure(figsize=(9.6, 5.2), dpi=110, layout="constrained")
+    extent = (0.0, SHOWN_FRAMES / pairs.frame_rate_hz, -pairs.axis.v_max_mps, pairs.axis.v_max_mps)
+    for axis, (name, values) in zip(figure.subplots(3, 1, sharex=True), maps.items(), strict=True):
+        shown = values[:SHOWN_FRAMES].T
+        level_db = 10 * np.log10(np.maximum(shown / shown.max(), 1e-4))
+        picture = axis.imshow(
+            level_db, origin="lower", aspect="auto", extent=extent, cmap="viridis", vmin=-30, vmax=0
+        )
+        axis.set_ylabel("m/s")
+        axis.set_title(name, fontsize=9, loc="left")
+    axis.set_xlabel("s")
+    figure.colorbar(picture, ax=figure.axes, label="dB below each map's own strongest cell")
+    figure.savefig(IMAGES / "denoiser-triple.png")
+
+
+if __name__ == "__main__":
+    main()
