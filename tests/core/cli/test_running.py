@@ -133,12 +133,23 @@ def test_wrong_values_are_usage_errors(sd2: Sd2, arguments: list[str]) -> None:
     assert arguments[0] in outcome.err.splitlines()[-1]
 
 
-HEAVY = ("numpy", "scipy", "numba", "zarr", "av", "trimesh", "pydantic", "torch", "anny")
+HEAVY = (
+    "numpy",
+    "scipy",
+    "numba",
+    "zarr",
+    "av",
+    "trimesh",
+    "pydantic",
+    "torch",
+    "lightning",
+    "anny",
+)
 WINDOW = ("PySide6", "shiboken6", "vtk", "vtkmodules", "pyvista", "pyvistaqt", "pyqtgraph")
 
 
 @pytest.mark.parametrize(
-    "arguments", [["--help"], ["--version"], ["synth", "--help"], ["open", "-h"]]
+    "arguments", [["--help"], ["--version"], ["synth", "--help"], ["train", "-h"], ["open", "-h"]]
 )
 def test_help_loads_nothing_heavy(arguments: list[str]) -> None:
     script = f"""

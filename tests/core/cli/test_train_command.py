@@ -1,0 +1,194 @@
+"""``sd2 train``, ``sd2 runs`` and ``sd2 eval``: what is told, refused and printed."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+from cli_outcome import Sd2
+from small_pairs import write_pairs
+
+from sd2core.train.folder import RunFolder
+from sd2core.train.progress import ProgressWriter, read_events
+
+SMALL = ("--model", "gru", "--set", "channels=4", "--set", "depth=1", "--segment-frames", "30")
+QUICK = (*SMALL, "--device", "cpu", "--threads", "1", "--epochs", "2")
+
+
+@pytest.fixture(scope="module")
+def pairs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_pairs(tmp_path_factory.mktemp("pairs") / "small.zarr", frames=90)
+
+
+def shown(sd2: Sd2, *words: object) -> dict[str, Any]:
+    outcome = sd2("train", *words, "--show-settings")
+    assert outcome.code == 0, outcome.err
+    return tomllib.loads(outcome.out)
+
+
+class TestTrain:
+    def test_from_pairs_to_an_evaluation(self, sd2: Sd2, pairs: Path, tmp_path: Path) -> None:
+        for seed in (0, 1):
+            run = tmp_path / f"run{seed}"
+            outcome = sd2("train", pairs, *QUICK, "--seed", seed, "--out", run, "--json")
+            assert outcome.code == 0, outcome.err
+            summary = json.loads(outcome.out)
+            assert (summary["outcome"], summary["best_epoch"]) == ("finished", 2)
+            assert Path(summary["model"]).is_file()
+        events = read_events(run / "progress.jsonl")
+        assert [event["event"] for event in events if event["event"] != "step"] == [
+            "start",
+            "epoch",
+            "epoch",
+            "end",
+        ]
+        scores, table, picture = (tmp_path / f"e.{kind}" for kind in ("json", "md", "png"))
+        words = ("--data", pairs, "--json", scores, "--markdown", table, "--plot", picture)
+        outcome = sd2("eval", tmp_path / "run0", tmp_path / "run1", *words)
+        assert outcome.code == 0, outcome.err
+        content = json.loads(scores.read_text())
+        assert content["subjects"] == ["s3"]
+        assert [(one["name"], len(one["models"])) for one in content["groups"]] == [
+            ("none", 1),
+            ("median", 1),
+            ("wiener", 1),
+            ("gru (channels=4, depth=1)", 2),
+        ]
+        mean = content["groups"][-1]["peak_mae_mps"]["mean"]
+        assert f"{mean:.3f} ± " in outcome.out
+        assert f"{mean:.3f} ± " in table.read_text()
+        assert picture.read_bytes().startswith(b"\x89PNG")
+
+    def test_options_go_before_the_file(self, sd2: Sd2, pairs: Path, tmp_path: Path) -> None:
+        toml = tmp_path / "a.toml"
+        toml.write_text(
+            f'[data]\npairs = ["{pairs}"]\n[model]\nname = "gru"\n[model.options]\nchannels = 8\n'
+            "[training]\nminutes = 5\nseed = 4\n"
+        )
+        content = shown(sd2, toml)
+        assert content["training"]["minutes"] == 5.0
+        content = shown(sd2, toml, "--epochs", "7", "--set", "depth=3")
+        assert content["training"] | {"epochs": 7, "seed": 4} == content["training"]
+        assert "minutes" not in content["training"]
+        assert content["model"] == {"name": "gru", "options": {"channels": 8, "depth": 3}}
+        # What one architecture was told says nothing to another.
+        assert shown(sd2, toml, "--model", "s4")["model"] == {"name": "s4", "options": {}}
+
+    def test_the_settings_shown_are_the_settings(
+        self, sd2: Sd2, pairs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.chdir(tmp_path)
+        words = (pairs, "--background", "--test-subjects", "none", "--range-factor", "1.5")
+        content = shown(sd2, *words)
+        assert (content["machine"]["threads"], content["machine"]["nice"]) == (1, 10)
+        assert content["data"]["test_subjects"] == []
+        (tmp_path / "again.toml").write_text(sd2("train", *words, "--show-settings").out)
+        assert shown(sd2, "again.toml") == content
+
+    @pytest.mark.parametrize(
+        ("words", "said"),
+        [
+            ((), "Nothing to learn from is given"),
+            (("no.zarr", "--out", "run"), "no.zarr does not exist"),
+            (("PAIRS",), "No folder for the run is given"),
+            (("PAIRS", "--model", "s5", "--out", "run"), "model.name is 's5'. Expected: one of s4"),
+            (("PAIRS", "--set", "width=4", "--out", "run"), "no option 'width'"),
+            (("PAIRS", "--nice", "30", "--out", "run"), "machine.nice is 30. Expected: a whole"),
+            (("PAIRS", "--out", "no/run"), "The folder"),
+            (("a.toml", "b.toml", "--out", "run"), "one file with settings"),
+            (("--resume", "run", "PAIRS"), "--resume is given with"),
+            (("--resume", "run", "--epochs", "3"), "--resume is given with --epochs"),
+            (("--resume", "run"), "run is no run"),
+        ],
+    )
+    def test_refused(
+        self,
+        sd2: Sd2,
+        pairs: Path,
+        tmp_path: Path,
+        monkeypatch: pytest.MonkeyPatch,
+        words: tuple[str, ...],
+        said: str,
+    ) -> None:
+        monkeypatch.chdir(tmp_path)
+        outcome = sd2("train", *(pairs if word == "PAIRS" else word for word in words))
+        assert (outcome.code, outcome.out) == (1, "")
+        assert said in outcome.err
+        assert not (tmp_path / "run").exists()
+
+    def test_what_is_no_option(self, sd2: Sd2, pairs: Path) -> None:
+        assert sd2("train", pairs, "--set", "channels").code == 2
+
+
+class TestRuns:
+    @pytest.fixture
+    def runs(self, tmp_path: Path) -> Path:
+        """One that ended, one under way, one whose process is gone."""
+        for name, state in (("a", "finished"), ("b", "running"), ("c", "running")):
+            run = RunFolder(tmp_path / name)
+            run.create("gru")
+            with ProgressWriter(run.progress) as writer:
+                writer.say("start", epochs=10, resumed=False, steps_done=0)
+                writer.say(
+                    "epoch", epoch=4, step=8, validation_rmse=0.5, validation_mae_mps=0.25,
+                    best=True, elapsed_s=90.0, left_s=4000.0,
+                )  # fmt: skip
+            run.set_state(state)  # type: ignore[arg-type]
+        return tmp_path
+
+    def test_the_list(self, sd2: Sd2, runs: Path) -> None:
+        lock = RunFolder(runs / "b").lock()
+        try:
+            rows = [line.split() for line in sd2("runs", runs).out.splitlines()]
+            content = json.loads(sd2("runs", runs, "--json").out)["runs"]
+        finally:
+            lock.release()
+        assert [row[:2] for row in rows[1:]] == [["a", "finished"], ["b", "running"], ["c", "died"]]
+        shown = " ".join(rows[2][3:])
+        assert shown == "4 of 10 epochs 2 min, 1 h 07 min left 0.5000, 0.250 m/s"
+        assert [one["state"] for one in content] == ["finished", "running", "died"]
+        assert content[0]["validation_mae_mps"] == 0.25
+
+    def test_one_of_them(self, sd2: Sd2, runs: Path) -> None:
+        (runs / "c" / "last.safetensors").touch()
+        out = sd2("runs", runs / "c").out
+        assert "died" in out
+        assert f"sd2 train --resume {runs / 'c'}" in out
+
+    def test_steering(self, sd2: Sd2, runs: Path) -> None:
+        run = RunFolder(runs / "b")
+        lock = run.lock()
+        try:
+            for word, written in (("pause", "pause"), ("resume", "run"), ("stop", "stop")):
+                assert sd2("runs", run.path, f"--{word}").code == 0
+                assert run.control.read_text() == f"{written}\n"
+        finally:
+            lock.release()
+        outcome = sd2("runs", runs / "a", "--stop")
+        assert outcome.code == 1
+        assert "has finished" in outcome.err
+
+    def test_cancelling_what_has_died_deletes_it(self, sd2: Sd2, runs: Path) -> None:
+        assert sd2("runs", runs / "c", "--cancel").code == 0
+        assert not (runs / "c").exists()
+        assert sd2("runs", runs / "a", "--cancel").code == 1
+        assert (runs / "a").exists()
+
+    def test_no_runs(self, sd2: Sd2, tmp_path: Path) -> None:
+        assert "no runs here" in sd2("runs", tmp_path).out
+        assert "does not exist" in sd2("runs", tmp_path / "x").err
+
+
+class TestEval:
+    def test_refused(self, sd2: Sd2, pairs: Path, tmp_path: Path) -> None:
+        RunFolder(tmp_path / "run").create("gru")
+        outcome = sd2("eval", tmp_path / "run", "--data", pairs)
+        assert outcome.code == 1
+        assert "has no model yet" in outcome.err
+        outcome = sd2("eval", "no-such-model", "--data", pairs)
+        assert "no model called 'no-such-model'" in outcome.err
+        outcome = sd2("eval", tmp_path / "run", "--data", pairs, "--plot", tmp_path / "e.bmp")
+        assert "ends in .png" in outcome.err
