@@ -84,6 +84,7 @@ class Context:
         """Stop every thread and let go of the files."""
         self.playback.pause()
         self.fit.close()
+        self.training_use.close()
         self.training.close()
         self.uncertainty.close()
         self.live.close()

@@ -69,20 +69,20 @@ class TrainingDialogs:
     def may_leave(self) -> bool:
         """Whether the window may close; says what becomes of a run under way."""
         training = self._training
-        if not training.under_way or training.run is None:
+        run = training.to_be_left()
+        if run is None:
             return True
         if training.closing == "ask":
-            return self._ask_what_becomes(training)
+            return self._ask_what_becomes(training, run.folder.path.name)
         if training.closing == "stop":
             training.stop()
         return True
 
-    def _ask_what_becomes(self, training: TrainingModel) -> bool:
-        assert training.run is not None
+    def _ask_what_becomes(self, training: TrainingModel, name: str) -> bool:
         box = QMessageBox(self._parent)
         box.setIcon(QMessageBox.Icon.Question)
         box.setWindowTitle("A training is under way")
-        box.setText(f"{training.run.folder.path.name} is being trained.")
+        box.setText(f"{name} is being trained.")
         box.setInformativeText(
             "It needs no window: it can go on in the background, and is found again when the"
             " program is started the next time."

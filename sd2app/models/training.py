@@ -108,6 +108,18 @@ class TrainingModel(QObject):
         """Whether the run in view has a process."""
         return self._follower is not None and self._follower.known and self._follower.under_way
 
+    def to_be_left(self) -> TrainingFollower | None:
+        """The run that would go on when the window is closed, brought into view.
+
+        What was started from a terminal is nobody's business here unless it is in view.
+        """
+        if not self.under_way:
+            live = self.library.live
+            if live is None or not output_of(live.path).exists():
+                return None
+            self.select(live.path)
+        return self._follower
+
     @property
     def mark(self) -> str:
         """How far the run in view is, in a word; empty when none is under way."""
@@ -297,6 +309,8 @@ class TrainingModel(QObject):
             self._say_ended(run)
 
     def _say_ended(self, run: TrainingFollower) -> None:
+        if self._watched:
+            return  # it is seen
         name = run.folder.path.name
         if run.phase == "finished":
             self.noted.emit(f"{name} is trained. The Train panel puts its model to use.")

@@ -126,15 +126,16 @@ class TrainingHistory:
         return taken
 
     def _start(self, event: dict[str, Any]) -> None:
-        model, steps_per_epoch = str(event["model"]), int(event["steps_per_epoch"])
-        self.epochs = int(event.get("epochs") or 0)
-        self.minutes = float(event.get("minutes") or 0.0)
-        self.model, self.steps_per_epoch = model, steps_per_epoch
-        self.device = str(event.get("device", ""))
-        self.parameters = int(event.get("parameters") or 0)
-        self.segments = int(event.get("train_segments") or 0)
+        steps_per_epoch, epochs = _count(event["steps_per_epoch"], 1), _count(event.get("epochs"))
+        minutes, done = _number(event.get("minutes")), _count(event.get("steps_done"))
+        parameters = _count(event.get("parameters"))
+        segments = _count(event.get("train_segments"))
+        self.model, self.device = str(event["model"]), str(event.get("device", ""))
+        self.epochs, self.steps_per_epoch = epochs, steps_per_epoch
+        self.minutes = minutes if minutes > 0 else 0.0
+        self.parameters, self.segments = parameters, segments
         # What was done after the checkpoint is done again.
-        self._go_back(int(event.get("steps_done") or 0) if event.get("resumed") else 0)
+        self._go_back(done if event.get("resumed") else 0)
         self.begun, self.paused = True, False
         self.outcome, self.error = None, ""
 
@@ -148,8 +149,8 @@ class TrainingHistory:
 
     def _stepped(self, event: dict[str, Any]) -> None:
         # Counted from the start of the run.
-        step, rmse = int(event["step"]), _number(event.get("train_rmse"))
-        self._advance(int(event["epoch"]), step, event)
+        step, rmse = _count(event["step"]), _number(event.get("train_rmse"))
+        self._advance(_count(event["epoch"], 1), step, event)
         self._skipped += 1
         if math.isfinite(rmse) and rmse > 0 and self._skipped >= self._stride:
             self._skipped = 0
@@ -159,16 +160,16 @@ class TrainingHistory:
                 self._stride *= 2
 
     def _advance(self, epoch: int, steps: int, event: dict[str, Any]) -> None:
-        self._epoch, self.steps_done = epoch, steps
         elapsed_s, left_s = _number(event.get("elapsed_s")), _number(event.get("left_s"))
-        self.left_s = left_s if left_s >= 0 else None
-        if math.isfinite(elapsed_s):
+        self._epoch, self.steps_done = epoch, steps
+        self.left_s = left_s if 0 <= left_s < math.inf else None
+        if 0 <= elapsed_s < math.inf:
             self.elapsed_s = elapsed_s
             if self._first is None:
                 self._first = (steps, elapsed_s)
 
     def _epoch_done(self, event: dict[str, Any]) -> None:
-        epoch = int(event["epoch"])
+        epoch = _count(event["epoch"], 1)
         point = EpochPoint(
             epoch,
             _number(event.get("train_rmse")),
@@ -196,6 +197,14 @@ class TrainingHistory:
 
     def _go_on(self, event: dict[str, Any]) -> None:
         self.paused = False
+
+
+def _count(value: Any, least: int = 0) -> int:
+    """A whole number; nought for what was not told."""
+    count = 0 if value is None else int(value)
+    if count < least:
+        raise ValueError(f"{value!r}")
+    return count
 
 
 def _number(value: Any) -> float:

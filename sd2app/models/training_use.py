@@ -9,13 +9,15 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QObject, Signal, SignalInstance
+from PySide6.QtCore import QObject, QTimer, Signal, SignalInstance
 
 from sd2app.models.tracks import TrackModel
 from sd2app.models.training import TrainingModel
 from sd2core.atomic import atomic_write
 from sd2core.errors import Sd2Error
 from sd2core.spectrum import DopplerMap
+
+CALM_MS = 150
 
 
 class Denoising(Protocol):
@@ -114,9 +116,13 @@ class TrainingUse(QObject):
         self._previous: Path | None = None
         self._gain: Gain | None = None
         self._before_mps: float | None = None
-        denoise.changed.connect(self._compare)
-        for track in (now, before, radar):
-            track.changed.connect(self._compare)
+        # Maps change many times while one is denoised piece by piece.
+        self._calm = QTimer(self)
+        self._calm.setSingleShot(True)
+        self._calm.setInterval(CALM_MS)
+        self._calm.timeout.connect(self._compare)
+        for signal in (denoise.changed, now.changed, before.changed, radar.changed):
+            signal.connect(self._wait)
 
     # --- what is known --------------------------------------------------------------------
 
@@ -184,6 +190,10 @@ class TrainingUse(QObject):
         """Show the map of the model before as well, or not."""
         self._denoise.set_comparing(comparing)
 
+    def close(self) -> None:
+        """Compare no more."""
+        self._calm.stop()
+
     def _keep(self, name: str, best: Path) -> Path:
         """Copy it to where it is found by name, whatever becomes of the run."""
         folder = self._models()
@@ -194,6 +204,10 @@ class TrainingUse(QObject):
         return kept
 
     # --- what it gains --------------------------------------------------------------------
+
+    def _wait(self) -> None:
+        if self._kept is not None:
+            self._calm.start()
 
     def _compare(self) -> None:
         plain, now, radar = self._plain.map, self._now.map, self._radar.map

@@ -75,6 +75,12 @@ def duration_text(seconds: float) -> str:
     return f"{seconds / 86400:.1f} days"
 
 
+def about(seconds: float) -> str:
+    """A duration, called an estimate."""
+    text = duration_text(seconds)
+    return text if text.startswith("a ") else f"about {text}"
+
+
 def exact_text(seconds: float) -> str:
     """Time that has passed."""
     minutes, rest = divmod(round(seconds), 60)
@@ -148,7 +154,7 @@ def estimate_text(estimate: Estimate) -> str:
     """How long it will take."""
     if estimate.seconds is None:
         return "Time: not known yet"
-    return f"Takes about {duration_text(estimate.seconds)}"
+    return f"Takes {about(estimate.seconds)}"
 
 
 def estimate_source_text(estimate: Estimate, key: StepKey, times: StepTimes, epochs: int) -> str:
@@ -167,7 +173,9 @@ def estimate_source_text(estimate: Estimate, key: StepKey, times: StepTimes, epo
 
 def step_text(seconds: float) -> str:
     """Time of a step."""
-    return f"{seconds:.1f} s" if seconds >= 1 else f"{1000 * seconds:.0f} ms"
+    if seconds >= 0.95:
+        return f"{seconds:.1f} s"
+    return f"{float(f'{1000 * seconds:.2g}'):g} ms"
 
 
 def headline(run: TrainingFollower) -> str:
@@ -189,7 +197,7 @@ def time_text(run: TrainingFollower) -> str:
     """Time that has passed, and what is left."""
     history, parts = run.history, []
     if run.phase in ("running", "pausing", "paused", "resuming") and history.left_s is not None:
-        parts.append(f"about {duration_text(history.left_s)} left")
+        parts.append(f"{about(history.left_s)} left")
     if history.elapsed_s is not None:
         parts.append(f"{exact_text(history.elapsed_s)} so far" if parts else "")
         parts[-1] = parts[-1] or f"trained for {exact_text(history.elapsed_s)}"
@@ -243,8 +251,10 @@ def gain_summary(gain: Gain | None, has_radar: bool) -> str:
     """What the figures below are, or why there are none."""
     if gain is not None:
         radar = "the simulated radar's" if gain.simulated else "the radar's"
+        worse = " Here it is worse than no denoising." if gain.now_mps > gain.plain_mps else ""
         return (
-            f"Peak velocity off {radar}, on average over {gain.frames:,} frames of this recording:"
+            f"Peak velocity off {radar}, on average over {gain.frames:,} frames of this"
+            f" recording.{worse}"
         )
     if not has_radar:
         return "Open a recording with a radar capture to see how much nearer it comes to that."

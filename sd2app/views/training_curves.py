@@ -28,6 +28,7 @@ from sd2app.views.time_axis import ticks
 _LEFT_PX, _TOP_PX, _RIGHT_PX, _BOTTOM_PX = 48, 24, 10, 36
 _PAD = 1.12
 _LEAST_RATIO = 1.6
+_ROUND = ((1,), (1, 3), (1, 2, 5), (1, 2, 3, 5, 7), (1, 1.5, 2, 3, 4, 5, 6, 8))
 _STEPS = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
 _TAKES = {Qt.Key.Key_Home, Qt.Key.Key_End, Qt.Key.Key_Escape, *_STEPS}
 
@@ -300,6 +301,16 @@ class TrainingCurves(QWidget):
 
 
 def error_ticks(axis: LogAxis, most: int) -> list[float]:
-    """Values to write on an axis that may span less than a decade."""
-    found = axis.ticks(most)
-    return found if len(found) > 2 else ticks(axis.low, axis.high, max(most - 1, 2))
+    """As many round values as there is room for, also on less than a decade."""
+    first, last = (math.floor(math.log10(end)) for end in (axis.low, axis.high))
+    found: list[float] = []
+    for steps in _ROUND:
+        values = [
+            step * 10.0**power
+            for power in range(first, last + 1)
+            for step in steps
+            if axis.low <= step * 10.0**power <= axis.high
+        ]
+        if len(found) < len(values) <= most:
+            found = values
+    return found or axis.ticks(most)

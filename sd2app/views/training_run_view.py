@@ -73,10 +73,12 @@ class TrainingRunView(QWidget):
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(6)
         self._add_progress(layout)
+        # Above the curves: they are to be at hand in a low window, too.
+        self._add_buttons(layout, use, resume, delete)
+        self._add_reasons(layout)
         self._curves = TrainingCurves(training, display, self)
         layout.addWidget(self._curves)
         self._add_metrics(layout)
-        self._add_buttons(layout, use, resume, delete)
         self._about = muted("")
         layout.addWidget(self._about)
         self._add_closing(layout)
@@ -95,10 +97,14 @@ class TrainingRunView(QWidget):
         self._bar.setMaximumHeight(14)
         self._bar.setTextVisible(False)
         self._bar.setAccessibleName("Progress of the training")
+        for widget in (self._headline, self._bar, self._time):
+            layout.addWidget(widget)
+
+    def _add_reasons(self, layout: QVBoxLayout) -> None:
         self._reason = muted("", "warning")
         self._remedy = muted("")
-        for widget in (self._headline, self._bar, self._time, self._reason, self._remedy):
-            layout.addWidget(widget)
+        layout.addWidget(self._reason)
+        layout.addWidget(self._remedy)
 
     def _add_metrics(self, layout: QVBoxLayout) -> None:
         self._metrics = QWidget(self)

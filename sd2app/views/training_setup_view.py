@@ -238,7 +238,9 @@ class TrainingSetupView(QWidget):
                 widget.hide()
                 widget.deleteLater()
         for store in self._setup.stores:
-            self._rows.addWidget(self._store_row(store))
+            row = self._store_row(store)
+            self._rows.addWidget(row)
+            row.show()
 
     def _store_row(self, store: Store) -> QWidget:
         row = QWidget(self)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import signal
 import sys
 from pathlib import Path
@@ -10,11 +11,17 @@ from pathlib import Path
 import pytest
 from training_pairs import write_pairs
 
+from sd2app.command_line import full_parser
+from sd2app.jobs.detached import is_alive, last_words, start_detached
 from sd2app.models import training_follower
+from sd2app.models.step_times import StepKey, StepTimes
 from sd2app.models.training import TrainingModel
+from sd2app.models.training_words import division_text
 from sd2app.settings import Settings
+from sd2core.cli.train import _config
 from sd2core.errors import Sd2Error
 from sd2core.train.control import read_control
+from sd2core.train.data import prepare, read_mixed
 from sd2core.train.folder import RunFolder
 
 FAKE = Path(__file__).resolve().parent.parent / "fake_train.py"
@@ -263,3 +270,84 @@ def test_a_run_deleted_by_somebody_else_is_put_away(made, qtbot) -> None:
     wait_for(qtbot, model, "finished")
     RunFolder(model.run.folder.path).discard()
     qtbot.waitUntil(lambda: model.run is None, timeout=5_000)
+
+
+def test_stores_are_learnt_from_as_the_library_does(made, qtbot, pairs, tmp_path) -> None:
+    """Who is learnt from, and how many segments that gives, is what the library finds."""
+    model = made()
+    write_pairs(tmp_path / "more.zarr", subjects=3, frames=200)
+    model.setup.add_store(tmp_path / "more.zarr" / "zarr.json")
+    qtbot.waitUntil(lambda: not model.setup.problem)
+    config = model.setup.config
+    data = prepare(read_mixed(config.data.pairs), config.data)
+    assert model.setup.division == data.split
+    assert model.setup.estimate.segments == len(data.training)
+    write_pairs(tmp_path / "other.zarr", subjects=3, bins=16)
+    model.setup.add_store(tmp_path / "other.zarr")
+    qtbot.waitUntil(lambda: "differ in their velocity axis" in model.setup.problem)
+    with pytest.raises(Sd2Error, match="differ in their velocity axis"):
+        model.start()
+
+
+def test_one_person_is_divided_by_takes_and_that_is_said(made, qtbot, tmp_path) -> None:
+    model = made()
+    model.setup.remove_store(model.setup.stores[0].path)
+    assert model.setup.problem == "Add pairs to learn from."
+    model.setup.add_store(write_pairs(tmp_path / "one.zarr", subjects=1, frames=3000))
+    qtbot.waitUntil(lambda: not model.setup.problem)
+    assert model.setup.division.by_take
+    assert "stays unknown" in division_text(model.setup.division)
+
+
+def test_the_command_is_one_that_sd2_takes(made) -> None:
+    """What the panel copies is parsed into the settings that it shows."""
+    model = made()
+    for name, value in (
+        ("model", "gru"), ("batch_size", 8), ("learning_rate", 0.001), ("range_factor", 1.5),
+        ("early_stopping_epochs", 9), ("seed", 4),
+    ):  # fmt: skip
+        model.setup.set_value(name, value)
+    words = shlex.split(model.command)
+    assert words[0] == "sd2"
+    options = full_parser().parse_args(words[1:])
+    assert _config(options) == model.setup.config
+    # And what is kept is there at the next start.
+    again = made(settings=model._settings)
+    assert again.setup.values == model.setup.values
+    assert [store.path for store in again.setup.stores] == list(model.setup.config.data.pairs)
+
+
+def test_a_step_is_timed_once_and_remembered(qtbot) -> None:
+    settings = Settings.forgetful()
+    times = StepTimes(settings, None, TIMING)
+    key = StepKey("s4", 64)
+    with qtbot.waitSignal(times.changed):
+        times.measure(key)
+    qtbot.waitUntil(lambda: times.timing is None, timeout=10_000)
+    assert times.of(key).seconds == 0.25
+    assert StepTimes(settings, None, ("no such program",)).of(key) == times.of(key)
+    # A run knows better.
+    times.learn(key, 0.5)
+    assert (times.of(key).seconds, times.of(key).source) == (0.5, "run")
+
+
+def test_a_step_that_cannot_be_timed_is_not_tried_again(qtbot) -> None:
+    times = StepTimes(Settings.forgetful(), None, ("no such program",))
+    key = StepKey("s4", 64)
+    times.measure(key)
+    qtbot.waitUntil(lambda: bool(times.why_not(key)), timeout=10_000)
+    times.measure(key)
+    assert times.timing is None
+
+
+def test_a_process_outlives_who_started_it_and_is_seen_to_end(qtbot, tmp_path) -> None:
+    script = "import time; print('here', flush=True); time.sleep(0.3); raise SystemExit('gone')"
+    pid = start_detached([sys.executable, "-c", script], tmp_path / "out", {"A": "1"})
+    assert is_alive(pid)
+    qtbot.waitUntil(lambda: last_words(tmp_path / "out") == "here", timeout=10_000)
+    if sys.platform != "win32":
+        assert os.getsid(pid) == pid
+    qtbot.waitUntil(lambda: not is_alive(pid), timeout=10_000)
+    assert last_words(tmp_path / "out") == "here\ngone"
+    assert start_detached(["/no/such/program"], tmp_path / "out") is None
+    assert last_words(tmp_path / "nothing") == ""
