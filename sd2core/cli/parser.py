@@ -40,6 +40,7 @@ examples:
   sd2 synth walk.npz --out map.npz --sensor 0,0,1
   sd2 radar capture/ --out real.npz
   sd2 denoise map.npz --out denoised.npz      what a radar would show
+  sd2 train pairs.zarr --out runs/s4          teach a denoiser from pairs
   sd2 ladder walk.npz --quick                 what accuracy this scene requires
 
 `sd2 COMMAND --help` explains one command.
