@@ -8,11 +8,13 @@ import json
 import multiprocessing
 import multiprocessing.connection
 import os
+import signal
 import threading
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
-from contextlib import contextmanager
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 from sd2core import __version__
@@ -98,13 +100,14 @@ def make_campaign(
         if processes == 1
         else _elsewhere(campaign, errors, missing, processes)
     )
-    for takes in made:
-        there = writer.done
-        for take in takes:
-            if take.key not in there:
-                writer.append(take)
-        done += 1
-        progress(done, len(numbers))
+    with closing(made):
+        for takes in made:
+            there = writer.done
+            for take in takes:
+                if take.key not in there:
+                    writer.append(take)
+            done += 1
+            progress(done, len(numbers))
     return len(missing)
 
 
@@ -128,7 +131,7 @@ def _written(writer: PairWriter, campaign: Campaign, subject: int, number: int) 
 
 def _here(
     campaign: Campaign, errors: FitErrors, numbers: Sequence[tuple[int, int]]
-) -> Iterator[list[Take]]:
+) -> Generator[list[Take], None, None]:
     maker = TakeMaker(campaign, errors)
     for subject, number in numbers:
         yield maker.make(subject, number)
@@ -136,10 +139,11 @@ def _here(
 
 def _elsewhere(
     campaign: Campaign, errors: Path | None, numbers: Sequence[tuple[int, int]], processes: int
-) -> Iterator[list[Take]]:
+) -> Generator[list[Take], None, None]:
     """Takes in order, made by processes that are a few takes ahead."""
     waiting = deque(numbers)
     context = multiprocessing.get_context("spawn")
+    others = multiprocessing.active_children()
     with (
         _one_thread_each(),
         ProcessPoolExecutor(
@@ -152,8 +156,20 @@ def _elsewhere(
                 while waiting and len(running) < _AHEAD * processes:
                     running.append(pool.submit(_make, *waiting.popleft()))
                 yield running.popleft().result()
+        except BrokenProcessPool as error:
+            raise Sd2Error(
+                "A process that makes takes has ended by itself",
+                f"memory and time for {processes} processes",
+                "Run the same command again, with fewer --processes; it goes on where it was",
+            ) from error
         except BaseException:
+            # Whoever stops does not wait for takes that are under way.
             pool.shutdown(wait=False, cancel_futures=True)
+            workers = [one for one in multiprocessing.active_children() if one not in others]
+            for worker in workers:
+                worker.terminate()
+            for worker in workers:
+                worker.join()
             raise
 
 
@@ -174,6 +190,8 @@ def _one_thread_each() -> Iterator[None]:
 
 def _start(campaign: Campaign, errors: Path | None) -> None:
     global _maker
+    # Ctrl+C goes to all of them; the parent sees to the others.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     _end_with_parent()
     _maker = TakeMaker(campaign, FitErrors.load(errors))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -91,6 +92,20 @@ def test_several_processes_make_the_same_and_a_longer_one_begins_alike(
     assert make_campaign(out, SHORT, subjects=2, minutes=0.5 * MINUTES, processes=2) == 2
     assert make_campaign(out, SHORT, subjects=2, minutes=MINUTES, processes=1) == 2
     assert same(read_pairs(out), read_pairs(whole))
+
+
+@pytest.mark.slow
+def test_who_stops_leaves_no_process_behind(tmp_path: Path) -> None:
+    def stop(done: int, total: int) -> None:
+        if done == 1:
+            raise Cancelled
+
+    before = multiprocessing.active_children()
+    out = tmp_path / "stopped.zarr"
+    with pytest.raises(Cancelled):
+        make_campaign(out, SHORT, subjects=1, minutes=100.0, processes=2, progress=stop)
+    assert multiprocessing.active_children() == before
+    assert len(read_pairs(out).takes) == 1
 
 
 def test_other_places_see_the_same_take(whole: Path, tmp_path: Path) -> None:
