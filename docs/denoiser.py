@@ -180,7 +180,12 @@ def _real_jobs(mars: Path, options: argparse.Namespace) -> dict[str, list[Job]]:
                 (
                     *("--model", model, "--seed", str(seed)),
                     *("--minutes", f"{options.real_minutes:g}"),
-                    *("--validation-subjects", others[-1], "--test-subjects", ",".join(kept_out)),
+                    *(
+                        "--validation-subjects",
+                        others[-1] if len(others) > 1 else "none",
+                        "--test-subjects",
+                        ",".join(kept_out),
+                    ),
                 ),
             )
             for model in ("s4", "gru")

@@ -151,7 +151,8 @@ def _add_data(parser: argparse.ArgumentParser) -> None:
         type=_names,
         metavar="NAMES",
         help="kept out to choose the best epoch by, separated by commas (default: a sixth of"
-        " all, at least one, from the end of the list)",
+        " all, at least one, from the end of the list), or none: then the last fifth of"
+        " everybody's takes",
     )
     group.add_argument(
         "--test-subjects",

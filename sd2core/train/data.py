@@ -29,8 +29,8 @@ class Split:
     training, validation, test : tuple of str
         Subjects. They share nobody.
     by_take : bool
-        True where there is one subject only: then the last fifth of their takes
-        validates, and what is measured there says nothing about other people.
+        True where nobody validates, as with one subject: then the last fifth of
+        everybody's takes does, and what is measured there says nothing about other people.
     """
 
     training: tuple[str, ...]
@@ -289,14 +289,17 @@ def _relabelled(
 
 
 def _by_take(takes: tuple[Take, ...]) -> tuple[tuple[Take, ...], tuple[Take, ...]]:
-    """The last fifth of the motions, with all their placements, apart from the others."""
-    motions = list(dict.fromkeys((take.subject, take.name) for take in takes))
-    if len(motions) < 2:
+    """The last fifth of everybody's motions, with all their placements, apart from the others."""
+    kept: set[tuple[str, str]] = set()
+    for subject in dict.fromkeys(take.subject for take in takes):
+        motions = list(dict.fromkeys(take.name for take in takes if take.subject == subject))
+        if len(motions) > 1:
+            kept |= {(subject, name) for name in motions[-max(1, len(motions) // 5) :]}
+    if not kept:
         raise Sd2Error(
-            "There is one take of one subject",
-            "at least two takes: one to learn from and one to choose the best epoch by",
+            "There is no subject with more than one take",
+            "one take to learn from and one to choose the best epoch by",
         )
-    kept = set(motions[-max(1, len(motions) // 5) :])
     return (
         tuple(take for take in takes if (take.subject, take.name) not in kept),
         tuple(take for take in takes if (take.subject, take.name) in kept),

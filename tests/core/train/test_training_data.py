@@ -118,8 +118,11 @@ class TestSegments:
         data = prepare(read_pairs(path), DataConfig((path,)))
         assert data.split.by_take
         assert {take.name for take in data.learnt_takes} == {"t0", "t1", "t2", "t3"}
+        several = write_pairs(tmp_path / "several.zarr", ("s1", "s2"), takes=3)
+        data = prepare(read_pairs(several), DataConfig((several,), (), ()))
+        assert [take.title for take in data.learnt_takes] == ["s1/t0", "s1/t1", "s2/t0", "s2/t1"]
         lone = write_pairs(tmp_path / "lone.zarr", ("s1",), takes=1)
-        with pytest.raises(Sd2Error, match="one take of one subject"):
+        with pytest.raises(Sd2Error, match="no subject with more than one take"):
             prepare(read_pairs(lone), DataConfig((lone,)))
 
     def test_inputs_and_targets_are_of_the_same_frames(self, tmp_path: Path) -> None:
