@@ -56,6 +56,7 @@ MOUSE = (
     ("Drag the frame or its edges in the overview", "Pan or zoom in time"),
     ("Drag the sensor in the scene", "Move it in the plane of the screen"),
     ("Shift+drag, Ctrl+drag the sensor", "Move it vertically, or along the line to the body"),
+    ("Drop a model file (.safetensors)", "Denoise this recording with it"),
     ("Drag elsewhere, middle drag, wheel in the scene", "Turn, shift, zoom; double click resets"),
 )
 """What the mouse does, for the list of keys."""

@@ -26,6 +26,9 @@ from sd2core.spectrum import DopplerMap
 _TOO_SLOW_S = 0.15
 """A model that takes longer for what follows a hand waits until the hand rests."""
 
+_TRIED = 3
+"""Sweeps in which that is found out."""
+
 _BETWEEN_MS = 80
 """While the synthetic map sharpens, a short clip is denoised so often at most."""
 
@@ -116,8 +119,8 @@ class DenoisedMap(QObject):
     @property
     def keeps_up(self) -> bool:
         """Whether the model is fast enough to follow a hand."""
-        took_s = sorted(self._took_s)
-        return not took_s or took_s[len(took_s) // 2] <= _TOO_SLOW_S
+        # The best of some: a busy machine is not a slow model.
+        return len(self._took_s) < _TRIED or min(self._took_s) <= _TOO_SLOW_S
 
     # --- requests -------------------------------------------------------------------------
 

@@ -19,9 +19,17 @@ class DifferenceModel(QObject):
     Counted and measured energies have no common unit, so each is taken relative to its
     own reference, as the heatmaps show it; what is below the faintest level shown counts
     as that level. On a linear scale it is the difference of shares of the references.
+
+    Signals
+    -------
+    changed
+        Its values.
+    state_changed
+        Whether there is one, or whether it is shown.
     """
 
     changed = Signal()
+    state_changed = Signal()
 
     def __init__(
         self,
@@ -37,8 +45,16 @@ class DifferenceModel(QObject):
         self._display = display
         self._settings = settings
         self._wanted = settings.flag(_SHOWN, False)
+        self._state = self._wanted, self.why_not
         for signal in (denoised.changed, real.changed, display.levels_changed):
-            signal.connect(self.changed)
+            signal.connect(self._follow)
+
+    def _follow(self) -> None:
+        self.changed.emit()
+        state = self._wanted, self.why_not
+        if state != self._state:
+            self._state = state
+            self.state_changed.emit()
 
     @property
     def wanted(self) -> bool:
@@ -80,7 +96,7 @@ class DifferenceModel(QObject):
         if wanted != self._wanted:
             self._wanted = wanted
             self._settings.set_value(_SHOWN, wanted)
-            self.changed.emit()
+            self._follow()
 
     def full_scale(self, levels: HeatmapLevels) -> tuple[float, str]:
         """Difference that has the strongest colour, and its unit."""

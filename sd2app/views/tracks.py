@@ -47,9 +47,10 @@ class Tracks(QWidget):
             column.addWidget(view, 1)
         for below in (self.spans, TimeRuler(c.span, c.playback, c.display), self.overview):
             column.addWidget(below)
+        self._shown: object = None
         for track in c.tracks:
             track.changed.connect(self._follow)
-        c.difference.changed.connect(self._follow)
+        c.difference.state_changed.connect(self._follow)
         self._follow()
 
     def show_document(self) -> None:
@@ -68,6 +69,10 @@ class Tracks(QWidget):
             self.real: c.real.map is not None,
             self.difference: c.difference.shown,
         }
+        state = *shown.values(), c.synthetic.map is None, c.document.content is None
+        if state == self._shown:
+            return  # maps change many times a second
+        self._shown = state
         lowest_px = _LOWEST_PX.get(sum(shown.values()), 60)
         for view, there in shown.items():
             view.setMinimumHeight(lowest_px)

@@ -276,7 +276,7 @@ class MainWindow(QMainWindow):
             c.uncertainty.changed,
             c.denoise.changed,
             c.live.changed,
-            c.difference.changed,
+            c.difference.state_changed,
             c.fit.state_changed,
             c.synthesis.completed,
             c.trade.plan_changed,

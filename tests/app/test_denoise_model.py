@@ -240,10 +240,10 @@ def test_a_model_too_slow_for_a_hand_waits_for_it(context, models, qtbot, ball, 
     context.denoise.use(next(iter(models.cards)))
     rest(context, qtbot)
     context.edits.begin_sensor_drag()
-    context.edits.drag_sensor((0.5, 0.0, 0.0))
-    qtbot.waitUntil(lambda: not context.synthesis.busy, timeout=10_000)
-    context.edits.drag_sensor((1.0, 0.0, 0.0))
-    qtbot.waitUntil(lambda: not context.synthesis.busy, timeout=10_000)
+    for step in range(1, 5):
+        assert context.denoised.covered is None
+        context.edits.drag_sensor((0.3 * step, 0.0, 0.0))
+        qtbot.waitUntil(lambda: not context.synthesis.busy, timeout=10_000)
     # Nothing of an earlier place is shown as if it were of this one.
     assert not context.denoised.covered.any()
     assert "follows when the sensor rests" in context.denoised.status
