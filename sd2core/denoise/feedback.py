@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import torch
@@ -33,11 +34,17 @@ def circle(length: int, precision: torch.dtype) -> tuple[int, float]:
     return points, float(_WRAPPED[precision] ** (1.0 / points))
 
 
-def _circle_terms(points: int, radius: float, like: Tensor) -> Tensor:
-    """1 + z on the upper half of the circle, (points // 2 + 1,) complex."""
-    angle = torch.arange(points // 2 + 1, dtype=like.dtype, device=like.device)
-    angle = angle * (-2.0 * torch.pi / points)
-    return torch.complex(1.0 + radius * torch.cos(angle), radius * torch.sin(angle))
+@lru_cache(maxsize=32)
+def _constants(
+    points: int, radius: float, length: int, device: torch.device
+) -> tuple[Tensor, Tensor]:
+    """1 + z on the upper half of the circle, complex128, and radius⁻ˡ, float64."""
+    with torch.inference_mode(False):
+        angle = torch.arange(points // 2 + 1, dtype=torch.float64, device=device)
+        angle = angle * (-2.0 * torch.pi / points)
+        ahead = torch.complex(1.0 + radius * torch.cos(angle), radius * torch.sin(angle))
+        lags = torch.arange(length, dtype=torch.float64, device=device)
+        return ahead, torch.pow(radius, -lags)
 
 
 class _CloseLoop(torch.autograd.Function):
@@ -46,12 +53,10 @@ class _CloseLoop(torch.autograd.Function):
         length = series.shape[-1]
         outer = torch.fft.rfft(series[:, 1:], n=points)  # (H, 3, M/2 + 1)
         leaving, entering, around = outer.unbind(1)
-        term = _circle_terms(points, radius, series)
-        gain = term / (1.0 + term * around)
+        ahead, growth = _constants(points, radius, length, series.device)
+        gain = ahead / (1.0 + ahead * around)
         gained = entering * gain
         closed = torch.fft.irfft(leaving * gained, n=points)[:, :length]
-        lags = torch.arange(length, dtype=series.dtype, device=series.device)
-        growth = torch.pow(radius, -lags)
         ctx.save_for_backward(leaving, gained, gain, growth)
         ctx.points = points
         return (series[:, 0] - closed) * growth

@@ -44,13 +44,13 @@ class _PowerSums(torch.autograd.Function):
     def forward(ctx: Any, poles: Tensor, weights: Tensor, length: int) -> Tensor:
         channels, rows, states = weights.shape
         baby, giant = _steps(rows, length)
-        # Conjugated, so that a product of reals is the real part of the product.
-        babies = powers(poles.conj().resolve_conj(), baby)  # (H, m, n)
-        giants = powers((babies[:, -1] * poles.conj()).conj().resolve_conj(), giant)  # (H, J, n)
+        babies = powers(poles, baby)  # (H, m, n)
+        giants = powers(babies[:, -1] * poles, giant)  # (H, J, n)
         scaled = (2.0 * weights)[:, :, None] * giants[:, None]  # (H, q, J, n)
         sums = torch.bmm(
-            _real(scaled).reshape(channels, rows * giant, 2 * states),
-            _real(babies).transpose(1, 2),
+            _real(scaled).view(channels, rows * giant, 2 * states),
+            # Conjugated, so that a product of reals is the real part of the product.
+            _real(babies.conj_physical()).transpose(1, 2),
         )
         ctx.save_for_backward(babies, giants, scaled)
         ctx.length = length
@@ -62,18 +62,16 @@ class _PowerSums(torch.autograd.Function):
         channels, rows, giant, states = scaled.shape
         baby, length = babies.shape[1], ctx.length
         # The derivative by z needs Σ l g[l] zˡ⁻¹ = Σ (l + 1) g[l + 1] zˡ.
-        both = gradient.new_zeros(2, channels, rows, giant * baby)
-        both[0, ..., :length] = gradient
+        both = gradient.new_zeros(channels, 2, rows, giant * baby)
+        both[:, 0, :, :length] = gradient
         lags = torch.arange(1, length, dtype=gradient.dtype, device=gradient.device)
-        torch.mul(gradient[..., 1:], lags, out=both[1, ..., : length - 1])
-        left = both.view(2, channels, rows * giant, baby).transpose(0, 1)  # (H, 2, qJ, m)
-        folded = torch.bmm(left.reshape(channels, 2 * rows * giant, baby), _real(babies)).view(
-            channels, 2, rows, giant, states, 2
-        )
-        folded = torch.view_as_complex(folded)  # sums of g conj(z)ⁱ
-        by_weights = 2.0 * (folded[:, 0] * giants.conj()[:, None]).sum(2)
-        by_poles = (folded[:, 1] * scaled.conj()).sum((1, 2))
-        return by_poles, by_weights, None
+        torch.mul(gradient[..., 1:], lags, out=both[:, 1, :, : length - 1])
+        left = both.view(channels, 2 * rows * giant, baby)
+        folded = torch.bmm(left, _real(babies)).view(channels, 2, rows, giant, states, 2)
+        folded = torch.view_as_complex(folded)  # sums of g zⁱ
+        by_weights = 2.0 * (folded[:, 0] * giants[:, None]).sum(2)
+        by_poles = (folded[:, 1] * scaled).sum((1, 2))
+        return by_poles.conj(), by_weights.conj(), None
 
 
 def power_sums(poles: Tensor, weights: Tensor, length: int) -> Tensor:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from sd2core.denoise.ssm import StateMatrix, expm1_ratio
+from sd2core.denoise.ssm import StateMatrix, held_exponential
 
 BLOCK = 32
 
@@ -99,9 +99,9 @@ def low_rank_recurrence(matrix: StateMatrix, C: Tensor, dt: Tensor, skip: Tensor
 def diagonal_recurrence(A: Tensor, B: Tensor, C: Tensor, dt: Tensor, skip: Tensor) -> Recurrence:
     """Zero-order hold; shapes as `diagonal_kernel`."""
     dt = dt.double()[..., None]
-    exponent = dt * A.to(torch.complex128)
-    inputs = B * (dt * expm1_ratio(exponent))
-    return _recurrence(torch.exp(exponent), C.to(torch.complex128), inputs, skip, None)
+    grown, held = held_exponential(dt * A.to(torch.complex128))
+    inputs = B * (dt * held)
+    return _recurrence(grown, C.to(torch.complex128), inputs, skip, None)
 
 
 def _recurrence(

@@ -15,6 +15,7 @@ from torch import Tensor
 from sd2core.denoise.feedback import circle, close_loop
 from sd2core.denoise.legs import legs_normal_form
 from sd2core.denoise.power_sums import power_sums
+from sd2core.denoise.terms import low_rank_terms
 from sd2core.errors import Sd2Error
 
 
@@ -120,23 +121,22 @@ def _low_rank_kernel(
 ) -> Tensor:
     check_length(length)
     dt = torch.as_tensor(dt, dtype=torch.float64, device=C.device)[..., None]
-    poles = matrix.poles.to(torch.complex128)
-    low_rank = matrix.low_rank.to(torch.float64)
-    inputs = matrix.inputs.to(torch.complex128)
-    half = 0.5 * dt
-    ahead = half * poles
-    inverse = 1.0 / (1.0 - ahead)
-    looped = low_rank * inverse
-    driven = (dt * inputs) * inverse
-    terms = (C * driven, C * looped, (half * low_rank) * driven, (half * low_rank) * looped)
-    shape = torch.broadcast_shapes(*(term.shape for term in terms))
-    weights = torch.stack([term.expand(shape) for term in terms], -2)
-    points, radius = circle(length, precision)
-    series = power_sums(
-        ((1.0 + ahead) * (radius * inverse)).expand(shape).reshape(-1, shape[-1]),
-        weights.reshape(-1, 4, shape[-1]),
-        length,
+    everything = (matrix.poles, matrix.low_rank, matrix.inputs, C, dt)
+    shape = torch.broadcast_shapes(*(values.shape for values in everything))
+    states = shape[-1]
+
+    def rows(values: Tensor, precision: torch.dtype) -> Tensor:
+        return values.to(precision).expand(shape).reshape(-1, states)
+
+    ratios, weights = low_rank_terms(
+        rows(matrix.poles, torch.complex128),
+        rows(matrix.low_rank, torch.float64),
+        rows(matrix.inputs, torch.complex128),
+        rows(C, torch.complex128),
+        dt.expand(*shape[:-1], 1).reshape(-1, 1),
     )
+    points, radius = circle(length, precision)
+    series = power_sums(radius * ratios, weights, length)
     kernel = close_loop(series, points, radius)
     return kernel.to(precision).reshape(*shape[:-1], length)
 
@@ -161,20 +161,25 @@ def diagonal_kernel(A: Tensor, B: Tensor, C: Tensor, dt: Tensor | float, length:
     check_length(length)
     precision = C.real.dtype
     dt = torch.as_tensor(dt, dtype=torch.float64, device=C.device)[..., None]
-    exponent = dt * A.to(torch.complex128)
-    weights = C * B * (dt * expm1_ratio(exponent))
-    poles = torch.exp(exponent).expand(weights.shape)
+    grown, held = held_exponential(dt * A.to(torch.complex128))
+    weights = C * B * (dt * held)
+    poles = grown.expand(weights.shape)
     states = weights.shape[-1]
     kernel = power_sums(poles.reshape(-1, states), weights.reshape(-1, 1, states), length)
     return kernel.to(precision).reshape(*weights.shape[:-1], length)
 
 
-def expm1_ratio(x: Tensor) -> Tensor:
-    """(exp(x) − 1) / x, and 1 at x = 0."""
-    small = x.abs() < 1e-2
-    safe = torch.where(small, torch.ones_like(x), x)
+def held_exponential(exponent: Tensor) -> tuple[Tensor, Tensor]:
+    """exp(x), and (exp(x) − 1) / x, which is 1 at x = 0; complex128.
+
+    Below 0.01 the quotient cancels and its series takes over; above, two digits are lost at most.
+    """
+    grown = torch.exp(exponent)
+    small = exponent.abs() < 1e-2
+    x = torch.where(small, exponent, torch.zeros_like(exponent))
     series = 1.0 + x / 2 * (1.0 + x / 3 * (1.0 + x / 4 * (1.0 + x / 5 * (1.0 + x / 6))))
-    return torch.where(small, series, torch.expm1(safe) / safe)
+    ratio = (grown - 1.0) / torch.where(small, torch.ones_like(exponent), exponent)
+    return grown, torch.where(small, series, ratio)
 
 
 def check_length(length: int) -> None:
