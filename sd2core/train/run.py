@@ -113,7 +113,7 @@ def carry_out(
         trainer = Trainer(
             accelerator="gpu" if device == "cuda" else "cpu",
             devices=ranks,
-            strategy=DDPStrategy(broadcast_buffers=False) if ranks > 1 else "auto",
+            strategy=DDPStrategy(forward_sync_buffers=False) if ranks > 1 else "auto",
             precision=precision,
             max_epochs=1,
             gradient_clip_val=config.training.clip_norm or None,

@@ -46,6 +46,9 @@ class Ending:
         The best model, where there is one.
     interrupted : bool
         Whether Ctrl-C ended it.
+    first : bool
+        False in the processes that Lightning starts beside the one that the user
+        started: they have nothing to say.
     """
 
     outcome: Literal["finished", "stopped", "cancelled"]
@@ -54,6 +57,7 @@ class Ending:
     validation_mae_mps: float | None
     model: Path | None
     interrupted: bool = False
+    first: bool = True
 
 
 def begin(
@@ -187,7 +191,7 @@ def _beside(folder: RunFolder, config: TrainConfig, command: str, resume: bool) 
             folder, config, writer, Control(folder.control), resume=resume, command=command
         )
     assert outcome != "failed"
-    return Ending(outcome, None, None, None, None)
+    return Ending(outcome, None, None, None, None, first=False)
 
 
 def _end_line(folder: RunFolder, outcome: str, position: Position) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -253,6 +254,28 @@ def test_terminated_and_killed(pairs: Path, tmp_path: Path) -> None:
     assert ending.outcome == "finished"
     assert same(tmp_path / "whole", run.path)
     assert curve(tmp_path / "whole") == curve(run.path)
+
+
+@pytest.mark.slow
+def test_two_processes(pairs: Path, tmp_path: Path) -> None:
+    config = settings(pairs, epochs=20, learning_rate=0.03)
+    config = config.with_values({"machine": {"devices": 2, "deterministic": False}})
+    toml = tmp_path / "settings.toml"
+    toml.write_text(config_text(config, tmp_path))
+    words = ["train", str(toml), "--out", str(tmp_path / "run"), "--json"]
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-m", "sd2core.cli", *words],
+        env=os.environ | {"PYTHONPATH": str(REPOSITORY), "OMP_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    # One of them speaks.
+    assert json.loads(done.stdout)["outcome"] == "finished"
+    epochs = curve(tmp_path / "run")
+    assert [epoch[0] for epoch in epochs] == list(range(1, 21))
+    assert epochs[-1][2] < 0.7 * epochs[0][2]
 
 
 class TestFailure:
