@@ -136,7 +136,9 @@ class StepTimes(QObject):
     def _end(self, ending: Ending) -> None:
         key, self._timing = self._timing, None
         if key is not None and self.of(key) is None:
-            self._refused[key] = ending.errors.removeprefix("sd2: ") or "No step could be timed."
+            # Of a traceback, what it ends with.
+            said = ending.errors.splitlines()[-1:]
+            self._refused[key] = said[0] if said else "the process ended without a word."
         self.changed.emit()
 
     def _keep(self, key: StepKey, found: StepTime) -> None:

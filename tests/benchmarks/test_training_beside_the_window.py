@@ -1,0 +1,81 @@
+"""The window while a training runs beside it: how soon the event loop is back.
+
+Run with a display, real or virtual; software OpenGL is what the targets are for::
+
+    make bench
+"""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QTimer
+from training_pairs import write_pairs
+
+from sd2core.resources import resource_path
+
+SECONDS = 10.0
+TICK_MS = 16
+
+
+@pytest.fixture
+def sample_window(qtbot, tmp_path, monkeypatch):
+    from sd2app.settings import Settings
+    from sd2app.views.window import MainWindow
+    from sd2core.compiled import warm_up
+
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
+    warm_up()
+    window = MainWindow(Settings.forgetful())
+    window.show()
+    window.populate()
+    window.open_paths([resource_path("swipes.sd2")])
+    qtbot.waitUntil(lambda: window.settled and window.context.synthesis.complete, timeout=60_000)
+    window.side.bring_up("Train")
+    yield window
+    window.context.training.cancel()
+    qtbot.waitUntil(lambda: not window.context.training.under_way, timeout=60_000)
+    window.context.document.undo_stack.clear()
+    window.close()
+
+
+def intervals_ms(window, qtbot) -> np.ndarray:
+    """Between the ticks of a timer of 16 ms while the sample is played in a loop."""
+    told: list[float] = []
+    timer = QTimer()
+    timer.setInterval(TICK_MS)
+    timer.timeout.connect(lambda: told.append(time.perf_counter()))
+    playback = window.context.playback
+    playback.seek(0.0)
+    playback.set_loop(True)
+    playback.play()
+    timer.start()
+    qtbot.wait(int(1000 * SECONDS))
+    timer.stop()
+    playback.pause()
+    return 1e3 * np.diff(told)
+
+
+def test_playing_while_a_training_runs(benchmark, sample_window, qtbot, tmp_path):
+    """Target: 95 % of the ticks within 40 ms; S4 on one thread, nice 10, curves in view."""
+    window, training = sample_window, sample_window.context.training
+    alone = intervals_ms(window, qtbot)
+    training.setup.add_store(write_pairs(tmp_path / "campaign.zarr", frames=2000))
+    qtbot.waitUntil(lambda: not training.setup.problem)
+    training.step_times.stop()
+    training.start()
+    qtbot.waitUntil(lambda: training.run.history.epoch >= 2, timeout=300_000)
+    beside = benchmark.pedantic(intervals_ms, (window, qtbot), rounds=1)
+    assert training.run.phase == "running"
+    found = {}
+    for name, values in (("alone", alone), ("training", beside)):
+        found |= {
+            f"{name}_median_ms": float(np.median(values)),
+            f"{name}_p95_ms": float(np.percentile(values, 95)),
+            f"{name}_worst_ms": float(values.max()),
+        }
+    found["step_s"] = training.run.history.step_s
+    benchmark.extra_info.update(found)
+    print("\nbeside a training:", {name: round(value, 3) for name, value in found.items()})
