@@ -15,7 +15,7 @@ from torch import Tensor
 
 from sd2core.denoise.ssm import StateMatrix, held_exponential
 
-BLOCK = 32
+BLOCK = 64
 
 
 class Recurrence(NamedTuple):
@@ -77,10 +77,22 @@ class Block(NamedTuple):
     drive: Tensor
     across: Tensor
 
-    def step(self, signal: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
-        """(H, B, m) and (H, B, N) → (H, B, m), next state; float64."""
-        out = torch.baddbmm(torch.bmm(signal, self.response), state, self.watch)
-        return out, torch.baddbmm(torch.bmm(signal, self.drive), state, self.across)
+    def run(self, signal: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
+        """Whole blocks: (H, B, n m) and (H, B, N) → (H, B, n m), next state; all float64.
+
+        Only the states follow one from the other; all else is done for all blocks at once.
+        """
+        channels, batch, frames = signal.shape
+        states = state.shape[-1]
+        blocks = signal.reshape(channels, -1, BLOCK)  # (H, B n, m)
+        into = torch.bmm(blocks, self.drive).view(channels, batch, -1, states)
+        before = []
+        for added in into.unbind(2):
+            before.append(state)
+            state = torch.baddbmm(added, state, self.across)
+        seen = torch.stack(before, 2).view(channels, -1, states)
+        out = torch.baddbmm(torch.bmm(blocks, self.response), seen, self.watch)
+        return out.view(channels, batch, frames), state
 
 
 def low_rank_recurrence(matrix: StateMatrix, C: Tensor, dt: Tensor, skip: Tensor) -> Recurrence:

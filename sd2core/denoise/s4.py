@@ -100,10 +100,8 @@ class S4Layer(nn.Module):
         whole = length - length % BLOCK
         parts = []
         if whole:
-            block = self.past.block()
-            for frames in normed[..., :whole].split(BLOCK, -1):
-                seen, state = block.step(frames, state)
-                parts.append(seen)
+            seen, state = self.past.block().run(normed[..., :whole], state)
+            parts.append(seen)
         for frame in range(whole, length):
             seen, state = recurrence.step(normed[..., frame], state)
             parts.append(seen[..., None])
