@@ -143,15 +143,15 @@ class RunFolder:
             )
         return lock
 
-    def create(self, model: str) -> None:
-        """Make the folder and its description.
+    def make(self) -> None:
+        """Make the folder.
 
         Raises
         ------
         Sd2Error
-            When there is something already.
+            When there is something already, or nowhere to make it.
         """
-        if self.path.exists() and (not self.path.is_dir() or any(self.path.iterdir())):
+        if self.path.exists() and not self._is_empty():
             what = "a run" if self.exists else "something that is not an empty folder"
             raise Sd2Error(
                 f"{self.path} is {what} already",
@@ -165,6 +165,16 @@ class RunFolder:
                 "an existing folder in which the run is made",
             )
         self.path.mkdir(exist_ok=True)
+
+    def create(self, model: str) -> None:
+        """Make the folder and the description of the run.
+
+        Raises
+        ------
+        Sd2Error
+            As :meth:`make`.
+        """
+        self.make()
         self._write({"model": model, "started_unix_s": time.time(), "state": "starting"})
 
     def set_state(self, state: State) -> None:
@@ -220,6 +230,10 @@ class RunFolder:
             rest.unlink(missing_ok=True)
         if self.path.is_dir() and not any(self.path.iterdir()):
             self.path.rmdir()
+
+    def _is_empty(self) -> bool:
+        """Whether it is a folder in which nothing is but the lock of who is about to use it."""
+        return self.path.is_dir() and all(one.name == LOCK_NAME for one in self.path.iterdir())
 
     def _state_and_about(self) -> tuple[State, dict[str, Any]]:
         about = self._about()

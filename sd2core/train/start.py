@@ -22,7 +22,8 @@ from sd2core.atomic import atomic_write_text
 from sd2core.errors import Sd2Error
 from sd2core.train.config import TrainConfig, config_text, read_config
 from sd2core.train.control import Control, signals_kept, write_control
-from sd2core.train.folder import LIVE, RunFolder
+from sd2core.train.folder import RunFolder
+from sd2core.train.lock import FileLock
 from sd2core.train.progress import Event, ProgressWriter
 
 if TYPE_CHECKING:
@@ -82,12 +83,19 @@ def begin(
     """
     check(config)
     folder = RunFolder(out)
-    if not _is_other_rank():
-        _clear_failed(folder)
+    if _is_other_rank():
+        return _beside(folder, config, command, resume=False)
+    _clear_failed(folder)
+    folder.make()
+    # Held before it is described, or it would look like one whose process is gone.
+    lock = folder.lock()
+    try:
         folder.create(config.model.name)
         atomic_write_text(folder.config, config_text(config, folder.path))
         write_control(folder.control, "run")
-    return _trained(folder, config, command, watch, resume=False)
+        return _trained(folder, config, command, watch, resume=False, lock=lock)
+    finally:
+        lock.release()
 
 
 def go_on(out: Path, *, command: str = "", watch: Watch | None = None) -> Ending:
@@ -109,10 +117,15 @@ def go_on(out: Path, *, command: str = "", watch: Watch | None = None) -> Ending
             "one that was stopped or lost its process",
             "Start a new one in another folder",
         )
-    config = read_config(folder.config)
-    if not _is_other_rank() and state not in LIVE:
+    config, resume = read_config(folder.config), folder.last.exists()
+    if _is_other_rank():
+        return _beside(folder, config, command, resume)
+    lock = folder.lock()
+    try:
         write_control(folder.control, "run")
-    return _trained(folder, config, command, watch, resume=folder.last.exists())
+        return _trained(folder, config, command, watch, resume=resume, lock=lock)
+    finally:
+        lock.release()
 
 
 def check(config: TrainConfig) -> None:
@@ -145,30 +158,32 @@ def check(config: TrainConfig) -> None:
 
 
 def _trained(
-    folder: RunFolder, config: TrainConfig, command: str, watch: Watch | None, *, resume: bool
+    folder: RunFolder,
+    config: TrainConfig,
+    command: str,
+    watch: Watch | None,
+    *,
+    resume: bool,
+    lock: FileLock,
 ) -> Ending:
-    if _is_other_rank():
-        return _beside(folder, config, command, resume)
-    lock = folder.lock()
     control = Control(folder.control)
-    try:
-        with ProgressWriter(folder.progress, watch) as writer, signals_kept():
-            control.take_signals()
-            folder.set_state("starting")
-            try:
-                from sd2core.train.run import carry_out
+    with ProgressWriter(folder.progress, watch) as writer, signals_kept():
+        control.take_signals()
+        folder.set_state("starting")
+        try:
+            from sd2core.train.run import carry_out
 
-                outcome, position = carry_out(
-                    folder, config, writer, control, resume=resume, command=command
-                )
-            except BaseException as error:
-                _note_failure(folder, writer, error)
-                raise
-            writer.say("end", **_end_line(folder, outcome, position))
-            folder.set_state(outcome)
-    finally:
-        lock.release()
+            outcome, position = carry_out(
+                folder, config, writer, control, resume=resume, command=command
+            )
+        except BaseException as error:
+            _note_failure(folder, writer, error)
+            raise
+        writer.say("end", **_end_line(folder, outcome, position))
+        folder.set_state(outcome)
     if outcome == "cancelled":
+        # Windows deletes no file that is open.
+        lock.release()
         folder.discard()
     assert outcome != "failed"
     best = position.best or {}

@@ -50,8 +50,7 @@ def lines(shift: int, noise: float = 0.0) -> PairSet:
 
 
 def model(pairs: PairSet, seed: int = 0, **about: Any) -> TrainedDenoiser:
-    """A network that adds nothing: it answers with what it gets."""
-    torch.manual_seed(seed)
+    """Called a trained network, it answers with what it gets."""
     scaling = Scaling(Compression(1.0), Compression(4.0))
     card = ModelCard(
         model="gru",
@@ -63,7 +62,7 @@ def model(pairs: PairSet, seed: int = 0, **about: Any) -> TrainedDenoiser:
         trained_on="simulated",
         about={"seed": seed, **about},
     )
-    return TrainedDenoiser(build("gru", 8, channels=4, depth=1), card)
+    return TrainedDenoiser(build("none", 8), card)
 
 
 def test_a_perfect_answer() -> None:
@@ -120,7 +119,7 @@ def test_seeds_make_one_row() -> None:
     # Networks that shift the whole map by as many bins as their seed says.
     for seed, one in enumerate(three):
         one.network.correction = (  # type: ignore[method-assign]
-            lambda values, seed=seed: torch.roll(values, seed, -1) - values
+            lambda values, seed=seed: torch.roll(values, seed, -1)
         )
     content = evaluate(three, pairs).to_json()["groups"][-1]
     # Off by 1, 2 and 3 bins of 0.5 m/s; those that fall over the edge are not looked at.

@@ -311,7 +311,9 @@ class TestFailure:
         from sd2core.denoise.recurrent import GruDenoiser
 
         monkeypatch.setattr(
-            GruDenoiser, "forward", lambda self, values: values * self.gain * float("inf")
+            GruDenoiser,
+            "forward",
+            lambda self, values: values * self.head.weight.sum() * float("inf"),
         )
         error, end = self.failing(settings(pairs), tmp_path / "run")
         assert "no finite number" in error.found
