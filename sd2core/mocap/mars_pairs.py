@@ -6,7 +6,7 @@ the target is what the radar's points say, on the same axis and the same frames.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -38,8 +38,6 @@ from sd2core.timebase import Timebase
 Target = Literal["share", "intensity"]
 
 _LABELS = ("background",)
-_POSING_SHARE = 0.8
-"""Of the time that a stretch takes; for the progress only."""
 
 _SYNTHESIS = replace(PRESETS["paper"], visibility="facing", null_bins=())
 
@@ -192,8 +190,8 @@ def make_mars_pairs(
         subject = _subject(part)
         if any(key not in writer.done for key in _keys(part)):
 
-            def report(at: float, done: int = done, part: MarsPart = part) -> None:
-                progress(done + int(at * _frames(part)), total)
+            def report(inside: int, before: int = done) -> None:
+                progress(before + inside, total)
 
             _write(writer, part, choices, made, report)
         made.subjects[subject] = (len(part.stretches), _frames(part))
@@ -203,35 +201,39 @@ def make_mars_pairs(
 
 
 def _write(
-    writer: PairWriter, part: MarsPart, choices: MarsChoices, made: MadePairs, report: Any
+    writer: PairWriter,
+    part: MarsPart,
+    choices: MarsChoices,
+    made: MadePairs,
+    progress: Callable[[int], None],
 ) -> None:
-    """Append those takes of one part that are not there."""
+    """Append those takes of one part that are not there; ``progress`` gets frames done."""
     subject = _subject(part)
-    frames = _frames(part)
-    driven = drive(part, lambda done, total: report(_POSING_SHARE * done / total))
-    before = 0
-    for key, stretch, clip in zip(_keys(part), part.stretches, driven, strict=True):
-        report(_POSING_SHARE + (1.0 - _POSING_SHARE) * before / frames)
-        before += stretch.frame_count
-        if key in writer.done:
-            continue
-        radar = radar_doppler(stretch, choices.synthesis.axis, choices.target)
-        radar[:, list(choices.synthesis.null_bins)] = 0.0
-        writer.append(
-            Take(
-                subject=subject,
-                name=key.name,
-                synthetic=body_doppler(clip, choices),
-                radar=radar,
-                times_s=clip.clip.times_s,
-                label=np.zeros(stretch.frame_count, np.int8),
-                sensor_position_m=np.zeros(3),
+    progress(0)
+    clips = [skeleton_clip(stretch) for stretch in part.stretches]
+    puppet = puppet_of(clips, KINECT_MARKERS)
+    done, residuals_m = 0, []
+    for key, stretch, clip in zip(_keys(part), part.stretches, clips, strict=True):
+        if key not in writer.done:
+            driven = puppet.pose(clip, partial(progress, done))
+            radar = radar_doppler(stretch, choices.synthesis.axis, choices.target)
+            radar[:, list(choices.synthesis.null_bins)] = 0.0
+            writer.append(
+                Take(
+                    subject=subject,
+                    name=key.name,
+                    synthetic=body_doppler(driven, choices),
+                    radar=radar,
+                    times_s=clip.times_s,
+                    label=np.zeros(stretch.frame_count, np.int8),
+                    sensor_position_m=np.zeros(3),
+                )
             )
-        )
-    made.stature_m[subject] = driven[0].puppet.shape.stature_m
-    made.residual_m[subject] = float(
-        np.nanmean(np.concatenate([clip.residual_m.ravel() for clip in driven]))
-    )
+            residuals_m.append(driven.residual_m.ravel())
+        done += stretch.frame_count
+        progress(done)
+    made.stature_m[subject] = puppet.shape.stature_m
+    made.residual_m[subject] = float(np.nanmean(np.concatenate(residuals_m)))
 
 
 def _subject(part: MarsPart) -> str:
