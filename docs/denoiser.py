@@ -85,8 +85,9 @@ REAL = """\
 ## Real pairs
 
 MARS: a body driven by a Kinect's skeleton, and what a real 77 GHz radar saw of the same person at
-10 frames/s ([decision 27](decisions/0027-real-pairs.md)). Each part is judged by models that have
-seen neither its person nor its part.
+10 frames/s ([decision 27](decisions/0027-real-pairs.md); what the pairs are worth before denoising:
+[real-pairs.md](real-pairs.md)). Each part is judged by models that have seen neither its person nor
+its part.
 
 {tables}
 """
