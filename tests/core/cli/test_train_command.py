@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -61,6 +63,33 @@ class TestTrain:
         assert f"{mean:.3f} ± " in outcome.out
         assert f"{mean:.3f} ± " in table.read_text()
         assert picture.read_bytes().startswith(b"\x89PNG")
+
+    @pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 0), (signal.SIGINT, 130)])
+    def test_a_signal_stops_it(
+        self,
+        sd2: Sd2,
+        pairs: Path,
+        tmp_path: Path,
+        monkeypatch: pytest.MonkeyPatch,
+        number: int,
+        code: int,
+    ) -> None:
+        from sd2core.train.progress import ProgressWriter
+
+        said = ProgressWriter.say
+
+        def say(self: ProgressWriter, event: str, **content: Any) -> None:
+            said(self, event, **content)
+            if event == "step":
+                os.kill(os.getpid(), number)
+
+        monkeypatch.setattr(ProgressWriter, "say", say)
+        outcome = sd2("train", pairs, *QUICK, "--out", tmp_path / "run")
+        assert outcome.code == code
+        assert f"sd2 train --resume {tmp_path / 'run'}" in outcome.out
+        monkeypatch.undo()
+        assert sd2("train", "--resume", tmp_path / "run").code == 0
+        assert RunFolder(tmp_path / "run").state() == "finished"
 
     def test_options_go_before_the_file(self, sd2: Sd2, pairs: Path, tmp_path: Path) -> None:
         toml = tmp_path / "a.toml"
