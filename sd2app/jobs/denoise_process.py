@@ -158,6 +158,7 @@ class RemoteDenoiser:
         content, _ = self._process.ask({"do": "load", "path": str(self._path)})
         self._number: int = content["model"]
         self.equals_batch: bool = content["equals_batch"]
+        self.frame_rate_hz: float = content["frame_rate_hz"]
         self._generation = self._process.generation
 
     def _ready(self) -> int:
@@ -173,11 +174,24 @@ class RemoteLive:
     def __init__(self, process: DenoiseProcess, number: int, equals_batch: bool) -> None:
         self._process = process
         self._number = number
+        self._generation = process.generation
         self.equals_batch = equals_batch
 
     def step(self, energies: NDArray[np.float32], present: bool = True) -> NDArray[np.float32]:
         """Answer to the next frame (bins,)."""
-        frame = np.ascontiguousarray(energies, np.float32)
-        content = {"do": "step", "live": self._number, "bins": len(frame), "present": bool(present)}
-        _, numbers = self._process.ask(content, frame.tobytes())
-        return unpacked_values(numbers, frame.shape)
+        return self.advance(energies[None], np.array([present]))[0]
+
+    def advance(
+        self, energies: NDArray[np.float32], present: NDArray[np.bool_]
+    ) -> NDArray[np.float32]:
+        """Answers to the next frames (frames, bins)."""
+        if self._process.generation != self._generation:
+            raise Sd2Error(
+                "The process that denoises was started again", remedy="Choose the model again"
+            )
+        frames, bins = energies.shape
+        content = {"do": "advance", "live": self._number, "frames": frames, "bins": bins}
+        values = np.ascontiguousarray(energies, np.float32)
+        numbers = np.asarray(present, np.bool_).tobytes() + values.tobytes()
+        _, answer = self._process.ask(content, numbers)
+        return unpacked_values(answer, (frames, bins))

@@ -11,6 +11,8 @@ import sys
 from pathlib import Path
 from typing import Any, BinaryIO
 
+import numpy as np
+
 from sd2app.jobs.denoise_messages import (
     Message,
     packed_map,
@@ -22,7 +24,8 @@ from sd2app.jobs.denoise_messages import (
 from sd2core.errors import Sd2Error
 
 _KEPT = 3
-"""Models: the one in use, the one before, and the one that is about to be."""
+"""Models: the one in use, the one before, and the one that is about to be. Of clips that
+are denoised frame after frame as many."""
 
 
 class Worker:
@@ -45,21 +48,28 @@ class Worker:
         self._models[number := self._number()] = model
         while len(self._models) > _KEPT:
             self._models.pop(next(iter(self._models)))
-        return {"model": number, "equals_batch": model.live().equals_batch}, b""
+        about = {"equals_batch": model.live().equals_batch}
+        return about | {"model": number, "frame_rate_hz": model.card.frame_rate_hz}, b""
 
     def _do_denoise(self, content: dict[str, Any], numbers: bytes) -> Message:
         return packed_map(self._model(content).denoise(unpacked_map(content["map"], numbers)))
 
     def _do_live(self, content: dict[str, Any], numbers: bytes) -> Message:
-        self._live = {(number := self._number()): self._model(content).live()}
+        self._live[number := self._number()] = self._model(content).live()
+        while len(self._live) > _KEPT:
+            self._live.pop(next(iter(self._live)))
         return {"live": number}, b""
 
-    def _do_step(self, content: dict[str, Any], numbers: bytes) -> Message:
+    def _do_advance(self, content: dict[str, Any], numbers: bytes) -> Message:
         live = self._live.get(content["live"])
         if live is None:
-            raise Sd2Error("Another clip is being denoised frame by frame")
-        frame = unpacked_values(numbers, (content["bins"],))
-        return {}, live.step(frame, content["present"]).tobytes()
+            raise Sd2Error("The model is no longer loaded", remedy="Choose it again")
+        frames, bins = content["frames"], content["bins"]
+        present = np.frombuffer(numbers, np.bool_, frames)
+        values = unpacked_values(numbers, (frames, bins), frames)
+        if frames == 1:
+            return {}, live.step(values[0], bool(present[0])).tobytes()
+        return {}, np.ascontiguousarray(live.advance(values, present)).tobytes()
 
     def _model(self, content: dict[str, Any]) -> Any:
         model = self._models.get(content["model"])

@@ -13,8 +13,9 @@ from sd2app.jobs.latest import LatestRunner
 from sd2app.models.canvas import View
 from sd2app.models.denoise_choice import NO_MODEL, UNSAID, DenoiserChoice
 from sd2app.models.denoise_library import Denoiser, DenoiserLibrary
+from sd2app.models.denoise_pieces import known_frames
 from sd2app.models.denoise_words import origin_words, track_words
-from sd2app.models.denoised_map import DenoisedMap, known_frames
+from sd2app.models.denoised_map import DenoisedMap
 from sd2app.models.document import DocumentModel
 from sd2app.models.jobs import JobsModel
 from sd2app.models.refine import Companion, Part
@@ -98,6 +99,7 @@ class DenoiseModel(QObject):
         synthesis.accompany(self._companion)
         synthesis.painted.connect(self._take)
         synthesis.completed.connect(self._wake)
+        synthesis.completed.connect(self._finish)
         synthetic.changed.connect(self._watch)
 
     # --- what is known --------------------------------------------------------------------
@@ -307,6 +309,11 @@ class DenoiseModel(QObject):
         if self._choice != UNSAID:
             self.failed.emit(words)
         self.changed.emit()
+
+    def _finish(self) -> None:
+        if self._synthesis.complete:
+            for one in (self.map, self.before_map):
+                one.finish()
 
     # --- following the synthetic map ------------------------------------------------------
 

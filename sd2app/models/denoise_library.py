@@ -24,9 +24,25 @@ class LiveSession(Protocol):
     def step(self, energies: NDArray[np.float32], present: bool = True) -> NDArray[np.float32]:
         """Answer to the next frame (bins,)."""
 
+    def advance(
+        self, energies: NDArray[np.float32], present: NDArray[np.bool_]
+    ) -> NDArray[np.float32]:
+        """Answers to the next frames (frames, bins)."""
+
 
 class Denoiser(Protocol):
-    """A model that is loaded; its methods take a while."""
+    """A model that is loaded; its methods take a while.
+
+    Attributes
+    ----------
+    equals_batch : bool
+        Whether frame after frame gives what the whole map does.
+    frame_rate_hz : float
+        Of the maps that it learned from.
+    """
+
+    equals_batch: bool
+    frame_rate_hz: float
 
     def denoise(self, doppler: DopplerMap) -> DopplerMap:
         """What a radar would show in place of a synthetic map."""

@@ -15,6 +15,7 @@ from sd2app.models.denoise_library import Denoiser, LiveSession
 from sd2app.models.playback import PlaybackModel
 from sd2app.models.tracks import TrackModel
 from sd2app.settings import Settings
+from sd2core.denoise.matching import is_regular
 
 _WANTED = "denoise_live"
 _JUMP_S = 1.0
@@ -157,6 +158,9 @@ class LiveDenoiseModel(QObject):
         self._anew = False
         # A model that looks at a window of frames knows no later ones here.
         past = "" if stepped.session.equals_batch else ", from past frames only"
+        source = self._synthetic.map
+        if source is not None and not is_regular(source.times_s, self._denoiser.frame_rate_hz):
+            past += f", as if at {self._denoiser.frame_rate_hz:g} frames/s"
         shown.track.set_status(
             f"{shown.words} · live, frame by frame{past}: {1e3 * stepped.cost_s:.1f} ms a frame"
         )

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sd2app.models.canvas import View
+from sd2core.segments import LENGTH, OVERLAP
 from sd2core.spectrum import DopplerMap
 from sd2core.timebase import Timebase
 
@@ -15,7 +17,7 @@ AT_ONCE = 2048
 """Frames that are denoised together; a clip up to this length always is whole."""
 
 CONTEXT = 288
-"""Frames around a stretch that its answer may depend on: four windows of training."""
+"""Frames around a stretch that its preview is made with: four windows of training."""
 
 
 def next_piece(wanted: NDArray[np.bool_], view: View) -> View | None:
@@ -40,9 +42,13 @@ def next_piece(wanted: NDArray[np.bool_], view: View) -> View | None:
 
 
 def with_context(known: NDArray[np.bool_], piece: View) -> View:
-    """A stretch with what comes before and after it, as far as that is known."""
+    """A stretch with what comes before and after it, as far as that is known.
+
+    It begins where a window does that is cut from the whole clip.
+    """
     first, last = piece[0], piece[1]
-    before = known[max(first - CONTEXT, 0) : first][::-1]
+    wanted = max(first - CONTEXT, 0)
+    before = known[wanted - wanted % (LENGTH - OVERLAP) : first][::-1]
     after = known[last : last + CONTEXT]
     return (
         first - (len(before) if before.all() else int(before.argmin())),
@@ -51,7 +57,7 @@ def with_context(known: NDArray[np.bool_], piece: View) -> View:
 
 
 def touched(piece: View, frames: int) -> slice:
-    """Frames whose answer changes with a stretch."""
+    """Frames whose preview changes with a stretch."""
     return slice(max(piece[0] - CONTEXT, 0), min(piece[1] + CONTEXT, frames))
 
 
@@ -66,3 +72,8 @@ def cut_out(doppler: DopplerMap, start: int, values: NDArray[np.float32]) -> Dop
         present=None if doppler.present is None else doppler.present[start:stop],
         uncertainty=None,
     )
+
+
+def known_frames(doppler: DopplerMap, covered: Any) -> NDArray[np.bool_]:
+    """Frames of a track that hold something, (T,)."""
+    return np.ones(len(doppler.timebase), bool) if covered is None else np.asarray(covered, bool)

@@ -6,7 +6,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +15,12 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from sd2app.jobs.latest import LatestRunner
 from sd2app.models.canvas import View
 from sd2app.models.content import reference_of
-from sd2app.models.denoise_library import Denoiser
+from sd2app.models.denoise_library import Denoiser, LiveSession
 from sd2app.models.denoise_pieces import AT_ONCE, cut_out, next_piece, touched, with_context
 from sd2app.models.jobs import Job, JobsModel
 from sd2app.models.refine import Companion
 from sd2app.models.tracks import TrackModel
+from sd2core.denoise.matching import is_regular
 from sd2core.errors import Sd2Error
 from sd2core.spectrum import DopplerMap
 
@@ -42,12 +43,20 @@ class _Answer(NamedTuple):
     offset: int
 
 
+class _InOrder(NamedTuple):
+    piece: View
+    session: LiveSession
+    values: NDArray[np.float32]
+
+
 class DenoisedMap(QObject):
     """Denoises what changed of the synthetic map, what is in view first.
 
     While a hand moves the sensor the model is asked in the same background task that
     sweeps the map (:meth:`companion`), so that both are of the same place and are shown
-    together. At rest one piece after another is denoised behind the synthetic map.
+    together. At rest one piece after another is denoised behind the synthetic map. Pieces
+    of a long clip are a preview, where a model remembers more than is around them: when
+    the synthetic map stands, the clip is gone through in order (:meth:`finish`).
 
     Signals
     -------
@@ -92,6 +101,7 @@ class DenoisedMap(QObject):
         self._source: DopplerMap | None = None
         self._known = np.zeros(0, bool)
         self._sensor: object = None
+        self._stands = False
         self._made: DopplerMap | None = None
         self._needs_reference = True
         self._revision = 0
@@ -103,6 +113,12 @@ class DenoisedMap(QObject):
         self._shown = np.zeros(frames, bool)
         self._changed_at = np.full(frames, self._revision)
         self._done_at = np.full(frames, -1)
+        self._strongest = 0.0
+        self._begin_order()
+
+    def _begin_order(self) -> None:
+        self._session: LiveSession | None = None
+        self._in_order = 0
 
     # --- what is known --------------------------------------------------------------------
 
@@ -165,9 +181,17 @@ class DenoisedMap(QObject):
         if not self._held:
             self.track.set_status(self.words)
         self._follow(source, known, sensor)
+        self._stands = False
+        self._begin_order()
         self._revision += 1
         self._changed_at[touched(piece, known.size)] = self._revision
         if not self._again.isActive():
+            self._go_on()
+
+    def finish(self) -> None:
+        """The synthetic map stands: what is a preview can be replaced."""
+        if not self._stands:
+            self._stands = True
             self._go_on()
 
     def companion(self) -> Companion | None:
@@ -200,6 +224,8 @@ class DenoisedMap(QObject):
         self._runner.cancel()
         self._again.stop()
         self._follow(source, known, sensor)
+        self._stands = False
+        self._begin_order()
         self._revision += 1
         self._changed_at[:] = self._revision
         self._shown[:] = False
@@ -261,10 +287,12 @@ class DenoisedMap(QObject):
             return
         wanted = self._known & (self._done_at < self._changed_at)
         piece = next_piece(wanted, self._view())
-        self._report(int(wanted.sum()))
         if piece is None:
-            self.idle.emit()
+            if not self._go_on_in_order():
+                self._report(0)
+                self.idle.emit()
             return
+        self._report(int(wanted.sum()))
         first, last = piece
         begin, end = with_context(self._known, piece)
         source, denoiser, revision = self._source, self._denoiser, self._revision
@@ -274,13 +302,50 @@ class DenoisedMap(QObject):
             lambda emit: _Answer((first, last), revision, denoiser.denoise(doppler), begin)
         )
 
-    def _receive(self, answer: _Answer) -> None:
+    def _go_on_in_order(self) -> bool:
+        """Denoise the next piece with what the model remembers of those before, if need be."""
+        source, denoiser, frames = self._source, self._denoiser, self._known.size
+        if not self._stands or frames <= AT_ONCE or self._in_order >= frames:
+            return False
+        assert source is not None
+        assert denoiser is not None
+        rate_hz = denoiser.frame_rate_hz
+        if not (denoiser.equals_batch and is_regular(source.times_s, rate_hz)):
+            return False
+        self._report(frames - self._in_order)
+        start, session = self._in_order, self._session
+        stop = min(start + AT_ONCE, frames)
+        values = source.values[:, start:stop].T.copy()
+        present = np.ones(stop - start, bool)
+        if source.present is not None:
+            present = source.present[start:stop]
+
+        def work(emit: object) -> _InOrder:
+            live = session or denoiser.live()
+            return _InOrder((start, stop), live, live.advance(values, present).T)
+
+        self._runner.submit(work)
+        return True
+
+    def _receive(self, answer: _Answer | _InOrder) -> None:
+        if isinstance(answer, _InOrder):
+            self._session, self._in_order = answer.session, answer.piece[1]
+            self._paint_values(answer.values, answer.piece)
+            whole = self._in_order == self._known.size
+            share = 100 * self._in_order // self._known.size
+            self.track.set_status(
+                self.words if whole else f"{self.words} · preview, {share} % final"
+            )
+            self._publish()
+            self._go_on()
+            return
         first, last = answer.piece
         self._paint(answer.doppler, first - answer.offset, answer.piece)
         self._done_at[first:last] = answer.revision
         self._publish()
         # Pieces of a long clip follow each other at once; a short one begins again.
         if self._shown.size > AT_ONCE:
+            self.track.set_status(f"{self.words} · preview")
             self._go_on()
         elif (self._done_at < self._changed_at)[self._known].any():
             self._again.start()
@@ -291,9 +356,14 @@ class DenoisedMap(QObject):
     def _paint(self, doppler: DopplerMap, offset: int, piece: View) -> None:
         if self._made is None:
             self._blank(doppler)
+        first, last = piece
+        self._paint_values(doppler.values[:, offset : offset + last - first], piece)
+
+    def _paint_values(self, values: NDArray[np.float32], piece: View) -> None:
         assert self._made is not None
         first, last = piece
-        self._made.values[:, first:last] = doppler.values[:, offset : offset + last - first]
+        self._made.values[:, first:last] = values
+        self._strongest = max(self._strongest, float(values.max(initial=0.0)))
         self._shown[first:last] = self._known[first:last]
 
     def _blank(self, like: DopplerMap) -> None:
@@ -308,11 +378,13 @@ class DenoisedMap(QObject):
     def _publish(self) -> None:
         if self._made is None:
             return
-        if self._needs_reference and self._shown.any():
-            # Of the first map that is whole; until then of what there is.
-            self._needs_reference = not self._shown.all()
-            self.track.set_reference(reference_of(self._made.values[:, self._shown]))
-        self.track.set_map(self._made, None if self._shown.all() else self._shown.copy())
+        whole = bool(self._shown.all())
+        if self._needs_reference and self._strongest > 0:
+            # Of the first map that is whole; until then of what there was.
+            self._needs_reference = not whole
+            strongest = reference_of(self._made.values) if whole else self._strongest
+            self.track.set_reference(strongest)
+        self.track.set_map(self._made, None if whole else self._shown.copy())
 
     def _report(self, left: int) -> None:
         """A long clip is a job that can be cancelled."""
@@ -327,6 +399,7 @@ class DenoisedMap(QObject):
     def _give_up(self) -> None:
         """The user does not want to wait; what is denoised stays."""
         self._stop()
+        self._stands = False
         self._done_at[:] = self._changed_at
         self.idle.emit()
 
@@ -346,8 +419,3 @@ class DenoisedMap(QObject):
         if self._job is not None:
             self._jobs.finish(self._job)
             self._job = None
-
-
-def known_frames(doppler: DopplerMap, covered: Any) -> NDArray[np.bool_]:
-    """Frames of a track that hold something, (T,)."""
-    return np.ones(len(doppler.timebase), bool) if covered is None else np.asarray(covered, bool)

@@ -79,6 +79,24 @@ def test_live_equals_batch(name: str, short_chunks: None) -> None:
     np.testing.assert_allclose(frames, batch, rtol=2e-4, atol=1e-5 * batch.max())
 
 
+@pytest.mark.parametrize("name", [*CAUSAL, *WINDOWED])
+def test_several_frames_at_once_are_those_one_by_one(name: str, short_chunks: None) -> None:
+    denoiser, values = trained(name), energies(100)
+    one_by_one, at_once = denoiser.live(), denoiser.live()
+    present = np.ones(100, bool)
+    present[[0, 20, 21, 59, 60, 99]] = False  # at the ends of blocks too
+    stepped = np.stack(
+        [one_by_one.step(*frame) for frame in zip(values, present.tolist(), strict=True)]
+    )
+    blocks = [
+        at_once.advance(values[start:stop], present[start:stop])
+        for start, stop in ((0, 20), (20, 60), (60, 61), (61, 100))
+    ]
+    np.testing.assert_allclose(
+        np.concatenate(blocks), stepped, rtol=1e-3, atol=1e-5 * stepped.max()
+    )
+
+
 @pytest.mark.parametrize("name", WINDOWED)
 def test_live_windows_answer_for_the_newest_frame(name: str) -> None:
     denoiser, values = trained(name), energies(80)
