@@ -33,7 +33,7 @@ from sd2core.progress import Progress, silent
 from sd2core.simulate.cast import PEOPLE, ROOMS
 from sd2core.simulate.clothing import Clothes
 from sd2core.simulate.encode import write_compact_mesh, write_video
-from sd2core.simulate.gestures import GestureSpan
+from sd2core.simulate.gestures import GestureSpan, arm_length_m
 from sd2core.simulate.motions import Action, duration_s, perform
 from sd2core.simulate.render import Camera, Renderer
 from sd2core.timebase import Timebase
@@ -215,7 +215,7 @@ def scene(clip: Clip, space: ShapeSpace) -> Scene:
     shape = PEOPLE[clip.person].shape(space)
     skeleton = space.skeleton(shape)
     times_s = np.arange(_frame_count(clip)) / FRAMES_PER_S
-    scale = _arm_length_m(skeleton) / _arm_length_m(space.base_skeleton)
+    scale = arm_length_m(skeleton) / arm_length_m(space.base_skeleton)
     motion, spans = perform(skeleton, clip.action, times_s, clip.seed, scale)
     place = np.array([clip.across_m, clip.camera_m, clip.distance_m])
     transforms = skeleton.transforms(motion.rotations, motion.translation_m + place)
@@ -351,11 +351,3 @@ def _description(clip: Clip) -> dict[str, Any]:
         for name, value in described["action"].items()
     }
     return described
-
-
-def _arm_length_m(skeleton: Skeleton) -> float:
-    heads, index = skeleton.heads_m, skeleton.index
-    shoulder, elbow, wrist = (
-        heads[index[f"{bone}.R"]] for bone in ("upperarm01", "lowerarm01", "wrist")
-    )
-    return float(np.linalg.norm(elbow - shoulder) + np.linalg.norm(wrist - elbow))

@@ -246,6 +246,15 @@ def reach(
     rotations[:, wrist] = product(half, flexion)
 
 
+def arm_length_m(skeleton: Skeleton) -> float:
+    """From shoulder over elbow to wrist, by the bones at rest."""
+    heads, index = skeleton.heads_m, skeleton.index
+    shoulder, elbow, wrist = (
+        heads[index[f"{bone}.R"]] for bone in ("upperarm01", "lowerarm01", "wrist")
+    )
+    return float(np.linalg.norm(elbow - shoulder) + np.linalg.norm(wrist - elbow))
+
+
 def bend(
     start: Floats, end: Floats, upper_rest: Floats, lower_rest: Floats, pole: Floats
 ) -> tuple[Floats, Floats]:

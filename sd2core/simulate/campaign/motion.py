@@ -17,12 +17,13 @@ from numpy.typing import NDArray
 
 from sd2core.body.model import Skeleton
 from sd2core.body.rotations import Floats, about, applied, product
-from sd2core.simulate.campaign.people import Subject, arm_scale
+from sd2core.simulate.campaign.people import Subject
 from sd2core.simulate.gait import Path, gait
 from sd2core.simulate.gestures import (
     HANGING,
     ArmPose,
     Motion,
+    arm_length_m,
     minimum_jerk,
     reach,
     relax_fingers,
@@ -127,7 +128,7 @@ def perform(
     drawn: Kind = rng.choice(list(KINDS), p=list(KINDS.values()))
     kind = kind or drawn
     label = np.zeros(len(times_s), np.int8)
-    scale = arm_scale(skeleton, base)
+    scale = arm_length_m(skeleton) / arm_length_m(base)
     if kind == "moving":
         motion = _moving(rng, subject, skeleton, times_s)
     elif kind == "pacing":

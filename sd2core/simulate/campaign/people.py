@@ -7,7 +7,6 @@ from typing import Literal
 
 import numpy as np
 
-from sd2core.body.model import Skeleton
 from sd2core.body.shape import BodyShape, ShapeSpace
 
 _SUBJECT = 1  # takes have 0 in this place of the seed
@@ -75,16 +74,3 @@ def random_subject(space: ShapeSpace, seed: int, number: int) -> Subject:
         float(np.exp(rng.normal(np.log(0.35), 0.4))),
         float(rests),
     )
-
-
-def arm_scale(skeleton: Skeleton, base: Skeleton) -> float:
-    """Length of one skeleton's arm to another's."""
-    return _arm_length_m(skeleton) / _arm_length_m(base)
-
-
-def _arm_length_m(skeleton: Skeleton) -> float:
-    heads, index = skeleton.heads_m, skeleton.index
-    shoulder, elbow, wrist = (
-        heads[index[f"{bone}.R"]] for bone in ("upperarm01", "lowerarm01", "wrist")
-    )
-    return float(np.linalg.norm(elbow - shoulder) + np.linalg.norm(wrist - elbow))

@@ -1,6 +1,6 @@
 """How a body is held, by the few vectors in which a fit errs, and bodies held otherwise.
 
-Three turns (pelvis, chest, head) and ten directions (shoulder, upper arm, forearm and
+Three turns (pelvis, chest, head) and fourteen directions (shoulder, upper arm, forearm and
 hand; thigh, shank and foot; left and right), all in the axes of the line of sight to
 the pelvis. A fit from video errs in these much more along the line of sight than across
 it, and every limb about its own joint, which is why they and not the joints' angles are
