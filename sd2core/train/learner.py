@@ -137,6 +137,21 @@ class Learner(LightningModule):
         # At zero the root has no slope.
         return (square + 1e-12).sqrt()
 
+    def configure_gradient_clipping(
+        self,
+        optimizer: torch.optim.Optimizer,
+        gradient_clip_val: float | None = None,
+        gradient_clip_algorithm: str | None = None,
+    ) -> None:
+        """Clip to a norm.
+
+        Lightning refuses to clip for a fused optimiser in mixed precision, because that
+        could unscale gradients by itself; without fp16 nothing is scaled.
+        """
+        norm = self._course.config.training.clip_norm
+        if norm > 0:
+            torch.nn.utils.clip_grad_norm_(self.network.parameters(), norm)
+
     def on_train_batch_end(self, outputs: Any, batch: Step, batch_idx: int) -> None:
         """Let the course decide what comes next."""
         if not self._course.after_step():

@@ -116,7 +116,6 @@ def carry_out(
             strategy=DDPStrategy(forward_sync_buffers=False) if ranks > 1 else "auto",
             precision=precision,
             max_epochs=1,
-            gradient_clip_val=config.training.clip_norm or None,
             # The course does all of this, between steps.
             logger=False,
             enable_checkpointing=False,

@@ -119,6 +119,34 @@ class TestLearning:
         assert same(tmp_path / "a", tmp_path / "b")
         assert not same(tmp_path / "a", tmp_path / "c")
 
+    @pytest.mark.parametrize("model", ["gru", "s4"])
+    def test_mixed_precision(self, pairs: Path, tmp_path: Path, model: str) -> None:
+        config = settings(pairs, model, epochs=4)
+        for precision in ("32", "bf16"):
+            machine = {"machine": {"precision": precision}}
+            begin(config.with_values(machine), tmp_path / precision)
+        whole, mixed = curve(tmp_path / "32"), curve(tmp_path / "bf16")
+        # Eight bits of mantissa: nearly the same course, and not the same.
+        assert mixed != whole
+        assert [one[2] for one in mixed] == pytest.approx([one[2] for one in whole], rel=0.02)
+
+    def test_gradients_are_clipped(
+        self, pairs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        norms = []
+        clip = torch.nn.utils.clip_grad_norm_
+
+        def noted(parameters: Any, norm: float) -> torch.Tensor:
+            tensors = list(parameters)
+            clip(tensors, norm)
+            norms.append(float(torch.cat([one.grad.ravel() for one in tensors]).norm()))
+            return torch.tensor(0.0)
+
+        monkeypatch.setattr(torch.nn.utils, "clip_grad_norm_", noted)
+        begin(settings(pairs, epochs=1, clip_norm=1e-3), tmp_path / "run")
+        assert norms == pytest.approx([1e-3] * len(norms), rel=1e-3)
+        assert norms
+
     def test_early_stopping(
         self, pairs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
