@@ -1,13 +1,15 @@
 """Kernels of state spaces against the published algorithms, and what a stack of layers takes.
 
 One torch thread where one is compared with the other; H = 128 channels, N = 64. What a run
-measures is printed.
+measures is printed; ratios and limits are asserted.
 """
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -35,8 +37,17 @@ def threads(count: int) -> Iterator[None]:
 
 
 def in_turn_ms(works: list[Any], rounds: int) -> list[float]:
-    """Best of each, one after the other every round, so that a busy machine is so for all."""
-    spent = [[best_s(work, 1) for work in works] for _ in range(rounds)]
+    """Best of each, in processor time, one after the other every round.
+
+    With one thread that is the time it takes, and who else is at work counts less.
+    """
+    spent = []
+    for _ in range(rounds):
+        marks = [time.process_time()]
+        for work in works:
+            work()
+            marks.append(time.process_time())
+        spent.append([after - before for before, after in pairwise(marks)])
     return [1e3 * min(times) for times in zip(*spent, strict=True)]
 
 
@@ -125,7 +136,7 @@ def test_four_layers(benchmark: Any, kernel: str, capsys: pytest.CaptureFixture[
     with torch.inference_mode():
         with threads(1):
             stack.layers[0].step(torch.randn(1, CHANNELS), states[0])
-            frame_s = best_s(live_frame, 300)
+            (frame_ms,) = in_turn_ms([live_frame], 300)
         with threads(2):
             stack(clip)
             clip_s = best_s(lambda: stack(clip), 25)
@@ -133,11 +144,12 @@ def test_four_layers(benchmark: Any, kernel: str, capsys: pytest.CaptureFixture[
         print(
             f"\n{kernel}: training step of 64 × 72 frames {ours_ms:.0f} ms, as published "
             f"{theirs_ms:.0f} ms, {theirs_ms / ours_ms:.1f} times; one live frame "
-            f"{1e3 * frame_s:.2f} ms; 450 frames at once {1e3 * clip_s:.1f} ms"
+            f"{frame_ms:.2f} ms; 450 frames at once {1e3 * clip_s:.1f} ms"
         )
-    # 0.51 and 0.33 s were measured of the reference implementation where 0.20 s is the limit.
-    assert theirs_ms / ours_ms >= {"legs": 2.5, "diagonal": 1.6}[kernel]
-    assert frame_s <= 1e-3
+    # The reference implementation itself took 510 and 330 ms, more than what stands for it here.
+    assert ours_ms <= 200
+    assert theirs_ms / ours_ms >= 1.5
+    assert frame_ms <= 1.0
     assert clip_s <= 40e-3
 
 
