@@ -162,7 +162,7 @@ def diagonal_kernel(A: Tensor, B: Tensor, C: Tensor, dt: Tensor | float, length:
     precision = C.real.dtype
     dt = torch.as_tensor(dt, dtype=torch.float64, device=C.device)[..., None]
     grown, held = held_exponential(dt * A.to(torch.complex128))
-    weights = C * B * (dt * held)
+    weights = (C.to(torch.complex128) * B) * (dt * held)
     poles = grown.expand(weights.shape)
     states = weights.shape[-1]
     kernel = power_sums(poles.reshape(-1, states), weights.reshape(-1, 1, states), length)
