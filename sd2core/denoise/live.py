@@ -22,7 +22,7 @@ from sd2core.segments import OVERLAP, cut, join, segment_starts
 from sd2core.spectrum import DopplerMap
 
 CHUNK = 512
-"""Frames that a causal model is given at once; of long maps the state is handed on."""
+"""Frames of a long map that a causal model is given at once, with the state from before."""
 
 _ROUND = 64
 _BATCH = 16
@@ -141,20 +141,20 @@ class TrainedDenoiser:
         Few lengths occur that way, and kernels that were worked out for one are used again.
         """
         frames = len(values)
-        length = min(-(-frames // _ROUND) * _ROUND, CHUNK)
-        padded = np.zeros((-(-frames // length) * length, values.shape[1]), np.float32)
+        step = _ROUND if frames <= CHUNK else CHUNK
+        padded = np.zeros((-(-frames // step) * step, values.shape[1]), np.float32)
         padded[:frames] = values
         done = np.empty_like(padded)
         with torch.no_grad():
-            if len(padded) == length:
+            if len(padded) <= max(self.network.longest, CHUNK):
                 done[:] = self._answer(self.network, padded)
                 return done[:frames]
             state = self.network.initial_state(1)
-            for start in range(0, frames, length):
+            for start in range(0, frames, CHUNK):
                 progress(start, frames)
-                chunk = torch.from_numpy(padded[start : start + length])[None].to(self.device)
+                chunk = torch.from_numpy(padded[start : start + CHUNK])[None].to(self.device)
                 answer, state = self.network.chunk(chunk, state)
-                done[start : start + length] = answer[0].cpu().numpy()
+                done[start : start + CHUNK] = answer[0].cpu().numpy()
         return done[:frames]
 
     def _in_windows(self, values: NDArray[np.float32], progress: Progress) -> NDArray[np.float32]:

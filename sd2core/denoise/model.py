@@ -28,10 +28,13 @@ class Denoiser(nn.Module):
         Whether a frame depends on itself and earlier frames only.
     window : int or None
         Frames that it looks at together; None for any length.
+    longest : int
+        Frames that are worked out at once when it is used; longer clips in pieces.
     """
 
     causal: bool = True
     window: int | None = None
+    longest: int = 8192
 
     def __init__(self, bins: int) -> None:
         super().__init__()

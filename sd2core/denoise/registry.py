@@ -48,7 +48,7 @@ _ENTRIES: dict[str, _Entry] = {
         "the paper's literal form: all cells one after another, one channel; slow",
         _S4,
         {"kernel": "legs"},
-        {"channels": 8},
+        {"channels": 4},
     ),
     "gru": _Entry(
         "recurrent.GruDenoiser",

@@ -102,6 +102,8 @@ class SerialS4Denoiser(S4Denoiser):
         As for :class:`S4Denoiser`.
     """
 
+    longest = 512
+
     def __init__(self, bins: int, *, channels: int = 128, **layers: Any):
         super().__init__(bins, channels=channels, **layers)
         self.lift = nn.Linear(1, channels)

@@ -13,7 +13,9 @@ from denoisers import CAUSAL, SMALL, WINDOWED, energies, synthetic_map, trained
 from sd2core.denoise import live, matching
 from sd2core.denoise.files import load_model, save_model
 from sd2core.denoise.live import TrainedDenoiser
+from sd2core.denoise.model import Denoiser
 from sd2core.denoise.registry import build
+from sd2core.denoise.state_space import SerialS4Denoiser
 from sd2core.errors import Sd2Error
 from sd2core.progress import Cancelled
 from sd2core.sensor import VelocityAxis
@@ -25,6 +27,8 @@ from sd2core.timebase import Timebase
 def short_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(live, "CHUNK", 32)
     monkeypatch.setattr(live, "_ROUND", 16)
+    for model in (Denoiser, SerialS4Denoiser):
+        monkeypatch.setattr(model, "longest", 64)
 
 
 @pytest.mark.parametrize("name", SMALL)
@@ -55,7 +59,7 @@ def test_without_denoising_levels_are_brought_together() -> None:
 
 
 @pytest.mark.parametrize("name", CAUSAL)
-@pytest.mark.parametrize("frames", [1, 15, 32, 33, 100])
+@pytest.mark.parametrize("frames", [1, 15, 32, 33, 64, 65, 100])
 def test_chunks_of_long_maps_change_nothing(name: str, frames: int, short_chunks: None) -> None:
     denoiser, values = trained(name), energies(frames)
     with torch.no_grad():
