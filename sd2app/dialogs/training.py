@@ -33,6 +33,12 @@ class TrainingDialogs:
         if name:
             self._training.setup.add_store(Path(name))
 
+    def ask_recordings(self) -> None:
+        """Let the user choose recordings to make pairs of."""
+        name = QFileDialog.getExistingDirectory(self._parent, "A recording, or a folder of some")
+        if name:
+            self._attempt(lambda: self._training.pair_maker.make(Path(name)))
+
     def start(self) -> None:
         """Begin as it is set up."""
         self._attempt(self._training.start)

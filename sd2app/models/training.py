@@ -10,6 +10,7 @@ from typing import Literal
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from sd2app.jobs.detached import start_detached
+from sd2app.models.pair_maker import PairMaker
 from sd2app.models.step_times import COMMAND as TIMING_COMMAND
 from sd2app.models.step_times import StepKey, StepTimes
 from sd2app.models.training_command import (
@@ -79,6 +80,10 @@ class TrainingModel(QObject):
         self.library = TrainingLibrary(
             folder or (Path(chosen) if chosen else user_runs_folder()), self
         )
+        self.pair_maker = PairMaker(self.library.folder.parent / "pairs", self, command)
+        self.pair_maker.changed.connect(self.changed)
+        self.pair_maker.made.connect(self.setup.add_store)
+        self.pair_maker.failed.connect(self.failed)
         self._follower: TrainingFollower | None = None
         self._was_under_way = False
         self._looking_for_runs = False
@@ -258,6 +263,7 @@ class TrainingModel(QObject):
         self._timer.stop()
         self._patience.stop()
         self.step_times.stop()
+        self.pair_maker.close()
         self.setup.close()
         self.library.close()
         if self._follower is not None:

@@ -202,6 +202,9 @@ class TrainingSetupModel(QObject):
             return (
                 "These pairs differ in their velocity axis or frame rate. Choose pairs of one kind."
             )
+        division = self.division
+        if division is not None and division.by_take and not any(one.divisible for one in facts):
+            return "All of it is one take. Add another to choose the best model by."
         if not self.estimate.segments:
             return "Every take is shorter than one segment of 72 frames."
         return ""

@@ -133,8 +133,8 @@ def division_text(division: Split) -> str:
     """Who is learnt from, and who is not."""
     if division.by_take:
         return (
-            "All of it is of one person: the last fifth chooses the best model, and how good it"
-            " is with other people stays unknown."
+            "All of it is of one person: the last takes choose the best model, and how good it is"
+            " with other people stays unknown."
         )
     count = len(division.training)
     text = f"Learns from {count} {'person' if count == 1 else 'people'}"

@@ -28,6 +28,9 @@ class Asks(Protocol):
     def ask_store(self) -> None:
         """Let the user choose a store of pairs."""
 
+    def ask_recordings(self) -> None:
+        """Let the user choose recordings to make pairs of."""
+
     def start(self) -> None:
         """Begin as it is set up."""
 
@@ -74,7 +77,7 @@ class TrainingPanel(QWidget):
         row.addWidget(self._new)
         layout.addWidget(self._head)
         self._setup = TrainingSetupView(
-            training, asks.ask_store, asks.start, asks.copy_command, self
+            training, asks.ask_store, asks.ask_recordings, asks.start, asks.copy_command, self
         )
         self._run = TrainingRunView(training, display, asks.use, asks.resume, asks.delete, self)
         self._gain = TrainingGainView(use, self)

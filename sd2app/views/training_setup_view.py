@@ -10,6 +10,7 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QMenu,
+    QProgressBar,
     QSizePolicy,
     QToolButton,
     QVBoxLayout,
@@ -54,8 +55,8 @@ class TrainingSetupView(QWidget):
     Parameters
     ----------
     training : TrainingModel
-    ask_store : callable
-        Lets the user choose a store of pairs.
+    ask_store, ask_recordings : callable
+        Let the user choose a store of pairs, or recordings to make one of.
     start, copy_command : callable
     """
 
@@ -63,6 +64,7 @@ class TrainingSetupView(QWidget):
         self,
         training: TrainingModel,
         ask_store: Callable[[], None],
+        ask_recordings: Callable[[], None],
         start: Callable[[], None],
         copy_command: Callable[[], None],
         parent: QWidget | None = None,
@@ -71,6 +73,7 @@ class TrainingSetupView(QWidget):
         self._training = training
         self._setup = training.setup
         self._ask_store = ask_store
+        self._ask_recordings = ask_recordings
         self._shown_stores: tuple[Store, ...] | None = None
         self._boxes: dict[str, NumberBox] = {}
         layout = QVBoxLayout(self)
@@ -99,15 +102,34 @@ class TrainingSetupView(QWidget):
         layout.addLayout(head)
         self._nothing = muted(
             "A denoiser learns from pairs: a synthetic map, and what a radar saw of the same"
-            " movement. Make some with sd2 simulate campaign or sd2 pairs, then add their"
-            " folder."
+            " movement. Make them of recordings that have a mesh and a radar capture, or with"
+            " sd2 simulate campaign, and add their folder."
         )
         layout.addWidget(self._nothing)
         self._rows = QVBoxLayout()
         self._rows.setSpacing(4)
         layout.addLayout(self._rows)
+        layout.addWidget(self._making_part())
         self._division = muted("")
         layout.addWidget(self._division)
+
+    def _making_part(self) -> QWidget:
+        maker = self._training.pair_maker
+        self._making = QWidget(self)
+        self._making_text = ElidedLabel(self)
+        self._making_text.setObjectName("muted")
+        bar = QProgressBar(self)
+        bar.setRange(0, 0)
+        bar.setMaximumHeight(14)
+        bar.setMaximumWidth(64)
+        bar.setAccessibleName("Pairs are being made")
+        self._making_cancel = outlined("Cancel", "Make no pairs", maker.cancel, self)
+        row = QHBoxLayout(self._making)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.addWidget(self._making_text, 1)
+        row.addWidget(bar)
+        row.addWidget(self._making_cancel)
+        return self._making
 
     def _add_model(self, layout: QVBoxLayout) -> None:
         self._model = Choice("Kind of model", self)
@@ -201,7 +223,13 @@ class TrainingSetupView(QWidget):
         setup = self._setup
         if setup.stores != self._shown_stores:
             self._list_stores()
-        self._nothing.setVisible(not setup.stores)
+        maker = self._training.pair_maker
+        self._nothing.setVisible(not setup.stores and maker.out is None)
+        self._making.setVisible(maker.out is not None)
+        if maker.out is not None:
+            doing = "Cancelling…" if maker.cancelling else "Making"
+            self._making_text.setText(f"{doing} {maker.out.name}")
+            self._making_cancel.setEnabled(not maker.cancelling)
         division = setup.division
         self._division.setText(division_text(division) if division is not None else "")
         self._division.setVisible(division is not None)
@@ -272,7 +300,11 @@ class TrainingSetupView(QWidget):
             action.triggered.connect(lambda _=False, path=path: self._setup.add_store(path))
         if not menu.isEmpty():
             menu.addSeparator()
-        menu.addAction("Choose a folder…").triggered.connect(lambda: self._ask_store())
+        menu.addAction("Folder of pairs…").triggered.connect(lambda: self._ask_store())
+        make = menu.addAction("Make of recordings…")
+        make.setToolTip("Of one recording, or of all in a folder, that have a mesh and a radar")
+        make.setEnabled(self._training.pair_maker.out is None)
+        make.triggered.connect(lambda: self._ask_recordings())
 
     def _unfold(self, shown: bool) -> None:
         self._rest.setVisible(shown)

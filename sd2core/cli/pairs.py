@@ -22,6 +22,42 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     )
     kinds = parser.add_subparsers(title="recordings", metavar="COMMAND", required=True)
     _add_mars(kinds)
+    _add_recordings(kinds)
+
+
+def _add_recordings(kinds: argparse._SubParsersAction) -> None:
+    parser = add_command(
+        kinds,
+        "recordings",
+        "pairs from recordings that have a mesh and a radar capture",
+        handler=_recordings,
+        description=(
+            "The synthetic Doppler of each recording's mesh is the input, the Doppler of its\n"
+            "radar capture the target, aligned by the recording's offset. Labels are its spans."
+        ),
+        examples=(
+            "  sd2 pairs recordings anna.sd2 ben.sd2 carla.sd2 --out mine.zarr\n"
+            "  sd2 pairs recordings a1.sd2 a2.sd2 b1.sd2 --subjects anna,anna,ben --out mine.zarr"
+        ),
+    )
+    parser.add_argument("recordings", type=Path, nargs="+", metavar="RECORDING", help="NAME.sd2")
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="PAIRS", help="the store to write (.zarr)"
+    )
+    parser.add_argument(
+        "--subjects",
+        type=lambda text: tuple(text.split(",")),
+        metavar="NAMES",
+        help="who each recording is of, separated by commas (default: everyone another person)",
+    )
+    add_axis(parser)
+    parser.add_argument(
+        "--null-bins",
+        type=bin_list,
+        metavar="LIST",
+        help="bins to empty in input and target (default: 14,15,16 of 32, else none)",
+    )
+    add_json(parser)
 
 
 def _add_mars(kinds: argparse._SubParsersAction) -> None:
@@ -93,6 +129,42 @@ def _choices(options: argparse.Namespace) -> MarsChoices:
     }
     choices = replace(choices, synthesis=replace(synthesis, axis=axis, **changes))
     return replace(choices, target=options.target) if options.target else choices
+
+
+def _recordings(options: argparse.Namespace) -> None:
+    from dataclasses import replace
+
+    from sd2core.doppler import PRESETS
+    from sd2core.mocap.recording_pairs import make_recording_pairs
+    from sd2core.sensor import VelocityAxis
+
+    synthesis = PRESETS["paper"]
+    if options.bins or options.v_max:
+        axis = VelocityAxis(
+            options.bins or synthesis.axis.bins, options.v_max or synthesis.axis.v_max_mps
+        )
+        # What is nulled by default are bins of the paper's axis.
+        nulled = synthesis.null_bins if axis == synthesis.axis else ()
+        synthesis = replace(synthesis, axis=axis, null_bins=nulled)
+    if options.null_bins is not None:
+        synthesis = replace(synthesis, null_bins=tuple(options.null_bins))
+    with progress_bar("Making pairs") as progress:
+        made = make_recording_pairs(
+            options.recordings, options.out, synthesis, subjects=options.subjects, progress=progress
+        )
+    if options.json:
+        subjects = {
+            name: {"takes": takes, "frames": frames}
+            for name, (takes, frames) in made.subjects.items()
+        }
+        print_json({"pairs": str(options.out), "subjects": subjects, "left_out_s": made.left_out_s})
+        return
+    facts = {
+        name: f"{takes} takes, {frames:,} frames" for name, (takes, frames) in made.subjects.items()
+    }
+    if made.left_out_s > 0:
+        facts["left out"] = f"{made.left_out_s:.1f} s without a person or a radar frame"
+    print_facts(str(options.out), facts)
 
 
 def _mars(options: argparse.Namespace) -> None:

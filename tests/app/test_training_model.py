@@ -144,8 +144,7 @@ def test_cancelling_is_said_at_once_and_leaves_nothing(made, qtbot) -> None:
     model.cancel()
     assert model.run.phase == "cancelling"
     qtbot.waitUntil(lambda: model.run is None, timeout=15_000)
-    assert not folder.path.exists()
-    assert not list(folder.path.parent.iterdir())
+    qtbot.waitUntil(lambda: not list(folder.path.parent.iterdir()))
 
 
 def test_cancelling_before_there_is_a_folder(made, qtbot) -> None:
@@ -168,7 +167,7 @@ def test_one_that_does_not_hear_is_ended(made, qtbot) -> None:
     real = run._clock_s
     run._clock_s = lambda: real() + 31.0
     qtbot.waitUntil(lambda: model.run is None, timeout=15_000)
-    assert not folder.path.exists()
+    qtbot.waitUntil(lambda: not folder.path.exists())
 
 
 def test_a_refusal_is_told_in_its_words(made, qtbot) -> None:
@@ -293,10 +292,16 @@ def test_one_person_is_divided_by_takes_and_that_is_said(made, qtbot, tmp_path) 
     model = made()
     model.setup.remove_store(model.setup.stores[0].path)
     assert model.setup.problem == "Add pairs to learn from."
-    model.setup.add_store(write_pairs(tmp_path / "one.zarr", subjects=1, frames=3000))
+    model.setup.add_store(write_pairs(tmp_path / "take.zarr", subjects=1))
+    qtbot.waitUntil(lambda: "one take" in model.setup.problem)
+    model.setup.remove_store(tmp_path / "take.zarr")
+    model.setup.add_store(write_pairs(tmp_path / "one.zarr", subjects=1, takes=5))
     qtbot.waitUntil(lambda: not model.setup.problem)
     assert model.setup.division.by_take
     assert "stays unknown" in division_text(model.setup.division)
+    config = model.setup.config
+    learnt = prepare(read_mixed(config.data.pairs), config.data).training
+    assert model.setup.estimate.segments == len(learnt)
 
 
 def test_the_command_is_one_that_sd2_takes(made) -> None:

@@ -13,9 +13,11 @@ from PySide6.QtWidgets import QApplication, QMessageBox, QTabBar, QToolButton
 from training_pairs import write_pairs
 
 from sd2app.models import training_follower
+from sd2app.models.pair_maker import PairMaker
 from sd2app.settings import Settings
 from sd2app.views.training_panel import TrainingPanel
 from sd2app.views.window import MainWindow
+from sd2core.pairs import read_pairs
 from sd2core.train.folder import RunFolder
 
 FAKE = Path(__file__).resolve().parent.parent / "fake_train.py"
@@ -128,3 +130,15 @@ def test_a_trained_model_denoises_the_recording(
     # It is an edit like any other.
     c.document.undo_stack.undo()
     qtbot.waitUntil(lambda: c.training_use.run is None)
+
+
+@pytest.mark.slow
+def test_pairs_are_made_of_a_recording(qtbot, small_recording, tmp_path) -> None:
+    """With the command that there is."""
+    maker = PairMaker(tmp_path / "pairs")
+    with qtbot.waitSignal(maker.made, timeout=120_000) as made:
+        maker.make(small_recording)
+    pairs = read_pairs(made.args[0])
+    assert (pairs.subjects, pairs.frames, pairs.kind) == (("ball",), 60, "simulated")
+    assert pairs.labels == ("background", "back", "there")
+    maker.close()

@@ -9,7 +9,15 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QCoreApplication, QEvent, QObject, Qt, QTimer, Signal
-from PySide6.QtWidgets import QApplication, QLabel, QMessageBox, QProgressBar, QToolButton, QToolTip
+from PySide6.QtWidgets import (
+    QApplication,
+    QFileDialog,
+    QLabel,
+    QMessageBox,
+    QProgressBar,
+    QToolButton,
+    QToolTip,
+)
 from training_pairs import write_pairs
 
 from sd2app.dialogs.training import TrainingDialogs
@@ -203,6 +211,48 @@ def test_a_store_that_is_none_is_named_and_can_be_taken_out(made, qtbot, tmp_pat
     assert window.training.setup.known_stores == [tmp_path / "empty"]
 
 
+def test_recordings_are_made_into_pairs(made, qtbot, tmp_path, small_recording, monkeypatch):
+    """Of the panel; that the command makes pairs is tested where it is."""
+    window = made()
+    maker = window.training.pair_maker
+    script = "import sys, time; time.sleep(0.5); sys.exit('sd2: There is no room.')"
+    maker._command = (sys.executable, "-c", script)
+    asked: list[object] = []
+    monkeypatch.setattr(
+        QFileDialog,
+        "getExistingDirectory",
+        lambda *a: asked.append(a) or str(small_recording),
+    )
+
+    def choose() -> None:
+        menu = QApplication.activePopupWidget()
+        if menu is None:
+            QTimer.singleShot(20, choose)
+            return
+        action = next(one for one in menu.actions() if one.text() == "Make of recordings…")
+        qtbot.mouseClick(menu, Qt.MouseButton.LeftButton, pos=menu.actionGeometry(action).center())
+
+    QTimer.singleShot(20, choose)
+    click(window, qtbot, "Add pairs")
+    assert len(asked) == 1
+    assert "Making ball.zarr" in texts(window)
+    said: list[str] = []
+    window.training.failed.connect(said.append)
+    qtbot.waitUntil(lambda: said == ["There is no room."], timeout=10_000)
+    qtbot.waitUntil(lambda: "Making" not in texts(window))
+    maker._command = (sys.executable, "-c", "import time; time.sleep(3600)")
+    window.dialogs.ask_recordings()
+    click(window, qtbot, "Cancel")
+    assert "Cancelling… ball.zarr" in texts(window)
+    qtbot.waitUntil(lambda: maker.out is None, timeout=10_000)
+    # What was made is learnt from; where there are no recordings that is said.
+    maker.made.emit(write_pairs(tmp_path / "made.zarr"))
+    qtbot.waitUntil(lambda: "made.zarr" in texts(window))
+    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *a: str(tmp_path))
+    window.dialogs.ask_recordings()
+    assert "no recording with a mesh and a radar capture" in window.said[-1]
+
+
 def test_a_run_is_watched_paused_and_stopped(made, qtbot, pairs) -> None:
     window = made("--step-s", 0.05)
     begun(window, qtbot, pairs, "running", epochs=200)
@@ -212,7 +262,7 @@ def test_a_run_is_watched_paused_and_stopped(made, qtbot, pairs) -> None:
     assert "Peak velocity, MAE" in texts(window)
     assert "123,456 parameters" in texts(window)
     assert window.panel.findChild(TrainingCurves).isVisible()
-    assert window.panel.findChild(QProgressBar).isVisible()
+    assert any(bar.isVisible() for bar in window.panel.findChildren(QProgressBar))
     click(window, qtbot, "Pause")
     assert "Pausing…" in texts(window)
     qtbot.waitUntil(lambda: "Paused" in texts(window), timeout=10_000)

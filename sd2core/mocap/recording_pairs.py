@@ -1,0 +1,230 @@
+"""Pairs of synthetic and radar Doppler from recordings that have a mesh and a radar capture."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core import __version__
+from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
+from sd2core.errors import Sd2Error
+from sd2core.fmcw.processing import doppler_map
+from sd2core.pairs import PairWriter, Take, TakeKey
+from sd2core.presence import runs
+from sd2core.progress import Progress, silent
+from sd2core.recording import Recording, open_recording
+from sd2core.spectrum import DopplerMap
+
+TAKE_S = 15.0
+"""Longer stretches are cut: takes can be kept apart even where there is one person."""
+
+_BACKGROUND = "background"
+_SAME_RATE = 0.01
+_STEPS = 1000
+"""Of progress per recording."""
+
+
+@dataclass(frozen=True)
+class PairsMade:
+    """What came of it.
+
+    Parameters
+    ----------
+    subjects : dict of str to (int, int)
+        Takes and frames per subject.
+    left_out_s : float
+        Time without a radar frame, without a person, or in rests shorter than a second.
+    """
+
+    subjects: dict[str, tuple[int, int]]
+    left_out_s: float
+
+
+def make_recording_pairs(
+    recordings: Sequence[Path],
+    out: Path,
+    synthesis: SynthesisOptions = PRESETS["paper"],
+    *,
+    subjects: Sequence[str] | None = None,
+    progress: Progress = silent,
+) -> PairsMade:
+    """Put recordings into a store of pairs; goes on with a store that was begun.
+
+    Every recording is seen by its own sensor. The radar's frame that is nearest to a frame
+    of the mesh, by the recording's offset, is its target. Nulled bins are those of the
+    synthesis, in input and target alike.
+
+    Parameters
+    ----------
+    recordings : sequence of Path
+    out : Path
+    synthesis : SynthesisOptions
+        Of the input; its axis is the target's, too.
+    subjects : sequence of str, optional
+        Who each recording is of; by default everyone's recording is of another person,
+        who is called as it is.
+    progress : Progress
+
+    Raises
+    ------
+    Sd2Error
+        When a recording lacks mesh or radar, two are called alike, or frame rates or kinds
+        of radar differ.
+    """
+    opened = [open_recording(path) for path in recordings]
+    names = _names(opened, subjects)
+    for recording in opened:
+        _check(recording)
+    labels = (_BACKGROUND, *sorted({span.label for one in opened for span in one.spans}))
+    writer: PairWriter | None = None
+    first: tuple[Path, float, bool] | None = None
+    found: dict[str, tuple[int, int]] = {}
+    left_out_s = 0.0
+    for number, (recording, subject) in enumerate(zip(opened, names, strict=True)):
+        synthetic, radar = _maps(recording, synthesis, _part(progress, number, len(opened)))
+        rate_hz = synthetic.timebase.frames_per_s
+        this = (recording.folder, rate_hz, radar.kind == "simulated")
+        first = first or this
+        _compare(first, this)
+        if writer is None:
+            writer = PairWriter(
+                out,
+                kind="simulated" if this[2] else "real",
+                axis=synthesis.axis,
+                null_bins=synthesis.null_bins,
+                frame_rate_hz=round(rate_hz, 3),
+                labels=labels,
+                provenance={
+                    "made_by": f"SD² Studio {__version__}",
+                    "recordings": [one.folder.name for one in opened],
+                    "synthesis": asdict(synthesis),
+                },
+            )
+        takes, without_s = _takes(recording, subject, synthetic, radar, labels)
+        left_out_s += without_s
+        for take in takes:
+            if TakeKey(take.subject, take.name, 0) not in writer.done:
+                writer.append(take)
+        count, frames = found.get(subject, (0, 0))
+        found[subject] = (
+            count + len(takes), frames + sum(len(take.times_s) for take in takes),
+        )  # fmt: skip
+    return PairsMade(found, left_out_s)
+
+
+def _names(recordings: Sequence[Recording], subjects: Sequence[str] | None) -> list[str]:
+    folders = [recording.folder.stem for recording in recordings]
+    for name in folders:
+        if folders.count(name) > 1:
+            raise Sd2Error(
+                f"Two recordings are called {name}", "names that differ", "Rename one of them"
+            )
+    if subjects is None:
+        return folders
+    if len(subjects) != len(folders):
+        raise Sd2Error(
+            f"{len(subjects)} people are named for {len(folders)} recordings",
+            "one for each, in their order",
+        )
+    return list(subjects)
+
+
+def _check(recording: Recording) -> None:
+    for what, path in (("mesh", recording.mesh), ("radar capture", recording.radar)):
+        if path is None:
+            raise Sd2Error(
+                f"{recording.folder} has no {what}",
+                "a recording with a mesh and a radar capture",
+                "Fit one with `sd2 fit`" if what == "mesh" else "",
+            )
+
+
+def _maps(
+    recording: Recording, synthesis: SynthesisOptions, progress: Progress
+) -> tuple[DopplerMap, DopplerMap]:
+    mesh = recording.load_mesh()
+    made = Synthesizer(mesh, synthesis).map(
+        recording.sensor,
+        progress=lambda done, total: progress(round(0.9 * _STEPS * done / max(total, 1)), _STEPS),
+    )
+    radar = doppler_map(recording.load_capture(), axis=synthesis.axis)
+    progress(_STEPS, _STEPS)
+    return made, radar
+
+
+def _compare(first: tuple[Path, float, bool], this: tuple[Path, float, bool]) -> None:
+    if abs(this[1] / first[1] - 1.0) > _SAME_RATE:
+        raise Sd2Error(
+            f"{this[0]} has {this[1]:.4g} frames/s, {first[0]} has {first[1]:.4g}",
+            "the same in all recordings",
+        )
+    if this[2] != first[2]:
+        raise Sd2Error(
+            f"Of {first[0]} and {this[0]} the radar of one is simulated, of the other real",
+            "all real or all simulated",
+            "Make two stores; `sd2 train` mixes them",
+        )
+
+
+def _takes(
+    recording: Recording,
+    subject: str,
+    synthetic: DopplerMap,
+    radar: DopplerMap,
+    labels: tuple[str, ...],
+) -> tuple[list[Take], float]:
+    """Stretches with a person and a radar frame, cut into takes; and the time left out."""
+    times_s = synthetic.timebase.times_s
+    nearest, seen = _nearest(times_s, radar.timebase.times_s + recording.radar_offset_s)
+    if synthetic.present is not None:
+        seen &= synthetic.present
+    target = radar.values.T[nearest].copy()  # (frames, bins)
+    target[:, list(synthetic.null_bins)] = 0.0
+    label = np.zeros(len(times_s), np.int8)
+    for span in recording.spans:
+        label[(times_s >= span.start_s) & (times_s < span.end_s)] = labels.index(span.label)
+    rate_hz = synthetic.timebase.frames_per_s
+    takes: list[Take] = []
+    kept = 0
+    for begun, ended in runs(seen):
+        # Of equal length, so that none is a rest.
+        parts = max(1, math.ceil((ended - begun) / (rate_hz * TAKE_S)))
+        edges = np.linspace(begun, ended, parts + 1).round().astype(int)
+        for start, stop in pairwise(edges.tolist()):
+            if stop - start < rate_hz:
+                continue
+            kept += stop - start
+            takes.append(
+                Take(
+                    subject=subject,
+                    name=f"{recording.folder.stem}-{len(takes):03d}",
+                    synthetic=np.ascontiguousarray(synthetic.values.T[start:stop]),
+                    radar=target[start:stop],
+                    times_s=times_s[start:stop] - times_s[start],
+                    label=label[start:stop],
+                    sensor_position_m=np.asarray(recording.sensor.position_m, np.float64),
+                )
+            )
+    return takes, float((len(times_s) - kept) / rate_hz)
+
+
+def _nearest(
+    times_s: NDArray[np.float64], there_s: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Nearest moments of another clock, and whether they are as near as its frames are."""
+    right = np.clip(np.searchsorted(there_s, times_s), 0, len(there_s) - 1)
+    left = np.maximum(right - 1, 0)
+    nearest = np.where(times_s - there_s[left] <= np.abs(there_s[right] - times_s), left, right)
+    spacing_s = float(np.median(np.diff(there_s))) if len(there_s) > 1 else 0.0
+    return nearest, np.abs(there_s[nearest] - times_s) <= 0.75 * spacing_s
+
+
+def _part(progress: Progress, number: int, of: int) -> Progress:
+    """Progress of one recording as that of all."""
+    return lambda done, total: progress(number * _STEPS + round(_STEPS * done / total), of * _STEPS)
