@@ -8,6 +8,7 @@ from pathlib import Path
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.jobs.latest import LatestRunner
+from sd2app.models.training_phase import is_live
 from sd2app.models.training_words import clock_text, model_name, state_text
 from sd2core.errors import Sd2Error
 from sd2core.train.folder import LIVE, RunFolder, RunStatus, runs_in
@@ -109,14 +110,17 @@ class TrainingLibrary(QObject):
                 for path in (run.progress, run.path / "run.json", run.best)
             ]
             # Without this every look would read all that every run has ever told.
-            key = (stamps, run.live)
+            live = is_live(run)
+            key = (stamps, live)
             kept = self._cache.get(run.path)
             if kept is not None and kept[0] == key:
                 return kept[1]
             known = KnownRun(run.path, run.status())
         except (Sd2Error, OSError):
             return None
-        self._cache[run.path] = (key, known)
+        # Otherwise it ended, or began, between two looks.
+        if known.live == live:
+            self._cache[run.path] = (key, known)
         return known
 
     def _take(self, runs: tuple[KnownRun, ...]) -> None:

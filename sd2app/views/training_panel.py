@@ -79,10 +79,12 @@ class TrainingPanel(QWidget):
         self._setup = TrainingSetupView(
             training, asks.ask_store, asks.ask_recordings, asks.start, asks.copy_command, self
         )
-        self._run = TrainingRunView(training, display, asks.use, asks.resume, asks.delete, self)
         self._gain = TrainingGainView(use, self)
-        for widget in (self._setup, self._run, self._gain):
-            layout.addWidget(widget)
+        self._run = TrainingRunView(
+            training, display, asks.use, asks.resume, asks.delete, self._gain, self
+        )
+        layout.addWidget(self._setup)
+        layout.addWidget(self._run)
         layout.addStretch(1)
         training.changed.connect(self._refresh)
         use.changed.connect(self._refresh)

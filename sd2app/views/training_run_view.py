@@ -56,6 +56,8 @@ class TrainingRunView(QWidget):
     display : DisplayModel
     use, resume, delete : callable
         They may ask first, or be refused.
+    gain : QWidget, optional
+        Put under the buttons.
     """
 
     def __init__(
@@ -65,6 +67,7 @@ class TrainingRunView(QWidget):
         use: Callable[[], None],
         resume: Callable[[], None],
         delete: Callable[[], None],
+        gain: QWidget | None = None,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
@@ -76,6 +79,8 @@ class TrainingRunView(QWidget):
         # Above the curves: they are to be at hand in a low window, too.
         self._add_buttons(layout, use, resume, delete)
         self._add_reasons(layout)
+        if gain is not None:
+            layout.addWidget(gain)
         self._curves = TrainingCurves(training, display, self)
         layout.addWidget(self._curves)
         self._add_metrics(layout)

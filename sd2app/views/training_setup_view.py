@@ -230,7 +230,7 @@ class TrainingSetupView(QWidget):
             doing = "Cancelling…" if maker.cancelling else "Making"
             self._making_text.setText(f"{doing} {maker.out.name}")
             self._making_cancel.setEnabled(not maker.cancelling)
-        division = setup.division
+        division = setup.division if not setup.problem else None
         self._division.setText(division_text(division) if division is not None else "")
         self._division.setVisible(division is not None)
         with QSignalBlocker(self._model):
