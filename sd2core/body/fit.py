@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.camera import PinholeCamera
-from sd2core.body.evidence import VELOCITY_CAUTION, Evidence, evidence_of
+from sd2core.body.evidence import Evidence, evidence_of
 from sd2core.body.fitted import BodyFit
 from sd2core.body.initial import Pose, initial_pose
 from sd2core.body.keypoints import KeypointSpace
@@ -44,8 +44,11 @@ _TOLD_BY = ("slopes", "depth_m", "trunk_m")
 
 # Measured on simulated people (docs/decisions/0022): what the lifter says of its
 # velocities, and the fit's error across the view per error of a landmark there.
-_ALONG = 0.57
+_ALONG = 0.42
 _ACROSS_PER_S = 3.0
+
+_UNSEEN_MPS = 0.3
+"""What a limb may do that the picture cuts off or something hides; a guess, not measured."""
 
 
 def fit_body(
@@ -113,7 +116,7 @@ def fit_body(
             _keep(workspace, number, part, found)
         _blend(pose, found, start, overlap)
     progress(total, total)
-    return _finished(track, evidence, rig, shape, pose)
+    return _finished(track, lifted, evidence, rig, shape, pose)
 
 
 class _People:
@@ -199,7 +202,12 @@ def _blend(pose: Pose, found: Pose, start: int, overlap: int) -> None:
 
 
 def _finished(
-    track: LandmarkTrack, evidence: Evidence, rig: Rig, shape: BodyShape, pose: Pose
+    track: LandmarkTrack,
+    lifted: LiftedTrack,
+    evidence: Evidence,
+    rig: Rig,
+    shape: BodyShape,
+    pose: Pose,
 ) -> BodyFit:
     known = np.flatnonzero(track.present)
     frames = np.arange(len(track))
@@ -211,6 +219,7 @@ def _finished(
     trunk_m = keypoints_m[:, evidence.trunk, 2].mean(axis=1)
     residual_m = np.linalg.norm(keypoints_m - replace(evidence, trunk_m=trunk_m).points_m, axis=-1)
     residual_m[~track.present] = np.nan
+    unseen = 1.0 - np.clip(track.visibility.astype(np.float64), 0.0, 1.0)
     return BodyFit(
         timebase=track.timebase,
         shape=shape,
@@ -219,7 +228,10 @@ def _finished(
         present=track.present.copy(),
         keypoints_m=keypoints_m,
         residual_m=residual_m,
-        along_sd_mps=_there(_ALONG * evidence.velocity_sd_mps / VELOCITY_CAUTION, track.present),
+        along_sd_mps=_there(
+            np.hypot(_ALONG * shape.stature_m * lifted.velocity_sigma, _UNSEEN_MPS * unseen**4),
+            track.present,
+        ),
         across_sd_mps=_there(
             _ACROSS_PER_S * evidence.slopes_sd * keypoints_m[..., 2], track.present
         ),

@@ -35,7 +35,7 @@ def add_fit_truth(kinds: argparse._SubParsersAction) -> None:
         "--clips",
         metavar="NAMES",
         help=(
-            "only these, separated by commas, or `tuning`: six other clips by which the weights"
+            "only these, separated by commas, or `tuning`: ten other clips by which the weights"
             " of the fit were chosen (default: all but those)"
         ),
     )

@@ -113,6 +113,10 @@ TUNING = (
     Clip("tune-4", _swipes(_VERTICAL * 2, "fast"), "chen", "evening", 2.2, 1.0, 104),
     Clip("tune-5", _swipes(_ALL, "normal", "L"), "femi", "studio", 3.0, 1.2, 105, 0.15),
     Clip("tune-6", _swipes(_ALL, "fast"), "emil", "window", 3.2, 1.4, 106),
+    Clip("tune-7", _swipes(_VERTICAL, "slow", "L"), "bo", "office", 2.6, 1.1, 107),
+    Clip("tune-8", _swipes(_HORIZONTAL, "slow"), "femi", "evening", 2.4, 1.2, 108, 0.1),
+    Clip("tune-9", Action("walk", walk_m=2.6, walk_mps=0.95), "dora", "studio", 4.6, 1.2, 109),
+    Clip("tune-10", Action("turn", turn_deg=(60.0, -75.0)), "ada", "window", 2.8, 1.1, 110),
 )
 """Other clips, by which the weights of the fit were chosen (``--clips tuning``)."""
 

@@ -6,10 +6,8 @@ import hashlib
 import itertools
 import json
 import multiprocessing
-import multiprocessing.connection
 import os
 import signal
-import threading
 from collections import deque
 from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
@@ -25,6 +23,7 @@ from sd2core.simulate.campaign.fit_errors import FitErrors
 from sd2core.simulate.campaign.motion import LABELS
 from sd2core.simulate.campaign.people import subject_name
 from sd2core.simulate.campaign.takes import OPTIONS, Campaign, TakeMaker, take_name
+from sd2core.worker_processes import end_with_parent
 
 _AHEAD = 3
 """Takes per process that are handed out before the first of them is written."""
@@ -192,20 +191,8 @@ def _start(campaign: Campaign, errors: Path | None) -> None:
     global _maker
     # Ctrl+C goes to all of them; the parent sees to the others.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    _end_with_parent()
+    end_with_parent()
     _maker = TakeMaker(campaign, FitErrors.load(errors))
-
-
-def _end_with_parent() -> None:
-    """A worker whose parent is killed would wait for work for ever."""
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-
-    def watch() -> None:
-        multiprocessing.connection.wait([parent.sentinel])
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
 
 
 def _make(subject: int, number: int) -> list[Take]:

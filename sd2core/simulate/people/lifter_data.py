@@ -9,6 +9,7 @@ from pathlib import Path
 
 from sd2core.progress import Progress, silent
 from sd2core.simulate.people.takes import Take, TakeMaker
+from sd2core.worker_processes import end_with_parent
 
 _maker: TakeMaker | None = None
 
@@ -82,6 +83,7 @@ def load_takes(folder: Path) -> list[Take]:
 
 
 def _start(models: Path | None) -> None:
+    end_with_parent()
     from sd2core.body.blazepose import PoseLandmarker
     from sd2core.body.landmark_models import landmark_models
 

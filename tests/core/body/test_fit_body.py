@@ -124,6 +124,18 @@ def test_line_of_sight_velocity_of_the_swiping_hand(scene: Scene, fitted: BodyFi
         assert np.sqrt(((true - found)[ends] ** 2).mean()) < 0.05
 
 
+def test_a_limb_that_is_hardly_seen_is_not_sure(scene: Scene, fitted: BodyFit) -> None:
+    knee = LANDMARKS.index("knee.R")
+    track = Scene(60).track
+    track.visibility[:, knee] = 0.0
+    found = fit_body(track, CAMERA, stature_m=scene.shape.stature_m, lift=scene.lift)
+    known = scene.lift.lifted.velocity_sigma[:, knee] * scene.shape.stature_m
+    assert (fitted.along_sd_mps[:, knee] < known).all()
+    assert (found.along_sd_mps[:, knee] > 0.25).all()
+    others = np.arange(33) != knee
+    np.testing.assert_allclose(found.along_sd_mps[:, others], fitted.along_sd_mps[:, others])
+
+
 def test_surface_has_the_outline(scene: Scene, fitted: BodyFit) -> None:
     vertices = fitted.mesh("low").read(0, 60)
     assert vertices.dtype == np.float32
