@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from sd2core.train.evaluate import Evaluation, Group
+    from sd2core.train.evaluation import Evaluation, Group
 
 SUFFIXES = (".png", ".svg", ".pdf")
 
