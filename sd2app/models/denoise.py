@@ -212,9 +212,15 @@ class DenoiseModel(QObject):
     # --- following the recording ----------------------------------------------------------
 
     def _open(self) -> None:
-        self._before, self._comparing = None, False
+        # What was in use for another recording is nothing to compare with here.
+        previous, self._loaded, self._before = self._loaded, None, None
+        self._comparing = False
         self._show_before()
         self._follow(anew=True)
+        if previous is not None and previous.card.path == self._path:
+            self._loaded = previous
+        else:
+            self.map.use(None)
 
     def _follow(self, anew: bool = False) -> None:
         choice = DenoiserChoice.of(self._document.recording)

@@ -36,6 +36,13 @@ _BETWEEN_MS = 80
 _WAITS = "too slow to be dragged, follows when the sensor rests"
 
 
+class Swept(NamedTuple):
+    """What a model made of a sweep."""
+
+    denoiser: Denoiser
+    doppler: DopplerMap
+
+
 class _Answer(NamedTuple):
     piece: View
     revision: int
@@ -200,7 +207,7 @@ class DenoisedMap(QObject):
         if denoiser is None or source is None or self._held or not self.keeps_up:
             return None
 
-        def denoised(start: int, values: NDArray[np.float32]) -> DopplerMap | None:
+        def denoised(start: int, values: NDArray[np.float32]) -> Swept | None:
             began = time.perf_counter()
             try:
                 made = denoiser.denoise(cut_out(source, start, values))
@@ -208,7 +215,7 @@ class DenoisedMap(QObject):
                 self._stumbled.emit(str(error))
                 return None
             self._took_s.append(time.perf_counter() - began)
-            return made
+            return Swept(denoiser, made)
 
         return denoised
 
@@ -218,9 +225,9 @@ class DenoisedMap(QObject):
         known: NDArray[np.bool_],
         sensor: object,
         start: int,
-        made: DopplerMap | None,
+        swept: Swept | None,
     ) -> None:
-        """A hand moved the sensor; ``made`` is what the companion made of the sweep."""
+        """A hand moved the sensor; ``swept`` is what the companion made of the sweep."""
         self._runner.cancel()
         self._again.stop()
         self._follow(source, known, sensor)
@@ -231,9 +238,9 @@ class DenoisedMap(QObject):
         self._shown[:] = False
         if self._denoiser is None or self._held:
             return
-        if made is not None:
-            stop = start + made.values.shape[1]
-            self._paint(made, 0, (start, stop))
+        if swept is not None and swept.denoiser is self._denoiser:
+            stop = start + swept.doppler.values.shape[1]
+            self._paint(swept.doppler, 0, (start, stop))
             self._done_at[start:stop] = self._revision
         else:
             self.track.set_status(f"{self.words} · {_WAITS}")

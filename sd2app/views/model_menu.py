@@ -27,13 +27,13 @@ class ModelMenu(QMenu):
         self._denoise = denoise
         self._use = use
         self._below = below
+        self._group = QActionGroup(self)
         self.setToolTipsVisible(True)
         self.aboutToShow.connect(self.fill)
 
     def fill(self) -> None:
         """List the models as they are on disk now."""
         self.clear()
-        group = QActionGroup(self)
         path = self._denoise.path
         none = self.addAction("No model")
         none.setToolTip("Show no denoised map for this recording")
@@ -49,7 +49,7 @@ class ModelMenu(QMenu):
             chosen.append((action, card.path == path))
         for action, checked in chosen:
             action.setCheckable(True)
-            action.setActionGroup(group)
+            action.setActionGroup(self._group)
             action.setChecked(checked)
         self.addSeparator()
         self.addActions(self._below)

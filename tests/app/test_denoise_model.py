@@ -273,6 +273,19 @@ def test_another_recording_shows_nothing_of_the_one_before(context, models, qtbo
     context.document.undo_stack.setClean()
     open_it(context, qtbot, original)
     assert context.denoised.map is None
+    assert context.denoise.card is None
+    assert context.denoise.before is None
+
+
+def test_a_recording_with_the_same_model_needs_no_loading(context, models, qtbot, ball):
+    open_it(context, qtbot, ball)
+    context.denoise.use(next(iter(models.cards)))
+    rest(context, qtbot)
+    context.document.save()
+    open_it(context, qtbot, ball)
+    assert is_of(context, 2.0)
+    assert len(models.loaded) == 1
+    assert context.denoise.before is None
 
 
 # --- long clips ---------------------------------------------------------------------------
