@@ -7,6 +7,7 @@ from pathlib import Path
 
 from sd2core.cli.options import add_command, add_json
 from sd2core.cli.output import progress_bar
+from sd2core.errors import Sd2Error
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
@@ -46,9 +47,18 @@ def _denoise(options: argparse.Namespace) -> None:
     from sd2core.cli.reading import check_map_output
     from sd2core.denoise.files import DEFAULT_NAME, describe_model, find_model, load_model
     from sd2core.denoise.matching import check_map
+    from sd2core.io.kinds import kind_of
     from sd2core.spectrum import DopplerMap
 
     check_map_output(options.out)
+    kind = kind_of(options.map)
+    if kind != "map":
+        makes_one = f"Make one: `sd2 synth {options.map} --out map.npz`"
+        raise Sd2Error(
+            f"{options.map} holds no Doppler map; it is of kind {kind}",
+            "a map from `sd2 synth`",
+            makes_one if kind in ("mesh", "recording") else "",
+        )
     path = find_model(options.model or DEFAULT_NAME)
     doppler = DopplerMap.load(options.map)
     # Before torch is loaded, which takes seconds.

@@ -41,5 +41,5 @@ def _about(about: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, st
             yield from _about(value, f"{label}, ")
         elif isinstance(value, float):
             yield label, f"{value:.4g}"
-        elif not isinstance(value, list | tuple):
+        elif value is not None and not isinstance(value, list | tuple):
             yield label, str(value)

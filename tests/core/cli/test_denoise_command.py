@@ -103,6 +103,17 @@ def test_a_map_that_does_not_fit_is_explained(
     assert not (tmp_path / "twice.npz").exists()
 
 
+@pytest.mark.parametrize("what", ["mesh", "model"])
+def test_what_is_no_map_is_named(
+    sd2: Sd2, plate: Path, model: Path, tmp_path: Path, what: str
+) -> None:
+    path = plate if what == "mesh" else model
+    outcome = sd2("denoise", path, "--out", tmp_path / "d.npz", "--model", model)
+    assert outcome.code == 1
+    assert f"it is of kind {what}" in outcome.err
+    assert (f"sd2 synth {plate}" in outcome.err) == (what == "mesh")
+
+
 def test_no_file_is_overwritten_by_mistake(
     sd2: Sd2, synthetic: Path, model: Path, tmp_path: Path
 ) -> None:
