@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -129,6 +130,15 @@ def test_a_lock_ends_with_its_process(tmp_path: Path) -> None:
         process.kill()
         process.communicate()
     assert not is_locked(path)
+
+
+def test_those_who_look_do_not_see_each_other(tmp_path: Path) -> None:
+    path = tmp_path / "lock"
+    lock = FileLock(path)
+    assert lock.take()
+    lock.release()
+    with ThreadPoolExecutor(8) as pool:
+        assert not any(pool.map(is_locked, [path] * 2000))
 
 
 class TestFolder:
