@@ -27,6 +27,13 @@ if TYPE_CHECKING:
 UNTITLED = Path()
 """Folder of a recording that was not saved yet."""
 
+_TOLD: dict[str, tuple[str, str]] = {
+    "map": ("is a Doppler map", "Look at it with `sd2 info`"),
+    "pairs": ("holds pairs to learn from", "Train with them in the Train panel"),
+    "model": ("is a model", "Open a recording, then choose the model under Model"),
+}
+"""Kinds that no recording is made of: what to say, and where they belong."""
+
 CLUTTER_CHOICES: tuple[Clutter, ...] = ("mean", "moving", "none")
 
 
@@ -65,14 +72,9 @@ def recording_of(paths: Sequence[Path], base: Recording | None = None) -> Record
     kinds: dict[Kind, Path] = {}
     for path in paths:
         kind = kind_of(path)
-        if kind in ("map", "pairs"):
-            raise Sd2Error(
-                f"{path} is a Doppler map"
-                if kind == "map"
-                else f"{path} holds pairs to learn from",
-                "a recording, video, mesh or radar capture",
-                "Look at it with `sd2 info`",
-            )
+        if kind in _TOLD:
+            words, remedy = _TOLD[kind]
+            raise Sd2Error(f"{path} {words}", "a recording, video, mesh or radar capture", remedy)
         if kind in kinds:
             raise Sd2Error(
                 f"{kinds[kind]} and {path} are both a {kind}", "at most one file of each kind"

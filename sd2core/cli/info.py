@@ -122,6 +122,14 @@ def describe_parts(recording: Recording) -> list[Description]:
     return parts
 
 
+def _denoiser(recording: Recording) -> str:
+    if recording.denoiser is not None:
+        return str(recording.denoiser)
+    if recording.bundled_denoiser is None:
+        return ""
+    return recording.bundled_denoiser or "none"
+
+
 def describe_recording(recording: Recording, parts: list[Description]) -> Description:
     """Describe a recording and its parts; missing files are named."""
     missing = recording.missing()
@@ -134,6 +142,8 @@ def describe_recording(recording: Recording, parts: list[Description]) -> Descri
         "radar_offset_s": recording.radar_offset_s,
         "camera": None if recording.camera is None else recording.camera.model_dump(mode="json"),
         "sensor_position_m": [x, y, z],
+        "denoiser": None if recording.denoiser is None else str(recording.denoiser),
+        "bundled_denoiser": recording.bundled_denoiser,
         "spans": [span.model_dump(mode="json") for span in recording.spans],
         "missing": {role: str(path) for role, path in missing.items()},
         "notes": list(recording.notes),
@@ -144,6 +154,7 @@ def describe_recording(recording: Recording, parts: list[Description]) -> Descri
         "camera": _camera(recording),
         "sensor": f"at x {x:g}, y {y:g}, z {z:g} m",
         "radar offset": f"{recording.radar_offset_s:g} s" if recording.radar else "",
+        "denoiser": _denoiser(recording),
         "spans": _labels(recording),
     }
     notes = tuple(f"the {role} is not at {path}" for role, path in missing.items())

@@ -1,10 +1,12 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sd2app.models.content import common_clock
+from sd2app.models.content import common_clock, recording_of
+from sd2core.errors import Sd2Error
 from sd2core.timebase import Timebase
 
 
@@ -43,3 +45,10 @@ def test_it_is_a_clock_and_holds_the_first(parts):
     assert np.isin(clocks[0].times_s, joined.times_s).all()
     assert joined.start_s <= clocks[0].start_s
     assert joined.end_s >= clocks[0].end_s - clocks[0].frame_duration_s
+
+
+def test_a_model_is_no_part_of_a_recording_and_says_where_it_belongs(tmp_path):
+    path = tmp_path / "own.safetensors"
+    path.write_bytes(b"weights")
+    with pytest.raises(Sd2Error, match="is a model.*under Model"):
+        recording_of([path])
