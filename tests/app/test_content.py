@@ -50,5 +50,5 @@ def test_it_is_a_clock_and_holds_the_first(parts):
 def test_a_model_is_no_part_of_a_recording_and_says_where_it_belongs(tmp_path):
     path = tmp_path / "own.safetensors"
     path.write_bytes(b"weights")
-    with pytest.raises(Sd2Error, match="is a model.*under Model"):
+    with pytest.raises(Sd2Error, match=r"is a model.*under Model"):
         recording_of([path])
