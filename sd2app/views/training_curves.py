@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import (
@@ -31,6 +32,21 @@ _LEAST_RATIO = 1.6
 _ROUND = ((1,), (1, 3), (1, 2, 5), (1, 2, 3, 5, 7), (1, 1.5, 2, 3, 4, 5, 6, 8))
 _STEPS = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
 _TAKES = {Qt.Key.Key_Home, Qt.Key.Key_End, Qt.Key.Key_Escape, *_STEPS}
+
+
+@dataclass(frozen=True)
+class _Scale:
+    """Epochs and errors to pixels; worked out once for all that is drawn."""
+
+    left_px: float
+    per_epoch_px: float
+    errors: LogAxis
+
+    def x_of(self, epoch: float) -> float:
+        return self.left_px + self.per_epoch_px * epoch
+
+    def place_of(self, epoch: float, rmse: float) -> QPointF:
+        return QPointF(self.x_of(epoch), self.errors.px(rmse))
 
 
 class TrainingCurves(QWidget):
@@ -79,11 +95,11 @@ class TrainingCurves(QWidget):
 
     def place_of(self, epoch: float, rmse: float) -> QPointF:
         """Pixel of an error after so many epochs."""
-        return QPointF(self._x_of(epoch), self._errors().px(rmse))
+        return self._scale().place_of(epoch, rmse)
 
-    def _x_of(self, epoch: float) -> float:
+    def _scale(self) -> _Scale:
         plot = self.plot_rect()
-        return plot.left() + plot.width() * epoch / self._last_epoch()
+        return _Scale(plot.left(), plot.width() / self._last_epoch(), self._errors())
 
     def _last_epoch(self) -> float:
         history = self._history
@@ -123,44 +139,42 @@ class TrainingCurves(QWidget):
 
     def _paint(self, painter: QPainter) -> None:
         colours, plot, history = self._display.palette, self.plot_rect(), self._history
-        errors = self._errors()
-        self._paint_axes(painter, plot, errors)
+        scale = self._scale()
+        self._paint_axes(painter, plot, scale)
         self._paint_legend(painter, plot)
         painter.save()
         painter.setClipRect(plot.adjusted(-6, -6, 6, 6))
         faint = QColor(colours.synthetic)
         faint.setAlpha(80)
-        self._paint_line(
-            painter,
-            [(point.at, point.train_rmse) for point in history.step_points],
-            QPen(faint, 1),
-            errors,
-        )
+        # No more of them than there are pixels.
+        every = max(1, round(len(history.step_points) / max(plot.width(), 1.0)))
+        steps = [(point.at, point.train_rmse) for point in history.step_points[::every]]
+        self._paint_line(painter, steps, QPen(faint, 1), scale)
         for colour, name in ((colours.synthetic, "train_rmse"), (colours.real, "validation_rmse")):
             points = [(float(one.epoch), getattr(one, name)) for one in history.epoch_points]
-            self._paint_line(painter, points, QPen(QColor(colour), 2), errors)
-        self._paint_marks(painter, plot, errors)
+            self._paint_line(painter, points, QPen(QColor(colour), 2), scale)
+        self._paint_marks(painter, plot, scale)
         painter.restore()
         if self.hasFocus():
             painter.setPen(QPen(QColor(colours.accent), 1))
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.drawRect(QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5))
 
-    def _paint_axes(self, painter: QPainter, plot: QRectF, errors: LogAxis) -> None:
+    def _paint_axes(self, painter: QPainter, plot: QRectF, scale: _Scale) -> None:
         colours, line_px = self._display.palette, painter.fontMetrics().height()
         grid, ink = QPen(QColor(colours.border), 1), QColor(colours.muted)
         last = self._last_epoch()
         for value in ticks(0.0, last, max(int(plot.width() / 48), 2)):
             if value != round(value) and last >= 2:
                 continue
-            x = self._x_of(value)
+            x = scale.x_of(value)
             painter.setPen(grid)
             painter.drawLine(QPointF(x, plot.top()), QPointF(x, plot.bottom()))
             painter.setPen(ink)
             box = QRectF(x - 30, plot.bottom() + 3, 60, line_px)
             painter.drawText(box, Qt.AlignmentFlag.AlignCenter, f"{value:g}")
-        for value in error_ticks(errors, max(int(plot.height() / (1.8 * line_px)), 2)):
-            y = errors.px(value)
+        for value in error_ticks(scale.errors, max(int(plot.height() / (1.8 * line_px)), 2)):
+            y = scale.errors.px(value)
             painter.setPen(grid)
             painter.drawLine(QPointF(plot.left(), y), QPointF(plot.right(), y))
             painter.setPen(ink)
@@ -192,14 +206,10 @@ class TrainingCurves(QWidget):
             x -= 30
 
     def _paint_line(
-        self, painter: QPainter, points: list[tuple[float, float]], pen: QPen, errors: LogAxis
+        self, painter: QPainter, points: list[tuple[float, float]], pen: QPen, scale: _Scale
     ) -> None:
         line = QPolygonF(
-            [
-                QPointF(self._x_of(at), errors.px(rmse))
-                for at, rmse in points
-                if math.isfinite(rmse) and rmse > 0
-            ]
+            [scale.place_of(at, rmse) for at, rmse in points if math.isfinite(rmse) and rmse > 0]
         )
         painter.setPen(pen)
         if len(line) == 1:
@@ -208,15 +218,15 @@ class TrainingCurves(QWidget):
         painter.setBrush(Qt.BrushStyle.NoBrush)
         painter.drawPolyline(line)
 
-    def _paint_marks(self, painter: QPainter, plot: QRectF, errors: LogAxis) -> None:
+    def _paint_marks(self, painter: QPainter, plot: QRectF, scale: _Scale) -> None:
         """A ring around the best epoch; a line where somebody points."""
         colours, best, pointed = self._display.palette, self._history.best, self.pointed
         painter.setBrush(Qt.BrushStyle.NoBrush)
         if best is not None and best.validation_rmse > 0:
             painter.setPen(QPen(QColor(colours.text), 1.5))
-            painter.drawEllipse(self.place_of(best.epoch, best.validation_rmse), 5.0, 5.0)
+            painter.drawEllipse(scale.place_of(best.epoch, best.validation_rmse), 5.0, 5.0)
         if pointed is not None:
-            x = self._x_of(pointed.epoch)
+            x = scale.x_of(pointed.epoch)
             painter.setPen(QPen(QColor(colours.accent), 1, Qt.PenStyle.DashLine))
             painter.drawLine(QPointF(x, plot.top()), QPointF(x, plot.bottom()))
 
@@ -225,9 +235,9 @@ class TrainingCurves(QWidget):
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         """Say what the epoch under the pointer came to."""
         plot, points = self.plot_rect(), self._history.epoch_points
-        x = event.position().x()
+        x, scale = event.position().x(), self._scale()
         inside = plot.left() - 4 <= x <= plot.right() + 4
-        nearest = min(points, key=lambda one: abs(self._x_of(one.epoch) - x), default=None)
+        nearest = min(points, key=lambda one: abs(scale.x_of(one.epoch) - x), default=None)
         self._point_at(nearest if inside else None)
         self._explain()
 
@@ -249,7 +259,7 @@ class TrainingCurves(QWidget):
         if point is None:
             QToolTip.hideText()
             return
-        place = QPointF(self._x_of(point.epoch), self.plot_rect().center().y())
+        place = QPointF(self._scale().x_of(point.epoch), self.plot_rect().center().y())
         QToolTip.showText(self.mapToGlobal(place.toPoint()), point_text(point), self)
 
     # --- keyboard -------------------------------------------------------------------------

@@ -79,3 +79,45 @@ def test_playing_while_a_training_runs(benchmark, sample_window, qtbot, tmp_path
     found["step_s"] = training.run.history.step_s
     benchmark.extra_info.update(found)
     print("\nbeside a training:", {name: round(value, 3) for name, value in found.items()})
+
+
+def test_an_update_of_the_panel(benchmark, sample_window, qtbot, tmp_path):
+    """Four a second at most: words, figures and curves of 500 epochs and 2,000 steps.
+
+    Processor time of the window's thread, which others on the machine do not change.
+    """
+    from PySide6.QtWidgets import QApplication
+
+    from sd2app.models.training_history import EpochPoint, StepPoint
+    from sd2app.views.training_curves import TrainingCurves
+
+    window, training = sample_window, sample_window.context.training
+    training.setup.add_store(write_pairs(tmp_path / "campaign.zarr"))
+    qtbot.waitUntil(lambda: not training.setup.problem)
+    training.step_times.stop()
+    training.start()
+    qtbot.waitUntil(lambda: training.run.history.epoch >= 1, timeout=300_000)
+    training.pause()
+    qtbot.waitUntil(lambda: training.run.phase == "paused", timeout=60_000)
+    history, rng = training.run.history, np.random.default_rng(1)
+    history.epoch_points = [
+        EpochPoint(epoch, 0.1 + 1 / epoch, 0.12 + 1 / epoch + 0.01 * rng.random(), 0.1, True)
+        for epoch in range(1, 501)
+    ]
+    history.step_points = [
+        StepPoint(at, 0.1 + rng.random() / at) for at in np.linspace(0.25, 500, 2000)
+    ]
+    curves = window.findChild(TrainingCurves)
+
+    def update() -> float:
+        began_s = time.thread_time()
+        training.changed.emit()
+        curves.repaint()
+        QApplication.processEvents()
+        return 1e3 * (time.thread_time() - began_s)
+
+    update()
+    took_ms = [update() for _ in range(20)]
+    benchmark.pedantic(update, rounds=5)
+    benchmark.extra_info["update_ms"] = float(np.median(took_ms))
+    print(f"\nan update of the panel: {np.median(took_ms):.1f} ms of the window's thread")
