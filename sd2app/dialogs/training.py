@@ -47,6 +47,12 @@ class TrainingDialogs:
         """Go on with the run in view."""
         self._attempt(self._training.resume)
 
+    def open_run(self) -> None:
+        """Let the user choose a run that lies elsewhere, as of a command in a terminal."""
+        name = QFileDialog.getExistingDirectory(self._parent, "Folder of a run")
+        if name:
+            self._attempt(lambda: self._training.open_run(Path(name)))
+
     def use(self) -> None:
         """Use the model of the run in view."""
         self._use.use()

@@ -25,6 +25,7 @@ from sd2app.models.training_library import TrainingLibrary, user_runs_folder
 from sd2app.models.training_setup import TrainingSetupModel
 from sd2app.settings import Settings
 from sd2core.errors import Sd2Error
+from sd2core.train.folder import RunFolder
 
 Closing = Literal["ask", "keep", "stop"]
 
@@ -196,6 +197,17 @@ class TrainingModel(QObject):
         elif self._follower is None or self._follower.folder.path != path:
             self._follow(TrainingFollower(path, self))
 
+    def open_run(self, path: Path) -> None:
+        """Show a run that lies elsewhere.
+
+        Raises
+        ------
+        Sd2Error
+            When there is none.
+        """
+        RunFolder(path).state()
+        self.select(path)
+
     def start(self) -> None:
         """Begin as it is set up.
 
@@ -340,5 +352,6 @@ class TrainingModel(QObject):
             self.noted.emit(f"{live.path.name} is being trained. The Train panel shows it.")
             return
         last = self._settings.stored("training/run", "")
-        if last and any(str(run.path) == last for run in self.library.runs):
+        # It may lie elsewhere.
+        if last and RunFolder(Path(last)).exists:
             self.select(Path(last))

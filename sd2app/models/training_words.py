@@ -159,16 +159,16 @@ def estimate_text(estimate: Estimate) -> str:
 
 def estimate_source_text(estimate: Estimate, key: StepKey, times: StepTimes, epochs: int) -> str:
     """Where that is known from."""
-    count = f"{estimate.segments:,} segments, {epochs:,} epochs of {estimate.steps_per_epoch:,}"
-    count += " step" if estimate.steps_per_epoch == 1 else " steps"
+    steps = epochs * estimate.steps_per_epoch
+    count = f"{estimate.segments:,} segments, {steps:,} {'step' if steps == 1 else 'steps'}"
     step = estimate.step
     if step is not None:
-        known = "as in the last run here" if step.source == "run" else "timed on this machine"
-        return f"{count}; a step takes about {step_text(step.seconds)}, {known}."
+        known = "as in the last run here" if step.source == "run" else "timed here"
+        return f"{count} of about {step_text(step.seconds)}, {known}."
     if times.timing == key:
-        return f"{count}. Timing a few steps…"
+        return f"{count}. Timing a few of them…"
     why_not = times.why_not(key)
-    return f"{count}. A step could not be timed: {why_not}" if why_not else f"{count}."
+    return f"{count}. They could not be timed: {why_not}" if why_not else f"{count}."
 
 
 def step_text(seconds: float) -> str:

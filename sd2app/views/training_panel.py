@@ -19,6 +19,7 @@ from sd2app.views.training_run_view import TrainingRunView
 from sd2app.views.training_setup_view import TrainingSetupView
 
 _NEW = "New training"
+_OPEN = "Open a run…"
 _TIP = "Runs: those under way, and those that have ended"
 
 
@@ -39,6 +40,9 @@ class Asks(Protocol):
 
     def use(self) -> None:
         """Use the model of the run in view."""
+
+    def open_run(self) -> None:
+        """Let the user choose a run that lies elsewhere."""
 
     def resume(self) -> None:
         """Go on with the run in view."""
@@ -61,21 +65,20 @@ class TrainingPanel(QWidget):
         super().__init__(parent)
         self.setObjectName("page")
         self._training = training
+        self._asks = asks
         self._paths: list[Path | None] = []
         layout = QVBoxLayout(self)
         layout.setContentsMargins(8, 6, 8, 6)
         layout.setSpacing(8)
         self._runs = Choice(_TIP, self)
         self._runs.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
-        self._runs.activated.connect(lambda index: training.select(self._paths[index]))
+        self._runs.activated.connect(self._choose)
         self._new = outlined("New", "Set up another training", lambda: training.select(None), self)
-        self._head = QWidget(self)
-        row = QHBoxLayout(self._head)
-        row.setContentsMargins(0, 0, 0, 0)
+        row = QHBoxLayout()
         row.setSpacing(6)
         row.addWidget(self._runs, 1)
         row.addWidget(self._new)
-        layout.addWidget(self._head)
+        layout.addLayout(row)
         self._setup = TrainingSetupView(
             training, asks.ask_store, asks.ask_recordings, asks.start, asks.copy_command, self
         )
@@ -90,6 +93,13 @@ class TrainingPanel(QWidget):
         use.changed.connect(self._refresh)
         self._use = use
         self._refresh()
+
+    def _choose(self, index: int) -> None:
+        if index < len(self._paths):
+            self._training.select(self._paths[index])
+        else:
+            self._asks.open_run()
+            self._list_runs()
 
     def showEvent(self, event: QShowEvent) -> None:
         """Look again at what lies on disk, and time a step where that is not known."""
@@ -119,6 +129,7 @@ class TrainingPanel(QWidget):
             paths.insert(1, here)
             texts.insert(1, here.name if here is not None else _NEW)
         self._runs.setToolTip(str(here) if here is not None else _TIP)
+        texts.append(_OPEN)
         if texts != [self._runs.itemText(index) for index in range(self._runs.count())]:
             with QSignalBlocker(self._runs):
                 self._runs.clear()
@@ -126,4 +137,3 @@ class TrainingPanel(QWidget):
         self._paths = paths
         with QSignalBlocker(self._runs):
             self._runs.setCurrentIndex(paths.index(here))
-        self._head.setVisible(len(paths) > 1)

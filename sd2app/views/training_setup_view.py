@@ -148,7 +148,7 @@ class TrainingSetupView(QWidget):
         layout.addWidget(self._about)
 
     def _add_settings(self, layout: QVBoxLayout) -> None:
-        layout.addWidget(self._form(_FIELDS))
+        layout.addWidget(self._form(_FIELDS, columns=2))
         self._more = QToolButton(self)
         self._more.setObjectName("fold")
         self._more.setCheckable(True)
@@ -166,29 +166,32 @@ class TrainingSetupView(QWidget):
         row.addStretch(1)
         row.addWidget(self._reset)
         layout.addLayout(row)
-        self._rest = self._form(_MORE)
+        self._rest = self._form(_MORE, columns=1)
         self._boxes["early_stopping_epochs"].setSpecialValueText("never")
         self._boxes["range_factor"].setPrefix("× ")
         self._rest.hide()
         layout.addWidget(self._rest)
 
-    def _form(self, fields: tuple[tuple, ...]) -> QWidget:
+    def _form(self, fields: tuple[tuple, ...], columns: int) -> QWidget:
         form = QWidget(self)
         grid = QGridLayout(form)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setHorizontalSpacing(8)
         grid.setVerticalSpacing(4)
-        grid.setColumnStretch(0, 1)
-        for row, (name, text, low, high, decimals, step, tip) in enumerate(fields):
+        # Labels to the left; several boxes share what room there is.
+        grid.setColumnStretch(0 if columns == 1 else 1, 1)
+        grid.setColumnStretch(3, columns - 1)
+        for number, (name, text, low, high, decimals, step, tip) in enumerate(fields):
+            row, column = divmod(number, columns)
             suffix = " epochs" if name == "early_stopping_epochs" else ""
             box = NumberBox(low, high, suffix, tip, decimals=decimals, step=step, parent=self)
-            box.setMinimumWidth(112)
+            box.setMinimumWidth(112 if columns == 1 else 64)
             box.setGroupSeparatorShown(decimals == 0 and name != "seed")
             box.valueChanged.connect(lambda value, name=name: self._setup.set_value(name, value))
             label = QLabel(text, self)
             label.setToolTip(tip)
-            grid.addWidget(label, row, 0)
-            grid.addWidget(box, row, 1)
+            grid.addWidget(label, row, 2 * column)
+            grid.addWidget(box, row, 2 * column + 1)
             self._boxes[name] = box
         return form
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import sys
 from pathlib import Path
 
@@ -178,9 +179,9 @@ def test_what_is_set_up_is_what_is_started(made, qtbot, pairs) -> None:
     assert "Learns from 4 people; the best model is chosen by s4; s5 kept for" in texts(window)
     # 300 frames are 5 segments, and four people learn from: 20 in one step of 64.
     assert setup.estimate.segments == 20
-    qtbot.waitUntil(lambda: "timed on this machine" in texts(window), timeout=10_000)
+    qtbot.waitUntil(lambda: "timed here" in texts(window), timeout=10_000)
     assert "Takes about 2 min" in texts(window)  # 500 × 0.25 s
-    assert "a step takes about 250 ms" in texts(window)
+    assert "20 segments, 500 steps of about 250 ms" in texts(window)
     type_number(qtbot, box(window, "Passes"), "3")
     type_number(qtbot, box(window, "Segments per step"), "8")
     model = next(c for c in window.panel.findChildren(Choice) if c.toolTip() == "Kind of model")
@@ -209,6 +210,26 @@ def test_a_store_that_is_none_is_named_and_can_be_taken_out(made, qtbot, tmp_pat
     click(window, qtbot, "✕")
     assert window.training.setup.stores == ()
     assert window.training.setup.known_stores == [tmp_path / "empty"]
+
+
+def test_a_run_that_lies_elsewhere_is_opened(made, qtbot, pairs, tmp_path, monkeypatch) -> None:
+    place = tmp_path / "elsewhere"
+    place.mkdir()
+    words = ["train", str(pairs), "--out", str(place / "mine"), "--epochs", "2"]
+    subprocess.run([sys.executable, str(FAKE), *words], check=True)
+    window = made()
+    runs = next(c for c in window.panel.findChildren(Choice) if c.toolTip().startswith("Runs"))
+    chosen = [tmp_path, place / "mine"]
+    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *a: str(chosen.pop(0)))
+    runs.setFocus()
+    qtbot.keyClick(runs, Qt.Key.Key_End)
+    assert "is no run" in window.said[-1]
+    assert runs.currentText() == "New training"
+    qtbot.keyClick(runs, Qt.Key.Key_End)
+    qtbot.waitUntil(lambda: "Finished after 2 epochs" in texts(window), timeout=5_000)
+    assert runs.currentText() == "mine"
+    qtbot.keyClick(runs, Qt.Key.Key_Home)
+    assert window.training.run is None
 
 
 def test_recordings_are_made_into_pairs(made, qtbot, tmp_path, small_recording, monkeypatch):
