@@ -132,7 +132,7 @@ class TrainedDenoiser:
         return expanded
 
     def live(self) -> LiveDenoiser:
-        """For frames as they come."""
+        """For frames as they come, at the model's frame rate."""
         return LiveDenoiser(self)
 
     def _in_chunks(self, values: NDArray[np.float32], progress: Progress) -> NDArray[np.float32]:
