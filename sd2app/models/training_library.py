@@ -8,7 +8,6 @@ from pathlib import Path
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.jobs.latest import LatestRunner
-from sd2app.models.training_phase import is_live
 from sd2app.models.training_words import clock_text, model_name, state_text
 from sd2core.errors import Sd2Error
 from sd2core.train.folder import LIVE, RunFolder, RunStatus, runs_in
@@ -110,7 +109,7 @@ class TrainingLibrary(QObject):
                 for path in (run.progress, run.path / "run.json", run.best)
             ]
             # Without this every look would read all that every run has ever told.
-            live = is_live(run)
+            live = run.live
             key = (stamps, live)
             kept = self._cache.get(run.path)
             if kept is not None and kept[0] == key:

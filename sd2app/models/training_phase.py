@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -17,8 +16,6 @@ Phase = Literal[
     "finished", "stopped", "failed", "died", "gone",
 ]  # fmt: skip
 """``gone`` is a run that was cancelled, or deleted by somebody else."""
-
-_GLANCE_S = 0.02
 
 UNDER_WAY: tuple[Phase, ...] = (
     "starting", "running", "pausing", "paused", "resuming", "stopping", "cancelling",
@@ -51,21 +48,10 @@ class Look:
     events: list[dict[str, Any]] = field(default_factory=list)
 
 
-def is_live(folder: RunFolder) -> bool:
-    """Whether a process is at a run; may wait for an instant.
-
-    Somebody else who looks holds the lock for as long as a look takes.
-    """
-    if not folder.live:
-        return False
-    time.sleep(_GLANCE_S)
-    return folder.live
-
-
 def look_at(folder: RunFolder, tail: ProgressTail) -> Look:
     """Look once; may wait for the disk."""
     # The process first: when it is gone, all that it wrote is there to be read.
-    live, exists = is_live(folder), folder.exists
+    live, exists = folder.live, folder.exists
     events = tail.new()
     state = ""
     if exists and not live:

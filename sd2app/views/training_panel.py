@@ -116,7 +116,9 @@ class TrainingPanel(QWidget):
         self._setup.setVisible(run is None)
         self._run.setVisible(run is not None)
         self._new.setVisible(run is not None)
-        self._gain.setVisible(run is not None and self._use.run == run.folder.path)
+        in_use = run is not None and self._use.run == run.folder.path
+        self._gain.setVisible(in_use)
+        self._run.set_in_use(in_use)
         self._list_runs()
 
     def _list_runs(self) -> None:

@@ -72,6 +72,7 @@ class TrainingRunView(QWidget):
     ) -> None:
         super().__init__(parent)
         self._training = training
+        self._in_use = False
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(6)
@@ -89,6 +90,12 @@ class TrainingRunView(QWidget):
         self._add_closing(layout)
         training.changed.connect(self._refresh)
         self._refresh()
+
+    def set_in_use(self, in_use: bool) -> None:
+        """Whether the model of this run denoises the recording already."""
+        if in_use != self._in_use:
+            self._in_use = in_use
+            self._refresh()
 
     # --- building -------------------------------------------------------------------------
 
@@ -217,7 +224,7 @@ class TrainingRunView(QWidget):
         for name, button in self._buttons.items():
             there = name in shown
             if name == "use":
-                there = there and has_model
+                there = there and has_model and not self._in_use
             elif name == "resume":
                 there = there and resumable
             button.setVisible(there)

@@ -7,11 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sd2app.models.training_history import TrainingHistory
-from sd2app.models.training_phase import Look, is_live, phase_of
+from sd2app.models.training_phase import Look, phase_of
 from sd2app.models.training_words import duration_text, metric_rows
 from sd2app.views.log_axis import LogAxis
 from sd2app.views.training_curves import error_ticks
-from sd2core.train.folder import RunFolder
 
 START = {"event": "start", "model": "s4", "parameters": 7, "device": "cpu", "epochs": 4,
          "steps_per_epoch": 5, "train_segments": 300}  # fmt: skip
@@ -150,13 +149,3 @@ def test_half_a_decade_has_three_values() -> None:
 )
 def test_durations_are_rounded_as_estimates_deserve(seconds, text) -> None:
     assert duration_text(seconds) == text
-
-
-def test_a_glance_at_the_lock_is_no_process(tmp_path, monkeypatch) -> None:
-    """Somebody else looks at the same instant; a process holds it for longer."""
-    folder = RunFolder(tmp_path)
-    held = iter([True, False])
-    monkeypatch.setattr(RunFolder, "live", property(lambda self: next(held)))
-    assert not is_live(folder)
-    held = iter([True, True])
-    assert is_live(folder)

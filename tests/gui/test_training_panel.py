@@ -115,10 +115,12 @@ def texts(window) -> str:
     return "\n".join(one.text() for one in window.panel.findChildren(QLabel) if one.isVisible())
 
 
+def buttons(window) -> list[QToolButton]:
+    return [b for b in window.panel.findChildren(QToolButton) if b.isVisible()]
+
+
 def button(window, text: str) -> QToolButton:
-    found = [
-        b for b in window.panel.findChildren(QToolButton) if b.text() == text and b.isVisible()
-    ]
+    found = [one for one in buttons(window) if one.text() == text]
     assert len(found) == 1, text
     return found[0]
 
@@ -337,6 +339,7 @@ def test_one_click_uses_the_model_and_one_goes_back(made, qtbot, pairs, tmp_path
     assert kept.read_bytes() == window.training.run.folder.best.read_bytes()
     assert window.denoise.comparing
     assert "Open a recording with a radar capture" in texts(window)
+    assert "Use this model" not in [b.text() for b in buttons(window)]
     click(window, qtbot, "Go back")
     assert window.denoise.path == before
     assert not window.denoise.comparing
