@@ -78,11 +78,17 @@ class DifferenceView(HeatmapView):
     def _paint_corner(self, painter: QPainter, box: QRectF, left: float) -> float:
         """What the colours mean."""
         full, unit = self._difference.full_scale(self._display.levels)
-        ends = f"{self._difference.against} stronger  −{full:g}", f"+{full:g} {unit}  denoised"
-        metrics = painter.fontMetrics()
-        widths = [metrics.horizontalAdvance(text) + 8 for text in ends]
-        width = sum(widths) + _BAR_PX
-        if self.width() - 16 - left - width <= 60:
+        metrics, against = painter.fontMetrics(), self._difference.against
+        for ends in (
+            (f"{against} stronger  −{full:g}", f"+{full:g} {unit}  denoised"),
+            (f"{against}  −{full:g}", f"+{full:g} {unit}  denoised"),
+            (f"−{full:g}", f"+{full:g} {unit}"),
+        ):
+            widths = [metrics.horizontalAdvance(text) + 8 for text in ends]
+            width = sum(widths) + _BAR_PX
+            if self.width() - 16 - left - width > 60:
+                break
+        else:
             return 0.0
         table = np.ascontiguousarray(self._table()[None])
         bar = QImage(table.tobytes(), 255, 1, 1020, QImage.Format.Format_RGB32)

@@ -14,7 +14,7 @@ from sd2app.views.timeline import Overview, SpanStrip, TimeRuler
 if TYPE_CHECKING:
     from sd2app.context import Context
 
-_LOWEST_PX = {1: 96, 2: 96, 3: 84, 4: 72}
+_LOWEST_PX = {1: 96, 2: 96, 3: 72, 4: 54}
 """Of one map, by how many there are."""
 
 
@@ -73,7 +73,7 @@ class Tracks(QWidget):
         if state == self._shown:
             return  # maps change many times a second
         self._shown = state
-        lowest_px = _LOWEST_PX.get(sum(shown.values()), 60)
+        lowest_px = _LOWEST_PX.get(sum(shown.values()), 44)
         for view, there in shown.items():
             view.setMinimumHeight(lowest_px)
             view.setVisible(there)

@@ -105,7 +105,7 @@ class MainWindow(QMainWindow):
             [self._panels["tracks"], self._panels["spectrum"]],
             (992, 272),
         )
-        self._rows = splitter(Qt.Orientation.Vertical, [self._top, self._bottom], (376, 320))
+        self._rows = splitter(Qt.Orientation.Vertical, [self._top, self._bottom], (360, 336))
         self._column = QVBoxLayout()
         self._column.setContentsMargins(8, 0, 8, 0)
         self._column.setSpacing(4)
