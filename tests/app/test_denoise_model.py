@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
-from fake_denoisers import FakeDenoisers, fading
+from fake_denoisers import FakeDenoisers, card_of, fading
 from fake_ladder import FakeLadder
 from PySide6.QtCore import QObject
 
@@ -405,3 +406,44 @@ def test_closing_lets_go_of_the_models(context, models, qtbot, ball):
     qtbot.waitUntil(lambda: context.denoise.map.busy, timeout=10_000)
     context.close()
     assert models.closed
+
+
+# --- the library's own --------------------------------------------------------------------
+
+
+def test_a_real_model_gives_the_map_that_the_library_gives(qapp, qtbot, ball, tmp_path):
+    import torch
+
+    from sd2core.denoise.files import load_model, save_model
+    from sd2core.denoise.live import TrainedDenoiser
+    from sd2core.denoise.registry import build
+
+    torch.manual_seed(0)
+    network = build("gru", 32, channels=8)
+    with torch.no_grad():
+        for parameter in network.parameters():
+            parameter += 0.3 * torch.randn_like(parameter)
+    card = replace(card_of(tmp_path), options={"channels": 8}, path=None)
+    save_model(tmp_path / "own.safetensors", TrainedDenoiser(network, card))
+    parent = QObject()
+    context = build_context(parent, Settings.forgetful(), FakeLadder().ladder)
+    open_it(context, qtbot, ball)
+    context.denoise.use(tmp_path / "own.safetensors")
+    qtbot.waitUntil(lambda: not context.denoise.busy, timeout=60_000)
+    expected = load_model(tmp_path / "own.safetensors").denoise(context.synthetic.map).values
+    assert expected.any()
+    np.testing.assert_allclose(
+        context.denoised.map.values, expected, rtol=1e-4, atol=1e-6 * expected.max()
+    )
+    context.edits.begin_sensor_drag()
+    context.edits.drag_sensor((0.5, 0.0, 0.0))
+    qtbot.waitUntil(lambda: not context.synthesis.busy, timeout=20_000)
+    assert context.denoised.covered is None
+    moved = load_model(tmp_path / "own.safetensors").denoise(context.synthetic.map).values
+    np.testing.assert_allclose(
+        context.denoised.map.values, moved, rtol=1e-4, atol=1e-6 * moved.max()
+    )
+    assert not np.allclose(moved, expected)
+    context.edits.end_sensor_drag()
+    context.close()
+    parent.deleteLater()
