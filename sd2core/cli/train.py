@@ -28,6 +28,7 @@ _SETTINGS = {
     "segment_frames": ("data", "segment_frames"),
     "overlap_frames": ("data", "overlap_frames"),
     "placements": ("data", "placements"),
+    "segments": ("data", "segments"),
     "range_factor": ("data", "range_factor"),
     "model": ("model", "name"),
     "epochs": ("training", "epochs"),
@@ -165,6 +166,11 @@ def _add_data(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument(
         "--overlap-frames", type=int, metavar="N", help="of neighbours (default: 10)"
+    )
+    group.add_argument(
+        "--segments",
+        choices=("shifted", "fixed"),
+        help="cut at other places in every epoch, or always at the same (default: shifted)",
     )
     group.add_argument(
         "--placements",

@@ -74,6 +74,11 @@ class DataConfig:
         choice("all", "first"),
         "all",
     )
+    segments: str = _setting(
+        "cut at other places in every epoch (shifted by up to half a step), or always at the same",
+        choice("shifted", "fixed"),
+        "shifted",
+    )
     range_factor: float = _setting(
         "range synthesis: scale input and target together as if the person were up to this"
         " many times nearer or farther; 1 is off",

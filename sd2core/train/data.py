@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +61,37 @@ class Segments:
 
 
 @dataclass(frozen=True, eq=False)
+class Windows:
+    """Segments that are cut while learning, so that they may lie elsewhere in every epoch.
+
+    Parameters
+    ----------
+    inputs, targets : float32 array, shape (frames, bins)
+        All takes one after another.
+    starts, earliest, latest : int64 array, shape (segments,)
+        First frame of every segment, and between which it may lie: within half a step of
+        its own place, and within its take.
+    length : int
+    """
+
+    inputs: NDArray[np.float32]
+    targets: NDArray[np.float32]
+    starts: NDArray[np.int64]
+    earliest: NDArray[np.int64]
+    latest: NDArray[np.int64]
+    length: int
+
+    def __len__(self) -> int:
+        return len(self.starts)
+
+    def places(self, indices: NDArray[np.int64], shares: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Where segments are cut: shares from 0 to below 1 of the way from earliest to latest."""
+        earliest = self.earliest[indices]
+        room = self.latest[indices] - earliest + 1
+        return earliest + (shares * room).astype(np.int64)
+
+
+@dataclass(frozen=True, eq=False)
 class TrainingData:
     """What a run learns from.
 
@@ -68,14 +100,15 @@ class TrainingData:
     pairs : PairSet
         All of it, the unseen subjects as well.
     split : Split
-    training, validation : Segments
+    training : Windows
+    validation : Segments
     learnt_takes : tuple of Take
         Those that the training segments are from.
     """
 
     pairs: PairSet
     split: Split
-    training: Segments
+    training: Windows
     validation: Segments
     learnt_takes: tuple[Take, ...]
 
@@ -83,10 +116,11 @@ class TrainingData:
     def digest(self) -> str:
         """The same for the same segments, whatever their files are called."""
         sums = hashlib.blake2b(digest_size=16)
-        for segments in (self.training, self.validation):
-            for values in (segments.inputs, segments.targets):
-                sums.update(str(values.shape).encode())
-                sums.update(np.ascontiguousarray(values).data)
+        learnt, chosen_by = self.training, self.validation
+        places = (learnt.starts, learnt.earliest, learnt.latest)
+        for values in (learnt.inputs, learnt.targets, *places, chosen_by.inputs, chosen_by.targets):
+            sums.update(str(values.shape).encode())
+            sums.update(np.ascontiguousarray(values).data)
         return sums.hexdigest()
 
 
@@ -210,9 +244,40 @@ def prepare(pairs: PairSet, config: DataConfig) -> TrainingData:
     return TrainingData(
         pairs,
         split,
-        segments_of(learnt, config.segment_frames, config.overlap_frames, pairs.null_bins),
+        windows_of(learnt, config),
         segments_of(own, config.segment_frames, 0, pairs.null_bins),
         learnt,
+    )
+
+
+def windows_of(takes: Sequence[Take], config: DataConfig) -> Windows:
+    """All segments to learn from, in the order of their takes.
+
+    Raises
+    ------
+    Sd2Error
+        When there is none.
+    """
+    length, overlap = config.segment_frames, config.overlap_frames
+    reach = (length - overlap) // 2 if config.segments == "shifted" else 0
+    starts, earliest, latest = [], [], []
+    before = 0
+    for take in takes:
+        frames = len(take.times_s)
+        own = segment_starts(frames, length, overlap)
+        starts.append(before + own)
+        earliest.append(before + np.maximum(own - reach, 0))
+        latest.append(before + np.minimum(own + reach, frames - length))
+        before += frames
+    if not sum(map(len, starts)):
+        raise _too_short(takes, length)
+    return Windows(
+        inputs=np.concatenate([take.synthetic for take in takes]),
+        targets=np.concatenate([take.radar for take in takes]),
+        starts=np.concatenate(starts),
+        earliest=np.concatenate(earliest),
+        latest=np.concatenate(latest),
+        length=length,
     )
 
 
@@ -234,14 +299,28 @@ def segments_of(
         moves = stands_out(take.radar, tuple(null_bins))
         moving.append(moves[starts[:, None] + np.arange(length)])
     if not sum(map(len, inputs)):
-        longest = max((len(take.times_s) for take in takes), default=0)
-        raise Sd2Error(
-            f"Segments are to be {length} frames long, and the longest of {len(takes)} takes has"
-            f" {longest}",
-            "takes that are at least as long as a segment",
-            "Choose shorter segments with --segment-frames",
-        )
+        raise _too_short(takes, length)
     return Segments(*(np.concatenate(parts) for parts in (inputs, targets, moving)))
+
+
+def _too_short(takes: Sequence[Take], length: int) -> Sd2Error:
+    longest = max((len(take.times_s) for take in takes), default=0)
+    return Sd2Error(
+        f"Segments are to be {length} frames long, and the longest of {len(takes)} takes has"
+        f" {longest}",
+        "takes that are at least as long as a segment",
+        "Choose shorter segments with --segment-frames",
+    )
+
+
+class Draw(NamedTuple):
+    """Segments in the order in which they are learnt from; all of shape (segments,)."""
+
+    indices: NDArray[np.int64]
+    gains: NDArray[np.float32]
+    """Of power."""
+    shares: NDArray[np.float64]
+    """Where between its earliest and latest place each is cut, from 0 to below 1."""
 
 
 @dataclass(frozen=True)
@@ -265,12 +344,13 @@ class Order:
         """Batches per epoch; the last may be smaller."""
         return -(-self.segments // self.batch_size)
 
-    def epoch(self, number: int) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
-        """Numbers of segments (segments,), and the power gain of each, in that order."""
+    def epoch(self, number: int) -> Draw:
+        """What an epoch learns from, in that order."""
         rng = np.random.default_rng([self.seed, number])
         indices = rng.permutation(self.segments)
         exponent = rng.uniform(-1.0, 1.0, self.segments)
-        return indices, (self.range_factor ** (-RANGE_LAW * exponent)).astype(np.float32)
+        gains = (self.range_factor ** (-RANGE_LAW * exponent)).astype(np.float32)
+        return Draw(indices, gains, rng.uniform(0.0, 1.0, self.segments))
 
     def part(self, step: int) -> slice:
         """Where in :meth:`epoch` a batch stands."""

@@ -17,14 +17,15 @@ from lightning.pytorch import LightningModule
 from sd2core.denoise.model import Denoiser
 from sd2core.train.checkpoint import Checkpoint, moments_of, set_moments
 from sd2core.train.course import Course
-from sd2core.train.data import Order
+from sd2core.train.data import Order, Windows
 from sd2core.train.optimiser import optimiser_of, set_rate
 
 
 class Step(NamedTuple):
-    """One batch: which segments, and how much nearer each is."""
+    """One batch: which segments, where each is cut, and how much nearer it is."""
 
     index: torch.Tensor  # (segments,) int64
+    start: torch.Tensor  # (segments,) int64
     gain: torch.Tensor  # (segments,) float32, of power
     epoch: int
     number: int
@@ -36,6 +37,7 @@ class Steps:
     Parameters
     ----------
     order : Order
+    windows : Windows
     epoch, step : int
         The first.
     rank, ranks : int
@@ -43,25 +45,33 @@ class Steps:
     """
 
     def __init__(
-        self, order: Order, epoch: int = 0, step: int = 0, rank: int = 0, ranks: int = 1
+        self,
+        order: Order,
+        windows: Windows,
+        epoch: int = 0,
+        step: int = 0,
+        rank: int = 0,
+        ranks: int = 1,
     ) -> None:
-        self._order = order
+        self._order, self._windows = order, windows
         self._epoch, self._step = epoch, step
         self._rank, self._ranks = rank, ranks
 
     def __iter__(self) -> Iterator[Step]:
         epoch, first = self._epoch, self._step
         while True:
-            indices, gains = self._order.epoch(epoch)
+            indices, gains, shares = self._order.epoch(epoch)
+            starts = self._windows.places(indices, shares)
             for step in range(first, self._order.steps):
-                mine = self._order.part(step)
-                index, gain = indices[mine], gains[mine]
+                rows = np.arange(self._order.segments)[self._order.part(step)]
                 if self._ranks > 1:
                     # All have as many, as a mean over processes wants it.
-                    each = -(-len(index) // self._ranks)
-                    rows = (np.arange(each) * self._ranks + self._rank) % len(index)
-                    index, gain = index[rows], gain[rows]
-                yield Step(torch.from_numpy(index), torch.from_numpy(gain), epoch, step)
+                    each = -(-len(rows) // self._ranks)
+                    rows = rows[(np.arange(each) * self._ranks + self._rank) % len(rows)]
+                index, start, gain = (
+                    torch.from_numpy(part[rows]) for part in (indices, starts, gains)
+                )
+                yield Step(index, start, gain, epoch, step)
             epoch, first = epoch + 1, 0
 
 
@@ -71,8 +81,8 @@ class Learner(LightningModule):
     Parameters
     ----------
     network : Denoiser
-    inputs, targets : Tensor, shape (segments, length, bins)
-        Compressed.
+    windows : Windows
+        Of energies; the course's scaling compresses them.
     course : Course
     checkpoint : Checkpoint, optional
         To go on from.
@@ -81,15 +91,16 @@ class Learner(LightningModule):
     def __init__(
         self,
         network: Denoiser,
-        inputs: torch.Tensor,
-        targets: torch.Tensor,
+        windows: Windows,
         course: Course,
         checkpoint: Checkpoint | None = None,
     ) -> None:
         super().__init__()
         self.network = network
         # Not buffers: they belong to no checkpoint, and need not be broadcast.
-        self._inputs, self._targets = inputs, targets
+        self._inputs = torch.from_numpy(course.scaling.input.compress(windows.inputs))
+        self._targets = torch.from_numpy(course.scaling.target.compress(windows.targets))
+        self._frames = torch.arange(windows.length)
         self._course = course
         self._moments = checkpoint.moments if checkpoint is not None else None
 
@@ -102,9 +113,9 @@ class Learner(LightningModule):
         return optimiser
 
     def on_fit_start(self) -> None:
-        """Bring all segments to the device: they are a few hundred MB at most."""
-        self._inputs = self._inputs.to(self.device)
-        self._targets = self._targets.to(self.device)
+        """Bring all frames to the device: they are a few hundred MB at most."""
+        for name in ("_inputs", "_targets", "_frames"):
+            setattr(self, name, getattr(self, name).to(self.device))
 
     def on_train_start(self) -> None:
         """Begin, with signals handled as we want it: Lightning has put its own in place."""
@@ -122,8 +133,8 @@ class Learner(LightningModule):
     def training_step(self, batch: Step, batch_idx: int) -> torch.Tensor:
         """Root mean square error of one batch."""
         course = self._course
-        inputs = self._inputs.index_select(0, batch.index)
-        targets = self._targets.index_select(0, batch.index)
+        rows = batch.start[:, None] + self._frames  # (segments, length)
+        inputs, targets = self._inputs[rows], self._targets[rows]
         if course.config.data.range_factor > 1.0:
             # (g·x / r)^p = g^p · (x / r)^p: gains are as well applied to compressed values.
             scaling = course.scaling

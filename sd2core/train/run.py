@@ -100,8 +100,7 @@ def carry_out(
         )
         learner = Learner(
             network,
-            torch.from_numpy(scaling.input.compress(data.training.inputs)),
-            torch.from_numpy(scaling.target.compress(data.training.targets)),
+            data.training,
             course,
             checkpoint,
         )
@@ -126,9 +125,10 @@ def carry_out(
             use_distributed_sampler=False,
         )
         position = course.position
-        trainer.fit(
-            learner, Steps(course.order, position.epoch, position.step, local_rank(), ranks)
+        steps = Steps(
+            course.order, data.training, position.epoch, position.step, local_rank(), ranks
         )
+        trainer.fit(learner, steps)
     return course.outcome, course.position
 
 

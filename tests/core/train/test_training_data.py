@@ -17,7 +17,15 @@ from sd2core.errors import Sd2Error
 from sd2core.pairs import read_pairs
 from sd2core.sensor import VelocityAxis
 from sd2core.train.config import DataConfig, TrainingConfig
-from sd2core.train.data import Order, prepare, read_mixed, segments_of, split_subjects
+from sd2core.train.data import (
+    Order,
+    Windows,
+    prepare,
+    read_mixed,
+    segments_of,
+    split_subjects,
+    windows_of,
+)
 from sd2core.train.learner import Steps
 from sd2core.train.optimiser import optimiser_of, rate_factor, set_rate
 
@@ -147,16 +155,52 @@ class TestSegments:
         }
         assert len(digests) == 2
 
+    @pytest.mark.parametrize("segments", ["shifted", "fixed"])
+    def test_segments_to_learn_from_stay_within_their_takes(
+        self, tmp_path: Path, segments: str
+    ) -> None:
+        pairs = read_pairs(write_pairs(tmp_path / "p.zarr", ("s1",), takes=3))
+        config = DataConfig((tmp_path,), segment_frames=40, overlap_frames=10, segments=segments)
+        cut = windows_of(pairs.takes, config)
+        assert np.array_equal(cut.inputs, np.concatenate([take.synthetic for take in pairs.takes]))
+        assert np.array_equal(cut.targets, np.concatenate([take.radar for take in pairs.takes]))
+        own = np.array([0, 30, 60, 90, 110])
+        everywhere = np.arange(len(cut)), 150 * np.repeat(np.arange(3), 5)
+        rng = np.random.default_rng(0)
+        places = np.array(
+            [cut.places(everywhere[0], rng.uniform(0, 1, len(cut))) for _ in range(200)]
+        )
+        shifts = places - everywhere[1] - np.tile(own, 3)
+        if segments == "fixed":
+            assert (shifts == 0).all()
+        else:
+            # 15 frames are half a step; a take of 150 frames ends 40 after 110.
+            assert shifts.reshape(-1, 5).min(axis=0).tolist() == [0, -15, -15, -15, -15]
+            assert shifts.reshape(-1, 5).max(axis=0).tolist() == [15, 15, 15, 15, 0]
+
+    def test_takes_too_short_to_learn_from(self, tmp_path: Path) -> None:
+        pairs = read_pairs(write_pairs(tmp_path / "p.zarr", ("s1",), frames=50))
+        with pytest.raises(Sd2Error, match="72 frames long, and the longest of 2 takes has 50"):
+            windows_of(pairs.takes, DataConfig((tmp_path,)))
+
+
+def windows(segments: int) -> Windows:
+    """Segments of four frames, each of which may be shifted by one."""
+    starts = 6 * np.arange(segments) + 1
+    frames = np.zeros((6 * segments, 8), np.float32)
+    return Windows(frames, frames, starts, starts - 1, starts + 1, 4)
+
 
 class TestOrder:
     @given(st.integers(1, 60), st.integers(1, 20), st.integers(0, 5), st.integers(0, 1000))
     def test_every_segment_once(self, segments: int, size: int, seed: int, epoch: int) -> None:
         order = Order(segments, size, seed)
-        indices, gains = order.epoch(epoch)
+        indices, gains, shares = order.epoch(epoch)
         batches = [indices[order.part(step)] for step in range(order.steps)]
         assert sorted(np.concatenate(batches)) == list(range(segments))
         assert all(len(batch) for batch in batches)
         assert (gains == 1.0).all()
+        assert ((shares >= 0.0) & (shares < 1.0)).all()
 
     def test_it_depends_on_seed_and_epoch_alone(self) -> None:
         first = Order(50, 8, 7, range_factor=2.0).epoch(3)
@@ -174,13 +218,14 @@ class TestOrder:
 
     def test_steps_from_a_position_on(self) -> None:
         order = Order(10, 4, 1)
-        whole = iter(Steps(order))
+        whole = iter(Steps(order, windows(10)))
         taken = [next(whole) for _ in range(7)]
-        later = iter(Steps(order, 1, 2))
+        later = iter(Steps(order, windows(10), 1, 2))
         for expected in taken[5:]:
             found = next(later)
             assert (found.epoch, found.number) == (expected.epoch, expected.number)
             assert torch.equal(found.index, expected.index)
+            assert torch.equal(found.start, expected.start)
         assert [(step.epoch, step.number, len(step.index)) for step in taken[:4]] == [
             (0, 0, 4),
             (0, 1, 4),
@@ -191,7 +236,7 @@ class TestOrder:
     @pytest.mark.parametrize("ranks", [2, 3])
     def test_processes_share_a_batch(self, ranks: int) -> None:
         order = Order(11, 6, 1)
-        parts = [iter(Steps(order, rank=rank, ranks=ranks)) for rank in range(ranks)]
+        parts = [iter(Steps(order, windows(11), rank=rank, ranks=ranks)) for rank in range(ranks)]
         for _ in range(order.steps):
             steps = [next(part) for part in parts]
             assert len({len(step.index) for step in steps}) == 1
