@@ -82,8 +82,8 @@ class TrainingDialogs:
         """Whether the window may close; says what becomes of a run under way."""
         training = self._training
         run = training.to_be_left()
-        if run is None:
-            return True
+        if run is None or run.phase in ("stopping", "cancelling"):
+            return True  # it ends by itself
         if training.closing == "ask":
             return self._ask_what_becomes(training, run.folder.path.name)
         if training.closing == "stop":

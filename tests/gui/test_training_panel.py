@@ -306,6 +306,8 @@ def test_cancelling_is_said_at_once(made, qtbot, pairs) -> None:
     click(window, qtbot, "Cancel")
     assert "Cancelling…" in texts(window)
     assert not button(window, "Stop").isEnabled()
+    # What becomes of it is decided.
+    assert window.dialogs.may_leave()
     qtbot.waitUntil(lambda: window.training.run is None, timeout=15_000)
     assert button(window, "Start training").isVisible()
 
