@@ -165,7 +165,7 @@ def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--folder", type=Path, default=DOCS.parent / "build" / "denoiser")
     parser.add_argument("--campaign", type=Path, help="a campaign that is there already")
-    parser.add_argument("--campaign-minutes", type=float, default=16, help="of every subject")
+    parser.add_argument("--campaign-minutes", type=float, default=240, help="of all people")
     parser.add_argument("--minutes", type=float, default=20.0, help="of training, each run")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--models", nargs="+", default=COMPARED, choices=MODELS)
