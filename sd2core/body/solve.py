@@ -11,6 +11,7 @@ import numpy as np
 from sd2core.body.evidence import Evidence
 from sd2core.body.initial import Pose
 from sd2core.body.objective import Objective, Residuals, cost, weighted
+from sd2core.body.one_thread import one_thread
 from sd2core.body.rig import Rig
 from sd2core.body.rotations import Floats
 
@@ -51,11 +52,12 @@ def solve(
     sd = np.full((max(frames - 2, 0), rig.freedoms), _FIRST_ROTATION_RADPS2)
     sd[:, -3:] = _FIRST_TRANSLATION_MPS2
     pose = start
-    for number in range(ROUNDS):
-        objective = Objective(rig, evidence, sd)
-        pose = _descend(objective, pose, robust=number > 0, tick=partial(tick, number))
-        if number < ROUNDS - 1:
-            sd = _liveliness(objective.accelerations(pose), evidence.times_s)
+    with one_thread():
+        for number in range(ROUNDS):
+            objective = Objective(rig, evidence, sd)
+            pose = _descend(objective, pose, robust=number > 0, tick=partial(tick, number))
+            if number < ROUNDS - 1:
+                sd = _liveliness(objective.accelerations(pose), evidence.times_s)
     return pose
 
 
@@ -64,8 +66,9 @@ def solve_stills(rig: Rig, evidence: Evidence, start: Pose) -> Pose:
     apart = replace(evidence, velocity_sd_mps=np.full_like(evidence.velocity_sd_mps, np.inf))
     sd = np.full((max(len(evidence.times_s) - 2, 0), rig.freedoms), np.inf)
     objective = Objective(rig, apart, sd)
-    pose = _descend(objective, start, robust=False, tick=lambda: None)
-    return _descend(objective, pose, robust=True, tick=lambda: None)
+    with one_thread():
+        pose = _descend(objective, start, robust=False, tick=lambda: None)
+        return _descend(objective, pose, robust=True, tick=lambda: None)
 
 
 def _descend(objective: Objective, pose: Pose, *, robust: bool, tick: Callable[[], None]) -> Pose:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -168,10 +167,6 @@ def _recordings(options: argparse.Namespace) -> None:
 
 
 def _mars(options: argparse.Namespace) -> None:
-    # The solver's many small products gain nothing from threads, and beside other work
-    # threads that wait for each other took more than ten times as long. It is read when
-    # NumPy and SciPy are first imported, which is below.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from sd2core.mocap.mars_pairs import make_mars_pairs
 
     with progress_bar("Making pairs") as progress:
