@@ -142,6 +142,7 @@ def test_the_wheel_holds_the_program_and_nothing_else(wheel: Path) -> None:
     assert any(name.endswith("/LICENSE") for name in names)
 
 
+@pytest.mark.slow
 def test_the_wheel_works_away_from_the_checkout(installed: Path, away: Path) -> None:
     check(installed, away)
 
