@@ -15,10 +15,11 @@ from matplotlib.figure import Figure
 
 from sd2core.compiled import warm_up
 from sd2core.doppler import PRESETS
+from sd2core.figure_files import save_figure
 from sd2core.io.mesh import load_mesh
 from sd2core.ladder.choosing import choose
 from sd2core.ladder.measuring import measure
-from sd2core.ladder.plot import plot_trade, save_plot
+from sd2core.ladder.plot import plot_trade
 from sd2core.ladder.results import Measurement
 from sd2core.ladder.scene import this_machine
 from sd2core.ladder.survey import survey_scene
@@ -110,7 +111,7 @@ def _tolerances(mesh: MeshSequence, sensor: VirtualSensor) -> Iterator[str]:
 
 def _measured(measurement: Measurement, picture: str) -> Iterator[str]:
     """Table and picture of all plans of a family."""
-    save_plot(plot_trade(measurement), IMAGES / picture)
+    save_figure(plot_trade(measurement), IMAGES / picture)
     what = {"histogram": "Counting", "fmcw": "FMCW signal"}[measurement.family]
     yield f"### {what}: {len(measurement.results)} plans\n"
     yield f"![error against cost]({IMAGES.name}/{picture})\n"
@@ -139,7 +140,7 @@ def _measured(measurement: Measurement, picture: str) -> Iterator[str]:
 
 def _scaling() -> Iterator[str]:
     found = [scaling for sight in ("facing", "exact") for scaling in scalings(sight)]
-    save_plot(_scaling_plot(found), IMAGES / "scaling.png")
+    save_figure(_scaling_plot(found), IMAGES / "scaling.png")
     yield "## Ten times as much\n"
     yield f"![cost and memory against size]({IMAGES.name}/scaling.png)\n"
     yield (

@@ -24,6 +24,7 @@ from matplotlib.figure import Figure
 from sd2core.atomic import atomic_write_text
 from sd2core.denoise.files import load_model
 from sd2core.denoise.registry import MODELS
+from sd2core.figure_files import save_figure
 from sd2core.ladder.scene import this_machine
 from sd2core.pairs import PairSet, read_pairs
 from sd2core.resources import resource_path
@@ -325,7 +326,7 @@ def _curves(folder: Path, jobs: Sequence[Job]) -> None:
         axis.set_yscale("log")
         axis.set_xlabel("minutes of training")
         axis.grid(alpha=0.25, which="both")
-    figure.savefig(IMAGES / "denoiser-curves.png")
+    save_figure(figure, IMAGES / "denoiser-curves.png")
 
 
 def _triple(path: Path, pairs: PairSet) -> None:
@@ -349,7 +350,7 @@ def _triple(path: Path, pairs: PairSet) -> None:
         axis.set_title(name, fontsize=9, loc="left")
     axis.set_xlabel("s")
     figure.colorbar(picture, ax=figure.axes, label="dB below each map's own strongest cell")
-    figure.savefig(IMAGES / "denoiser-triple.png")
+    save_figure(figure, IMAGES / "denoiser-triple.png")
 
 
 if __name__ == "__main__":

@@ -16,10 +16,11 @@ from matplotlib.figure import Figure
 
 from sd2core.atomic import atomic_write_text
 from sd2core.cli import build_parser, run
-from sd2core.compare.figure import save_comparison
+from sd2core.compare.figure import draw_comparison
 from sd2core.compare.meshes import compare_meshes
 from sd2core.compare.truth import read_truth
 from sd2core.compiled import warm_up
+from sd2core.figure_files import save_figure
 from sd2core.io.mesh import load_mesh
 from sd2core.io.video import open_video
 from sd2core.ladder.scene import this_machine
@@ -91,7 +92,8 @@ def main() -> None:
     )
     truth = read_truth(clips / COMPARED)
     pair = [truth.mesh(), load_mesh(fits / f"{COMPARED}.zarr")]
-    save_comparison(compare_meshes(pair, ["true", "fitted"]), IMAGES / "fit-compared.png")
+    compared = compare_meshes(pair, ["true", "fitted"])
+    save_figure(draw_comparison(compared), IMAGES / "fit-compared.png")
     page = PAGE.format(machine=this_machine(), tables=tables.read_text("utf-8"), compared=COMPARED)
     atomic_write_text(DOCS / "fitting.md", page)
 
@@ -112,7 +114,7 @@ def _frames(clips: Path) -> None:
         axes = figure.add_axes((0.25 * column, 0.5 - 0.5 * row, 0.249, 0.498))
         axes.imshow(picture)
         axes.set_axis_off()
-    figure.savefig(IMAGES / "fit-truth.png")
+    save_figure(figure, IMAGES / "fit-truth.png")
 
 
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from sd2app.dialogs.figure_filter import FIGURES
 from sd2app.models.comparison import ComparisonModel
 from sd2app.views.comparison.curves import JointCurves
 from sd2app.views.comparison.pictures import ComparedPicture
@@ -30,8 +31,6 @@ from sd2app.views.timeline import TimeRuler
 
 if TYPE_CHECKING:
     from sd2app.context import Context
-
-_FORMATS = "PNG (*.png);;SVG (*.svg);;PDF (*.pdf)"
 
 
 class ComparisonWindow(QWidget):
@@ -159,7 +158,7 @@ class ComparisonWindow(QWidget):
         self._notes.setVisible(bool(text))
 
     def _ask(self) -> None:
-        name, _ = QFileDialog.getSaveFileName(self, "Export comparison", "comparison.png", _FORMATS)
+        name, _ = QFileDialog.getSaveFileName(self, "Export comparison", "comparison.png", FIGURES)
         if name:
             self._attempt(lambda: self._model.save_figure(Path(name)))
 

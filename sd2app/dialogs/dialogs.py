@@ -23,6 +23,7 @@ from PySide6.QtWidgets import (
 import sd2core
 from sd2app.actions import ACTIONS, MOUSE
 from sd2app.dialogs.comparison import ComparisonWindow
+from sd2app.dialogs.figure_filter import FIGURES
 from sd2app.dialogs.model_card import ModelCardDialog
 from sd2app.dialogs.new_from_video import VIDEOS, NewFromVideoDialog
 from sd2app.dialogs.strip import StripDialog
@@ -46,7 +47,6 @@ _FILES = (
 
 
 _MODELS = "Model (*.safetensors);;All files (*)"
-_FIGURES = "PNG (*.png);;SVG (*.svg);;PDF (*.pdf)"
 
 _MESHES = (
     "Mesh or recording (*.npz *.zip zarr.json *.pkl *.obj *.ply *.glb recording.json);;"
@@ -241,7 +241,7 @@ class Dialogs:
     def export_maps(self) -> None:
         """Ask for a file and draw the maps into it."""
         name, _ = QFileDialog.getSaveFileName(
-            self._parent, "Export figure of the maps", "doppler-maps.png", _FIGURES
+            self._parent, "Export figure of the maps", "doppler-maps.png", FIGURES
         )
         if name:
             self.attempt(lambda: self._save_figure(Path(name)))

@@ -20,13 +20,13 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from sd2app.dialogs.figure_filter import FIGURES
 from sd2app.models.strip import StripModel
 from sd2app.palette import Palette
 from sd2app.views.inputs import Choice, NumberBox
 
 _WAYS = (("spread", "spread evenly"), ("around", "around the cursor"), ("list", "list or ranges"))
 _ROWS = (("video", "video"), ("mesh", "mesh"), ("overlay", "mesh over video"))
-_FORMATS = "PNG (*.png);;SVG (*.svg);;PDF (*.pdf)"
 
 
 class StripPreview(QWidget):
@@ -191,7 +191,7 @@ class StripDialog(QDialog):
 
     def _ask(self) -> None:
         name, chosen = QFileDialog.getSaveFileName(
-            self, "Export strip of frames", f"{self._name}.png", _FORMATS
+            self, "Export strip of frames", f"{self._name}.png", FIGURES
         )
         if name:
             path = Path(name)

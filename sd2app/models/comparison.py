@@ -203,10 +203,11 @@ class ComparisonModel(QObject):
 
     def save_figure(self, path: Path) -> None:
         """Write maps and curves; raises Sd2Error and OSError."""
-        from sd2core.compare.figure import save_comparison
+        from sd2core.compare.figure import draw_comparison
+        from sd2core.figure_files import save_figure
 
         if self.comparison is not None:
-            save_comparison(self.comparison, path)
+            save_figure(draw_comparison(self.comparison), path)
 
     def close(self) -> None:
         """Stop working."""

@@ -70,13 +70,13 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 def _compare(options: argparse.Namespace) -> None:
     from sd2core.cli.reading import check_output
-    from sd2core.compare.figure import SUFFIXES, save_comparison
+    from sd2core.compare.figure import draw_comparison
     from sd2core.compare.meshes import compare_meshes
+    from sd2core.figure_files import SUFFIXES, save_figure
     from sd2core.sensor import VirtualSensor
 
     if options.figure is not None:
-        suffix = options.figure.suffix.lower()
-        check_output(options.figure, suffix if suffix in SUFFIXES else SUFFIXES[0])
+        check_output(options.figure, *SUFFIXES)
     labels = _labels(options)
     reference = 0
     if options.reference is not None:
@@ -95,7 +95,7 @@ def _compare(options: argparse.Namespace) -> None:
             progress=progress,
         )
     if options.figure is not None:
-        save_comparison(comparison, options.figure)
+        save_figure(draw_comparison(comparison), options.figure)
     if options.json:
         print_json(comparison.as_dict())
         return

@@ -14,7 +14,6 @@ from sd2core.errors import Sd2Error
 if TYPE_CHECKING:
     from sd2core.denoise.live import TrainedDenoiser
 
-_PLOTS = (".png", ".svg", ".pdf")
 _STANDARD_OUTPUT = Path("-")
 
 
@@ -72,17 +71,17 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 def _eval(options: argparse.Namespace) -> None:
     from sd2core.atomic import atomic_write_text
     from sd2core.cli.reading import check_output
+    from sd2core.figure_files import SUFFIXES, save_figure
 
     if options.plot is not None:
-        suffix = options.plot.suffix.lower()
-        check_output(options.plot, suffix if suffix in _PLOTS else ".png")
+        check_output(options.plot, *SUFFIXES)
     if options.json not in (None, _STANDARD_OUTPUT):
         check_output(options.json, ".json")
     if options.markdown is not None:
         check_output(options.markdown, ".md")
     from sd2core.train.data import read_mixed
     from sd2core.train.evaluate import evaluate
-    from sd2core.train.evaluate_words import as_markdown, as_text, save_figure
+    from sd2core.train.evaluate_words import as_markdown, as_text, draw
 
     pairs = read_mixed(options.data)
     with progress_bar("Denoising", unit="take") as progress:
@@ -101,7 +100,7 @@ def _eval(options: argparse.Namespace) -> None:
     if options.json not in (None, _STANDARD_OUTPUT):
         atomic_write_text(options.json, content + "\n")
     if options.plot is not None:
-        save_figure(evaluation, options.plot)
+        save_figure(draw(evaluation), options.plot)
     if options.markdown is not None:
         atomic_write_text(options.markdown, as_markdown(evaluation))
 

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from sd2core.sensor import VirtualSensor
 
 _TOLERANCE = 0.02
-_PLOTS = (".png", ".svg", ".pdf")
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
@@ -87,13 +86,13 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 def _ladder(options: argparse.Namespace) -> int:
     from sd2core.cli.reading import check_output, mesh_and_sensor
     from sd2core.doppler import PRESETS
+    from sd2core.figure_files import SUFFIXES, save_figure
     from sd2core.ladder.choosing import checked_options
 
     if options.plot is not None:
-        suffix = options.plot.suffix.lower()
         if options.quick:
             raise Sd2Error("--plot is given with --quick", "one of the two: nothing is measured")
-        check_output(options.plot, suffix if suffix in _PLOTS else ".png")
+        check_output(options.plot, *SUFFIXES)
     if options.quick and options.family == "fmcw":
         raise Sd2Error("--quick is given with --family fmcw", "it with --family histogram only")
     mesh, sensor = mesh_and_sensor(options)
@@ -106,9 +105,9 @@ def _ladder(options: argparse.Namespace) -> int:
         choice = chosen(mesh, sensor, synthesis, tolerance, options.budget_ms)
     measurement = None if options.quick else _measured(mesh, sensor, synthesis, options)
     if options.plot is not None and measurement is not None:
-        from sd2core.ladder.plot import plot_trade, save_plot
+        from sd2core.ladder.plot import plot_trade
 
-        save_plot(plot_trade(measurement, choice), options.plot)
+        save_figure(plot_trade(measurement, choice), options.plot)
     if options.json:
         print_json(
             {

@@ -104,12 +104,13 @@ def _given(options: argparse.Namespace, names: tuple[str, ...], but: tuple[str, 
     ]
 
 
-def check_output(path: Path, suffix: str) -> None:
+def check_output(path: Path, *suffixes: str) -> None:
     """Refuse an output file that cannot be written, before the work is done."""
-    if path.suffix.lower() != suffix:
-        raise Sd2Error(f"The output file is {path}", f"a name that ends in {suffix}")
+    endings = ", ".join(suffixes)
+    if path.suffix.lower() not in suffixes:
+        raise Sd2Error(f"The output file is {path}", f"a name that ends in {endings}")
     if path.is_dir():
-        raise Sd2Error(f"The output file {path} is a folder", f"a file's name, ending in {suffix}")
+        raise Sd2Error(f"The output file {path} is a folder", f"a file's name, ending in {endings}")
     if not path.absolute().parent.is_dir():
         raise Sd2Error(
             f"The folder {path.absolute().parent} does not exist",

@@ -103,8 +103,9 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _strip(options: argparse.Namespace) -> None:
+    from sd2core.figure_files import check_figure
     from sd2core.figures.frames import parse_frames, spread_frames
-    from sd2core.figures.strip import check_figure, plot_strip, save_strip
+    from sd2core.figures.strip import plot_strip, save_strip
     from sd2core.figures.strip_source import StripOptions
 
     check_figure(options.out)

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sd2core.atomic import atomic_write
 from sd2core.compare.joints import GROUPS, rows_of
 from sd2core.compare.meshes import Comparison
-from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SUFFIXES = (".png", ".svg", ".pdf")
 COLOURS = ("#222222", "#b35806", "#2166ac", "#1b7837", "#7b3294", "#c51b7d")
 """Of the meshes in order; the reference is drawn in the first, whatever its number."""
 
@@ -101,22 +97,6 @@ def draw_comparison(comparison: Comparison) -> Figure:
         fontsize=10,
     )
     return figure
-
-
-def save_comparison(comparison: Comparison, path: Path) -> None:
-    """Write the figure as PNG, SVG or PDF, by the name's ending.
-
-    Raises
-    ------
-    Sd2Error
-        For another ending.
-    """
-    suffix = Path(path).suffix.lower()
-    if suffix not in SUFFIXES:
-        raise Sd2Error(f"{path} is to be written", f"a name that ends in {', '.join(SUFFIXES)}")
-    figure = draw_comparison(comparison)
-    with atomic_write(Path(path)) as stream:
-        figure.savefig(stream, format=suffix.lstrip("."))
 
 
 def _place(number: int, reference: int) -> int:

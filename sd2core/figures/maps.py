@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,10 +10,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-import sd2core
-from sd2core.atomic import atomic_write
 from sd2core.errors import Sd2Error
-from sd2core.figures.strip import check_figure
+from sd2core.figure_files import save_figure
 from sd2core.presence import runs
 from sd2core.spectrum import DopplerMap
 
@@ -189,28 +186,14 @@ def save_maps(figure: Figure, path: Path, rows: Sequence[MapRow], about: dict[st
     about : dict
         What else is to be known, fit for JSON.
     """
-    from matplotlib import rc_context
-
-    check_figure(path)
     provenance = about | {
         "maps": [
             {"title": row.title, "kind": row.doppler.kind, "reference": row.reference}
             | {"offset_s": row.offset_s, "provenance": row.doppler.meta}
             for row in rows
-        ],
-        "version": sd2core.__version__,
+        ]
     }
-    description = json.dumps(provenance, ensure_ascii=False)
-    program, kind = f"SD² Studio {sd2core.__version__}", path.suffix.lower()
-    metadata: Any = {
-        ".png": {"Software": program, "Description": description},
-        # Without a date the same figure gives the same bytes.
-        ".svg": {"Creator": program, "Description": description, "Date": None},
-        ".pdf": {"Creator": program, "Subject": description, "CreationDate": None},
-    }[kind]
-    rules: Any = {"svg.fonttype": "none", "svg.hashsalt": "sd2", "pdf.fonttype": 42}
-    with rc_context(rules), atomic_write(path) as stream:
-        figure.savefig(stream, format=kind[1:], dpi=_PIXELS_PER_INCH, metadata=metadata)
+    save_figure(figure, path, provenance, _PIXELS_PER_INCH)
 
 
 def _draw(

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import sd2core
-from sd2core.atomic import atomic_write
-from sd2core.errors import Sd2Error
+from sd2core.figure_files import save_figure
 from sd2core.figures.colours import DIVERGING
 from sd2core.figures.strip_drawing import MUTED, Body, draw_picture, strip_box
 from sd2core.figures.strip_source import Row, StripOptions, StripSource, check_strip
@@ -22,7 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FORMATS = (".png", ".svg", ".pdf")
 _INK, _PAPER = "#1d2127", "#f3f4f6"
 _PICTURE_IN = 1.3
 """Width of one picture."""
@@ -80,14 +76,6 @@ def plot_strip(
     return figure
 
 
-def check_figure(path: Path) -> None:
-    """Refuse a name that no figure can have."""
-    if path.suffix.lower() not in FORMATS:
-        raise Sd2Error(f"The figure is to be {path}", f"a name that ends in {', '.join(FORMATS)}")
-    if not path.absolute().parent.is_dir():
-        raise Sd2Error(f"The folder {path.absolute().parent} does not exist", "an existing folder")
-
-
 def save_strip(
     figure: Figure, path: Path, source: StripSource, frames: Sequence[int], options: StripOptions
 ) -> None:
@@ -95,11 +83,6 @@ def save_strip(
 
     Text and axes of SVG and PDF are text and lines; pictures and meshes are pictures in them.
     """
-    from matplotlib import rc_context
-
-    check_figure(path)
-    kind = path.suffix.lower()
-    program = f"SD² Studio {sd2core.__version__}"
     provenance = {
         "source": source.name,
         "frames": list(frames),
@@ -107,18 +90,8 @@ def save_strip(
         "sensor_position_m": list(source.sensor.position_m),
         "camera": asdict(source.camera),
         "options": asdict(options),
-        "version": sd2core.__version__,
     }
-    description = json.dumps(provenance, ensure_ascii=False)
-    metadata: Any = {
-        ".png": {"Software": program, "Description": description},
-        # Without a date the same figure gives the same bytes.
-        ".svg": {"Creator": program, "Description": description, "Date": None},
-        ".pdf": {"Creator": program, "Subject": description, "CreationDate": None},
-    }[kind]
-    rules: Any = {"svg.fonttype": "none", "svg.hashsalt": "sd2", "pdf.fonttype": 42}
-    with rc_context(rules), atomic_write(path) as stream:
-        figure.savefig(stream, format=kind[1:], dpi=_PIXELS_PER_INCH, metadata=metadata)
+    save_figure(figure, path, provenance, _PIXELS_PER_INCH)
 
 
 class _Layout:

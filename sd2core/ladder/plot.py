@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sd2core.atomic import atomic_write
 from sd2core.ladder.results import Choice, Measurement, PlanResult
 
 if TYPE_CHECKING:
@@ -51,12 +49,6 @@ def plot_trade(measurement: Measurement, choice: Choice | None = None) -> Figure
     axes.grid(which="both", alpha=0.2)
     axes.legend(title="visibility", fontsize=8)
     return figure
-
-
-def save_plot(figure: Figure, path: Path) -> None:
-    """Write a figure as PNG, SVG or PDF, by the name's ending."""
-    with atomic_write(path) as stream:
-        figure.savefig(stream, format=path.suffix.lstrip(".").lower())
 
 
 def _places(results: tuple[PlanResult, ...] | list[PlanResult]) -> tuple[list[float], list[float]]:

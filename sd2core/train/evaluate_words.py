@@ -3,22 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-
-from sd2core.atomic import atomic_write
-from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from sd2core.train.evaluation import Evaluation, Group
-
-SUFFIXES = (".png", ".svg", ".pdf")
 
 _Table = Callable[[Sequence[str], Sequence[Sequence[str]]], list[str]]
 """``table(head, rows)`` gives lines."""
@@ -74,22 +68,6 @@ def draw(evaluation: Evaluation) -> Figure:
         f"Denoised against {evaluation.kind} radar, {evaluation.moving} frames", fontsize=10
     )
     return figure
-
-
-def save_figure(evaluation: Evaluation, path: Path) -> None:
-    """Write the picture as PNG, SVG or PDF, by the name's ending.
-
-    Raises
-    ------
-    Sd2Error
-        For another ending.
-    """
-    suffix = Path(path).suffix.lower()
-    if suffix not in SUFFIXES:
-        raise Sd2Error(f"{path} is to be drawn", f"a name that ends in {', '.join(SUFFIXES)}")
-    figure = draw(evaluation)
-    with atomic_write(Path(path)) as stream:
-        figure.savefig(stream, format=suffix.lstrip("."))
 
 
 def _places(evaluation: Evaluation) -> tuple[tuple[str, ...], tuple[str, ...]]:

@@ -8,12 +8,13 @@ import pytest
 
 from sd2core.body.model import Body
 from sd2core.body.rotations import about
-from sd2core.compare.figure import draw_comparison, save_comparison
+from sd2core.compare.figure import draw_comparison
 from sd2core.compare.joints import JOINTS, rows_of
 from sd2core.compare.maps import map_l1
 from sd2core.compare.meshes import compare_meshes
 from sd2core.compare.times import at_times, common_times
 from sd2core.errors import Sd2Error
+from sd2core.figure_files import save_figure
 from sd2core.mesh import MeshSequence
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
@@ -165,7 +166,7 @@ def test_the_figure_shows_every_mesh(mesh: MeshSequence, tmp_path: Path, suffix:
     titles = [axes.get_title() for axes in figure.axes]
     assert [title.split("\n")[0] for title in titles if title] == ["truth", "ours", "theirs"]
     assert titles[1].endswith("reference")
-    save_comparison(found, tmp_path / f"figure{suffix}")
+    save_figure(draw_comparison(found), tmp_path / f"figure{suffix}")
     start = (tmp_path / f"figure{suffix}").read_bytes()[:200]
     assert {".png": b"PNG", ".svg": b"<?xml"}[suffix] in start
 
@@ -173,4 +174,4 @@ def test_the_figure_shows_every_mesh(mesh: MeshSequence, tmp_path: Path, suffix:
 def test_a_figure_of_another_kind_is_refused(mesh: MeshSequence, tmp_path: Path) -> None:
     found = compare_meshes([mesh, mesh], ["a", "b"])
     with pytest.raises(Sd2Error, match=r"\.png, \.svg, \.pdf"):
-        save_comparison(found, tmp_path / "figure.bmp")
+        save_figure(draw_comparison(found), tmp_path / "figure.bmp")
