@@ -4,30 +4,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import (
-    QColor,
-    QFocusEvent,
-    QHelpEvent,
-    QKeyEvent,
-    QMouseEvent,
-    QPainter,
-    QPaintEvent,
-    QPen,
-    QPolygonF,
-)
-from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
+from PySide6.QtCore import QEvent, QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPen, QPolygonF
+from PySide6.QtWidgets import QWidget
 
 from sd2app.models.display import DisplayModel
 from sd2app.models.measured import front_at_rest, serves_at_rest
 from sd2app.models.plan_words import percent, point_text
 from sd2app.models.trade import TradeModel
 from sd2app.views.log_axis import LogAxis, tick_text
+from sd2app.views.point_plot import PointPlot
 
 if TYPE_CHECKING:
     from sd2core.ladder.results import PlanResult
 
-_LEFT_PX, _TOP_PX, _RIGHT_PX, _BOTTOM_PX = 44, 20, 10, 36
 _FLOOR_PERCENT = 0.01
 _REACH_PX = 8.0
 _STEPS = {
@@ -36,10 +26,9 @@ _STEPS = {
     Qt.Key.Key_Up: 1,
     Qt.Key.Key_Down: -1,
 }
-_TAKES = {Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Escape, *_STEPS}
 
 
-class TradePlot(QWidget):
+class TradePlot(PointPlot):
     """Every plan as a point: the cheaper the further left, the nearer the lower.
 
     Hovering says what a point is, a click uses it. With the keyboard Left and
@@ -47,49 +36,54 @@ class TradePlot(QWidget):
     uses the point, Escape gives the keyboard back.
     """
 
+    MARGINS_PX = (44, 20, 10, 36)
+    HEIGHTS_PX = (164, 164, 260)
+    KEYS = frozenset({Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Escape, *_STEPS})
+
     def __init__(
         self, trade: TradeModel, display: DisplayModel, parent: QWidget | None = None
     ) -> None:
-        super().__init__(parent)
+        super().__init__(display, "Error against cost of every plan", parent)
         self._trade = trade
-        self._display = display
-        self._pointed: PlanResult | None = None
-        self.setMouseTracking(True)
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setMinimumHeight(164)
-        self.setMaximumHeight(260)
-        self.setAccessibleName("Error against cost of every plan")
         trade.changed.connect(self._refresh)
         trade.plan_changed.connect(self._refresh)
-        display.theme_changed.connect(self.update)
 
-    def sizeHint(self) -> QSize:
-        """A little wider than high."""
-        return QSize(260, 164)
+    def points(self) -> tuple[PlanResult, ...]:
+        """All plans that were measured."""
+        measurement = self._trade.measured.measurement
+        return measurement.results if measurement is not None else ()
 
-    @property
-    def pointed(self) -> PlanResult | None:
-        """The point under the pointer, or the one the keyboard is at."""
-        return self._pointed
+    def first_point(self) -> PlanResult | None:
+        """The plan in use."""
+        return self._trade.current_point
+
+    def tip_place(self, point: PlanResult) -> QPointF:
+        """Where the plan stands."""
+        return self.point_of(point)
+
+    def words_of(self, point: PlanResult) -> str:
+        """What a plan costs and misses."""
+        return point_text(point)
+
+    def tip_of(self, point: PlanResult) -> str:
+        """The same, and whether it can be used."""
+        if point is self._trade.current_point:
+            return f"In use\n{point_text(point)}"
+        if point.plan.family != "histogram":
+            return f"For comparison\n{point_text(point)}"
+        if not serves_at_rest(point):
+            return f"For a sensor that moves\n{point_text(point)}"
+        return f"{point_text(point)}\nClick to use it"
 
     # --- places ---------------------------------------------------------------------------
-
-    def plot_rect(self) -> QRectF:
-        """Where points are drawn."""
-        return QRectF(self.rect()).adjusted(_LEFT_PX, _TOP_PX, -_RIGHT_PX, -_BOTTOM_PX)
 
     def point_of(self, result: PlanResult) -> QPointF:
         """Pixel of a plan."""
         costs, errors = self._axes()
         return QPointF(costs.px(result.cost.all_cores_ms.median), errors.px(100 * result.errors.l1))
 
-    def _results(self) -> tuple[PlanResult, ...]:
-        measurement = self._trade.measured.measurement
-        return measurement.results if measurement is not None else ()
-
     def _axes(self) -> tuple[LogAxis, LogAxis]:
-        plot, results = self.plot_rect(), self._results()
+        plot, results = self.plot_rect(), self.points()
         costs = [result.cost.all_cores_ms.median for result in results]
         errors = [100 * self._trade.tolerance, *(100 * result.errors.l1 for result in results)]
         return (
@@ -98,27 +92,21 @@ class TradePlot(QWidget):
         )
 
     def _refresh(self) -> None:
-        if self._pointed not in self._results():
+        if self._pointed not in self.points():
             self._pointed = None
         self.update()
 
     # --- painting -------------------------------------------------------------------------
 
-    def paintEvent(self, event: QPaintEvent) -> None:
+    def paint_plot(self, painter: QPainter) -> None:
         """Axes, tolerance, points, front, what is in use."""
-        with QPainter(self) as painter:
-            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-            painter.fillRect(self.rect(), QColor(self._display.palette.panel))
-            if self._results():
-                self._paint(painter)
-
-    def _paint(self, painter: QPainter) -> None:
+        measurement = self._trade.measured.measurement
+        if measurement is None or not measurement.results:
+            return
         colours, plot = self._display.palette, self.plot_rect()
         costs, errors = self._axes()
         self._paint_axes(painter, plot, costs, errors)
         self._paint_tolerance(painter, plot, errors)
-        measurement = self._trade.measured.measurement
-        assert measurement is not None
         accent = QColor(colours.synthetic if measurement.family == "histogram" else colours.real)
         if measurement.stale:
             accent = QColor(colours.muted)
@@ -135,41 +123,22 @@ class TradePlot(QWidget):
         if self._pointed is not None:
             painter.setPen(QPen(QColor(colours.accent), 1.5))
             painter.drawEllipse(self.point_of(self._pointed), 5.5, 5.5)
-        if self.hasFocus():
-            painter.setPen(QPen(QColor(colours.accent), 1))
-            painter.drawRect(QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5))
 
     def _paint_axes(self, painter: QPainter, plot: QRectF, costs: LogAxis, errors: LogAxis) -> None:
-        colours, line_px = self._display.palette, painter.fontMetrics().height()
-        grid, ink = QPen(QColor(colours.border), 1), QColor(colours.muted)
-        for value in costs.ticks(max(int(plot.width() / 44), 2)):
-            x = costs.px(value)
-            painter.setPen(grid)
-            painter.drawLine(QPointF(x, plot.top()), QPointF(x, plot.bottom()))
-            painter.setPen(ink)
-            box = QRectF(x - 30, plot.bottom() + 3, 60, line_px)
-            painter.drawText(box, Qt.AlignmentFlag.AlignCenter, tick_text(value))
-        for value in errors.ticks(max(int(plot.height() / (1.8 * line_px)), 2)):
-            y = errors.px(value)
-            painter.setPen(grid)
-            painter.drawLine(QPointF(plot.left(), y), QPointF(plot.right(), y))
-            painter.setPen(ink)
-            box = QRectF(0, y - line_px / 2, _LEFT_PX - 6, line_px)
-            right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-            edge = "≤" if value <= _FLOOR_PERCENT * 1.001 else ""
-            painter.drawText(box, right, f"{edge}{tick_text(value)}")
-        painter.setPen(QPen(QColor(colours.hatch), 1))
-        painter.drawLine(plot.bottomLeft(), plot.bottomRight())
-        painter.drawLine(plot.topLeft(), plot.bottomLeft())
-        painter.setPen(ink)
-        painter.drawText(
-            QRectF(plot.left(), plot.bottom() + line_px + 3, plot.width(), line_px),
-            Qt.AlignmentFlag.AlignCenter,
+        self.paint_axes(
+            painter,
+            [
+                (costs.px(value), tick_text(value))
+                for value in costs.ticks(max(int(plot.width() / 44), 2))
+            ],
+            [
+                (errors.px(value), _error_text(value))
+                for value in errors.ticks(self.most_upwards(painter))
+            ],
             "cost (ms per frame)",
         )
-        painter.drawText(
-            QRectF(4, 0, plot.width(), line_px + 2), Qt.AlignmentFlag.AlignVCenter, "error (%)"
-        )
+        box = QRectF(4, 0, plot.width(), painter.fontMetrics().height() + 2)
+        painter.drawText(box, Qt.AlignmentFlag.AlignVCenter, "error (%)")
 
     def _paint_tolerance(self, painter: QPainter, plot: QRectF, errors: LogAxis) -> None:
         if self._trade.measured.family != "histogram":
@@ -254,11 +223,11 @@ class TradePlot(QWidget):
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         """Point at the nearest point."""
-        self._point_at(self._near(event.position()))
+        self.point_at(self._near(event.position()))
         self.setCursor(
             Qt.CursorShape.PointingHandCursor if self._pointed else Qt.CursorShape.ArrowCursor
         )
-        self._explain()
+        self.explain()
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """Use the point."""
@@ -268,7 +237,7 @@ class TradePlot(QWidget):
 
     def leaveEvent(self, event: QEvent) -> None:
         """Point at nothing."""
-        self._point_at(None)
+        self.point_at(None)
 
     def _near(self, place: QPointF) -> PlanResult | None:
         """The nearest plan within reach; one on the front before others as near."""
@@ -286,50 +255,12 @@ class TradePlot(QWidget):
         best = min(measurement.results, key=distance_px, default=None)
         return best if best is not None and distance_px(best) <= _REACH_PX else None
 
-    def _point_at(self, result: PlanResult | None) -> None:
-        if result is not self._pointed:
-            self._pointed = result
-            self.setAccessibleDescription(point_text(result) if result is not None else "")
-            self.update()
-
-    def _explain(self) -> None:
-        if self._pointed is None:
-            QToolTip.hideText()
-            return
-        place = self.mapToGlobal(self.point_of(self._pointed).toPoint())
-        QToolTip.showText(place, self._tip(self._pointed), self)
-
-    def _tip(self, result: PlanResult) -> str:
-        current = self._trade.current_point
-        if result is current:
-            return f"In use\n{point_text(result)}"
-        if result.plan.family != "histogram":
-            return f"For comparison\n{point_text(result)}"
-        if not serves_at_rest(result):
-            return f"For a sensor that moves\n{point_text(result)}"
-        return f"{point_text(result)}\nClick to use it"
-
     # --- keyboard -------------------------------------------------------------------------
-
-    def event(self, event: QEvent) -> bool:
-        """Arrows and Return belong to the plot while it has the keyboard."""
-        if (
-            event.type() == QEvent.Type.ShortcutOverride
-            and isinstance(event, QKeyEvent)
-            and event.modifiers() == Qt.KeyboardModifier.NoModifier
-            and event.key() in _TAKES
-            and self._results()
-        ):
-            event.accept()
-            return True
-        if isinstance(event, QHelpEvent):
-            return True
-        return super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Go from point to point; Return uses one."""
         measurement, key = self._trade.measured.measurement, event.key()
-        if measurement is None or key not in _TAKES:
+        if measurement is None or key not in self.KEYS:
             super().keyPressEvent(event)
         elif key == Qt.Key.Key_Escape:
             self.clearFocus()
@@ -340,8 +271,8 @@ class TradePlot(QWidget):
             along = list(front_at_rest(measurement))
             if key in (Qt.Key.Key_Up, Qt.Key.Key_Down):
                 along = sorted(measurement.results, key=lambda result: result.errors.l1)
-            self._point_at(self._next(along, _STEPS[Qt.Key(key)]))
-            self._explain()
+            self.point_at(self._next(along, _STEPS[Qt.Key(key)]))
+            self.explain()
 
     def _next(self, along: list[PlanResult], step: int) -> PlanResult:
         """The neighbour of the point the keyboard is at; from elsewhere, the nearest."""
@@ -353,15 +284,6 @@ class TradePlot(QWidget):
         place = self.point_of(here)
         return min(along, key=lambda result: (self.point_of(result) - place).manhattanLength())
 
-    def focusInEvent(self, event: QFocusEvent) -> None:
-        """Show where the keyboard is."""
-        super().focusInEvent(event)
-        if event.reason() != Qt.FocusReason.MouseFocusReason:
-            self._point_at(self._trade.current_point)
-        self.update()
 
-    def focusOutEvent(self, event: QFocusEvent) -> None:
-        """Point at nothing."""
-        super().focusOutEvent(event)
-        self._point_at(None)
-        QToolTip.hideText()
+def _error_text(value: float) -> str:
+    return f"{'≤' if value <= _FLOOR_PERCENT * 1.001 else ''}{tick_text(value)}"

@@ -5,33 +5,22 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import (
-    QColor,
-    QFocusEvent,
-    QHelpEvent,
-    QKeyEvent,
-    QMouseEvent,
-    QPainter,
-    QPaintEvent,
-    QPen,
-    QPolygonF,
-)
-from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
+from PySide6.QtCore import QEvent, QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPen, QPolygonF
+from PySide6.QtWidgets import QWidget
 
 from sd2app.models.display import DisplayModel
 from sd2app.models.training import TrainingModel
 from sd2app.models.training_history import EpochPoint, TrainingHistory
 from sd2app.models.training_words import point_text
 from sd2app.views.log_axis import LogAxis, tick_text
+from sd2app.views.point_plot import PointPlot
 from sd2app.views.time_axis import ticks
 
-_LEFT_PX, _TOP_PX, _RIGHT_PX, _BOTTOM_PX = 48, 24, 10, 36
 _PAD = 1.12
 _LEAST_RATIO = 1.6
 _ROUND = ((1,), (1, 3), (1, 2, 5), (1, 2, 3, 5, 7), (1, 1.5, 2, 3, 4, 5, 6, 8))
 _STEPS = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
-_TAKES = {Qt.Key.Key_Home, Qt.Key.Key_End, Qt.Key.Key_Escape, *_STEPS}
 
 
 @dataclass(frozen=True)
@@ -49,38 +38,46 @@ class _Scale:
         return QPointF(self.x_of(epoch), self.errors.px(rmse))
 
 
-class TrainingCurves(QWidget):
+class TrainingCurves(PointPlot):
     """Training and validation, the best epoch marked.
 
     Hovering says what an epoch came to; with the keyboard Left and Right go from epoch
     to epoch, Home and End to the first and the last, Escape gives the keyboard back.
     """
 
+    MARGINS_PX = (48, 24, 10, 36)
+    HEIGHTS_PX = (160, 176, 280)
+    KEYS = frozenset({Qt.Key.Key_Home, Qt.Key.Key_End, Qt.Key.Key_Escape, *_STEPS})
+
     def __init__(
         self, training: TrainingModel, display: DisplayModel, parent: QWidget | None = None
     ) -> None:
-        super().__init__(parent)
+        super().__init__(display, "Errors over the epochs", parent)
         self._training = training
-        self._display = display
-        self._pointed: int | None = None
-        self.setMouseTracking(True)
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setMinimumHeight(160)
-        self.setMaximumHeight(280)
-        self.setAccessibleName("Errors over the epochs")
         training.changed.connect(self._refresh)
-        display.theme_changed.connect(self.update)
 
-    def sizeHint(self) -> QSize:
-        """A little wider than high."""
-        return QSize(260, 176)
+    def points(self) -> list[EpochPoint]:
+        """The epochs that have ended."""
+        return self._history.epoch_points
+
+    def first_point(self) -> EpochPoint | None:
+        """The best epoch."""
+        return self._history.best
+
+    def tip_place(self, point: EpochPoint) -> QPointF:
+        """Half way up the line at an epoch."""
+        return QPointF(self._scale().x_of(point.epoch), self.plot_rect().center().y())
+
+    def words_of(self, point: EpochPoint) -> str:
+        """What an epoch came to."""
+        return point_text(point)
 
     @property
     def pointed(self) -> EpochPoint | None:
-        """The epoch under the pointer, or the one the keyboard is at."""
-        points = self._history.epoch_points
-        return next((point for point in points if point.epoch == self._pointed), None)
+        """The epoch that is pointed at, as the history tells it now."""
+        if self._pointed is None:
+            return None
+        return next((one for one in self.points() if one.epoch == self._pointed.epoch), None)
 
     @property
     def _history(self) -> TrainingHistory:
@@ -88,10 +85,6 @@ class TrainingCurves(QWidget):
         return run.history if run is not None else TrainingHistory()
 
     # --- places ---------------------------------------------------------------------------
-
-    def plot_rect(self) -> QRectF:
-        """Where curves are drawn."""
-        return QRectF(self.rect()).adjusted(_LEFT_PX, _TOP_PX, -_RIGHT_PX, -_BOTTOM_PX)
 
     def place_of(self, epoch: float, rmse: float) -> QPointF:
         """Pixel of an error after so many epochs."""
@@ -130,14 +123,8 @@ class TrainingCurves(QWidget):
 
     # --- painting -------------------------------------------------------------------------
 
-    def paintEvent(self, event: QPaintEvent) -> None:
+    def paint_plot(self, painter: QPainter) -> None:
         """Axes, curves, the best epoch, and what is pointed at."""
-        with QPainter(self) as painter:
-            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-            painter.fillRect(self.rect(), QColor(self._display.palette.panel))
-            self._paint(painter)
-
-    def _paint(self, painter: QPainter) -> None:
         colours, plot, history = self._display.palette, self.plot_rect(), self._history
         scale = self._scale()
         self._paint_axes(painter, plot, scale)
@@ -155,39 +142,19 @@ class TrainingCurves(QWidget):
             self._paint_line(painter, points, QPen(QColor(colour), 2), scale)
         self._paint_marks(painter, plot, scale)
         painter.restore()
-        if self.hasFocus():
-            painter.setPen(QPen(QColor(colours.accent), 1))
-            painter.setBrush(Qt.BrushStyle.NoBrush)
-            painter.drawRect(QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5))
 
     def _paint_axes(self, painter: QPainter, plot: QRectF, scale: _Scale) -> None:
-        colours, line_px = self._display.palette, painter.fontMetrics().height()
-        grid, ink = QPen(QColor(colours.border), 1), QColor(colours.muted)
         last = self._last_epoch()
-        for value in ticks(0.0, last, max(int(plot.width() / 48), 2)):
-            if value != round(value) and last >= 2:
-                continue
-            x = scale.x_of(value)
-            painter.setPen(grid)
-            painter.drawLine(QPointF(x, plot.top()), QPointF(x, plot.bottom()))
-            painter.setPen(ink)
-            box = QRectF(x - 30, plot.bottom() + 3, 60, line_px)
-            painter.drawText(box, Qt.AlignmentFlag.AlignCenter, f"{value:g}")
-        for value in error_ticks(scale.errors, max(int(plot.height() / (1.8 * line_px)), 2)):
-            y = scale.errors.px(value)
-            painter.setPen(grid)
-            painter.drawLine(QPointF(plot.left(), y), QPointF(plot.right(), y))
-            painter.setPen(ink)
-            box = QRectF(0, y - line_px / 2, _LEFT_PX - 6, line_px)
-            right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-            painter.drawText(box, right, tick_text(value))
-        painter.setPen(QPen(QColor(colours.hatch), 1))
-        painter.drawLine(plot.bottomLeft(), plot.bottomRight())
-        painter.drawLine(plot.topLeft(), plot.bottomLeft())
-        painter.setPen(ink)
-        painter.drawText(
-            QRectF(plot.left(), plot.bottom() + line_px + 3, plot.width(), line_px),
-            Qt.AlignmentFlag.AlignCenter,
+        whole = [
+            value
+            for value in ticks(0.0, last, max(int(plot.width() / 48), 2))
+            if value == round(value) or last < 2
+        ]
+        errors = error_ticks(scale.errors, self.most_upwards(painter))
+        self.paint_axes(
+            painter,
+            [(scale.x_of(value), f"{value:g}") for value in whole],
+            [(scale.errors.px(value), tick_text(value)) for value in errors],
             "epochs",
         )
 
@@ -234,55 +201,25 @@ class TrainingCurves(QWidget):
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         """Say what the epoch under the pointer came to."""
-        plot, points = self.plot_rect(), self._history.epoch_points
+        plot, points = self.plot_rect(), self.points()
         x, scale = event.position().x(), self._scale()
         inside = plot.left() - 4 <= x <= plot.right() + 4
         nearest = min(points, key=lambda one: abs(scale.x_of(one.epoch) - x), default=None)
-        self._point_at(nearest if inside else None)
-        self._explain()
+        self.point_at(nearest if inside else None)
+        self.explain()
 
     def leaveEvent(self, event: QEvent) -> None:
         """Point at nothing."""
         super().leaveEvent(event)
         if not self.hasFocus():
-            self._point_at(None)
-
-    def _point_at(self, point: EpochPoint | None) -> None:
-        epoch = point.epoch if point is not None else None
-        if epoch != self._pointed:
-            self._pointed = epoch
-            self.setAccessibleDescription(point_text(point) if point is not None else "")
-            self.update()
-
-    def _explain(self) -> None:
-        point = self.pointed
-        if point is None:
-            QToolTip.hideText()
-            return
-        place = QPointF(self._scale().x_of(point.epoch), self.plot_rect().center().y())
-        QToolTip.showText(self.mapToGlobal(place.toPoint()), point_text(point), self)
+            self.point_at(None)
 
     # --- keyboard -------------------------------------------------------------------------
 
-    def event(self, event: QEvent) -> bool:
-        """Arrows belong to the plot while it has the keyboard."""
-        if (
-            event.type() == QEvent.Type.ShortcutOverride
-            and isinstance(event, QKeyEvent)
-            and event.modifiers() == Qt.KeyboardModifier.NoModifier
-            and event.key() in _TAKES
-            and self._history.epoch_points
-        ):
-            event.accept()
-            return True
-        if isinstance(event, QHelpEvent):
-            return True
-        return super().event(event)
-
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Go from epoch to epoch."""
-        points, key = self._history.epoch_points, event.key()
-        if not points or key not in _TAKES:
+        points, key = self.points(), event.key()
+        if not points or key not in self.KEYS:
             super().keyPressEvent(event)
         elif key == Qt.Key.Key_Escape:
             self.clearFocus()
@@ -293,21 +230,8 @@ class TrainingCurves(QWidget):
                 at = 0 if key == Qt.Key.Key_Home else len(points) - 1
             elif self.pointed is not None:
                 at = min(max(at + _STEPS[Qt.Key(key)], 0), len(points) - 1)
-            self._point_at(points[at])
-            self._explain()
-
-    def focusInEvent(self, event: QFocusEvent) -> None:
-        """Show where the keyboard is."""
-        super().focusInEvent(event)
-        if event.reason() != Qt.FocusReason.MouseFocusReason:
-            self._point_at(self._history.best)
-        self.update()
-
-    def focusOutEvent(self, event: QFocusEvent) -> None:
-        """Point at nothing."""
-        super().focusOutEvent(event)
-        self._point_at(None)
-        QToolTip.hideText()
+            self.point_at(points[at])
+            self.explain()
 
 
 def error_ticks(axis: LogAxis, most: int) -> list[float]:
