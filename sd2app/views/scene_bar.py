@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QToolButton, QWidget
 from sd2app.action_set import ActionSet
 from sd2app.models.display import DisplayModel
 from sd2app.views.inputs import Choice, action_button
+from sd2app.views.panel_parts import title
 
 _COLOURS = (
     ("velocity", "radial velocity"),
@@ -38,9 +39,7 @@ class SceneBar(QWidget):
         layout = QHBoxLayout(self)
         layout.setContentsMargins(8, 2, 4, 2)
         layout.setSpacing(4)
-        title = QLabel("Scene", self)
-        title.setObjectName("title")
-        layout.addWidget(title)
+        layout.addWidget(title("Scene"))
         layout.addSpacing(8)
         layout.addWidget(QLabel("colour", self))
         layout.addWidget(self._colour)

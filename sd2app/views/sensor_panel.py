@@ -9,7 +9,6 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
     QComboBox,
     QFormLayout,
-    QFrame,
     QGridLayout,
     QHBoxLayout,
     QLabel,
@@ -24,6 +23,7 @@ from sd2app.models.document import DocumentModel
 from sd2app.models.sensor import SensorModel
 from sd2app.models.synthesis import SynthesisModel
 from sd2app.views.inputs import Choice, NumberBox
+from sd2app.views.panel_parts import rule, title
 from sd2core.sensor import aimed_at, position_from_spherical, spherical_from_position
 
 _CLUTTER_TEXT = {
@@ -56,7 +56,7 @@ class SensorPanel(QWidget):
         layout.setContentsMargins(8, 4, 8, 4)
         layout.setSpacing(5)
         head = QHBoxLayout()
-        head.addWidget(_title("Placement"))
+        head.addWidget(title("Placement"))
         head.addStretch(1)
         for action, text in ((aim, "Aim at body"), (to_camera, "To camera")):
             button = QToolButton(self)
@@ -70,8 +70,8 @@ class SensorPanel(QWidget):
             head.addWidget(button)
         layout.addLayout(head)
         layout.addLayout(self._placement_form())
-        layout.addWidget(_rule())
-        layout.addWidget(_title("What it sees"))
+        layout.addWidget(rule())
+        layout.addWidget(title("What it sees"))
         layout.addLayout(self._readout_form())
         self._capture = self._capture_part()
         layout.addWidget(self._capture)
@@ -144,8 +144,8 @@ class SensorPanel(QWidget):
         layout = QVBoxLayout(part)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(5)
-        layout.addWidget(_rule())
-        self._capture_title = _title("Radar capture")
+        layout.addWidget(rule())
+        self._capture_title = title("Radar capture")
         layout.addWidget(self._capture_title)
         form = _form()
         self._offset = NumberBox(
@@ -275,19 +275,6 @@ def _form() -> QFormLayout:
     form.setVerticalSpacing(3)
     form.setLabelAlignment(Qt.AlignmentFlag.AlignLeft)
     return form
-
-
-def _title(text: str) -> QLabel:
-    label = QLabel(text)
-    label.setObjectName("title")
-    return label
-
-
-def _rule() -> QFrame:
-    rule = QFrame()
-    rule.setFixedHeight(1)
-    rule.setObjectName("rule")
-    return rule
 
 
 def _value(parent: QWidget, tip: str) -> QLabel:

@@ -15,6 +15,7 @@ from PySide6.QtWidgets import (
 from sd2app.models.plan_words import milliseconds, number, percent
 from sd2app.models.trade import PRESETS, TradeModel
 from sd2app.views.inputs import NumberBox
+from sd2app.views.panel_parts import title
 
 
 class ToleranceRow(QWidget):
@@ -32,10 +33,8 @@ class ToleranceRow(QWidget):
             step=0.5,
         )
         self._box.valueChanged.connect(lambda value: trade.set_tolerance(value / 100))
-        title = QLabel("Tolerance", self)
-        title.setObjectName("title")
         head = QHBoxLayout()
-        head.addWidget(title)
+        head.addWidget(title("Tolerance"))
         head.addStretch(1)
         head.addWidget(self._box)
         row = QHBoxLayout()

@@ -5,9 +5,7 @@ from __future__ import annotations
 from PySide6.QtCore import QSignalBlocker, Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
-    QFrame,
     QHBoxLayout,
-    QLabel,
     QProgressBar,
     QToolButton,
     QVBoxLayout,
@@ -19,6 +17,7 @@ from sd2app.models.measured import FAMILIES
 from sd2app.models.plan_words import deviation, milliseconds, percent, seconds
 from sd2app.models.trade import TradeModel
 from sd2app.views.inputs import Choice
+from sd2app.views.panel_parts import rule, sentence, title
 from sd2app.views.reason_list import ReasonList
 from sd2app.views.tolerance_row import ToleranceRow
 from sd2app.views.trade_plot import TradePlot
@@ -49,7 +48,7 @@ class TradePanel(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(8, 6, 8, 6)
         layout.setSpacing(6)
-        self._nothing = _text(_NO_MESH)
+        self._nothing = sentence(_NO_MESH)
         layout.addWidget(self._nothing)
         self._parts = [
             ToleranceRow(trade, self),
@@ -68,11 +67,11 @@ class TradePanel(QWidget):
 
     def _use_part(self) -> QWidget:
         part, layout = _part(self)
-        self._plan = _text("", "plan")
+        self._plan = sentence("", "plan")
         self._plan.setAccessibleName("Plan in use")
-        self._figures = _text("", "title")
+        self._figures = sentence("", "title")
         self._figures.setAccessibleName("Its error and cost")
-        self._warning = _text("", "warning")
+        self._warning = sentence("", "warning")
         self._by_tolerance = QToolButton(self)
         self._by_tolerance.setObjectName("outlined")
         self._by_tolerance.setText("Choose by tolerance")
@@ -86,11 +85,11 @@ class TradePanel(QWidget):
 
     def _plot_part(self, display: DisplayModel, measure: QAction) -> QWidget:
         part, layout = _part(self)
-        self._empty = _text("", "muted")
+        self._empty = sentence("")
         layout.addWidget(self._empty)
         self._plot = TradePlot(self._trade, display, self)
         layout.addWidget(self._plot)
-        self._source = _text("", "muted")
+        self._source = sentence("")
         row = QHBoxLayout()
         self._family = Choice("Plans of which signal model", self)
         for family in FAMILIES:
@@ -122,8 +121,8 @@ class TradePanel(QWidget):
 
     def _reason_part(self) -> QWidget:
         part, layout = _part(self)
-        layout.addWidget(_rule())
-        self._why = _title("Why this plan")
+        layout.addWidget(rule())
+        self._why = title("Why this plan")
         layout.addWidget(self._why)
         self._reasons = ReasonList(self)
         layout.addWidget(self._reasons)
@@ -209,28 +208,7 @@ def _part(parent: QWidget) -> tuple[QWidget, QVBoxLayout]:
     return part, layout
 
 
-def _title(text: str) -> QLabel:
-    label = QLabel(text)
-    label.setObjectName("title")
-    return label
-
-
-def _text(text: str, role: str = "muted") -> QLabel:
-    label = QLabel(text)
-    label.setObjectName(role)
-    label.setWordWrap(True)
-    label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-    return label
-
-
 def _unbroken(plan: str) -> str:
     """No line starts with a separator, or ends between a sign and its number."""
     space = "\N{NO-BREAK SPACE}"
     return plan.replace(" ·", f"{space}·").replace("× ", f"×{space}").replace(" %", f"{space}%")
-
-
-def _rule() -> QFrame:
-    rule = QFrame()
-    rule.setFixedHeight(1)
-    rule.setObjectName("rule")
-    return rule

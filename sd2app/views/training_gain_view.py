@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QCheckBox, QGridLayout, QHBoxLayout, QLabel, QVBox
 
 from sd2app.models.training_use import TrainingUse
 from sd2app.models.training_words import gain_rows, gain_summary
-from sd2app.views.training_parts import muted, outlined, title
+from sd2app.views.panel_parts import outlined, sentence, title
 
 
 class TrainingGainView(QWidget):
@@ -20,7 +20,7 @@ class TrainingGainView(QWidget):
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(4)
         layout.addWidget(title("In use"))
-        self._summary = muted("")
+        self._summary = sentence("")
         layout.addWidget(self._summary)
         self._table = QWidget(self)
         grid = QGridLayout(self._table)
@@ -30,7 +30,7 @@ class TrainingGainView(QWidget):
         grid.setColumnStretch(0, 1)
         self._cells: list[tuple[QLabel, QLabel]] = []
         for row in range(3):
-            name, value = muted(""), QLabel(self)
+            name, value = sentence(""), QLabel(self)
             value.setAlignment(Qt.AlignmentFlag.AlignRight)
             grid.addWidget(name, row, 0)
             grid.addWidget(value, row, 1)

@@ -13,8 +13,8 @@ from sd2app.models.display import DisplayModel
 from sd2app.models.training import TrainingModel
 from sd2app.models.training_use import TrainingUse
 from sd2app.views.inputs import Choice
+from sd2app.views.panel_parts import outlined
 from sd2app.views.training_gain_view import TrainingGainView
-from sd2app.views.training_parts import outlined
 from sd2app.views.training_run_view import TrainingRunView
 from sd2app.views.training_setup_view import TrainingSetupView
 

@@ -26,8 +26,8 @@ from sd2app.models.training_words import (
     time_text,
 )
 from sd2app.views.inputs import Choice
+from sd2app.views.panel_parts import outlined, sentence
 from sd2app.views.training_curves import TrainingCurves
-from sd2app.views.training_parts import muted, outlined
 
 _STEPS = 1000
 _CLOSING_TEXT = {"ask": "ask", "keep": "keep training", "stop": "stop, keep the best"}
@@ -85,7 +85,7 @@ class TrainingRunView(QWidget):
         self._curves = TrainingCurves(training, display, self)
         layout.addWidget(self._curves)
         self._add_metrics(layout)
-        self._about = muted("")
+        self._about = sentence("")
         layout.addWidget(self._about)
         self._add_closing(layout)
         training.changed.connect(self._refresh)
@@ -104,7 +104,7 @@ class TrainingRunView(QWidget):
         self._headline.setObjectName("title")
         self._headline.setWordWrap(True)
         self._headline.setAccessibleName("How the training stands")
-        self._time = muted("")
+        self._time = sentence("")
         self._bar = QProgressBar(self)
         self._bar.setMaximumHeight(14)
         self._bar.setTextVisible(False)
@@ -113,8 +113,8 @@ class TrainingRunView(QWidget):
             layout.addWidget(widget)
 
     def _add_reasons(self, layout: QVBoxLayout) -> None:
-        self._reason = muted("", "warning")
-        self._remedy = muted("")
+        self._reason = sentence("", "warning")
+        self._remedy = sentence("")
         layout.addWidget(self._reason)
         layout.addWidget(self._remedy)
 
@@ -127,7 +127,7 @@ class TrainingRunView(QWidget):
         grid.setColumnStretch(1, 1)
         self._cells: list[tuple[QLabel, QLabel]] = []
         for row in range(3):
-            name, value = muted(""), QLabel(self)
+            name, value = sentence(""), QLabel(self)
             name.setWordWrap(False)
             grid.addWidget(name, row, 0)
             grid.addWidget(value, row, 1)

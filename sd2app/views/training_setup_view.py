@@ -28,7 +28,7 @@ from sd2app.models.training_words import (
 )
 from sd2app.views.elided import ElidedLabel
 from sd2app.views.inputs import Choice, NumberBox
-from sd2app.views.training_parts import muted, outlined, title
+from sd2app.views.panel_parts import outlined, sentence, title
 
 _FIELDS = (
     # name, text, low, high, decimals, step, tip
@@ -100,7 +100,7 @@ class TrainingSetupView(QWidget):
         head.addStretch(1)
         head.addWidget(self._add)
         layout.addLayout(head)
-        self._nothing = muted(
+        self._nothing = sentence(
             "A denoiser learns from pairs: a synthetic map, and what a radar saw of the same"
             " movement. Make them of recordings that have a mesh and a radar capture, or with"
             " sd2 simulate campaign, and add their folder."
@@ -110,7 +110,7 @@ class TrainingSetupView(QWidget):
         self._rows.setSpacing(4)
         layout.addLayout(self._rows)
         layout.addWidget(self._making_part())
-        self._division = muted("")
+        self._division = sentence("")
         layout.addWidget(self._division)
 
     def _making_part(self) -> QWidget:
@@ -144,7 +144,7 @@ class TrainingSetupView(QWidget):
         row.addWidget(title("Model"))
         row.addWidget(self._model, 1)
         layout.addLayout(row)
-        self._about = muted("")
+        self._about = sentence("")
         layout.addWidget(self._about)
 
     def _add_settings(self, layout: QVBoxLayout) -> None:
@@ -202,8 +202,8 @@ class TrainingSetupView(QWidget):
         self._estimate.setObjectName("title")
         self._estimate.setWordWrap(True)
         self._estimate.setAccessibleName("How long it will take")
-        self._source = muted("")
-        self._problem = muted("", "warning")
+        self._source = sentence("")
+        self._problem = sentence("", "warning")
         self._start = outlined("Start training", "Train beside the window", start, self)
         self._start.setObjectName("primary")
         self._copy = outlined(
@@ -278,7 +278,9 @@ class TrainingSetupView(QWidget):
         name = ElidedLabel(row)
         name.setText(store.path.name)
         name.setToolTip(str(store.path))
-        facts = muted(store.problem or store_text(store.facts), "warning" if store.problem else "")
+        facts = sentence(
+            store.problem or store_text(store.facts), "warning" if store.problem else "muted"
+        )
         remove = QToolButton(row)
         remove.setText("✕")
         remove.setToolTip(f"Do not learn from {store.path.name}")

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QSignalBlocker, Qt
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QSlider, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QSlider, QWidget
 
 from sd2app.action_set import ActionSet
 from sd2app.models.overlay import OverlayModel
 from sd2app.views.inputs import action_button
+from sd2app.views.panel_parts import title
 
 _STEPS = 20
 
@@ -30,9 +31,7 @@ class VideoBar(QWidget):
         layout = QHBoxLayout(self)
         layout.setContentsMargins(8, 2, 4, 2)
         layout.setSpacing(4)
-        title = QLabel("Video", self)
-        title.setObjectName("title")
-        layout.addWidget(title)
+        layout.addWidget(title("Video"))
         layout.addStretch(1)
         layout.addWidget(action_button(self._mesh, "Mesh"))
         layout.addWidget(self._slider)

@@ -1,11 +1,11 @@
-"""Labels and buttons of the Train panel."""
+"""Labels, lines and buttons of the panels at the side."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLabel, QToolButton, QWidget
+from PySide6.QtWidgets import QFrame, QLabel, QToolButton, QWidget
 
 
 def title(text: str) -> QLabel:
@@ -15,13 +15,21 @@ def title(text: str) -> QLabel:
     return label
 
 
-def muted(text: str, role: str = "") -> QLabel:
-    """A sentence that wraps and can be selected."""
+def sentence(text: str, role: str = "muted") -> QLabel:
+    """Words that wrap and can be selected."""
     label = QLabel(text)
-    label.setObjectName(role or "muted")
+    label.setObjectName(role)
     label.setWordWrap(True)
     label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
     return label
+
+
+def rule() -> QFrame:
+    """A line between two parts."""
+    line = QFrame()
+    line.setFixedHeight(1)
+    line.setObjectName("rule")
+    return line
 
 
 def outlined(text: str, tip: str, run: Callable[[], object] | None, parent: QWidget) -> QToolButton:
