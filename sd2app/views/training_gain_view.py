@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QSignalBlocker, Qt
-from PySide6.QtWidgets import QCheckBox, QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtCore import QSignalBlocker
+from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QVBoxLayout, QWidget
 
 from sd2app.models.training_use import TrainingUse
 from sd2app.models.training_words import gain_rows, gain_summary
+from sd2app.views.fact_rows import FactRows
 from sd2app.views.panel_parts import outlined, sentence, title
 
 
@@ -22,19 +23,7 @@ class TrainingGainView(QWidget):
         layout.addWidget(title("In use"))
         self._summary = sentence("")
         layout.addWidget(self._summary)
-        self._table = QWidget(self)
-        grid = QGridLayout(self._table)
-        grid.setContentsMargins(0, 0, 0, 0)
-        grid.setHorizontalSpacing(12)
-        grid.setVerticalSpacing(2)
-        grid.setColumnStretch(0, 1)
-        self._cells: list[tuple[QLabel, QLabel]] = []
-        for row in range(3):
-            name, value = sentence(""), QLabel(self)
-            value.setAlignment(Qt.AlignmentFlag.AlignRight)
-            grid.addWidget(name, row, 0)
-            grid.addWidget(value, row, 1)
-            self._cells.append((name, value))
+        self._table = FactRows(3, at_the_edge=True, parent=self)
         layout.addWidget(self._table)
         self._both = QCheckBox("Show the map from before", self)
         self._both.setToolTip("Draw the map of the model before under that of this one")
@@ -51,13 +40,7 @@ class TrainingGainView(QWidget):
     def _refresh(self) -> None:
         use = self._use
         self._summary.setText(gain_summary(use.gain, use.has_radar))
-        rows = gain_rows(use.gain) if use.gain is not None else []
-        self._table.setVisible(bool(rows))
-        for (name, value), row in zip(self._cells, [*rows, *[("", "")] * 3], strict=False):
-            name.setText(row[0])
-            value.setText(row[1])
-            name.setVisible(bool(row[0]))
-            value.setVisible(bool(row[0]))
+        self._table.show_facts(gain_rows(use.gain) if use.gain is not None else [])
         with QSignalBlocker(self._both):
             self._both.setChecked(use.comparing)
         self._both.setVisible(use.can_compare)

@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QSignalBlocker
 from PySide6.QtWidgets import (
-    QGridLayout,
     QHBoxLayout,
     QLabel,
     QProgressBar,
@@ -25,6 +24,7 @@ from sd2app.models.training_words import (
     remedy_text,
     time_text,
 )
+from sd2app.views.fact_rows import FactRows
 from sd2app.views.inputs import Choice
 from sd2app.views.panel_parts import outlined, sentence
 from sd2app.views.training_curves import TrainingCurves
@@ -84,7 +84,8 @@ class TrainingRunView(QWidget):
             layout.addWidget(gain)
         self._curves = TrainingCurves(training, display, self)
         layout.addWidget(self._curves)
-        self._add_metrics(layout)
+        self._metrics = FactRows(3, at_the_edge=False, parent=self)
+        layout.addWidget(self._metrics)
         self._about = sentence("")
         layout.addWidget(self._about)
         self._add_closing(layout)
@@ -117,22 +118,6 @@ class TrainingRunView(QWidget):
         self._remedy = sentence("")
         layout.addWidget(self._reason)
         layout.addWidget(self._remedy)
-
-    def _add_metrics(self, layout: QVBoxLayout) -> None:
-        self._metrics = QWidget(self)
-        grid = QGridLayout(self._metrics)
-        grid.setContentsMargins(0, 0, 0, 0)
-        grid.setHorizontalSpacing(12)
-        grid.setVerticalSpacing(2)
-        grid.setColumnStretch(1, 1)
-        self._cells: list[tuple[QLabel, QLabel]] = []
-        for row in range(3):
-            name, value = sentence(""), QLabel(self)
-            name.setWordWrap(False)
-            grid.addWidget(name, row, 0)
-            grid.addWidget(value, row, 1)
-            self._cells.append((name, value))
-        layout.addWidget(self._metrics)
 
     def _add_buttons(
         self,
@@ -202,21 +187,12 @@ class TrainingRunView(QWidget):
         self._remedy.setText(remedy_text(run))
         self._remedy.setVisible(bool(self._remedy.text()))
         self._curves.setVisible(bool(history.epoch_points or history.step_points))
-        self._refresh_metrics(run)
+        self._metrics.show_facts(metric_rows(history))
         self._refresh_buttons(run, phase)
         self._about.setText(about_text(run))
         self._closing.setVisible(under_way)
         with QSignalBlocker(self._choice):
             self._choice.setCurrentIndex(CLOSING.index(self._training.closing))
-
-    def _refresh_metrics(self, run: TrainingFollower) -> None:
-        rows = metric_rows(run.history)
-        self._metrics.setVisible(bool(rows))
-        for (name, value), row in zip(self._cells, [*rows, *[("", "")] * 3], strict=False):
-            name.setText(row[0])
-            value.setText(row[1])
-            name.setVisible(bool(row[0]))
-            value.setVisible(bool(row[0]))
 
     def _refresh_buttons(self, run: TrainingFollower, phase: Phase) -> None:
         shown = _BUTTONS[phase]
