@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from answering import once_asked
 from fake_denoisers import fading
 from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QTimer, QUrl
 from PySide6.QtGui import QColor, QDropEvent
@@ -216,15 +217,11 @@ def test_the_spectrum_has_a_curve_of_it(denoised, qtbot):
 def test_the_card_says_what_the_model_is(denoised, qtbot):
     texts = []
 
-    def read():
-        dialog = QApplication.activeModalWidget()
-        if not isinstance(dialog, ModelCardDialog):
-            QTimer.singleShot(20, read)
-            return
+    def read(dialog):
         texts.extend(label.text() for label in dialog.findChildren(QLabel))
         dialog.reject()
 
-    QTimer.singleShot(20, read)
+    once_asked(ModelCardDialog, read)
     denoised._actions["model_card"].trigger()
     assert "kitchen" in texts
     assert "simulated data only" in texts

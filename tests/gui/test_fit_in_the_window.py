@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from answering import once_asked
 from fake_denoisers import FakeDenoisers
-from PySide6.QtCore import QCoreApplication, QEvent, QPoint, Qt, QTimer
+from PySide6.QtCore import QCoreApplication, QEvent, QPoint, Qt
 from PySide6.QtWidgets import (
-    QApplication,
     QCheckBox,
     QFileDialog,
     QMessageBox,
@@ -81,19 +81,6 @@ def click(window, qtbot, text: str) -> None:
     qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
 
 
-def answer(qtbot, work) -> None:
-    """Have the next dialog answered: ``work(dialog)`` is called once it is up."""
-
-    def wait() -> None:
-        dialog = QApplication.activeModalWidget()
-        if dialog is None:
-            QTimer.singleShot(20, wait)
-        else:
-            work(dialog)
-
-    QTimer.singleShot(20, wait)
-
-
 def test_from_the_offer_to_the_recording(made, qtbot, video) -> None:
     window = made("--body")
     show(window, qtbot, video)
@@ -119,7 +106,7 @@ def test_from_the_offer_to_the_recording(made, qtbot, video) -> None:
         asked.append(dialog.picker._setup.request())
         qtbot.mouseClick(fit, Qt.MouseButton.LeftButton)
 
-    answer(qtbot, fill)
+    once_asked(NewFromVideoDialog, fill)
     click(window, qtbot, "Fit a body…")
     fit = window.context.fit
     person = asked[0].person
@@ -190,7 +177,7 @@ def test_a_failure_is_shown_and_put_away(made, qtbot, video) -> None:
         asked.append(dialog.picker._setup.video)
         dialog.reject()
 
-    answer(qtbot, look)
+    once_asked(NewFromVideoDialog, look)
     click(window, qtbot, "Change…")
     assert asked == [video]
     click(window, qtbot, "✕")
@@ -203,11 +190,11 @@ def test_closing_asks_and_the_next_start_continues(made, qtbot, video) -> None:
     show(window, qtbot, video)
     window.context.fit.start(FitRequest(video, video.with_name("walk.sd2")))
     qtbot.waitUntil(lambda: window.context.fit.landmarks_at(10) is not None, timeout=20_000)
-    answer(qtbot, lambda box: box.button(QMessageBox.StandardButton.Cancel).click())
+    once_asked(QMessageBox, lambda box: box.button(QMessageBox.StandardButton.Cancel).click())
     window.close()
     assert window.isVisible()
     assert window.context.fit.state == "running"
-    answer(qtbot, lambda box: box.button(QMessageBox.StandardButton.Ok).click())
+    once_asked(QMessageBox, lambda box: box.button(QMessageBox.StandardButton.Ok).click())
     window.close()
     assert not window.isVisible()
     again = made("--body", settings=settings)

@@ -6,9 +6,10 @@ import json
 
 import numpy as np
 import pytest
+from answering import once_asked
 from PIL import Image
-from PySide6.QtCore import QPoint, Qt, QTimer
-from PySide6.QtWidgets import QApplication, QCheckBox, QFileDialog, QPushButton
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtWidgets import QCheckBox, QFileDialog, QPushButton
 
 from sd2app.dialogs.strip import StripDialog
 from sd2app.models.strip import StripModel
@@ -73,11 +74,7 @@ def test_exported_by_hand(window, qtbot, tmp_path, monkeypatch):
         QFileDialog, "getSaveFileName", lambda *a, **k: (str(path.with_suffix("")), "PNG (*.png)")
     )
 
-    def choose() -> None:
-        dialog = QApplication.activeModalWidget()
-        if not isinstance(dialog, StripDialog):
-            QTimer.singleShot(20, choose)
-            return
+    def choose(dialog: StripDialog) -> None:
         model = dialog._model
         model.choose(way="list")
         field = dialog._list
@@ -90,7 +87,7 @@ def test_exported_by_hand(window, qtbot, tmp_path, monkeypatch):
         qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
         assert not button.isEnabled()
 
-    QTimer.singleShot(20, choose)
+    once_asked(StripDialog, choose)
     qtbot.keyClick(
         window,
         Qt.Key.Key_E,

@@ -8,8 +8,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QCoreApplication, QEvent, Qt, QTimer
-from PySide6.QtWidgets import QApplication, QMessageBox, QTabBar, QToolButton
+from answering import answer
+from PySide6.QtCore import QCoreApplication, QEvent, Qt
+from PySide6.QtWidgets import QTabBar, QToolButton
 from training_pairs import write_pairs
 
 from sd2app.models import training_follower
@@ -57,18 +58,6 @@ def click(window: MainWindow, qtbot, text: str) -> None:
     found = [b for b in panel.findChildren(QToolButton) if b.text() == text and b.isVisible()]
     assert len(found) == 1, text
     qtbot.mouseClick(found[0], Qt.MouseButton.LeftButton)
-
-
-def answer(qtbot, text: str) -> None:
-    def choose() -> None:
-        dialog = QApplication.activeModalWidget()
-        if not isinstance(dialog, QMessageBox):
-            QTimer.singleShot(20, choose)
-            return
-        found = next(b for b in dialog.buttons() if b.text().replace("&", "") == text)
-        qtbot.mouseClick(found, Qt.MouseButton.LeftButton)
-
-    QTimer.singleShot(20, choose)
 
 
 def test_a_run_outlives_its_window_and_is_found_by_the_next(made, qtbot, tmp_path) -> None:

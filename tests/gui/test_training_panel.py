@@ -9,12 +9,12 @@ import sys
 from pathlib import Path
 
 import pytest
+from answering import answer
 from PySide6.QtCore import QCoreApplication, QEvent, QObject, Qt, QTimer, Signal
 from PySide6.QtWidgets import (
     QApplication,
     QFileDialog,
     QLabel,
-    QMessageBox,
     QProgressBar,
     QToolButton,
     QToolTip,
@@ -138,20 +138,6 @@ def type_number(qtbot, number_box: NumberBox, text: str) -> None:
     number_box.selectAll()
     qtbot.keyClicks(number_box, text)
     qtbot.keyClick(number_box, Qt.Key.Key_Return)
-
-
-def answer(qtbot, text: str) -> None:
-    """Have the next question answered."""
-
-    def choose() -> None:
-        dialog = QApplication.activeModalWidget()
-        if not isinstance(dialog, QMessageBox):
-            QTimer.singleShot(20, choose)
-            return
-        found = next(b for b in dialog.buttons() if b.text().replace("&", "") == text)
-        qtbot.mouseClick(found, Qt.MouseButton.LeftButton)
-
-    QTimer.singleShot(20, choose)
 
 
 def ready(window, qtbot, pairs, epochs: int = 3) -> None:
