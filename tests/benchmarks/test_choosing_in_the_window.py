@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from PySide6.QtWidgets import QApplication
+from window_on_sample import settle, window_on_sample
 
-from sd2core.resources import resource_path
 from sd2core.sensor import VirtualSensor
 
 PLACES = 12
@@ -25,9 +25,6 @@ def ended():
 @pytest.fixture
 def window(qtbot, ended):
     from sd2app.models.ladder import CORE
-    from sd2app.settings import Settings
-    from sd2app.views.window import MainWindow
-    from sd2core.compiled import warm_up
 
     def survey(*place):
         try:
@@ -35,19 +32,8 @@ def window(qtbot, ended):
         finally:
             ended.append(time.perf_counter())
 
-    warm_up()
-    window = MainWindow(Settings.forgetful(), replace(CORE, survey=survey))
-    window.show()
-    window.populate()
-    window.open_paths([resource_path("swipes.sd2")])
-    settle(window, qtbot)
-    yield window
-    window.context.document.undo_stack.clear()
-    window.close()
-
-
-def settle(window, qtbot):
-    qtbot.waitUntil(lambda: window.settled and window.context.synthesis.complete, timeout=60_000)
+    with window_on_sample(qtbot, replace(CORE, survey=survey)) as window:
+        yield window
 
 
 def spin(until):

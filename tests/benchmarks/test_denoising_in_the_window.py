@@ -14,11 +14,11 @@ import time
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt, QTimer
+from window_on_sample import settle, window_on_sample
 
 from sd2app.jobs.denoise_process import DenoiseProcess
 from sd2core.denoise.card import ModelCard
 from sd2core.denoise.scaling import Compression, Scaling
-from sd2core.resources import resource_path
 from sd2core.sensor import VelocityAxis
 from sd2core.spectrum import DopplerMap
 from sd2core.timebase import Timebase
@@ -148,18 +148,14 @@ def test_what_the_way_to_the_process_costs(benchmark, model):
         print(f"\n{name}:", {part: round(value, 2) for part, value in figures.items()}, end="")
 
 
-def test_dragging_with_and_without_a_denoiser(benchmark, model, qtbot):
-    """Maps a second while a hand moves the sensor at 125 Hz, and the window's tick."""
-    from sd2app.settings import Settings
-    from sd2app.views.window import MainWindow
-    from sd2core.compiled import warm_up
+@pytest.fixture
+def window(qtbot):
+    with window_on_sample(qtbot) as window:
+        yield window
 
-    warm_up()
-    window = MainWindow(Settings.forgetful())
-    window.show()
-    window.populate()
-    window.open_paths([resource_path("swipes.sd2")])
-    qtbot.waitUntil(lambda: window.settled and window.context.synthesis.complete, timeout=60_000)
+
+def test_dragging_with_and_without_a_denoiser(benchmark, model, window, qtbot):
+    """Maps a second while a hand moves the sensor at 125 Hz, and the window's tick."""
     c = window.context
 
     def drag(seconds=5.0):
@@ -188,7 +184,7 @@ def test_dragging_with_and_without_a_denoiser(benchmark, model, qtbot):
         tick.stop()
         track.changed.disconnect(count)
         c.edits.end_sensor_drag()
-        qtbot.waitUntil(lambda: window.settled and c.synthesis.complete, timeout=60_000)
+        settle(window, qtbot)
         steps = 1e3 * np.diff(ticks)
         return {
             "maps_per_s": sum(counts.values()) / seconds,
@@ -207,5 +203,3 @@ def test_dragging_with_and_without_a_denoiser(benchmark, model, qtbot):
     benchmark.extra_info.update(found)
     for name, figures in found.items():
         print(f"\n{name}:", {part: round(value, 1) for part, value in figures.items()}, end="")
-    c.document.undo_stack.clear()
-    window.close()

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from longer_walk import FRAMES, LAST, POSES, longer_walk
 from numpy.typing import NDArray
 from timing import best_s
 
@@ -31,7 +32,6 @@ from sd2core.scattering.facets import facet_visibility
 from sd2core.sensor import PAPER_RADAR, VirtualSensor
 from sd2core.timebase import Timebase
 
-FRAMES = 450
 FACETS = 7400
 CAMERA = VirtualSensor()
 
@@ -39,19 +39,15 @@ CAMERA = VirtualSensor()
 @pytest.fixture(scope="module")
 def mesh(shared_data: Path) -> MeshSequence:
     compile_kernels()
-    with np.load(shared_data / "mesh" / "walk.npz") as data:
-        vertices, faces = data["vertices"], data["faces"]
-    there_and_back = np.abs((np.arange(FRAMES) + 88) % 176 - 88)
-    return MeshSequence(vertices[there_and_back], faces, Timebase.regular(FRAMES, 30.0), "walk")
+    return longer_walk(shared_data)
 
 
 @pytest.fixture(scope="module")
 def visible(mesh: MeshSequence) -> NDArray[np.bool_]:
     """Facets that nothing hides, (450, F), looked at once per pose."""
-    once = MeshSequence(mesh.read(0, 89), mesh.faces, Timebase.regular(89, 30.0))
+    once = MeshSequence(mesh.read(0, LAST + 1), mesh.faces, Timebase.regular(LAST + 1, 30.0))
     pose = facet_visibility(once, CAMERA)
-    back = np.abs((np.arange(FRAMES) + 88) % 176 - 88) - np.abs((0 + 88) % 176 - 88)
-    return pose[np.abs(back) % 89]
+    return pose[POSES]
 
 
 @pytest.mark.benchmark(group="FMCW, one frame")

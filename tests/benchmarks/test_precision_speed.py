@@ -12,23 +12,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from longer_walk import longer_walk
 from precisions import CAMERA, costs, errors, in_both_precisions
 
 from sd2core.compiled import warm_up
 from sd2core.mesh import MeshSequence
 from sd2core.precision import SHARE_OF_A_BIN
-from sd2core.timebase import Timebase
-
-FRAMES = 450
 
 
 @pytest.fixture(scope="module")
 def walk(shared_data: Path) -> MeshSequence:
     warm_up()
-    with np.load(shared_data / "mesh" / "walk.npz") as data:
-        vertices, faces = data["vertices"], data["faces"]
-    there_and_back = np.abs((np.arange(FRAMES) + 88) % 176 - 88)
-    return MeshSequence(vertices[there_and_back], faces, Timebase.regular(FRAMES, 30.0), "walk")
+    return longer_walk(shared_data)
 
 
 @pytest.mark.benchmark(group="precision")

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from longer_walk import FRAMES, longer_walk
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from timing import best_s
@@ -23,19 +24,14 @@ from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.mesh import MeshSequence
 from sd2core.scattering.exact import exact_visibility_kernel
 from sd2core.sensor import VirtualSensor
-from sd2core.timebase import Timebase
 
-FRAMES = 450
 PAPER = PRESETS["paper"]
 
 
 @pytest.fixture(scope="module")
 def mesh(shared_data: Path) -> MeshSequence:
     warm_up()
-    with np.load(shared_data / "mesh" / "walk.npz") as data:
-        vertices, faces = data["vertices"], data["faces"]
-    there_and_back = np.abs((np.arange(FRAMES) + 88) % 176 - 88)
-    return MeshSequence(vertices[there_and_back], faces, Timebase.regular(FRAMES, 30.0), "walk")
+    return longer_walk(shared_data)
 
 
 def copy_bytes_per_s(size_bytes: int) -> float:

@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QTimer
 from training_pairs import write_pairs
-
-from sd2core.resources import resource_path
+from window_on_sample import window_on_sample
 
 SECONDS = 10.0
 TICK_MS = 16
@@ -22,23 +21,12 @@ TICK_MS = 16
 
 @pytest.fixture
 def sample_window(qtbot, tmp_path, monkeypatch):
-    from sd2app.settings import Settings
-    from sd2app.views.window import MainWindow
-    from sd2core.compiled import warm_up
-
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
-    warm_up()
-    window = MainWindow(Settings.forgetful())
-    window.show()
-    window.populate()
-    window.open_paths([resource_path("swipes.sd2")])
-    qtbot.waitUntil(lambda: window.settled and window.context.synthesis.complete, timeout=60_000)
-    window.side.bring_up("Train")
-    yield window
-    window.context.training.cancel()
-    qtbot.waitUntil(lambda: not window.context.training.under_way, timeout=60_000)
-    window.context.document.undo_stack.clear()
-    window.close()
+    with window_on_sample(qtbot) as window:
+        window.side.bring_up("Train")
+        yield window
+        window.context.training.cancel()
+        qtbot.waitUntil(lambda: not window.context.training.under_way, timeout=60_000)
 
 
 def intervals_ms(window, qtbot) -> np.ndarray:

@@ -16,6 +16,7 @@ import time
 
 import pytest
 from PySide6.QtCore import QEvent, QObject, QTimer
+from window_on_sample import window_on_sample
 
 from sd2core.resources import resource_path
 
@@ -92,19 +93,8 @@ class PaintCounter(QObject):
 
 @pytest.fixture
 def sample_window(qtbot):
-    from sd2app.settings import Settings
-    from sd2app.views.window import MainWindow
-    from sd2core.compiled import warm_up
-
-    warm_up()
-    window = MainWindow(Settings.forgetful())
-    window.show()
-    window.populate()
-    window.open_paths([resource_path("swipes.sd2")])
-    qtbot.waitUntil(lambda: window.settled and window.context.synthesis.complete, timeout=60_000)
-    yield window
-    window.context.document.undo_stack.clear()
-    window.close()
+    with window_on_sample(qtbot) as window:
+        yield window
 
 
 def play(window, qtbot, every_tick=lambda: None):
