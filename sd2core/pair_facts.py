@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import get_args
 
 from sd2core.errors import Sd2Error
-from sd2core.pairs import PairKind, check_version, is_pair_store, read_index
+from sd2core.pairs import PairKind, read_description
 from sd2core.segments import segment_starts
 
 
@@ -81,27 +79,15 @@ def pair_facts(path: Path) -> PairFacts:
     Raises
     ------
     Sd2Error
-        When it is none, of another version, empty, or its description is damaged.
+        When it is none, of another version or kind, empty, or its description is damaged.
     """
     path = Path(path)
-    if not is_pair_store(path):
-        raise Sd2Error(
-            f"{path} holds no pairs of synthetic and radar Doppler",
-            "a folder made by `sd2 simulate campaign` or `sd2 pairs`",
-        )
-    header = json.loads((path / "zarr.json").read_text(encoding="utf-8"))["attributes"]
-    check_version(path, header)
+    header, index = read_description(path)
     takes = tuple(
         TakeFacts(entry["subject"], int(entry["placement"]), entry["stop"] - entry["start"])
-        for entry in read_index(path)
+        for entry in index
     )
-    if not takes:
-        raise Sd2Error(
-            f"{path} holds no take yet", "at least one", "Wait until the first one is made"
-        )
     try:
-        if header["kind"] not in get_args(PairKind):
-            raise ValueError(f"kind {header['kind']!r}")
         return PairFacts(
             path=path,
             kind=header["kind"],

@@ -206,7 +206,7 @@ class PairWriter:
             self._group = _reopened(self._path, header)
         else:
             self._group = _begun(self._path, header)
-        self._index = read_index(self._path)
+        self._index = _read_takes(self._path)
         _drop_torn_line(self._path, len(self._index))
         self._frames = max((entry["stop"] for entry in self._index), default=0)
 
@@ -279,17 +279,8 @@ def read_pairs(path: Path) -> PairSet:
     import zarr
 
     path = Path(path)
-    if not is_pair_store(path):
-        raise Sd2Error(
-            f"{path} holds no pairs of synthetic and radar Doppler",
-            "a folder made by `sd2 simulate campaign` or `sd2 pairs`",
-        )
+    header, index = read_description(path)
     group = zarr.open_group(str(path), mode="r")
-    header: dict[str, Any] = dict(group.attrs)
-    check_version(path, header)
-    index = read_index(path)
-    if not index:
-        raise Sd2Error(f"{path} holds no take yet", "at least one", _REMAKE)
     arrays: dict[str, Any] = {}
     frames = max(entry["stop"] for entry in index)
     for name in ("synthetic", "radar", "times_s", "label"):
@@ -311,11 +302,8 @@ def read_pairs(path: Path) -> PairSet:
         for entry in index
     )
     try:
-        kind = header["kind"]
-        if kind not in get_args(PairKind):
-            raise Sd2Error(f"{path}: its kind is {kind!r}", f"one of {get_args(PairKind)}")
         return PairSet(
-            kind=kind,
+            kind=header["kind"],
             axis=VelocityAxis(int(header["bins"]), float(header["v_max_mps"])),
             null_bins=tuple(header["null_bins"]),
             frame_rate_hz=float(header["frame_rate_hz"]),
@@ -329,12 +317,36 @@ def read_pairs(path: Path) -> PairSet:
         ) from None
 
 
-def check_version(path: Path, header: dict[str, Any]) -> None:
-    """Refuse a store of another version."""
+def read_description(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """Header of a store and its lines of takes; no array is read.
+
+    Raises
+    ------
+    Sd2Error
+        When it is none, of another version or kind, or empty.
+    """
+    if not is_pair_store(path):
+        raise Sd2Error(
+            f"{path} holds no pairs of synthetic and radar Doppler",
+            "a folder made by `sd2 simulate campaign` or `sd2 pairs`",
+        )
+    header = json.loads((path / "zarr.json").read_text(encoding="utf-8"))["attributes"]
     if header.get("version") != VERSION:
         raise Sd2Error(
             f"{path} is of version {header.get('version')}", f"version {VERSION}", _REMAKE
         )
+    if header.get("kind") not in get_args(PairKind):
+        raise Sd2Error(
+            f"{path}: its kind is {header.get('kind')!r}", f"one of {get_args(PairKind)}", _REMAKE
+        )
+    takes = _read_takes(path)
+    if not takes:
+        raise Sd2Error(
+            f"{path} holds no take yet",
+            "at least one",
+            "Wait until the first one is made, or make the pairs again",
+        )
+    return header, takes
 
 
 def _begun(path: Path, header: dict[str, Any]) -> Any:
@@ -373,7 +385,7 @@ def _reopened(path: Path, header: dict[str, Any]) -> Any:
     return group
 
 
-def read_index(path: Path) -> list[dict[str, Any]]:
+def _read_takes(path: Path) -> list[dict[str, Any]]:
     """Lines of takes; the last one is left out when it was not written to its end."""
     index = path / INDEX_NAME
     if not index.exists():
