@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Sequence, Set
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, get_args
@@ -206,14 +206,15 @@ class PairWriter:
             self._group = _reopened(self._path, header)
         else:
             self._group = _begun(self._path, header)
-        self._index = _read_takes(self._path)
-        _drop_torn_line(self._path, len(self._index))
-        self._frames = max((entry["stop"] for entry in self._index), default=0)
+        index = _read_takes(self._path)
+        _drop_torn_line(self._path, len(index))
+        self._done = {_key(entry) for entry in index}
+        self._frames = max((entry["stop"] for entry in index), default=0)
 
     @property
-    def done(self) -> set[TakeKey]:
-        """Takes that are there."""
-        return {_key(entry) for entry in self._index}
+    def done(self) -> Set[TakeKey]:
+        """Takes that are there; grows as they are appended."""
+        return self._done
 
     def append(self, take: Take) -> None:
         """Add one take.
@@ -223,7 +224,7 @@ class PairWriter:
         Sd2Error
             When it is there already, or of other bins or labels.
         """
-        if take.key in self.done:
+        if take.key in self._done:
             raise Sd2Error(f"{self._path} already holds the take {take.title}", "each take once")
         header = self._group.attrs
         if take.synthetic.shape[1] != header["bins"]:
@@ -255,7 +256,7 @@ class PairWriter:
             index.write(json.dumps(entry) + "\n")
             index.flush()
             os.fsync(index.fileno())
-        self._index.append(entry)
+        self._done.add(take.key)
         self._frames = stop
 
 

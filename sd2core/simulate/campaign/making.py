@@ -101,9 +101,8 @@ def make_campaign(
     )
     with closing(made):
         for takes in made:
-            there = writer.done
             for take in takes:
-                if take.key not in there:
+                if take.key not in writer.done:
                     writer.append(take)
             done += 1
             progress(done, len(numbers))
