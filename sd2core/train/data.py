@@ -68,21 +68,20 @@ class Windows:
     ----------
     inputs, targets : float32 array, shape (frames, bins)
         All takes one after another.
-    starts, earliest, latest : int64 array, shape (segments,)
-        First frame of every segment, and between which it may lie: within half a step of
-        its own place, and within its take.
+    earliest, latest : int64 array, shape (segments,)
+        Between which the first frame of every segment may lie: within half a step of its
+        own place, and within its take.
     length : int
     """
 
     inputs: NDArray[np.float32]
     targets: NDArray[np.float32]
-    starts: NDArray[np.int64]
     earliest: NDArray[np.int64]
     latest: NDArray[np.int64]
     length: int
 
     def __len__(self) -> int:
-        return len(self.starts)
+        return len(self.earliest)
 
     def places(self, indices: NDArray[np.int64], shares: NDArray[np.float64]) -> NDArray[np.int64]:
         """Where segments are cut: shares from 0 to below 1 of the way from earliest to latest."""
@@ -117,7 +116,7 @@ class TrainingData:
         """The same for the same segments, whatever their files are called."""
         sums = hashlib.blake2b(digest_size=16)
         learnt, chosen_by = self.training, self.validation
-        places = (learnt.starts, learnt.earliest, learnt.latest)
+        places = (learnt.earliest, learnt.latest)
         for values in (learnt.inputs, learnt.targets, *places, chosen_by.inputs, chosen_by.targets):
             sums.update(str(values.shape).encode())
             sums.update(np.ascontiguousarray(values).data)
@@ -260,21 +259,19 @@ def windows_of(takes: Sequence[Take], config: DataConfig) -> Windows:
     """
     length, overlap = config.segment_frames, config.overlap_frames
     reach = (length - overlap) // 2 if config.segments == "shifted" else 0
-    starts, earliest, latest = [], [], []
+    earliest, latest = [], []
     before = 0
     for take in takes:
         frames = len(take.times_s)
         own = segment_starts(frames, length, overlap)
-        starts.append(before + own)
         earliest.append(before + np.maximum(own - reach, 0))
         latest.append(before + np.minimum(own + reach, frames - length))
         before += frames
-    if not sum(map(len, starts)):
+    if not sum(map(len, earliest)):
         raise _too_short(takes, length)
     return Windows(
         inputs=np.concatenate([take.synthetic for take in takes]),
         targets=np.concatenate([take.radar for take in takes]),
-        starts=np.concatenate(starts),
         earliest=np.concatenate(earliest),
         latest=np.concatenate(latest),
         length=length,

@@ -71,9 +71,10 @@ def carry_out(
     digest = data.digest
     if checkpoint is not None and checkpoint.about["data_digest"] != digest:
         raise Sd2Error(
-            "The pairs have changed since the run began: its segments are others",
-            "the same pairs and the same split",
-            "Start a new run with the new pairs",
+            "The segments are not those that the run began with: its pairs have changed, or it"
+            " was begun by a version that cut them otherwise",
+            "the same pairs, split and cut in the same way",
+            "Start a new run, or go on with the version that began this one",
         )
     precision = precision_of(config.machine, device)
     with settled(config.machine, threads), signals_kept():

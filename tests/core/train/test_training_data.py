@@ -188,7 +188,7 @@ def windows(segments: int) -> Windows:
     """Segments of four frames, each of which may be shifted by one."""
     starts = 6 * np.arange(segments) + 1
     frames = np.zeros((6 * segments, 8), np.float32)
-    return Windows(frames, frames, starts, starts - 1, starts + 1, 4)
+    return Windows(frames, frames, starts - 1, starts + 1, 4)
 
 
 class TestOrder:
