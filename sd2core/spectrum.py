@@ -134,15 +134,11 @@ class DopplerMap:
 
     def mean_velocity_mps(self) -> NDArray[np.float64]:
         """Energy-weighted mean velocity per frame; NaN where a frame is empty."""
-        values = self.values.astype(np.float64)
-        total = values.sum(axis=0)
-        moment = self.axis.centres_mps @ values
-        return np.divide(moment, total, out=np.full_like(total, np.nan), where=total > 0)
+        return mean_velocity_mps(self.values.T, self.axis)
 
     def peak_velocity_mps(self) -> NDArray[np.float64]:
         """Velocity of the strongest bin per frame; NaN where a frame is empty."""
-        peak = self.axis.centres_mps[self.values.argmax(axis=0)]
-        return np.where(self.values.max(axis=0) > 0, peak, np.nan)
+        return peak_velocity_mps(self.values.T, self.axis)
 
     def save(self, path: Path) -> None:
         """Write ``values``, ``velocity_mps``, ``times_s`` and ``meta`` to one ``.npz``.
@@ -229,3 +225,42 @@ class DopplerMap:
             raise Sd2Error(
                 f"{path}: its description is damaged ({error!r})", "the meta written by `sd2 synth`"
             ) from error
+
+
+def peak_velocity_mps(
+    energies: NDArray[np.floating], axis: VelocityAxis, floor: float = 0.0
+) -> NDArray[np.float64]:
+    """Centre of the strongest bin per frame, (frames,); NaN where a frame is empty.
+
+    Parameters
+    ----------
+    energies : float array, shape (frames, bins)
+    axis : VelocityAxis
+    floor : float
+        A frame that does not exceed it counts as empty.
+    """
+    _check(energies, axis)
+    peak = axis.centres_mps[energies.argmax(axis=1)]
+    return np.where(energies.max(axis=1) > floor, peak, np.nan)
+
+
+def mean_velocity_mps(
+    energies: NDArray[np.floating], axis: VelocityAxis, floor: float = 0.0
+) -> NDArray[np.float64]:
+    """Energy-weighted mean velocity per frame, (frames,); NaN where a frame is empty.
+
+    Parameters
+    ----------
+    energies, axis, floor
+        As for :func:`peak_velocity_mps`.
+    """
+    _check(energies, axis)
+    values = energies.astype(np.float64)
+    total = values.sum(axis=1)
+    known = (values.max(axis=1) > floor) & (total > 0)
+    return np.divide(values @ axis.centres_mps, total, out=np.full_like(total, np.nan), where=known)
+
+
+def _check(energies: NDArray[np.floating], axis: VelocityAxis) -> None:
+    if energies.ndim != 2 or energies.shape[1] != axis.bins:
+        raise Sd2Error(f"The values are of shape {energies.shape}", f"(frames, {axis.bins})")

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from sd2core.denoise.scaling import Compression
 from sd2core.errors import Sd2Error
 from sd2core.sensor import VelocityAxis
+from sd2core.spectrum import mean_velocity_mps, peak_velocity_mps
 
 
 @dataclass(frozen=True)
@@ -90,40 +91,6 @@ class MapError:
     def to_json(self) -> dict[str, float]:
         """By name."""
         return asdict(self)
-
-
-def peak_velocity_mps(
-    energies: NDArray[np.floating], axis: VelocityAxis, floor: float = 0.0
-) -> NDArray[np.float64]:
-    """Centre of the strongest bin per frame, (frames,); NaN where a frame is empty.
-
-    Parameters
-    ----------
-    energies : float array, shape (frames, bins)
-    axis : VelocityAxis
-    floor : float
-        A frame that does not exceed it counts as empty.
-    """
-    _check(energies, axis)
-    peak = axis.centres_mps[energies.argmax(axis=1)]
-    return np.where(energies.max(axis=1) > floor, peak, np.nan)
-
-
-def mean_velocity_mps(
-    energies: NDArray[np.floating], axis: VelocityAxis, floor: float = 0.0
-) -> NDArray[np.float64]:
-    """Energy-weighted mean velocity per frame, (frames,); NaN where a frame is empty.
-
-    Parameters
-    ----------
-    energies, axis, floor
-        As for :func:`peak_velocity_mps`.
-    """
-    _check(energies, axis)
-    values = energies.astype(np.float64)
-    total = values.sum(axis=1)
-    known = (values.max(axis=1) > floor) & (total > 0)
-    return np.divide(values @ axis.centres_mps, total, out=np.full_like(total, np.nan), where=known)
 
 
 def velocity_error(
@@ -247,11 +214,6 @@ def stands_out(
         return np.zeros(len(energies), bool)
     out: NDArray[np.bool_] = counted.max(axis=1) > factor * np.median(counted)
     return out
-
-
-def _check(energies: NDArray[np.floating], axis: VelocityAxis) -> None:
-    if energies.ndim != 2 or energies.shape[1] != axis.bins:
-        raise Sd2Error(f"The values are of shape {energies.shape}", f"(frames, {axis.bins})")
 
 
 def _correlation(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:

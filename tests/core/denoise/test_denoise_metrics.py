@@ -10,16 +10,14 @@ from hypothesis import strategies as st
 from sd2core.denoise.metrics import (
     map_error,
     mean_velocity_error,
-    mean_velocity_mps,
     peak_error,
-    peak_velocity_mps,
     stands_out,
     velocity_error,
 )
 from sd2core.denoise.scaling import Compression
 from sd2core.errors import Sd2Error
 from sd2core.sensor import VelocityAxis
-from sd2core.spectrum import DopplerMap
+from sd2core.spectrum import DopplerMap, mean_velocity_mps, peak_velocity_mps
 from sd2core.timebase import Timebase
 
 AXIS = VelocityAxis(32, 2.0)
