@@ -25,6 +25,7 @@ from sd2app.jobs.denoise_messages import (
 )
 from sd2core.errors import Sd2Error
 from sd2core.spectrum import DopplerMap
+from sd2core.worker_processes import ONE_THREAD
 
 COMMAND = (sys.executable, "-m", "sd2app.jobs.denoise_worker")
 
@@ -110,13 +111,12 @@ class DenoiseProcess:
             self._process = None
         if self._process is None:
             # One thread: the cores belong to synthesis, video and drawing as well.
-            environment = os.environ | {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
             self._process = subprocess.Popen(
                 self._command,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,
-                env=environment,
+                env=os.environ | ONE_THREAD,
                 creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
             )
             self.generation += 1

@@ -26,6 +26,7 @@ from sd2app.models.training_setup import TrainingSetupModel
 from sd2app.settings import Settings
 from sd2core.errors import Sd2Error
 from sd2core.train.folder import RunFolder
+from sd2core.worker_processes import ONE_THREAD
 
 Closing = Literal["ask", "keep", "stop"]
 
@@ -34,8 +35,6 @@ CLOSING: tuple[Closing, ...] = ("ask", "keep", "stop")
 """What happens to a run when the window is closed."""
 _LIBRARY_MS = 3000
 _PATIENCE_MS = 500
-_ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
-"""What moves on the screen comes first: the training gets by with one processor."""
 
 
 class TrainingModel(QObject):
@@ -236,7 +235,8 @@ class TrainingModel(QObject):
         self._launch(run.folder.path, resume_arguments(run.folder.path))
 
     def _launch(self, path: Path, arguments: list[str]) -> None:
-        pid = start_detached([*self._command, *arguments], output_of(path), _ONE_THREAD)
+        # What moves on the screen comes first: the training gets by with one processor.
+        pid = start_detached([*self._command, *arguments], output_of(path), ONE_THREAD)
         if pid is None:
             raise Sd2Error(
                 f"{self._command[0]} cannot be started", remedy="Look whether it is installed"

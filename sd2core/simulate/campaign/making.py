@@ -23,12 +23,10 @@ from sd2core.simulate.campaign.fit_errors import FitErrors
 from sd2core.simulate.campaign.motion import LABELS
 from sd2core.simulate.campaign.people import subject_name
 from sd2core.simulate.campaign.takes import OPTIONS, Campaign, TakeMaker, take_name
-from sd2core.worker_processes import end_with_parent
+from sd2core.worker_processes import ONE_THREAD, end_with_parent
 
 _AHEAD = 3
 """Takes per process that are handed out before the first of them is written."""
-
-_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 _maker: TakeMaker | None = None
 
@@ -174,8 +172,8 @@ def _elsewhere(
 @contextmanager
 def _one_thread_each() -> Iterator[None]:
     """Processes that are started meanwhile multiply matrices on one thread."""
-    before = {name: os.environ.get(name) for name in _ONE_THREAD}
-    os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
+    before = {name: os.environ.get(name) for name in ONE_THREAD}
+    os.environ.update(ONE_THREAD)
     try:
         yield
     finally:
