@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
-from typing import Any, BinaryIO
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ _LENGTHS = struct.Struct("<IQ")
 """Bytes of JSON, bytes of numbers."""
 
 
-def write_message(stream: BinaryIO, content: dict[str, Any], numbers: bytes = b"") -> None:
+def write_message(stream: IO[bytes], content: dict[str, Any], numbers: bytes = b"") -> None:
     """Write one message."""
     text = json.dumps(content).encode()
     stream.write(_LENGTHS.pack(len(text), len(numbers)) + text)
@@ -27,7 +27,7 @@ def write_message(stream: BinaryIO, content: dict[str, Any], numbers: bytes = b"
     stream.flush()
 
 
-def read_message(stream: BinaryIO) -> Message | None:
+def read_message(stream: IO[bytes]) -> Message | None:
     """The next message; None where the other side is gone."""
     lengths = stream.read(_LENGTHS.size)
     if len(lengths) < _LENGTHS.size:
