@@ -28,7 +28,14 @@ class _Entry:
     same_time: Mapping[str, Any] = field(default_factory=dict)
 
 
-_S4 = {"channels": 128, "depth": 4, "state_size": 64, "dropout": 0.0}
+_S4 = {
+    "channels": 128,
+    "depth": 4,
+    "state_size": 64,
+    "dropout": 0.0,
+    "dt_min": 1e-3,
+    "dt_max": 1e-1,
+}
 
 _ENTRIES: dict[str, _Entry] = {
     "s4": _Entry(
@@ -182,5 +189,10 @@ def _check(name: str, option: str, value: Any, known: Mapping[str, Any]) -> None
     elif isinstance(known[option], int):
         if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= _LARGEST:
             raise Sd2Error(f"{name}: {option} is {value!r}", f"a whole number, 1 to {_LARGEST}")
-    elif isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value < 1:
+    elif isinstance(value, bool) or not isinstance(value, int | float):
+        raise Sd2Error(f"{name}: {option} is {value!r}", "a number")
+    elif option in ("dt_min", "dt_max"):
+        if not 1e-6 <= value <= 10:
+            raise Sd2Error(f"{name}: {option} is {value!r}", "a step from 1e-6 to 10")
+    elif not 0 <= value < 1:
         raise Sd2Error(f"{name}: {option} is {value!r}", "a share from 0 to below 1")

@@ -11,7 +11,7 @@ from torch.nn import functional
 from sd2core.denoise.channels import SMALLEST_VARIANCE, mix_gated, normalise
 from sd2core.denoise.convolution import causal_convolution
 from sd2core.denoise.recurrence import BLOCK
-from sd2core.denoise.systems import Kernel, State, StateSpace
+from sd2core.denoise.systems import DT_MAX, DT_MIN, Kernel, State, StateSpace
 from sd2core.errors import Sd2Error
 
 __all__ = ["Kernel", "S4Layer", "State"]
@@ -35,6 +35,8 @@ class S4Layer(nn.Module):
         A second kernel looks ahead; such a layer cannot run live.
     dropout : float
         Share of channels that a training step leaves out, the same ones for all frames.
+    dt_min, dt_max : float
+        Where the state spaces' steps start, see :class:`~sd2core.denoise.systems.StateSpace`.
     """
 
     def __init__(
@@ -44,11 +46,14 @@ class S4Layer(nn.Module):
         kernel: Kernel = "legs",
         bidirectional: bool = False,
         dropout: float = 0.0,
+        dt_min: float = DT_MIN,
+        dt_max: float = DT_MAX,
     ) -> None:
         super().__init__()
         self.channels = channels
-        self.past = StateSpace(channels, state_size, kernel)
-        self.future = StateSpace(channels, state_size, kernel) if bidirectional else None
+        space = (channels, state_size, kernel, dt_min, dt_max)
+        self.past = StateSpace(*space)
+        self.future = StateSpace(*space) if bidirectional else None
         self.mixing = nn.Linear(channels, 2 * channels)
         self.dropout = dropout
 

@@ -9,6 +9,7 @@ from torch import Tensor, nn
 
 from sd2core.denoise.model import Denoiser, State
 from sd2core.denoise.s4 import S4Layer
+from sd2core.denoise.systems import DT_MAX, DT_MIN
 
 
 class S4Denoiser(Denoiser):
@@ -27,6 +28,8 @@ class S4Denoiser(Denoiser):
     bidirectional : bool
         Also backwards in time: no longer causal, so not for live use.
     dropout : float
+    dt_min, dt_max : float
+        A channel begins with a memory of between about 1 / ``dt_max`` and 1 / ``dt_min`` frames.
     """
 
     def __init__(
@@ -39,6 +42,8 @@ class S4Denoiser(Denoiser):
         kernel: Literal["legs", "diagonal"] = "legs",
         bidirectional: bool = False,
         dropout: float = 0.0,
+        dt_min: float = DT_MIN,
+        dt_max: float = DT_MAX,
     ) -> None:
         super().__init__(bins)
         self.causal = not bidirectional
@@ -51,6 +56,8 @@ class S4Denoiser(Denoiser):
                 kernel=kernel,
                 bidirectional=bidirectional,
                 dropout=dropout,
+                dt_min=dt_min,
+                dt_max=dt_max,
             )
             for _ in range(depth)
         )
@@ -98,7 +105,7 @@ class SerialS4Denoiser(S4Denoiser):
 
     Parameters
     ----------
-    bins, channels, depth, state_size, kernel, dropout
+    bins, channels, depth, state_size, kernel, dropout, dt_min, dt_max
         As for :class:`S4Denoiser`.
     """
 

@@ -35,7 +35,7 @@ SLOWEST_DECAY = 1e-4
 # exp(±100) and its square are still numbers in double precision.
 LARGEST_LOG = 100.0
 STEP_RANGE = (1e-7, 1e2)
-FIRST_STEPS = (1e-3, 1e-1)
+DT_MIN, DT_MAX = 1e-3, 1e-1
 MOST_KEPT = 8
 
 
@@ -57,13 +57,30 @@ class StateSpace(nn.Module):
     kernel : {"legs", "diagonal"}
         Starts as HiPPO-LegS with random C (real, in the dense basis), or as S4D-Lin, λ = −1/2 +
         i π n (Gu et al. 2022, S4D).
+    dt_min, dt_max : float
+        Between these the steps Δ of the channels start, drawn evenly in their logarithm. A
+        channel looks back about 1 / Δ frames. With "legs" and Δ N far above 2 the bilinear
+        rule turns poles that are faster than a frame into ringing: take a smaller N then.
     """
 
-    def __init__(self, channels: int, state_size: int, kernel: Kernel) -> None:
+    def __init__(
+        self,
+        channels: int,
+        state_size: int,
+        kernel: Kernel,
+        dt_min: float = DT_MIN,
+        dt_max: float = DT_MAX,
+    ) -> None:
         super().__init__()
         if kernel not in ("legs", "diagonal"):
             raise Sd2Error(
                 found=f"the kernel {kernel!r}", expected='"legs" or "diagonal"', remedy=""
+            )
+        if not STEP_RANGE[0] <= dt_min <= dt_max <= STEP_RANGE[1]:
+            raise Sd2Error(
+                found=f"first steps from dt_min = {dt_min:g} to dt_max = {dt_max:g}",
+                expected=f"dt_min ≤ dt_max, both from {STEP_RANGE[0]:g} to {STEP_RANGE[1]:g}",
+                remedy="",
             )
         first = legs_state_matrix(state_size)
         self.kernel_name = kernel
@@ -71,8 +88,8 @@ class StateSpace(nn.Module):
         self._held: tuple[Tensor, ...] = ()
         self._counts: tuple[int, ...] = ()
         pairs = state_size // 2
-        low, high = (math.log(step) for step in FIRST_STEPS)
-        self.log_dt = nn.Parameter(torch.empty(channels).uniform_(low, high))
+        log_dt = torch.empty(channels).uniform_(math.log(dt_min), math.log(dt_max))
+        self.log_dt = nn.Parameter(log_dt)
         self.log_decay = nn.Parameter(torch.full((channels, pairs), math.log(0.5 - SLOWEST_DECAY)))
         self.skip = nn.Parameter(torch.randn(channels))
         if kernel == "legs":

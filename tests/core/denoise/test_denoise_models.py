@@ -188,6 +188,10 @@ def test_every_model_says_what_it_is(name: str) -> None:
         ("gru", {"channels": True}, "channels is True"),
         ("gru", {"dropout": 1.0}, "dropout is 1.0"),
         ("s4", {"bidirectional": 1}, "bidirectional is 1"),
+        ("s4", {"dt_min": 0.0}, "dt_min is 0.0"),
+        ("s4d", {"dt_max": 1e9}, "dt_max is 1000000000.0"),
+        ("s4", {"dt_max": "slow"}, "dt_max is 'slow'"),
+        ("s4-serial", {"dt_min": 0.5, "dt_max": 0.2}, "dt_min = 0.5 to dt_max = 0.2"),
         ("none", {"channels": 8}, "no option 'channels'"),
     ],
 )

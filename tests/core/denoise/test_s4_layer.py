@@ -12,7 +12,7 @@ from torch import Tensor
 from sd2core.denoise.convolution import causal_convolution
 from sd2core.denoise.s4 import S4Layer
 from sd2core.denoise.ssm import legs_kernel
-from sd2core.denoise.systems import SLOWEST_DECAY, StateSpace
+from sd2core.denoise.systems import SLOWEST_DECAY, Kernel, StateSpace
 from sd2core.errors import Sd2Error
 
 KERNELS = ("legs", "diagonal")
@@ -121,6 +121,23 @@ def shaken(layer: S4Layer, size: float) -> S4Layer:
         for parameter in layer.past.parameters():
             parameter += size * torch.randn_like(parameter)
     return layer
+
+
+@pytest.mark.parametrize(("dt_min", "dt_max"), [(1e-3, 1e-1), (0.2, 2.0), (0.5, 0.5)])
+def test_steps_start_where_they_are_told(dt_min: float, dt_max: float) -> None:
+    steps = StateSpace(400, 4, "legs", dt_min, dt_max).dt().detach()
+    assert dt_min * (1 - 1e-6) <= float(steps.min()) <= float(steps.max()) <= dt_max * (1 + 1e-6)
+    middle = float(steps.log().mean()) - np.log(dt_min) / 2 - np.log(dt_max) / 2
+    assert abs(middle) <= 0.06 * np.log(dt_max / dt_min) + 1e-6
+
+
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_the_smaller_the_step_the_farther_a_channel_looks_back(kernel: Kernel) -> None:
+    space = StateSpace(200, 16, kernel, 1e-2, 1e-1).eval()
+    with torch.no_grad():
+        steps, response = space.dt(), space.kernel(4096)[:, 1:].double() ** 2
+    looks_back = (response * torch.arange(1, 4096)).sum(1) / response.sum(1)
+    assert float(torch.corrcoef(torch.stack((looks_back.log(), -steps.log())))[0, 1]) > 0.8
 
 
 @pytest.mark.parametrize("size", [0.1, 1.0, 10.0, 100.0])
