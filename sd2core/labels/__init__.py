@@ -1,0 +1,1 @@
+"""Labelled spans of time: what they are, how they are edited, and their files."""

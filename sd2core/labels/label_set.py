@@ -1,0 +1,98 @@
+"""What can be said of a span: labels with a colour, a key and a class for the classifier."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from sd2core.errors import Sd2Error
+
+_COLOUR = re.compile(r"#[0-9a-f]{6}")
+LONGEST_NAME = 200
+
+
+@dataclass(frozen=True)
+class Label:
+    """One label.
+
+    Parameters
+    ----------
+    name : str
+        Not empty, at most :data:`LONGEST_NAME` characters, one line.
+    colour : str
+        ``#rrggbb``, lower case.
+    key : str
+        The character that marks with it, or nothing.
+    gesture_class : str
+        What the classifier is to call it, or nothing: such spans are not learnt from.
+    """
+
+    name: str
+    colour: str
+    key: str = ""
+    gesture_class: str = ""
+
+    def __post_init__(self) -> None:
+        check_name(self.name, "label")
+        if not _COLOUR.fullmatch(self.colour):
+            raise Sd2Error(
+                f"The colour of the label {self.name!r} is {self.colour!r}", "#rrggbb, lower case"
+            )
+        if len(self.key) > 1 or self.key.isspace():
+            raise Sd2Error(f"The key of the label {self.name!r} is {self.key!r}", "one character")
+
+
+@dataclass(frozen=True)
+class LabelSet:
+    """The labels of a project, in the order in which they are offered.
+
+    Parameters
+    ----------
+    name : str
+    labels : tuple of Label
+        Names differ, and keys as well; lower and upper case are one key.
+    """
+
+    name: str
+    labels: tuple[Label, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "labels", tuple(self.labels))
+        for what, values in (
+            ("name", [one.name for one in self.labels]),
+            ("key", [one.key.casefold() for one in self.labels if one.key]),
+        ):
+            twice = sorted({value for value in values if values.count(value) > 1})
+            if twice:
+                raise Sd2Error(
+                    f"Labels of the set {self.name!r} share the {what} {', '.join(twice)}",
+                    f"a {what} of its own for every label",
+                )
+
+    def find(self, name: str) -> Label | None:
+        """The label of that name, if there is one."""
+        return next((one for one in self.labels if one.name == name), None)
+
+
+# Two blues and two oranges (Okabe and Ito, colour universal design): classes differ in hue for
+# every kind of colour vision, directions in lightness, and each has a name and a key besides.
+GESTURES = LabelSet(
+    "Gestures of the paper",
+    (
+        Label("left-to-right", "#0072b2", "r", "horizontal"),
+        Label("right-to-left", "#56b4e9", "l", "horizontal"),
+        Label("up-to-down", "#d55e00", "d", "vertical"),
+        Label("down-to-up", "#e69f00", "u", "vertical"),
+        Label("background", "#999999", "b", "background"),
+    ),
+)
+"""The default: the paper's four swipes and what is none of them."""
+
+
+def check_name(name: str, what: str) -> None:
+    """Refuse a name that no file and no menu can hold."""
+    if not name.strip() or len(name) > LONGEST_NAME or not name.isprintable():
+        raise Sd2Error(
+            f"The name of a {what} is {name[: LONGEST_NAME + 1]!r}",
+            f"one line of 1 to {LONGEST_NAME} characters",
+        )

@@ -1,0 +1,159 @@
+"""Spans, the tracks they stand on, and all labels of one recording."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal
+
+from sd2core.errors import Sd2Error
+from sd2core.labels.label_set import GESTURES, LabelSet, check_name
+
+Origin = Literal["person", "suggestion", "import"]
+Overlap = Literal["exclusive", "free"]
+
+ORIGINS: tuple[Origin, ...] = ("person", "suggestion", "import")
+OVERLAPS: tuple[Overlap, ...] = ("exclusive", "free")
+
+
+@dataclass(frozen=True)
+class Span:
+    """A stretch of time with a label, half-open: ``[start_s, end_s)``.
+
+    Parameters
+    ----------
+    id : int
+        At least 1; unique within the labels of a recording, and kept by edits.
+    track : str
+        Name of a :class:`Track`.
+    start_s, end_s : float
+        On the clock of the recording; ``start_s < end_s``.
+    label : str
+        Usually one of the label set; others are shown in grey.
+    note, author : str
+    confidence : float, optional
+        0 to 1.
+    origin : {"person", "suggestion", "import"}
+    """
+
+    id: int
+    track: str
+    start_s: float
+    end_s: float
+    label: str
+    note: str = ""
+    author: str = ""
+    confidence: float | None = None
+    origin: Origin = "person"
+
+    def __post_init__(self) -> None:
+        if isinstance(self.id, bool) or not isinstance(self.id, int) or self.id < 1:
+            raise Sd2Error(f"The id of a span is {self.id!r}", "a whole number from 1 on")
+        check_name(self.label, "label")
+        check_name(self.track, "track")
+        if not (math.isfinite(self.start_s) and math.isfinite(self.end_s)):
+            raise Sd2Error(f"{self._words()} is not finite", "finite times in seconds")
+        if not self.start_s < self.end_s:
+            raise Sd2Error(f"{self._words()} ends before it has begun", "a start before the end")
+        known = self.confidence
+        if known is not None and not 0.0 <= known <= 1.0:
+            raise Sd2Error(f"{self._words()} has the confidence {known!r}", "0 to 1")
+        if self.origin not in ORIGINS:
+            raise Sd2Error(
+                f"{self._words()} is of origin {self.origin!r}", f"one of {', '.join(ORIGINS)}"
+            )
+
+    @property
+    def duration_s(self) -> float:
+        """From start to end."""
+        return self.end_s - self.start_s
+
+    def overlaps(self, other: Span) -> bool:
+        """Whether both hold some instant; spans that touch do not."""
+        return self.start_s < other.end_s and other.start_s < self.end_s
+
+    def _words(self) -> str:
+        return f"Span {self.id} ({self.label!r}, {self.start_s:g} to {self.end_s:g} s)"
+
+
+@dataclass(frozen=True)
+class Track:
+    """A row of spans.
+
+    Parameters
+    ----------
+    name : str
+    overlap : {"exclusive", "free"}
+        Whether spans of this track may hold the same instant.
+    """
+
+    name: str
+    overlap: Overlap = "exclusive"
+
+    def __post_init__(self) -> None:
+        check_name(self.name, "track")
+        if self.overlap not in OVERLAPS:
+            raise Sd2Error(
+                f"The track {self.name!r} has the overlap {self.overlap!r}",
+                f"one of {', '.join(OVERLAPS)}",
+            )
+
+
+@dataclass(frozen=True)
+class Labels:
+    """All labels of one recording.
+
+    Parameters
+    ----------
+    tracks : tuple of Track
+        From top to bottom; names differ.
+    spans : tuple of Span
+        Kept in the order of start, end and id. Each is on one of the tracks, ids differ,
+        and on an exclusive track no two overlap.
+    label_set : LabelSet
+
+    Raises
+    ------
+    Sd2Error
+        When any of this does not hold; the message names the spans.
+    """
+
+    tracks: tuple[Track, ...] = (Track("Gestures"),)
+    spans: tuple[Span, ...] = ()
+    label_set: LabelSet = field(default=GESTURES)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "tracks", tuple(self.tracks))
+        ordered = tuple(sorted(self.spans, key=lambda one: (one.start_s, one.end_s, one.id)))
+        object.__setattr__(self, "spans", ordered)
+        names = [track.name for track in self.tracks]
+        if len(set(names)) < len(names):
+            raise Sd2Error(f"Tracks are called {', '.join(names)}", "a name of its own for each")
+        if len({span.id for span in ordered}) < len(ordered):
+            raise Sd2Error("Two spans have the same id", "an id of its own for each")
+        last: dict[str, Span | None] = {
+            track.name: None for track in self.tracks if track.overlap == "exclusive"
+        }
+        for span in ordered:
+            if span.track not in names:
+                raise Sd2Error(
+                    f"{span._words()} is on the track {span.track!r}",
+                    f"one of {', '.join(names)}",
+                )
+            before = last.get(span.track)
+            if before is not None and before.overlaps(span):
+                raise Sd2Error(
+                    f"{before._words()} and {span._words()} overlap on {span.track!r}",
+                    "spans apart from each other on an exclusive track",
+                )
+            if span.track in last:
+                last[span.track] = span
+
+    @property
+    def next_id(self) -> int:
+        """An id that no span has."""
+        return max((span.id for span in self.spans), default=0) + 1
+
+    def of_track(self, name: str) -> tuple[Span, ...]:
+        """The spans of one track, in order."""
+        return tuple(span for span in self.spans if span.track == name)
