@@ -74,6 +74,15 @@ class LabelSet:
         return next((one for one in self.labels if one.name == name), None)
 
 
+def check_name(name: str, what: str) -> None:
+    """Refuse a name that no file and no menu can hold."""
+    if not name.strip() or len(name) > LONGEST_NAME or not name.isprintable():
+        raise Sd2Error(
+            f"The name of a {what} is {name[: LONGEST_NAME + 1]!r}",
+            f"one line of 1 to {LONGEST_NAME} characters",
+        )
+
+
 # Two blues and two oranges (Okabe and Ito, colour universal design): classes differ in hue for
 # every kind of colour vision, directions in lightness, and each has a name and a key besides.
 GESTURES = LabelSet(
@@ -87,12 +96,3 @@ GESTURES = LabelSet(
     ),
 )
 """The default: the paper's four swipes and what is none of them."""
-
-
-def check_name(name: str, what: str) -> None:
-    """Refuse a name that no file and no menu can hold."""
-    if not name.strip() or len(name) > LONGEST_NAME or not name.isprintable():
-        raise Sd2Error(
-            f"The name of a {what} is {name[: LONGEST_NAME + 1]!r}",
-            f"one line of 1 to {LONGEST_NAME} characters",
-        )
