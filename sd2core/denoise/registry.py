@@ -33,8 +33,8 @@ _S4 = {
     "depth": 4,
     "state_size": 64,
     "dropout": 0.0,
-    "dt_min": 1e-3,
-    "dt_max": 1e-1,
+    "dt_min": 0.02,
+    "dt_max": 1.0,
 }
 
 _ENTRIES: dict[str, _Entry] = {
@@ -53,7 +53,8 @@ _ENTRIES: dict[str, _Entry] = {
     "s4-serial": _Entry(
         "state_space.SerialS4Denoiser",
         "the paper's literal form: all cells one after another, one channel; slow",
-        _S4,
+        # A sample is a bin, not a frame.
+        {**_S4, "dt_min": 1e-3, "dt_max": 1e-1},
         {"kernel": "legs"},
         {"channels": 4},
     ),

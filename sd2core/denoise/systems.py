@@ -35,7 +35,7 @@ SLOWEST_DECAY = 1e-4
 # exp(±100) and its square are still numbers in double precision.
 LARGEST_LOG = 100.0
 STEP_RANGE = (1e-7, 1e2)
-DT_MIN, DT_MAX = 1e-3, 1e-1
+DT_MIN, DT_MAX = 0.02, 1.0
 MOST_KEPT = 8
 
 
