@@ -20,10 +20,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from sd2core.atomic import atomic_write_text
 from sd2core.errors import Sd2Error
+from sd2core.file_lock import FileLock
 from sd2core.train.config import TrainConfig, config_text, read_config
 from sd2core.train.control import Control, signals_kept, write_control
 from sd2core.train.folder import RunFolder
-from sd2core.train.lock import FileLock
 from sd2core.train.progress import Event, ProgressWriter
 
 if TYPE_CHECKING:

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from lock_holders import held
 
 from sd2core.errors import Sd2Error
 from sd2core.train.control import Control, read_control, write_control
 from sd2core.train.folder import RunFolder, runs_in
-from sd2core.train.lock import FileLock, _is_held, is_locked
 from sd2core.train.progress import (
     ProgressTail,
     ProgressWriter,
@@ -22,8 +20,6 @@ from sd2core.train.progress import (
     read_events,
     standing,
 )
-
-REPOSITORY = Path(__file__).resolve().parents[3]
 
 
 class TestProgress:
@@ -99,50 +95,6 @@ class TestControl:
         monkeypatch.setattr("sd2core.train.control.time.sleep", nap)
         assert Control(path).wait_while_paused()[0] == "cancel"
         assert len(naps) == 3
-
-
-def held(path: Path) -> subprocess.Popen[str]:
-    """A process that holds a lock until it is killed."""
-    code = (
-        "import sys, time; from pathlib import Path; from sd2core.train.lock import FileLock;"
-        " lock = FileLock(Path(sys.argv[1])); print(lock.take(), flush=True); time.sleep(60)"
-    )
-    process = subprocess.Popen(
-        [sys.executable, "-c", code, str(path)],
-        stdout=subprocess.PIPE,
-        text=True,
-        cwd=REPOSITORY,
-    )
-    assert process.stdout is not None
-    assert process.stdout.readline() == "True\n"
-    return process
-
-
-def test_a_lock_ends_with_its_process(tmp_path: Path) -> None:
-    path = tmp_path / "lock"
-    assert not is_locked(path)
-    process = held(path)
-    try:
-        assert is_locked(path)
-        assert not FileLock(path).take()
-    finally:
-        process.kill()
-        process.communicate()
-    assert not is_locked(path)
-
-
-def test_those_who_look_do_not_see_each_other(tmp_path: Path) -> None:
-    path = tmp_path / "lock"
-    path.touch()
-    with path.open("ab") as looking:
-        assert not _is_held(looking)
-        # It has not gone yet.
-        assert not is_locked(path)
-        assert not FileLock(path).take()
-    lock = FileLock(path)
-    assert lock.take()
-    assert is_locked(path)
-    lock.release()
 
 
 class TestFolder:
