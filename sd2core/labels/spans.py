@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass, field, replace
+from operator import attrgetter
 from typing import Literal
 
 from sd2core.errors import Sd2Error
@@ -14,6 +16,8 @@ Overlap = Literal["exclusive", "free"]
 
 ORIGINS: tuple[Origin, ...] = ("person", "suggestion", "import")
 OVERLAPS: tuple[Overlap, ...] = ("exclusive", "free")
+
+_IN_ORDER = attrgetter("start_s", "end_s", "id")
 
 
 @dataclass(frozen=True)
@@ -52,15 +56,15 @@ class Span:
         check_name(self.label, "label")
         check_name(self.track, "track")
         if not (math.isfinite(self.start_s) and math.isfinite(self.end_s)):
-            raise Sd2Error(f"{self._words()} is not finite", "finite times in seconds")
+            raise Sd2Error(f"{self.words()} is not finite", "finite times in seconds")
         if not self.start_s < self.end_s:
-            raise Sd2Error(f"{self._words()} ends before it has begun", "a start before the end")
+            raise Sd2Error(f"{self.words()} ends before it has begun", "a start before the end")
         known = self.confidence
         if known is not None and not 0.0 <= known <= 1.0:
-            raise Sd2Error(f"{self._words()} has the confidence {known!r}", "0 to 1")
+            raise Sd2Error(f"{self.words()} has the confidence {known!r}", "0 to 1")
         if self.origin not in ORIGINS:
             raise Sd2Error(
-                f"{self._words()} is of origin {self.origin!r}", f"one of {', '.join(ORIGINS)}"
+                f"{self.words()} is of origin {self.origin!r}", f"one of {', '.join(ORIGINS)}"
             )
 
     @property
@@ -72,7 +76,8 @@ class Span:
         """Whether both hold some instant; spans that touch do not."""
         return self.start_s < other.end_s and other.start_s < self.end_s
 
-    def _words(self) -> str:
+    def words(self) -> str:
+        """What to call it in a sentence."""
         return f"Span {self.id} ({self.label!r}, {self.start_s:g} to {self.end_s:g} s)"
 
 
@@ -124,7 +129,7 @@ class Labels:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "tracks", tuple(self.tracks))
-        ordered = tuple(sorted(self.spans, key=lambda one: (one.start_s, one.end_s, one.id)))
+        ordered = tuple(sorted(self.spans, key=_IN_ORDER))
         object.__setattr__(self, "spans", ordered)
         names = [track.name for track in self.tracks]
         if len(set(names)) < len(names):
@@ -137,13 +142,13 @@ class Labels:
         for span in ordered:
             if span.track not in names:
                 raise Sd2Error(
-                    f"{span._words()} is on the track {span.track!r}",
+                    f"{span.words()} is on the track {span.track!r}",
                     f"one of {', '.join(names)}",
                 )
             before = last.get(span.track)
             if before is not None and before.overlaps(span):
                 raise Sd2Error(
-                    f"{before._words()} and {span._words()} overlap on {span.track!r}",
+                    f"{before.words()} and {span.words()} overlap on {span.track!r}",
                     "spans apart from each other on an exclusive track",
                 )
             if span.track in last:
@@ -157,3 +162,28 @@ class Labels:
     def of_track(self, name: str) -> tuple[Span, ...]:
         """The spans of one track, in order."""
         return tuple(span for span in self.spans if span.track == name)
+
+    def span(self, span_id: int) -> Span:
+        """The span of that id; it must exist."""
+        for span in self.spans:
+            if span.id == span_id:
+                return span
+        raise Sd2Error(f"No span has the id {span_id}", f"one of the {len(self.spans)} spans")
+
+    def track(self, name: str) -> Track:
+        """The track of that name; it must exist."""
+        for track in self.tracks:
+            if track.name == name:
+                return track
+        known = ", ".join(one.name for one in self.tracks)
+        raise Sd2Error(f"No track is called {name!r}", f"one of {known}" if known else "a track")
+
+    def with_spans(self, changed: Iterable[Span] = (), without: Collection[int] = ()) -> Labels:
+        """The same with some spans instead of those with their ids, or besides, or left out.
+
+        What changes nothing gives these very labels.
+        """
+        put = {span.id: span for span in changed}
+        kept = [put.pop(one.id, one) for one in self.spans if one.id not in without]
+        spans = (*kept, *put.values())
+        return self if spans == self.spans else replace(self, spans=spans)

@@ -1,0 +1,281 @@
+"""Edits of the times of spans: made, moved, shortened, cut, joined.
+
+Every edit is a function of labels, frames and what is wanted, and returns an
+:class:`Edit`: the labels afterwards and the name of the step. Labels are never changed in
+place, so the ones before are the step back. Decision 30 has the reasons for the policy:
+
+- An edge that an edit sets is that of a frame, inside the recording, and what is left
+  always holds the time of at least one frame. Edges that an edit does not set stay where
+  they are, on a frame or not.
+- On an exclusive track an edge stops at the neighbour (exactly there, where an import has
+  put the neighbour's edge between frames), and so does a moved span. A new span is clipped
+  to the longest free part of what was wanted. Where no frame is free the edit is refused.
+  Nothing is pushed, and nothing shrinks that was not touched, but by :func:`carve`.
+- An edit that changes nothing returns the very labels that it was given.
+
+While a hand drags, call the edit with the labels from before it took hold and the place
+where it is now: it can then stop at a neighbour and come back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from sd2core.errors import Sd2Error
+from sd2core.labels.rooms import Frames, clipped, free_parts, room_around
+from sd2core.labels.spans import Labels, Span
+from sd2core.timebase import Timebase
+
+Side = Literal["start", "end"]
+
+
+@dataclass(frozen=True)
+class Edit:
+    """What an edit comes to.
+
+    Parameters
+    ----------
+    name : str
+        Of the step, as a list of steps shows it: "Move span".
+    labels : Labels
+        Afterwards.
+    ids : tuple of int
+        The spans that were made or changed: what one would have selected now.
+    """
+
+    name: str
+    labels: Labels
+    ids: tuple[int, ...] = ()
+
+
+def create(
+    labels: Labels,
+    timebase: Timebase,
+    track: str,
+    start_s: float,
+    end_s: float,
+    label: str,
+    *,
+    author: str = "",
+) -> Edit:
+    """Mark what is between two times, in any order, as far as there is room."""
+    frames = Frames.of(timebase)
+    part = clipped(labels, track, frames.stretch(start_s, end_s), frames)
+    made = Span(labels.next_id, track, *part, label, author=author)
+    return Edit("Create span", labels.with_spans([made]), (made.id,))
+
+
+def duplicate(
+    labels: Labels, timebase: Timebase, span_id: int, start_s: float, track: str | None = None
+) -> Edit:
+    """Make a copy of a span that begins elsewhere, or on another track, where there is room."""
+    frames = Frames.of(timebase)
+    span = labels.span(span_id)
+    track = span.track if track is None else track
+    # A recording has frames, so there is room.
+    wanted = frames.placed(start_s, span.duration_s, frames.whole) or frames.whole
+    start_s, end_s = clipped(labels, track, wanted, frames)
+    made = replace(span, id=labels.next_id, track=track, start_s=start_s, end_s=end_s)
+    return Edit("Duplicate span", labels.with_spans([made]), (made.id,))
+
+
+def delete(labels: Labels, ids: Iterable[int]) -> Edit:
+    """Delete spans."""
+    gone = {labels.span(one).id for one in ids}
+    name = "Delete span" if len(gone) == 1 else f"Delete {len(gone)} spans"
+    return Edit(name, labels.with_spans(without=gone))
+
+
+def resize(labels: Labels, timebase: Timebase, span_id: int, side: Side, time_s: float) -> Edit:
+    """Put one edge of a span at the frame edge nearest to a time, as far as it can go there."""
+    frames = Frames.of(timebase)
+    span = labels.span(span_id)
+    low_s, high_s = room_around(labels, span, frames)
+    wanted_s = frames.nearest(time_s)
+    if side == "start":
+        latest_s = float(frames.times_s[max(frames.last_before(span.end_s), 0)])
+        changed = _timed(span, max(min(wanted_s, latest_s), low_s), span.end_s, frames)
+    else:
+        first = min(frames.first_from(span.start_s), len(timebase) - 1)
+        earliest_s = float(frames.edges_s[first + 1])
+        changed = _timed(span, span.start_s, min(max(wanted_s, earliest_s), high_s), frames)
+    return Edit(f"Move {side} of span", labels.with_spans([changed]), (span_id,))
+
+
+def move(labels: Labels, timebase: Timebase, span_id: int, start_s: float) -> Edit:
+    """Put a span so that it begins at a time, keeping its duration; it stops at neighbours."""
+    frames = Frames.of(timebase)
+    span = labels.span(span_id)
+    place = frames.placed(start_s, span.duration_s, room_around(labels, span, frames))
+    changed = _timed(span, *(place or (span.start_s, span.end_s)), frames)
+    return Edit("Move span", labels.with_spans([changed]), (span_id,))
+
+
+def nudge(labels: Labels, timebase: Timebase, span_id: int, count: int) -> Edit:
+    """Move a span by so many frames, keeping how many it holds; it stops at neighbours.
+
+    Where frames are not evenly spaced its duration changes, and a step back restores it. A
+    span between frames goes to them with the first step.
+    """
+    frames = Frames.of(timebase)
+    span = labels.span(span_id)
+    low_s, high_s = room_around(labels, span, frames)
+    if count < 0:
+        wall = int(frames.edges_s.searchsorted(low_s))
+        here = int(frames.edges_s.searchsorted(span.start_s))
+        count = max(count, min(wall - here, 0))
+    elif count > 0:
+        wall = int(frames.edges_s.searchsorted(high_s, "right"))
+        here = int(frames.edges_s.searchsorted(span.end_s, "right"))
+        count = min(count, max(wall - here, 0))
+    if count == 0:
+        return Edit("Nudge span", labels, (span_id,))
+    start_s, end_s = (frames.stepped(time_s, count) for time_s in (span.start_s, span.end_s))
+    if not frames.held(start_s, end_s):  # one that lay between two frames
+        start_s, end_s = frames.stretch(start_s, start_s)
+        end_s = min(end_s, high_s)
+    changed = _timed(span, start_s, end_s, frames)
+    return Edit("Nudge span", labels.with_spans([changed]), (span_id,))
+
+
+def nudge_edge(labels: Labels, timebase: Timebase, span_id: int, side: Side, count: int) -> Edit:
+    """Move one edge of a span by so many frames, as far as it can go."""
+    span = labels.span(span_id)
+    from_s = span.start_s if side == "start" else span.end_s
+    if count == 0:
+        return Edit(f"Move {side} of span", labels, (span_id,))
+    return resize(labels, timebase, span_id, side, Frames.of(timebase).stepped(from_s, count))
+
+
+def split(labels: Labels, timebase: Timebase, span_id: int, time_s: float) -> Edit:
+    """Cut a span in two at the frame nearest to a time; the first part keeps the id."""
+    frames = Frames.of(timebase)
+    span = labels.span(span_id)
+    if not span.start_s <= time_s <= span.end_s:
+        raise Sd2Error(f"{span.words()} is to be split at {time_s:.3f} s", "a time within it")
+    first, last = frames.first_from(span.start_s) + 1, frames.last_before(span.end_s)
+    if first > last:
+        raise Sd2Error(f"{span.words()} holds a single frame", "two frames or more, to be split")
+    at_s = min(max(frames.nearest(time_s), frames.times_s[first]), frames.times_s[last])
+    left = replace(span, end_s=float(at_s))
+    right = replace(span, id=labels.next_id, start_s=float(at_s))
+    return Edit("Split span", labels.with_spans([left, right]), (left.id, right.id))
+
+
+def merge(labels: Labels, ids: Sequence[int]) -> Edit:
+    """Join spans of one track into one, from the first start to the last end.
+
+    It is the earliest of them that grows: id and label are its own. Notes and authors that
+    differ are joined, and the lowest confidence that is given holds.
+
+    Raises
+    ------
+    Sd2Error
+        When they are on several tracks, or another span of an exclusive track is between.
+    """
+    parts = [span for span in labels.spans if span.id in {labels.span(one).id for one in ids}]
+    tracks = sorted({span.track for span in parts})
+    if len(parts) < 2 or len(tracks) != 1:
+        raise Sd2Error(
+            f"{len(parts)} spans on {', '.join(tracks) or 'no track'} are to be merged",
+            "two or more spans of one track",
+        )
+    known = [span.confidence for span in parts if span.confidence is not None]
+    merged = replace(
+        parts[0],
+        end_s=max(span.end_s for span in parts),
+        note="; ".join(dict.fromkeys(span.note for span in parts if span.note)),
+        author=", ".join(dict.fromkeys(span.author for span in parts if span.author)),
+        confidence=min(known) if known else None,
+    )
+    gone = {span.id for span in parts}
+    return Edit("Merge spans", labels.with_spans([merged], without=gone), (merged.id,))
+
+
+def meet(labels: Labels, timebase: Timebase, one_id: int, other_id: int, time_s: float) -> Edit:
+    """Let two neighbours on a track meet at the frame nearest to a time: no gap, no overlap."""
+    frames = Frames.of(timebase)
+    left, right = sorted(
+        (labels.span(one_id), labels.span(other_id)), key=lambda one: (one.start_s, one.end_s)
+    )
+    between = [span.id for span in labels.of_track(left.track)]
+    if left.track != right.track or between.index(right.id) != between.index(left.id) + 1:
+        raise Sd2Error(
+            f"{left.words()} and {right.words()} are to meet", "two neighbours on one track"
+        )
+    first, last = frames.first_from(left.start_s) + 1, frames.last_before(right.end_s)
+    if first > last:
+        raise Sd2Error(
+            f"{left.words()} and {right.words()} have one frame between them", "one for each"
+        )
+    at_s = float(min(max(frames.nearest(time_s), frames.times_s[first]), frames.times_s[last]))
+    met = [replace(left, end_s=at_s), replace(right, start_s=at_s)]
+    return Edit("Let spans meet", labels.with_spans(met), (left.id, right.id))
+
+
+def fill_gaps(
+    labels: Labels,
+    timebase: Timebase,
+    track: str,
+    label: str,
+    start_s: float | None = None,
+    end_s: float | None = None,
+    *,
+    author: str = "",
+) -> Edit:
+    """Make a span in every gap of a track that holds a frame, e.g. of background.
+
+    Gaps before the first and after the last span count; ``start_s`` and ``end_s`` narrow it
+    to a part of the recording.
+    """
+    frames = Frames.of(timebase)
+    labels.track(track)
+    low_s, high_s = frames.whole
+    low_s = low_s if start_s is None else frames.nearest(start_s)
+    high_s = high_s if end_s is None else frames.nearest(end_s)
+    gaps = [gap for gap in free_parts(labels, track, (low_s, high_s)) if frames.held(*gap)]
+    free_id = labels.next_id
+    made = [Span(free_id + k, track, *gap, label, author=author) for k, gap in enumerate(gaps)]
+    return Edit("Fill gaps", labels.with_spans(made), tuple(span.id for span in made))
+
+
+def carve(
+    labels: Labels,
+    timebase: Timebase,
+    track: str,
+    start_s: float,
+    end_s: float,
+    label: str,
+    *,
+    author: str = "",
+) -> Edit:
+    """Make a span between two times, cutting away what others on the track hold of it.
+
+    A span around it is cut in two; what is left of a span without a single frame goes.
+    """
+    frames = Frames.of(timebase)
+    labels.track(track)
+    made = Span(labels.next_id, track, *frames.stretch(start_s, end_s), label, author=author)
+    free_id = made.id + 1
+    put, gone = [made], set()
+    for span in labels.of_track(track):
+        if not span.overlaps(made):
+            continue
+        gone.add(span.id)
+        sides = ((span.start_s, made.start_s), (made.end_s, span.end_s))
+        for count, (low_s, high_s) in enumerate(side for side in sides if frames.held(*side)):
+            put.append(replace(span, id=free_id if count else span.id, start_s=low_s, end_s=high_s))
+            free_id += count
+    return Edit("Carve span", labels.with_spans(put, without=gone), (made.id,))
+
+
+def _timed(span: Span, start_s: float, end_s: float, frames: Frames) -> Span:
+    if not frames.held(start_s, end_s):
+        raise Sd2Error(
+            f"{span.words()} has no room for a frame",
+            "room for one frame on its track, inside the recording",
+            "Move or delete the spans beside it",
+        )
+    return replace(span, start_s=start_s, end_s=end_s)

@@ -1,0 +1,60 @@
+"""A dragged time jumps to the nearest edge of a span nearby, otherwise to a frame."""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+from labelled import imported, uneven
+
+from sd2core.labels.snapping import Snap, snap
+from sd2core.labels.spans import Labels, Span, Track
+from sd2core.timebase import Timebase
+
+FRAMES = Timebase.regular(100, 10.0)
+LABELS = Labels(
+    (Track("Gestures"), Track("Suggested")),
+    (
+        Span(1, "Gestures", 1.0, 2.0, "up"),
+        Span(2, "Suggested", 1.96, 3.0, "up", origin="suggestion"),
+    ),
+)
+
+
+def test_spans_attract_within_the_distance() -> None:
+    assert snap(LABELS, FRAMES, 2.2, 0.25) == Snap(2.0, "span", 1)
+    assert snap(LABELS, FRAMES, 2.2, 0.1) == Snap(FRAMES.times_s[22], "frame")
+    assert snap(LABELS, FRAMES, 2.9, 0.25) == Snap(3.0, "suggestion", 2)
+    assert snap(LABELS, FRAMES, 1.961, 0.25) == Snap(1.96, "suggestion", 2)
+
+
+def test_spans_in_the_hand_do_not_attract() -> None:
+    assert snap(LABELS, FRAMES, 2.2, 0.25, ignore={1}) == Snap(1.96, "suggestion", 2)
+    assert snap(LABELS, FRAMES, 2.2, 0.25, ignore={1, 2}).at == "frame"
+
+
+def test_on_a_tie_a_span_goes_before_a_suggestion() -> None:
+    labels = Labels(
+        (Track("Gestures"), Track("Suggested")),
+        (
+            Span(1, "Suggested", 1.0, 2.0, "up", origin="suggestion"),
+            Span(2, "Gestures", 2.0, 3.0, "up"),
+        ),
+    )
+    assert snap(labels, FRAMES, 2.05, 0.1) == Snap(2.0, "span", 2)
+
+
+@given(st.integers(0, 99), st.floats(-3, 12), st.floats(0, 1))
+def test_nothing_that_may_attract_is_nearer(seed: int, time_s: float, within_s: float) -> None:
+    timebase = uneven(seed)
+    labels = imported(timebase, seed)
+    found = snap(labels, timebase, time_s, within_s)
+    edges = [edge for span in labels.spans for edge in (span.start_s, span.end_s)]
+    near = [edge for edge in edges if abs(edge - time_s) <= within_s]
+    if near:
+        assert found.at != "frame"
+        assert abs(found.time_s - time_s) == min(abs(edge - time_s) for edge in near)
+    else:
+        frames = [*timebase.times_s.tolist(), timebase.end_s]
+        assert found.at == "frame"
+        assert found.time_s in frames
+        assert abs(found.time_s - time_s) == min(abs(edge - time_s) for edge in frames)

@@ -1,0 +1,147 @@
+"""What is said of spans, tracks and label sets changes; times and everything else stay."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from sd2core.errors import Sd2Error
+from sd2core.labels.edits import Edit
+from sd2core.labels.label_set import GESTURES, Label, LabelSet
+from sd2core.labels.span_fields import (
+    accept,
+    reject,
+    relabel,
+    set_author,
+    set_confidence,
+    set_note,
+    set_track,
+)
+from sd2core.labels.spans import Labels, Span, Track
+from sd2core.labels.track_edits import (
+    add_track,
+    move_track,
+    remove_track,
+    rename_label,
+    rename_track,
+    set_label_set,
+    set_overlap,
+)
+from sd2core.timebase import Timebase
+
+FRAMES = Timebase.regular(100, 10.0)
+LABELS = Labels(
+    (Track("Gestures"), Track("Suggested", "free")),
+    (
+        Span(1, "Gestures", 1.037, 2.0, "up-to-down"),
+        Span(2, "Suggested", 1.5, 2.5, "down-to-up", confidence=0.7, origin="suggestion"),
+        Span(3, "Suggested", 1.6, 1.9, "background", origin="suggestion"),
+    ),
+)
+
+
+@pytest.mark.parametrize(
+    ("edit", "field", "value"),
+    [
+        (lambda: relabel(LABELS, [1, 3], "left-to-right"), "label", "left-to-right"),
+        (lambda: set_note(LABELS, [1, 3], "clear"), "note", "clear"),
+        (lambda: set_author(LABELS, [1, 3], "B"), "author", "B"),
+        (lambda: set_confidence(LABELS, [1, 3], 0.2), "confidence", 0.2),
+        (lambda: set_track(LABELS, [1, 3], "Suggested"), "track", "Suggested"),
+    ],
+)
+def test_one_field_changes(edit: Callable[[], Edit], field: str, value: object) -> None:
+    after = edit().labels
+    for span in LABELS.spans:
+        expected = replace(span, **{field: value}) if span.id in (1, 3) else span
+        assert after.span(span.id) == expected
+    assert after.tracks == LABELS.tracks
+
+
+def test_bad_values_are_refused() -> None:
+    with pytest.raises(Sd2Error, match=r"confidence 1\.5.*0 to 1"):
+        set_confidence(LABELS, [1], 1.5)
+    with pytest.raises(Sd2Error, match="No track is called 'Feet'"):
+        set_track(LABELS, [1], "Feet")
+    with pytest.raises(Sd2Error, match=r"Span 1 .* and Span 2 .* overlap on 'Gestures'"):
+        set_track(LABELS, [2], "Gestures")
+
+
+class TestSuggestions:
+    def test_accepted_it_is_a_persons(self) -> None:
+        edit = accept(LABELS, FRAMES, [2], author="B")
+        assert edit.labels.span(2) == replace(LABELS.span(2), origin="person", author="B")
+        assert edit.name == "Accept suggestion"
+
+    def test_on_another_track_it_takes_the_free_part(self) -> None:
+        after = accept(LABELS, FRAMES, [2], "Gestures").labels
+        assert (after.span(2).track, after.span(2).start_s, after.span(2).end_s) == (
+            "Gestures", 2.0, 2.5,
+        )  # fmt: skip
+
+    def test_all_or_none(self) -> None:
+        with pytest.raises(Sd2Error, match=r"From 1\.600 to 1\.900 s every frame has a span"):
+            accept(LABELS, FRAMES, [2, 3], "Gestures")
+
+    def test_rejected_it_is_gone(self) -> None:
+        assert [span.id for span in reject(LABELS, [2, 3]).labels.spans] == [1]
+        for edit in (lambda: reject(LABELS, [1]), lambda: accept(LABELS, FRAMES, [1])):
+            with pytest.raises(Sd2Error, match=r"Span 1 .*origin 'person'. Expected: a sugg"):
+                edit()
+
+
+class TestTracks:
+    def test_added_below_or_in_between(self) -> None:
+        assert [t.name for t in add_track(LABELS, "C").labels.tracks][-1] == "C"
+        added = add_track(LABELS, "C", "free", 1).labels.tracks
+        assert added == (Track("Gestures"), Track("C", "free"), Track("Suggested", "free"))
+        with pytest.raises(Sd2Error, match="a name of its own"):
+            add_track(LABELS, "Gestures")
+
+    def test_renamed_with_its_spans(self) -> None:
+        after = rename_track(LABELS, "Suggested", "Model").labels
+        assert [span.track for span in after.spans] == ["Gestures", "Model", "Model"]
+        assert after.tracks[1] == Track("Model", "free")
+        assert rename_track(after, "Model", "Suggested").labels == LABELS
+        with pytest.raises(Sd2Error, match="a name of its own"):
+            rename_track(LABELS, "Suggested", "Gestures")
+
+    def test_removed_with_its_spans(self) -> None:
+        edit = remove_track(LABELS, "Suggested")
+        assert edit.name == "Remove track with 2 spans"
+        assert [span.id for span in edit.labels.spans] == [1]
+        assert edit.labels.tracks == (Track("Gestures"),)
+
+    def test_put_in_another_order(self) -> None:
+        after = move_track(LABELS, "Suggested", 0).labels
+        assert [track.name for track in after.tracks] == ["Suggested", "Gestures"]
+        assert after.spans == LABELS.spans
+
+    def test_overlaps_forbidden_only_where_there_are_none(self) -> None:
+        with pytest.raises(Sd2Error, match=r"Span 2 .* and Span 3 .* overlap"):
+            set_overlap(LABELS, "Suggested", "exclusive")
+        after = set_overlap(reject(LABELS, [3]).labels, "Suggested", "exclusive").labels
+        assert after.track("Suggested").overlap == "exclusive"
+
+
+class TestLabelSets:
+    def test_another_set_keeps_the_spans(self) -> None:
+        other = LabelSet("Other", (Label("wave", "#000000"),))
+        after = set_label_set(LABELS, other).labels
+        assert after.label_set == other
+        assert after.spans == LABELS.spans
+
+    def test_a_label_is_renamed_wherever_it_stands(self) -> None:
+        after = rename_label(LABELS, "up-to-down", "fall").labels
+        assert after.span(1).label == "fall"
+        assert after.span(2) == LABELS.span(2)
+        assert [one.name for one in after.label_set.labels][2] == "fall"
+        assert rename_label(after, "fall", "up-to-down").labels == LABELS
+
+    def test_names_that_are_taken_or_unknown(self) -> None:
+        with pytest.raises(Sd2Error, match="share the name background"):
+            rename_label(LABELS, "up-to-down", "background")
+        with pytest.raises(Sd2Error, match=f"The set {GESTURES.name!r} has no label 'fall'"):
+            rename_label(LABELS, "fall", "up")
