@@ -120,6 +120,31 @@ def comparison(application: QApplication) -> None:
         window.close()
 
 
+def training(application: QApplication) -> None:
+    """The Train panel while a denoiser learns from a small simulated campaign."""
+    with tempfile.TemporaryDirectory() as folder:
+        pairs, runs = Path(folder) / "campaign.zarr", Path(folder) / "runs"
+        command = [sys.executable, "-m", "sd2app.command_line", "simulate", "campaign", str(pairs)]
+        size = ["--subjects", "3", "--minutes", "6", "--seed", "1"]
+        if subprocess.run([*command, *size], check=False).returncode != 0:
+            print("training.png is left as it is: no pairs to learn from", file=sys.stderr)
+            return
+        window = opened(application, [resource_path("swipes.sd2")], runs)
+        window.context.playback.seek(1.9)
+        window.resize(1280, 960)
+        window.side.bring_up("Train")
+        model = window.context.training
+        model.setup.add_store(pairs)
+        model.setup.set_value("epochs", 40)
+        wait_for(application, lambda: not model.setup.problem)
+        model.start()
+        wait_for(application, lambda: model.run is not None and model.run.history.epoch >= 12)
+        save(window, "training.png")
+        model.cancel()
+        wait_for(application, lambda: not model.under_way)
+        window.close()
+
+
 def wait_for(application: QApplication, condition: Callable[[], bool]) -> None:
     """Run the event loop until something is so; at most five minutes."""
     deadline = time.monotonic() + 300.0
@@ -128,11 +153,13 @@ def wait_for(application: QApplication, condition: Callable[[], bool]) -> None:
         time.sleep(0.01)
 
 
-def opened(application: QApplication, paths: list[Path]) -> MainWindow:
-    """The window on some files, everything computed."""
+def opened(application: QApplication, paths: list[Path], runs: Path | None = None) -> MainWindow:
+    """The window on some files, everything computed; trainings are kept in ``runs``."""
     apply_theme(application, False)
     settings = Settings.forgetful()
     settings.dark = False
+    if runs is not None:
+        settings.set_value("training/folder", str(runs))
     window = MainWindow(settings)
     window.resize(1280, 800)
     window.show()
@@ -177,6 +204,7 @@ def main() -> None:
     take(application, "dark.png", swipes, far_in_the_dark)
     take(application, "trade.png", swipes, trade)
     comparison(application)
+    training(application)
     walk = [SHARED / "video" / "walk.mkv", SHARED / "mesh" / "walk.npz"]
     if all(path.exists() for path in walk):
         take(application, "real-video.png", walk, real)
