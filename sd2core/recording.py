@@ -42,7 +42,7 @@ from sd2core.relative_paths import (
 from sd2core.sensor import VirtualSensor
 
 if TYPE_CHECKING:
-    from sd2core.io.radar import RadarCapture
+    from sd2core.io.radar import RadarCapture, RecordedMap
     from sd2core.io.video import VideoReader
     from sd2core.mesh import MeshSequence
 
@@ -329,6 +329,19 @@ class Recording:
         from sd2core.io.radar import load_capture
 
         return load_capture(self._present("radar"))
+
+    @property
+    def holds_radar_map(self) -> bool:
+        """Whether its radar file holds a map: :meth:`load_radar_map`, not a capture."""
+        from sd2core.io.radar import holds_map
+
+        return self.radar is not None and holds_map(self.radar)
+
+    def load_radar_map(self) -> RecordedMap:
+        """Load the radar's own map and labels on their own clock, as the capture's is."""
+        from sd2core.io.radar import load_recorded_map
+
+        return load_recorded_map(self._present("radar"))
 
     def _files(self) -> dict[Role, Path]:
         paths = {role: getattr(self, role) for role in ROLES}

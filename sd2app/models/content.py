@@ -11,6 +11,7 @@ import numpy as np
 
 from sd2core.errors import Sd2Error
 from sd2core.io.kinds import Kind, kind_of
+from sd2core.labels.spans import Labels
 from sd2core.mesh import MeshSequence
 from sd2core.progress import Progress
 from sd2core.recording import Recording, open_recording
@@ -39,7 +40,10 @@ CLUTTER_CHOICES: tuple[Clutter, ...] = ("mean", "moving", "none")
 
 @dataclass(frozen=True, eq=False)
 class Content:
-    """A recording with its parts opened; what could not be opened is in ``problems``."""
+    """A recording with its parts opened; what could not be opened is in ``problems``.
+
+    ``radar_labels`` are those that a radar file brings with it, on the radar's clock.
+    """
 
     recording: Recording
     timebase: Timebase
@@ -47,6 +51,7 @@ class Content:
     mesh: MeshSequence | None = None
     capture: RadarCapture | None = None
     radar_map: DopplerMap | None = None
+    radar_labels: Labels | None = None
     notes: tuple[str, ...] = ()
     problems: tuple[str, ...] = ()
 
@@ -132,13 +137,18 @@ def load_content(recording: Recording, clutter: Clutter, progress: Progress) -> 
 
     video = attempt(recording.video, lambda: recording.open_video(step(0)))
     mesh = attempt(recording.mesh, lambda: recording.load_mesh(step(1)))
-    capture = attempt(recording.radar, recording.load_capture)
-    radar_map = attempt(
-        capture,
-        lambda: doppler_map(capture, axis=VelocityAxis(), clutter=clutter, progress=step(3)),
-    )
+    capture = recorded = None
+    if recording.holds_radar_map:
+        recorded = attempt(recording.radar, recording.load_radar_map)
+        radar_map = None if recorded is None else recorded.doppler
+    else:
+        capture = attempt(recording.radar, recording.load_capture)
+        radar_map = attempt(
+            capture,
+            lambda: doppler_map(capture, axis=VelocityAxis(), clutter=clutter, progress=step(3)),
+        )
     progress(400, 400)
-    parts = [part for part in (video, mesh, capture) if part is not None]
+    parts = [part for part in (video, mesh, capture, recorded) if part is not None]
     if not parts:
         raise (
             problems[0]
@@ -151,8 +161,11 @@ def load_content(recording: Recording, clutter: Clutter, progress: Progress) -> 
     for part in parts:
         notes.extend(part.notes)
     clocks = [part.timebase for part in (video, mesh) if part is not None]
-    if capture is not None:
-        clocks.append(capture.timebase.shifted(recording.radar_offset_s))
+    clocks.extend(
+        radar.timebase.shifted(recording.radar_offset_s)
+        for radar in (capture, recorded)
+        if radar is not None
+    )
     return Content(
         recording=recording,
         timebase=common_clock(clocks),
@@ -160,6 +173,7 @@ def load_content(recording: Recording, clutter: Clutter, progress: Progress) -> 
         mesh=mesh,
         capture=capture,
         radar_map=radar_map,
+        radar_labels=None if recorded is None else recorded.labels,
         notes=tuple(notes),
         problems=tuple(str(problem) for problem in problems),
     )

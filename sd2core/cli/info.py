@@ -88,8 +88,11 @@ def describe(path: Path, options: argparse.Namespace) -> Description:
         with open_video(path) as video:
             return describe_video(path, video)
     if kind == "radar":
-        from sd2core.io.radar import load_capture
+        from sd2core.cli.info_recorded_map import describe_recorded_map
+        from sd2core.io.radar import holds_map, load_capture, load_recorded_map
 
+        if holds_map(path):
+            return describe_recorded_map(path, load_recorded_map(path))
         return describe_capture(path, load_capture(path))
     if kind == "pairs":
         from sd2core.cli.info_pairs import describe_pairs
@@ -118,7 +121,12 @@ def describe_parts(recording: Recording) -> list[Description]:
             mesh = recording.load_mesh(progress)
         parts.append(describe_mesh(recording.mesh, mesh))
     if recording.radar is not None and "radar" not in missing:
-        parts.append(describe_capture(recording.radar, recording.load_capture()))
+        if recording.holds_radar_map:
+            from sd2core.cli.info_recorded_map import describe_recorded_map
+
+            parts.append(describe_recorded_map(recording.radar, recording.load_radar_map()))
+        else:
+            parts.append(describe_capture(recording.radar, recording.load_capture()))
     return parts
 
 

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from sd2core.cli.options import add_axis, add_command, add_json, span_m
 from sd2core.cli.output import progress_bar
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    from sd2core.io.radar import RecordedMap
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
@@ -23,11 +28,15 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         examples=(
             "  sd2 radar capture/ --out real.npz\n"
             "  sd2 radar capture/ --out real.npz --clutter mean --range 0.5,4\n"
-            "  sd2 radar walk.sd2 --out real.npz    (the capture of a recording)"
+            "  sd2 radar walk.sd2 --out real.npz    (the capture of a recording)\n"
+            "  sd2 radar swing.h5 --out real.npz    (a file that holds the map already)"
         ),
     )
     parser.add_argument(
-        "capture", type=Path, metavar="CAPTURE", help="the capture's folder, or a recording"
+        "capture",
+        type=Path,
+        metavar="CAPTURE",
+        help="the capture's folder, the .h5 of a K60168A, or a recording",
     )
     parser.add_argument(
         "--out", type=Path, required=True, metavar="FILE.npz", help="the map to write"
@@ -53,7 +62,7 @@ def _radar(options: argparse.Namespace) -> None:
     from sd2core.cli.info import describe_map, limit_facts, show
     from sd2core.cli.reading import check_map_output
     from sd2core.fmcw import doppler_map, limits
-    from sd2core.io.radar import load_capture
+    from sd2core.io.radar import holds_map, load_capture, load_recorded_map
     from sd2core.recording import is_recording, open_recording
     from sd2core.sensor import VelocityAxis
 
@@ -61,7 +70,13 @@ def _radar(options: argparse.Namespace) -> None:
     offset_s = 0.0
     if is_recording(options.capture):
         recording = open_recording(options.capture)
+        if recording.holds_radar_map:
+            _write_recorded(recording.load_radar_map(), recording.radar_offset_s, options)
+            return
         capture, offset_s = recording.load_capture(), recording.radar_offset_s
+    elif holds_map(options.capture):
+        _write_recorded(load_recorded_map(options.capture), 0.0, options)
+        return
     else:
         capture = load_capture(options.capture)
     default = VelocityAxis()
@@ -79,3 +94,23 @@ def _radar(options: argparse.Namespace) -> None:
     radar = {"radar": capture.config.name, **limit_facts(capture.config)}
     description.facts = radar | description.facts
     show(description, as_json=options.json)
+
+
+def _write_recorded(recorded: RecordedMap, offset_s: float, options: argparse.Namespace) -> None:
+    """Write a map that the radar made itself: there are no samples to choose anything for."""
+    from sd2core.cli.info import describe_map, show
+
+    for name, given in (
+        ("--bins", options.bins is not None),
+        ("--v-max", options.v_max is not None),
+        ("--clutter", options.clutter != "none"),
+        ("--range", options.range is not None),
+    ):
+        if given:
+            raise Sd2Error(
+                f"{name} is given, and {recorded.source} holds a finished map",
+                f"{name} for raw samples only",
+            )
+    doppler = recorded.doppler.shifted(offset_s)
+    doppler.save(options.out)
+    show(describe_map(options.out, doppler), as_json=options.json)

@@ -13,6 +13,7 @@ from sd2core.relative_paths import is_pattern
 Kind = Literal["recording", "video", "mesh", "radar", "map", "pairs", "model"]
 
 VIDEO_SUFFIXES = frozenset({".mp4", ".mkv", ".mov", ".avi", ".webm", ".m4v", ".mpg", ".ts", ".wmv"})
+RADAR_MAP_SUFFIXES = frozenset({".h5", ".hdf5"})
 MESH_SUFFIXES = frozenset({".obj", ".ply", ".glb", ".pkl", ".pickle", ".joblib"})
 
 
@@ -38,7 +39,7 @@ def kind_of(path: Path) -> Kind:
         return "video"
     if suffix in MESH_SUFFIXES or path.name.endswith(".zarr.zip"):
         return "mesh"
-    if suffix == ".npy":
+    if suffix == ".npy" or suffix in RADAR_MAP_SUFFIXES:
         return "radar"
     if suffix == ".safetensors":
         return "model"
@@ -47,7 +48,7 @@ def kind_of(path: Path) -> Kind:
     raise Sd2Error(
         f"{path} is of no kind that is known",
         "a recording (.sd2), a video (.mp4, .mkv …), a mesh (.npz, .zarr, .obj, .ply, .glb, .pkl)"
-        " or a radar capture (a folder with radar.npy)",
+        " or a radar capture (a folder with radar.npy, or the .h5 of a K60168A)",
     )
 
 

@@ -1,11 +1,12 @@
 from __future__ import annotations
 
+import h5py
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sd2app.models.content import common_clock, recording_of
+from sd2app.models.content import common_clock, load_content, recording_of
 from sd2core.errors import Sd2Error
 from sd2core.timebase import Timebase
 
@@ -52,3 +53,27 @@ def test_a_model_is_no_part_of_a_recording_and_says_where_it_belongs(tmp_path):
     path.write_bytes(b"weights")
     with pytest.raises(Sd2Error, match=r"is a model.*under Model"):
         recording_of([path])
+
+
+def test_a_radar_file_with_a_map_shows_it_and_brings_its_labels(tmp_path):
+    path = tmp_path / "swing.h5"
+    values = np.zeros((2, 32, 32, 10), np.float16)
+    values[0, 3, 20] = 2.0
+    with h5py.File(path, "w") as file:
+        file["DS1"] = values
+        file["LABEL"] = np.isin(np.arange(10), (2, 3)).astype(np.uint16)[:, None]
+    recording = recording_of([path])
+    recording.radar_offset_s = 0.5
+    content = load_content(recording, "mean", lambda *_: None)
+    assert content.capture is None
+    assert content.radar_map.kind == "real"
+    assert content.timebase.start_s == 0.5
+    assert [span.label for span in content.radar_labels.spans] == ["gesture"]
+    assert any("no units" in note for note in content.notes)
+
+
+def test_a_damaged_radar_file_is_the_problem_that_is_named(tmp_path):
+    path = tmp_path / "swing.h5"
+    path.write_bytes(b"nothing of the kind")
+    with pytest.raises(Sd2Error, match="is not an HDF5 file"):
+        load_content(recording_of([path]), "mean", lambda *_: None)

@@ -1,10 +1,11 @@
-"""Raw radar recordings: one file per maker's format."""
+"""Radar recordings: one file per maker's format."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from sd2core.errors import Sd2Error
+from sd2core.io.kinds import RADAR_MAP_SUFFIXES
 from sd2core.io.radar.capture import RadarCapture
 from sd2core.io.radar.infineon import (
     check_replaceable,
@@ -13,12 +14,16 @@ from sd2core.io.radar.infineon import (
     read_radar_config,
     write_capture,
 )
+from sd2core.io.radar.kkt import RecordedMap, load_kkt
 
 __all__ = [
     "SUPPORTED",
     "RadarCapture",
+    "RecordedMap",
     "check_replaceable",
+    "holds_map",
     "load_capture",
+    "load_recorded_map",
     "read_radar_config",
     "write_capture",
 ]
@@ -45,9 +50,31 @@ def load_capture(path: Path | str) -> RadarCapture:
     path = Path(path).expanduser()
     if not path.exists():
         raise Sd2Error(f"{path} does not exist", SUPPORTED, "Check the path")
+    if holds_map(path):
+        raise Sd2Error(
+            f"{path} holds maps of a radar and no raw samples",
+            SUPPORTED,
+            "Open it in the window, or write its map with `sd2 radar FILE --out map.npz`",
+        )
     folder = find_recording(path)
     if folder is None:
         holds = sorted(entry.name for entry in path.iterdir())[:6] if path.is_dir() else []
         found = f"; it holds {', '.join(holds) or 'nothing'}" if path.is_dir() else ""
         raise Sd2Error(f"{path} is not a radar recording that can be read{found}", SUPPORTED)
     return load_infineon(folder)
+
+
+def holds_map(path: Path | str) -> bool:
+    """Whether a radar recording is, by its name, of maps: to be read by `load_recorded_map`."""
+    return Path(path).suffix.lower() in RADAR_MAP_SUFFIXES
+
+
+def load_recorded_map(path: Path | str) -> RecordedMap:
+    """Open a radar recording that holds a Doppler map and labels instead of samples.
+
+    Raises
+    ------
+    Sd2Error
+        When it is none that is known (:mod:`sd2core.io.radar.kkt`), or is damaged.
+    """
+    return load_kkt(Path(path).expanduser())
