@@ -23,12 +23,14 @@ from matplotlib.figure import Figure
 
 from sd2core.atomic import atomic_write_text
 from sd2core.denoise.files import load_model
+from sd2core.denoise.metrics import mean_velocity_error, peak_error, stands_out
 from sd2core.denoise.registry import MODELS
 from sd2core.denoise.registry import options as options_of
 from sd2core.figure_files import save_figure
 from sd2core.ladder.scene import this_machine
 from sd2core.pairs import PairSet, read_pairs
 from sd2core.resources import resource_path
+from sd2core.simulate.campaign.takes import Campaign, TakeMaker, take_name
 from sd2core.train.folder import RunFolder
 from sd2core.train.progress import read_events, standing
 
@@ -40,6 +42,7 @@ MARS = (SHARED / "paired" / "mars_subject1", SHARED / "paired" / "mars_subject4"
 COMPARED = ("s4", "s4d", "gru", "unet", "swin")
 DROPOUT = 0.1
 SHOWN_FRAMES = 450
+LIMIT_TAKES = 16
 
 PAGE = """\
 # The denoiser
@@ -93,6 +96,12 @@ are free of that.
 One take of that person; the radar is simulated:
 
 ![Synthetic, denoised and radar's map of one take](images/denoiser-triple.png)
+
+What limits it, in {limit_takes} takes of that person. *The radar again* saw the same motion with
+other noise and another rough surface: nothing that knows only the motion can be expected to do
+better. *True motion* is the synthetic map of a body without the errors of a fit:
+
+{limits}
 {compared}"""
 
 COMPARISON = """
@@ -161,6 +170,8 @@ def main() -> None:
     bundled = resource_path("denoiser.safetensors")
     _triple(bundled, pairs)
     page = PAGE.format(
+        limits=_limits(bundled, pairs),
+        limit_takes=LIMIT_TAKES,
         machine=this_machine(),
         campaign_minutes=round(pairs.frames / pairs.frame_rate_hz / 60),
         bundled=_tables(folder, [bundled], campaign),
@@ -349,6 +360,42 @@ def _curves(folder: Path, jobs: Sequence[Job]) -> None:
         axis.set_xlabel("minutes of training")
         axis.grid(alpha=0.25, which="both")
     save_figure(figure, IMAGES / "denoiser-curves.png")
+
+
+def _limits(path: Path, pairs: PairSet) -> str:
+    """Errors of what a denoiser could know, as a table."""
+    model = load_model(path)
+    campaign = Campaign(pairs.provenance["seed"], pairs.provenance["take_seconds"])
+    maker = TakeMaker(campaign)
+    by_name = {take.name: take for take in pairs.of(pairs.subjects[-1:]).takes}
+    judged = [by_name[take_name(number)] for number in range(LIMIT_TAKES)]
+    maps: dict[str, list[np.ndarray]] = {}
+    for number, take in enumerate(judged):
+        again = maker.make(len(pairs.subjects) - 1, number, look=1)[0]
+        for name, values in (
+            ("synthetic", take.synthetic),
+            ("synthetic, denoised", model.denoise_values(take.synthetic)),
+            ("synthetic of the true motion", again.synthetic),
+            ("the same, denoised", model.denoise_values(again.synthetic)),
+            ("the radar again", again.radar),
+        ):
+            maps.setdefault(name, []).append(values)
+    radar = np.concatenate([take.radar for take in judged])
+    moving = np.concatenate([stands_out(take.radar, pairs.null_bins) for take in judged])
+    gesture = moving & np.concatenate([take.label > 0 for take in judged])
+    lines = [
+        "| map | peak MAE m/s | in gestures | mean MAE m/s |",
+        "| --- | ---: | ---: | ---: |",
+    ]
+    for name, parts in maps.items():
+        values = np.concatenate(parts)
+        errors = (
+            peak_error(values[moving], radar[moving], pairs.axis),
+            peak_error(values[gesture], radar[gesture], pairs.axis),
+            mean_velocity_error(values[moving], radar[moving], pairs.axis),
+        )
+        lines.append(f"| {name} | " + " | ".join(f"{one.mae_mps:.3f}" for one in errors) + " |")
+    return "\n".join(lines)
 
 
 def _triple(path: Path, pairs: PairSet) -> None:

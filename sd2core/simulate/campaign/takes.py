@@ -89,11 +89,11 @@ class TakeMaker:
     Parameters
     ----------
     campaign : Campaign
-    errors : FitErrors
-        How fits of its videos err.
+    errors : FitErrors, optional
+        How fits of its videos err; by default not at all.
     """
 
-    def __init__(self, campaign: Campaign, errors: FitErrors) -> None:
+    def __init__(self, campaign: Campaign, errors: FitErrors | None = None) -> None:
         self._campaign = campaign
         self._errors = errors
         self._space = ShapeSpace()
@@ -103,7 +103,12 @@ class TakeMaker:
         }
 
     def make(
-        self, subject_number: int, number: int, on_frame: Callable[[], None] = lambda: None
+        self,
+        subject_number: int,
+        number: int,
+        on_frame: Callable[[], None] = lambda: None,
+        *,
+        look: int = 0,
     ) -> list[Take]:
         """One take as every placement sees it.
 
@@ -112,6 +117,9 @@ class TakeMaker:
         subject_number, number : int
         on_frame : callable
             Called before every radar frame; may raise to stop.
+        look : int
+            Others have the same motion, and a radar with other noise and another rough
+            surface.
         """
         campaign = self._campaign
         rngs = [
@@ -129,6 +137,7 @@ class TakeMaker:
         true = self._mesh(TRUE, subject.shape, transforms, times_s)
         fitted = self._fitted(rngs[_FIT], subject.shape, transforms, times_s)
         synthesizer = Synthesizer(fitted, OPTIONS, threads=1)
+        seed = [campaign.seed, _TAKE, subject_number, number, _RADAR]
         takes = []
         for placement, sensor in enumerate(setting.sensors):
             radar = radar_target(
@@ -138,7 +147,7 @@ class TakeMaker:
                 OPTIONS.axis,
                 OPTIONS.null_bins,
                 reflectors=setting.reflectors,
-                seed=[campaign.seed, _TAKE, subject_number, number, _RADAR, placement],
+                seed=[*seed, placement, *([look] if look else [])],
                 options=campaign.target,
                 on_frame=on_frame,
             )
@@ -160,6 +169,8 @@ class TakeMaker:
         self, rng: np.random.Generator, shape: BodyShape, transforms: Floats, times_s: Floats
     ) -> MeshSequence:
         """The mesh that a fit of this take's video might give."""
+        if self._errors is None:
+            return self._mesh(FITTED, shape, transforms, times_s)
         drawn = self._errors.drawn(rng)
         found = drawn.shape(shape)
         held = drawn.transforms(

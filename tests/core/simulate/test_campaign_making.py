@@ -18,7 +18,7 @@ from sd2core.pairs import PairSet, PairWriter, Take, read_pairs
 from sd2core.progress import Cancelled
 from sd2core.simulate.campaign.making import make_campaign, take_numbers
 from sd2core.simulate.campaign.radar import TargetOptions
-from sd2core.simulate.campaign.takes import Campaign
+from sd2core.simulate.campaign.takes import Campaign, TakeMaker
 
 SHORT = Campaign(seed=3, take_seconds=2.0, target=TargetOptions(looks=1))
 MINUTES = 4 * 2.0 / 60.0
@@ -55,6 +55,17 @@ def test_takes_are_of_everybody_in_turn(whole: Path) -> None:
         for values in (take.synthetic, take.radar):
             assert not values[:, list(pairs.null_bins)].any()
     assert any(take.synthetic.any() and take.radar.any() for take in pairs.takes)
+
+
+def test_another_look_and_a_perfect_fit_are_of_the_same_motion(whole: Path) -> None:
+    made = read_pairs(whole).takes[0]
+    one = TakeMaker(SHORT).make(0, 0)[0]
+    other = TakeMaker(SHORT).make(0, 0, look=1)[0]
+    assert one.radar.tobytes() == made.radar.tobytes() != other.radar.tobytes()
+    assert one.synthetic.tobytes() == other.synthetic.tobytes() != made.synthetic.tobytes()
+    assert one.label.tobytes() == other.label.tobytes() == made.label.tobytes()
+    # The same energy in the mean, but for speckle.
+    assert 0.5 < one.radar.sum() / other.radar.sum() < 2.0
 
 
 def test_stopped_and_continued_is_as_if_it_had_not_been(
