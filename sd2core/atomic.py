@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
+_PREFIX, _SUFFIX = ".sd2-", ".tmp"
 _DISK_FULL = frozenset({errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)})
 
 
@@ -58,6 +59,12 @@ def atomic_write_text(path: Path, text: str) -> None:
         stream.write(text.encode("utf-8"))
 
 
+def remove_leftovers(folder: Path) -> None:
+    """Delete what killed writes left in a folder; nobody may be writing there."""
+    for path in Path(folder).glob(f"{_PREFIX}*{_SUFFIX}"):
+        path.unlink(missing_ok=True)
+
+
 def _target(path: Path) -> Path:
     target = path.resolve() if path.is_symlink() else path
     if target.is_dir():
@@ -68,7 +75,7 @@ def _target(path: Path) -> Path:
 def _temporary(path: Path, target: Path) -> tuple[int, Path]:
     # Not named after the file, whose name may be as long as a name can be.
     try:
-        handle, name = tempfile.mkstemp(prefix=".sd2-", suffix=".tmp", dir=target.parent)
+        handle, name = tempfile.mkstemp(prefix=_PREFIX, suffix=_SUFFIX, dir=target.parent)
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(path)) from error
     return handle, Path(name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -62,7 +63,7 @@ class Timebase:
     def __len__(self) -> int:
         return len(self.times_s)
 
-    @property
+    @cached_property
     def frame_duration_s(self) -> float:
         """Typical (median) time from one frame to the next; 1/30 s for a single frame."""
         return float(np.median(np.diff(self.times_s))) if len(self) > 1 else 1.0 / 30.0

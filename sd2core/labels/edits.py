@@ -13,8 +13,13 @@ place, so the ones before are the step back. Decision 30 has the reasons for the
   Nothing is pushed, and nothing shrinks that was not touched, but by :func:`carve`.
 - An edit that changes nothing returns the very labels that it was given.
 
+There is no history here: a step is the labels before and after, and whoever shows labels
+has a stack for such steps (``sd2app/commands.py``: ``_push(edit.name, assign, before,
+edit.labels)``, which also knows what is saved and drops what changed nothing).
+
 While a hand drags, call the edit with the labels from before it took hold and the place
-where it is now: it can then stop at a neighbour and come back.
+where it is now: it can then stop at a neighbour and come back. When it lets go, that is one
+step.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from sd2core.atomic import atomic_write, atomic_write_text, check_writable
+from sd2core.atomic import atomic_write, atomic_write_text, check_writable, remove_leftovers
 from sd2core.errors import Sd2Error
 
 
@@ -96,3 +96,16 @@ def test_a_full_disk_names_the_file(tmp_path):
     with pytest.raises(OSError, match="No space") as caught, atomic_write(tmp_path / "a.npz"):
         raise OSError(28, "No space left on device")
     assert caught.value.filename == str(tmp_path / "a.npz")
+
+
+def test_what_a_killed_write_left_is_removed_and_nothing_else(tmp_path):
+    path = tmp_path / "file.json"
+    atomic_write_text(path, "text")
+    with atomic_write(path) as stream:
+        # As a kill would leave it: the write goes on after this, on no name.
+        assert len(list(tmp_path.iterdir())) == 2
+        copy = next(one for one in tmp_path.iterdir() if one != path)
+        copy.with_name(".sd2-left.tmp").write_bytes(b"half")
+        stream.write(b"new")
+    remove_leftovers(tmp_path)
+    assert list(tmp_path.iterdir()) == [path]

@@ -15,7 +15,7 @@ from sd2core.timebase import Timebase
 EDITS = 300
 
 
-@settings(max_examples=12)
+@settings(max_examples=8)
 @given(seed=st.integers(0, 2**32), variable=st.booleans())
 def test_rules_hold_after_hundreds_of_edits(seed: int, variable: bool) -> None:
     timebase = uneven(seed) if variable else even()
@@ -34,7 +34,7 @@ def test_rules_hold_after_hundreds_of_edits(seed: int, variable: bool) -> None:
     assert len(names) > 10
 
 
-@settings(max_examples=12)
+@settings(max_examples=8)
 @given(seed=st.integers(0, 2**32))
 def test_without_imports_every_edge_is_of_a_frame(seed: int) -> None:
     timebase = uneven(seed)

@@ -1,0 +1,124 @@
+"""Labels as JSON entries: what files and the journal write, checked when it is read."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, NonNegativeInt, ValidationError
+
+from sd2core.labels.label_set import Label, LabelSet
+from sd2core.labels.spans import Labels, Origin, Overlap, Span, Track
+
+
+class Entry(BaseModel):
+    """Refuses what it does not know: an edit would lose it without a word."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class LabelEntry(Entry):
+    """A :class:`Label`."""
+
+    name: str
+    colour: str
+    key: str = ""
+    gesture_class: str = ""
+
+
+class LabelSetEntry(Entry):
+    """A :class:`LabelSet`."""
+
+    name: str
+    labels: tuple[LabelEntry, ...]
+
+    def made(self) -> LabelSet:
+        """The label set itself."""
+        return LabelSet(self.name, tuple(Label(**dict(entry)) for entry in self.labels))
+
+
+class TrackEntry(Entry):
+    """A :class:`Track`."""
+
+    name: str
+    overlap: Overlap = "exclusive"
+
+
+class SpanEntry(Entry):
+    """A :class:`Span`; ``frames`` are for people, the times hold."""
+
+    id: int
+    track: str
+    start_s: FiniteFloat
+    end_s: FiniteFloat
+    frames: tuple[NonNegativeInt, NonNegativeInt] | None = None
+    label: str
+    note: str = ""
+    author: str = ""
+    confidence: Annotated[float, Field(ge=0, le=1)] | None = None
+    origin: Origin = "person"
+
+    def made(self) -> Span:
+        """The span itself."""
+        return Span(**{name: getattr(self, name) for name in _SPAN_FIELDS})
+
+
+class LabelsEntry(Entry):
+    """A whole :class:`Labels`."""
+
+    label_set: LabelSetEntry
+    tracks: tuple[TrackEntry, ...]
+    spans: tuple[SpanEntry, ...]
+
+    def made(self) -> Labels:
+        """The labels themselves."""
+        tracks = tuple(Track(**dict(entry)) for entry in self.tracks)
+        return Labels(tracks, tuple(entry.made() for entry in self.spans), self.label_set.made())
+
+
+_SPAN_FIELDS = tuple(field.name for field in fields(Span))
+_SPAN_OPTIONAL = {"note": "", "author": "", "confidence": None, "origin": "person"}
+
+
+def span_entry(span: Span, frames: tuple[int, int] | None = None) -> dict[str, Any]:
+    """What is written of a span; what nobody said is left out."""
+    entry: dict[str, Any] = {}
+    for name in _SPAN_FIELDS:
+        value = getattr(span, name)
+        if name not in _SPAN_OPTIONAL or value != _SPAN_OPTIONAL[name]:
+            entry[name] = value
+        if name == "end_s" and frames is not None:
+            entry["frames"] = list(frames)
+    return entry
+
+
+def track_entries(tracks: tuple[Track, ...]) -> list[dict[str, Any]]:
+    """What is written of tracks."""
+    return [{"name": track.name, "overlap": track.overlap} for track in tracks]
+
+
+def label_set_entry(label_set: LabelSet) -> dict[str, Any]:
+    """What is written of a label set."""
+    names = [field.name for field in fields(Label)]
+    labels = [{name: getattr(label, name) for name in names} for label in label_set.labels]
+    return {"name": label_set.name, "labels": labels}
+
+
+def labels_entry(labels: Labels) -> dict[str, Any]:
+    """What is written of all labels of a recording."""
+    return {
+        "label_set": label_set_entry(labels.label_set),
+        "tracks": track_entries(labels.tracks),
+        "spans": [span_entry(span) for span in labels.spans],
+    }
+
+
+def first_fault(error: ValidationError) -> str:
+    """Where the first fault is, what stands there and what is wrong with it."""
+    first = error.errors(include_url=False)[0]
+    where = ".".join(str(part) for part in first["loc"]) or "the file"
+    if first["type"] == "missing":
+        return f"{where} is missing"
+    if first["type"] == "extra_forbidden":
+        return f"{where} is nothing that this version knows"
+    return f"{where} is {first['input']!r} ({first['msg']})"

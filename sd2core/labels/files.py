@@ -1,0 +1,223 @@
+"""``labels.json``, the file of the labels of one recording, and label sets in files of their own.
+
+See ``docs/formats.md``. Other programs' formats are elsewhere.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, Literal, Protocol, TypeVar
+
+from pydantic import ValidationError
+
+from sd2core.atomic import atomic_write_text
+from sd2core.errors import Sd2Error
+from sd2core.labels.entries import (
+    Entry,
+    LabelsEntry,
+    LabelSetEntry,
+    first_fault,
+    label_set_entry,
+    span_entry,
+    track_entries,
+)
+from sd2core.labels.label_set import LONGEST_NAME, LabelSet
+from sd2core.labels.spans import Labels, Span, Track
+from sd2core.recording_document import Span as InlineSpan
+from sd2core.relative_paths import located_path, plain_path, stored_path
+from sd2core.timebase import Timebase
+
+FILE_NAME = "labels.json"
+FORMAT: Literal["sd2-labels"] = "sd2-labels"
+SET_FORMAT: Literal["sd2-label-set"] = "sd2-label-set"
+VERSION = 1
+
+NO_LABEL = "no label"
+"""What a span of a recording is called that says nothing."""
+
+
+class _LabelsDocument(LabelsEntry):
+    format: Literal["sd2-labels"]
+    version: int
+    recording: str | None = None
+    video: str | None = None
+
+
+class _LabelSetDocument(LabelSetEntry):
+    format: Literal["sd2-label-set"]
+    version: int
+
+
+_Document = TypeVar("_Document", bound=Entry)
+_Made = TypeVar("_Made", covariant=True)
+
+
+class _Makes(Protocol[_Made]):
+    def made(self) -> _Made: ...
+
+
+@dataclass(frozen=True)
+class LabelFile:
+    """What a ``labels.json`` holds.
+
+    Parameters
+    ----------
+    labels : Labels
+    recording, video : Path or None
+        What they are of; absolute paths, which need not exist.
+    """
+
+    labels: Labels
+    recording: Path | None = None
+    video: Path | None = None
+
+
+def write_labels(
+    path: Path,
+    labels: Labels,
+    *,
+    timebase: Timebase | None = None,
+    recording: Path | None = None,
+    video: Path | None = None,
+) -> None:
+    """Write labels in one step: after an interrupted write the old file is there.
+
+    Parameters
+    ----------
+    path : Path
+        Usually ``labels.json`` in the folder of the recording.
+    timebase : Timebase, optional
+        Frames of the recording: every span then says its frames as well, for people.
+    recording, video : Path, optional
+        What the labels are of; stored relative to the file's folder.
+
+    Raises
+    ------
+    OSError
+        When the file cannot be written.
+    """
+    folder = plain_path(path).parent
+    head = {
+        "format": FORMAT,
+        "version": VERSION,
+        "recording": None if recording is None else stored_path(plain_path(recording), folder),
+        "video": None if video is None else stored_path(plain_path(video), folder),
+    }
+    spans = [
+        span_entry(
+            one, None if timebase is None else timebase.frames_between(one.start_s, one.end_s)
+        )
+        for one in labels.spans
+    ]
+    body = {
+        "label_set": label_set_entry(labels.label_set),
+        "tracks": track_entries(labels.tracks),
+        "spans": spans,
+    }
+    atomic_write_text(path, _text(head | body))
+
+
+def read_labels(path: Path) -> LabelFile:
+    """Read a ``labels.json``.
+
+    Raises
+    ------
+    Sd2Error
+        When it is not there, damaged, of a later version, holds what this version does not
+        know, or spans that cannot be; the message names file and place.
+    """
+    path = Path(path)
+    document = _read(path, _LabelsDocument, FORMAT)
+    folder = plain_path(path).parent
+    return LabelFile(
+        _made(path, document),
+        located_path(document.recording, folder),
+        located_path(document.video, folder),
+    )
+
+
+def write_label_set(path: Path, label_set: LabelSet) -> None:
+    """Write a label set by itself, to be shared between projects."""
+    head = {"format": SET_FORMAT, "version": VERSION}
+    atomic_write_text(path, _text(head | label_set_entry(label_set)))
+
+
+def read_label_set(path: Path) -> LabelSet:
+    """Read a label set; errors are those of :func:`read_labels`."""
+    return _made(path, _read(Path(path), _LabelSetDocument, SET_FORMAT))
+
+
+def labels_of(spans: Iterable[InlineSpan], track: str = "Gestures") -> Labels:
+    """Labels from the spans in a ``recording.json``, with ids in the order of time.
+
+    Where they overlap, the track allows it. A label that no file can hold is put on one line
+    and shortened. What else those spans say stays in ``recording.json``.
+    """
+    ordered = sorted(spans, key=lambda one: (one.start_s, one.end_s))
+    apart = all(one.end_s <= after.start_s for one, after in pairwise(ordered))
+    made = [
+        Span(k, track, one.start_s, one.end_s, _one_line(one.label), origin="import")
+        for k, one in enumerate(ordered, start=1)
+    ]
+    return Labels((Track(track, "exclusive" if apart else "free"),), tuple(made))
+
+
+def _one_line(label: str) -> str:
+    kept = "".join(one if one.isprintable() else " " for one in label)
+    return " ".join(kept.split())[:LONGEST_NAME].strip() or NO_LABEL
+
+
+def _read(path: Path, document: type[_Document], expected: str) -> _Document:
+    try:
+        text = path.read_text(encoding="utf-8")
+        content = json.loads(text)
+    except FileNotFoundError as error:
+        raise Sd2Error(f"{path} does not exist", f"a file of the format {expected!r}") from error
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        raise Sd2Error(f"{path} cannot be read ({error})", "JSON written by SD² Studio") from error
+    found = content.get("format") if isinstance(content, dict) else None
+    if found != expected:
+        raise Sd2Error(f"{path} has the format {found!r}", f"the format {expected!r}")
+    version = content.get("version")
+    if isinstance(version, bool) or not isinstance(version, int) or not 1 <= version <= VERSION:
+        raise Sd2Error(
+            f"{path} is of version {version!r}",
+            f"a version from 1 to {VERSION}",
+            "Open it with the version of SD² Studio that wrote it, or a later one",
+        )
+    try:
+        return document.model_validate_json(text)
+    except ValidationError as error:
+        raise Sd2Error(
+            f"{path}: {first_fault(error)}",
+            "what docs/formats.md says of labels",
+            "Correct that entry with a text editor",
+        ) from error
+
+
+def _made(path: Path, document: _Makes[_Made]) -> _Made:
+    try:
+        return document.made()
+    except Sd2Error as error:
+        raise Sd2Error(f"{path}: {error.found}", error.expected, error.remedy) from error
+
+
+def _text(content: dict[str, Any]) -> str:
+    """JSON with one line for every span, track and label, so that people can read and compare."""
+    return _lines(content, "") + "\n"
+
+
+def _lines(value: Any, indent: str) -> str:
+    deeper = indent + "  "
+    if isinstance(value, dict) and any(isinstance(one, list | dict) for one in value.values()):
+        inner = [f"{json.dumps(key)}: {_lines(one, deeper)}" for key, one in value.items()]
+        brackets = "{}"
+    elif isinstance(value, list) and value and isinstance(value[0], dict):
+        inner, brackets = [json.dumps(one, ensure_ascii=False) for one in value], "[]"
+    else:
+        return json.dumps(value, ensure_ascii=False)
+    return f"{brackets[0]}\n{deeper}" + f",\n{deeper}".join(inner) + f"\n{indent}{brackets[1]}"

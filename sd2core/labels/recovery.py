@@ -1,0 +1,327 @@
+"""What a crash left behind is offered again; and one window at a time edits a recording.
+
+Below a folder of the caller's choice every recording has a place of its own::
+
+    NAME-1234567890ab/         name of the recording, and a number made of its path
+        lock                   held by who edits it, for as long as that process lives
+        holder.json            who that is
+        000003-000001.journal  session 3, part 1
+        000002-000004.declined parts of a session that the user did not want back
+
+Nothing that cannot be read is deleted, and nothing that the user has not saved, unless he
+says so.
+"""
+
+from __future__ import annotations
+
+import getpass
+import hashlib
+import json
+import os
+import socket
+import time
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from itertools import groupby
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from sd2core.atomic import atomic_write_text, remove_leftovers
+from sd2core.errors import Sd2Error
+from sd2core.file_lock import FileLock, is_locked
+from sd2core.labels.entries import first_fault
+from sd2core.labels.journal import SUFFIX, Journal
+from sd2core.labels.journal_records import Replayed, replay, unpacked
+from sd2core.labels.spans import Labels
+
+DECLINED = ".declined"
+_LOCK_NAME = "lock"
+_HOLDER_NAME = "holder.json"
+
+
+@dataclass(frozen=True)
+class Holder:
+    """Who edits the labels of a recording; empty or 0 where it is not known.
+
+    Parameters
+    ----------
+    user, host : str
+    pid : int
+    since_unix_s : float
+    """
+
+    user: str = ""
+    host: str = ""
+    pid: int = 0
+    since_unix_s: float = 0.0
+
+    def __str__(self) -> str:
+        who = self.user or "Somebody"
+        return f"{who} on {self.host} (process {self.pid})" if self.host else who
+
+
+@dataclass(frozen=True)
+class Offer:
+    """Labels that a session left behind, with edits that the user's file does not hold.
+
+    Parameters
+    ----------
+    recording : Path
+        Absolute path of what was labelled.
+    labels : Labels
+        After the last whole edit.
+    edits : int
+        How many were not saved.
+    last : str
+        Name of the last one, such as "Move span".
+    time_unix_s : float
+        When it was made.
+    declined : bool
+        Whether the user did not want it.
+    files : tuple of Path
+        Where it is.
+    """
+
+    recording: Path
+    labels: Labels
+    edits: int
+    last: str
+    time_unix_s: float
+    declined: bool
+    files: tuple[Path, ...]
+
+
+@dataclass(frozen=True)
+class Found:
+    """What is in a recovery folder.
+
+    Parameters
+    ----------
+    offers : tuple of Offer
+        The newest of a recording first.
+    notes : tuple of str
+        What could not be read, or only in part.
+    """
+
+    offers: tuple[Offer, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+class RecoveryPlace:
+    """Where the journals of one recording are.
+
+    Parameters
+    ----------
+    root : Path
+        Recovery folder of the program, made when it is needed. Locks hold between those who
+        name the same folder: a folder of the user's keeps out his own windows only.
+    recording : Path
+        The recording, or the video, that is labelled; a link is the same as what it leads to.
+    """
+
+    def __init__(self, root: Path, recording: Path) -> None:
+        self._recording = Path(recording).resolve()
+        number = hashlib.sha256(os.path.normcase(self._recording).encode()).hexdigest()[:12]
+        name = "".join(one if one.isalnum() else "-" for one in self._recording.stem[:40])
+        self._folder = Path(root) / f"{name}-{number}"
+        self._lock: FileLock | None = None
+
+    @property
+    def held(self) -> bool:
+        """Whether the labels are this place's to edit."""
+        return self._lock is not None
+
+    def take(self) -> bool:
+        """Become the one who edits; False where another is: show the labels read-only then.
+
+        Raises
+        ------
+        OSError
+            When the folder cannot be made or written to.
+        """
+        self._folder.mkdir(parents=True, exist_ok=True)
+        lock = FileLock(self._folder / _LOCK_NAME)
+        if self.held or not lock.take():
+            return self.held
+        self._lock = lock
+        holder = Holder(_user(), socket.gethostname(), os.getpid(), time.time())
+        atomic_write_text(self._folder / _HOLDER_NAME, json.dumps(asdict(holder)) + "\n")
+        return True
+
+    def release(self) -> None:
+        """Let others edit. Close the journal first."""
+        if self._lock is not None:
+            self._lock.release()
+            self._lock = None
+
+    def holder(self) -> Holder | None:
+        """Who edits, of this process or another; None where nobody does."""
+        if not is_locked(self._folder / _LOCK_NAME):
+            return None
+        try:
+            content = json.loads((self._folder / _HOLDER_NAME).read_text(encoding="utf-8"))
+            return Holder(**content)
+        except (OSError, ValueError, TypeError):  # not written yet, or by another version
+            return Holder()
+
+    def offers(self, *, declined: bool = False) -> Found:
+        """What earlier sessions left here; those that were declined only when asked for.
+
+        Call it before :meth:`begin`, whose session is no earlier one.
+        """
+        return _search(self._folder, (SUFFIX, DECLINED) if declined else (SUFFIX,)).found
+
+    def begin(self, labels: Labels, recovered: Offer | None = None) -> Journal:
+        """Begin a session, with the labels of the user's file or of an offer.
+
+        Parameters
+        ----------
+        labels : Labels
+            Those that are edited from now on.
+        recovered : Offer, optional
+            Where they are from; what it was read from is deleted once they are on disk anew.
+
+        Raises
+        ------
+        Sd2Error
+            When the place is not held.
+        OSError
+            When the disk does not take it.
+        """
+        self._check_held()
+        remove_leftovers(self._folder)
+        earlier = _search(self._folder, (SUFFIX,))
+        sessions = [_session_of(path) for path in _journals(self._folder, (SUFFIX, DECLINED))]
+        journal = Journal(
+            self._folder,
+            max(sessions, default=0) + 1,
+            self._recording,
+            labels,
+            unsaved=recovered.edits if recovered else 0,
+            last=recovered.last if recovered else "",
+        )
+        if recovered is not None:
+            self.delete(recovered)
+        for path in earlier.settled:
+            path.unlink(missing_ok=True)
+        return journal
+
+    def decline(self, offer: Offer) -> None:
+        """Remember that the user does not want it; it is kept, and not offered again."""
+        self._check_held()
+        for path in offer.files:
+            path.rename(path.with_suffix(DECLINED))
+
+    def delete(self, offer: Offer) -> None:
+        """Delete what an offer was read from."""
+        self._check_held()
+        for path in offer.files:
+            path.unlink(missing_ok=True)
+
+    def _check_held(self) -> None:
+        if not self.held:
+            holder = self.holder()
+            raise Sd2Error(
+                f"The labels of {self._recording} are edited by {holder or 'nobody yet'}",
+                "labels that this window edits",
+                "Close the other window, and open the recording here again",
+            )
+
+
+def offers_in(root: Path) -> Found:
+    """What sessions of all recordings left behind that nobody edits now."""
+    found = [
+        _search(folder, (SUFFIX,)).found
+        for folder in _listed(Path(root))
+        if folder.is_dir() and not is_locked(folder / _LOCK_NAME)
+    ]
+    offers = [offer for one in found for offer in one.offers]
+    notes = [note for one in found for note in one.notes]
+    return Found(tuple(sorted(offers, key=lambda one: -one.time_unix_s)), tuple(notes))
+
+
+@dataclass(frozen=True)
+class _Search:
+    found: Found
+    settled: tuple[Path, ...]
+    """Parts of sessions that hold nothing but what the user's file holds as well."""
+
+
+def _search(folder: Path, suffixes: Iterable[str]) -> _Search:
+    offers, notes, settled = [], [], []
+    for _, group in groupby(_journals(folder, suffixes), key=_session_of):
+        parts = list(group)
+        while parts:  # the newest first; one before it only where that cannot be read
+            path = parts[0]
+            try:
+                replayed, note = _replayed(path)
+            except (OSError, ValueError, Sd2Error) as error:
+                notes.append(f"{path} cannot be read and is left where it is ({_words(error)})")
+                parts = parts[1:]
+                continue
+            if note:
+                notes.append(note)
+            if replayed.unsaved:
+                offers.append(_offer(replayed, tuple(parts)))
+            elif not note:
+                settled += parts
+            break
+    return _Search(Found(tuple(offers), tuple(notes)), tuple(settled))
+
+
+def _offer(replayed: Replayed, files: tuple[Path, ...]) -> Offer:
+    return Offer(
+        Path(replayed.recording),
+        replayed.labels,
+        replayed.unsaved,
+        replayed.last,
+        replayed.time_unix_s,
+        files[0].suffix == DECLINED,
+        files,
+    )
+
+
+def _replayed(path: Path) -> tuple[Replayed, str]:
+    content = path.read_bytes()
+    records, end = unpacked(content)
+    if not records:
+        raise ValueError("it does not begin with a whole record")
+    left = len(content) - end
+    note = f"{path} ends within an edit: {left} bytes are left out" if left else ""
+    return replay(records), note
+
+
+def _journals(folder: Path, suffixes: Iterable[str]) -> list[Path]:
+    """Parts by their names, newest session first, and its newest part first."""
+    named = [path for path in _listed(folder) if path.suffix in suffixes and _numbers(path)]
+    return sorted(named, key=_numbers, reverse=True)
+
+
+def _numbers(path: Path) -> tuple[int, ...]:
+    parts = path.stem.split("-")
+    return tuple(map(int, parts)) if len(parts) == 2 and all(map(str.isdecimal, parts)) else ()
+
+
+def _session_of(path: Path) -> int:
+    return _numbers(path)[0]
+
+
+def _listed(folder: Path) -> list[Path]:
+    try:
+        return sorted(folder.iterdir())
+    except OSError:
+        return []
+
+
+def _words(error: Exception) -> str:
+    if isinstance(error, ValidationError):
+        return first_fault(error)
+    return str(error)
+
+
+def _user() -> str:
+    try:
+        return getpass.getuser()
+    except (OSError, KeyError, ImportError):  # a number without a name, e.g. in a container
+        return ""

@@ -1,0 +1,284 @@
+"""What a crash left behind is offered, declined, deleted; and only one window edits."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from labelled import even, imported
+from lock_holders import held
+
+from sd2core.errors import Sd2Error
+from sd2core.labels import journal as journal_module
+from sd2core.labels.journal import Journal
+from sd2core.labels.recovery import Found, Holder, RecoveryPlace, offers_in
+from sd2core.labels.spans import Labels, Span
+
+START = imported(even(), 7)
+
+
+def edited(count: int) -> Labels:
+    """Labels after so many edits."""
+    return START.with_spans(without=range(1, count + 1))
+
+
+def crashed(root: Path, recording: Path, edits: int, *, saved_after: int = 0) -> None:
+    """A session that ended without a close."""
+    place = RecoveryPlace(root, recording)
+    assert place.take()
+    journal = place.begin(START)
+    for count in range(1, edits + 1):
+        journal.write(f"Edit {count}", edited(count))
+        if count == saved_after:
+            journal.saved()
+    abandon(place, journal)
+
+
+def abandon(place: RecoveryPlace, journal: Journal) -> None:
+    """What the end of a process does."""
+    journal._close_stream()
+    place.release()
+
+
+Take = Callable[[Path, Path], RecoveryPlace]
+
+
+@pytest.fixture
+def taken() -> Iterator[Take]:
+    """Takes places, and releases them in the end."""
+    places = []
+
+    def take(root: Path, recording: Path) -> RecoveryPlace:
+        place = RecoveryPlace(root, recording)
+        assert place.take()
+        places.append(place)
+        return place
+
+    yield take
+    for place in places:
+        place.release()
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Path:
+    path = tmp_path / "data" / "Wälk 1.sd2"
+    path.mkdir(parents=True)
+    return path
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    return tmp_path / "recovery"
+
+
+class TestOffers:
+    def test_what_was_not_saved(self, taken: Take, root: Path, recording: Path) -> None:
+        before_s = time.time()
+        crashed(root, recording, 5, saved_after=2)
+        (offer,) = taken(root, recording).offers().offers
+        assert offer.labels == edited(5)
+        assert (offer.edits, offer.last, offer.recording) == (3, "Edit 5", recording)
+        assert before_s <= offer.time_unix_s <= time.time()
+        assert not offer.declined
+
+    def test_nothing_after_a_save_a_close_or_no_edit(
+        self, taken: Take, root: Path, recording: Path
+    ) -> None:
+        crashed(root, recording, 4, saved_after=4)
+        crashed(root, recording, 0)
+        place = taken(root, recording)
+        assert place.offers() == Found()
+        journal = place.begin(START)
+        journal.write("Edit", edited(1))
+        journal.close()
+        assert place.offers() == Found()
+        # What only says what the user's file says as well is gone too.
+        assert not list(root.rglob("*.journal"))
+
+    def test_of_all_recordings_but_those_in_use(
+        self, taken: Take, root: Path, tmp_path: Path
+    ) -> None:
+        assert offers_in(root) == Found()
+        for name in "ab":
+            crashed(root, tmp_path / name, 2)
+        assert [one.recording.name for one in offers_in(root).offers] == ["b", "a"]
+        place = taken(root, tmp_path / "b")
+        assert [one.recording.name for one in offers_in(root).offers] == ["a"]
+        place.release()
+        assert len(offers_in(root).offers) == 2
+
+    def test_the_newest_session_first(self, taken: Take, root: Path, recording: Path) -> None:
+        crashed(root, recording, 1)
+        crashed(root, recording, 2)
+        assert [one.edits for one in taken(root, recording).offers().offers] == [2, 1]
+
+    def test_taken_it_goes_on_in_a_new_session(
+        self, taken: Take, root: Path, recording: Path
+    ) -> None:
+        crashed(root, recording, 3)
+        place = taken(root, recording)
+        (offer,) = place.offers().offers
+        journal = place.begin(offer.labels, offer)
+        assert not any(path.exists() for path in offer.files)
+        assert journal.unsaved == 3
+        journal.write("Edit 4", edited(4))
+        abandon(place, journal)
+        (again,) = taken(root, recording).offers().offers
+        assert (again.edits, again.last, again.labels) == (4, "Edit 4", edited(4))
+
+    def test_lost_again_before_any_edit_it_is_still_offered(
+        self, taken: Take, root: Path, recording: Path
+    ) -> None:
+        crashed(root, recording, 3)
+        place = taken(root, recording)
+        (offer,) = place.offers().offers
+        abandon(place, place.begin(offer.labels, offer))
+        (again,) = taken(root, recording).offers().offers
+        assert (again.edits, again.last, again.labels) == (3, "Edit 3", edited(3))
+
+    def test_declined_it_is_kept_and_not_offered(
+        self, taken: Take, root: Path, recording: Path
+    ) -> None:
+        crashed(root, recording, 3)
+        place = taken(root, recording)
+        (offer,) = place.offers().offers
+        place.decline(offer)
+        assert place.offers() == Found()
+        assert offers_in(root) == Found()
+        (declined,) = place.offers(declined=True).offers
+        assert declined.declined
+        assert declined.labels == edited(3)
+        journal = place.begin(START)
+        journal.write("Edit", edited(1))
+        abandon(place, journal)
+        place = taken(root, recording)
+        assert [one.edits for one in place.offers(declined=True).offers] == [1, 3]
+        place.delete(declined)
+        assert [one.edits for one in place.offers(declined=True).offers] == [1]
+
+    def test_a_link_leads_to_the_same_place(
+        self, taken: Take, root: Path, recording: Path, tmp_path: Path
+    ) -> None:
+        link = tmp_path / "link.sd2"
+        link.symlink_to(recording, target_is_directory=True)
+        crashed(root, link, 2)
+        assert taken(root, recording).offers().offers[0].recording == recording
+
+
+class TestDamage:
+    @pytest.mark.parametrize(
+        ("content", "says"),
+        [
+            (b"", "does not begin with a whole record"),
+            (bytes(5000), "does not begin with a whole record"),
+            (b"hello\n", "does not begin with a whole record"),
+        ],
+    )
+    def test_is_noted_and_left(
+        self, taken: Take, root: Path, recording: Path, content: bytes, says: str
+    ) -> None:
+        crashed(root, recording, 2)
+        crashed(root, recording, 3)
+        newest = max(root.rglob("*.journal"))
+        newest.write_bytes(content)
+        place = taken(root, recording)
+        found = place.offers()
+        assert [one.edits for one in found.offers] == [2]
+        assert str(newest) in found.notes[0]
+        assert says in found.notes[0]
+        place.begin(START, found.offers[0]).close()
+        assert newest.read_bytes() == content
+
+    def test_of_the_newest_part_costs_that_part(
+        self, taken: Take, root: Path, recording: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(journal_module, "SHORTEST_BYTES", 1)
+        place = taken(root, recording)
+        journal = place.begin(Labels())
+        made = Labels()
+        for count in range(60):
+            made = made.with_spans([Span(count + 1, "Gestures", count, count + 0.5, "wave")])
+            journal.write("Edit", made)
+        abandon(place, journal)
+        older, newest = sorted(root.rglob("*.journal"))
+        damaged = newest.read_bytes()[:-1][1:]
+        newest.write_bytes(damaged)
+        found = taken(root, recording).offers()
+        assert found.offers[0].files == (older,)
+        assert 30 < found.offers[0].edits < 60
+        assert found.offers[0].labels.spans == made.spans[: found.offers[0].edits]
+        assert "left where it is" in found.notes[0]
+
+    def test_a_torn_end_is_noted(self, taken: Take, root: Path, recording: Path) -> None:
+        crashed(root, recording, 3)
+        (path,) = root.rglob("*.journal")
+        path.write_bytes(path.read_bytes()[:-7])
+        found = taken(root, recording).offers()
+        assert found.offers[0].labels == edited(2)
+        assert "ends within an edit" in found.notes[0]
+
+    def test_a_later_version_is_left_alone(
+        self, taken: Take, root: Path, recording: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        with monkeypatch.context() as patch:
+            patch.setattr("sd2core.labels.journal_records.VERSION", 2)
+            crashed(root, recording, 1)
+        found = taken(root, recording).offers()
+        assert found.offers == ()
+        assert "version is 2" in found.notes[0]
+
+    def test_strange_names_are_nothing(self, taken: Take, root: Path, recording: Path) -> None:
+        crashed(root, recording, 1)
+        (path,) = root.rglob("*.journal")
+        for name in ("mine.journal", "1-2-3.journal", "-.journal", "notes.txt"):
+            (path.parent / name).write_text("mine")
+        place = taken(root, recording)
+        assert len(place.offers().offers) == 1
+        place.begin(START).close()
+        assert (path.parent / "mine.journal").read_text() == "mine"
+
+
+class TestOneWindow:
+    def test_the_second_is_told_who_is_first(
+        self, taken: Take, root: Path, recording: Path
+    ) -> None:
+        second = RecoveryPlace(root, recording)
+        assert second.holder() is None
+        first = taken(root, recording)
+        assert first.take()
+        assert not second.take()
+        assert not second.held
+        holder = second.holder()
+        assert holder is not None
+        assert holder.pid == os.getpid()
+        assert f"(process {os.getpid()})" in str(holder)
+        with pytest.raises(Sd2Error, match=rf"edited by .*process {os.getpid()}.*Close the other"):
+            second.begin(START)
+        first.release()
+        assert second.holder() is None
+        taken(root, recording)
+
+    def test_it_ends_with_the_process(self, taken: Take, root: Path, recording: Path) -> None:
+        place = taken(root, recording)
+        place.release()
+        (lock,) = root.rglob("lock")
+        (said,) = root.rglob("holder.json")
+        said.write_text("half a")
+        process = held(lock)
+        try:
+            assert not place.take()
+            assert place.holder() == Holder()
+            assert str(Holder()) == "Somebody"
+        finally:
+            process.kill()
+            process.communicate()
+        assert place.take()
+
+    def test_other_recordings_are_other_places(
+        self, taken: Take, root: Path, tmp_path: Path
+    ) -> None:
+        taken(root, tmp_path / "a" / "walk.sd2")
+        taken(root, tmp_path / "b" / "walk.sd2")
