@@ -1,0 +1,263 @@
+"""Where something moves: candidate spans from the energy of a Doppler map.
+
+Every bin is measured against its own quiet level, so that what stands still, and the
+sidelobes that it leaves in other bins, count as quiet. Two thresholds (hysteresis, as for
+the edges of J. Canny, "A computational approach to edge detection", IEEE TPAMI 8(6),
+1986) tell motion from it. What was chosen, and how flat it is: docs/decisions/0032.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+from sd2core.labels.spans import Span
+from sd2core.presence import Presence, runs
+from sd2core.spectrum import DopplerMap
+from sd2core.timebase import Timebase
+
+TRACK = "Suggestions"
+"""Name of the track that suggestions stand on unless another is asked for."""
+LABEL = "gesture"
+"""What a suggestion is called: energy says that something moves, not what."""
+SURE_DB = 20.0
+"""A span that is found with this threshold as well has the confidence 1."""
+
+_QUIET_SHARE = 0.25
+"""Of the frames; what each bin does not exceed in them is its quiet level."""
+_FLOOR = 1e-3
+"""Share of the strongest frame below which nothing is told apart from nothing."""
+_SMOOTHING_S = 0.1
+_PAUSE_FRAMES, _PAUSE_S = 3.0, 0.2
+"""A step of more typical frame durations and of more time is a pause in the recording."""
+_ROUNDING_S = 1e-6
+
+
+@dataclass(frozen=True)
+class SuggestOptions:
+    """When a stretch of motion is worth suggesting.
+
+    Parameters
+    ----------
+    high_db : float
+        Energy over the quiet level that a span must reach somewhere.
+    low_db : float
+        Energy over the quiet level that it must not fall below, up to `high_db`.
+    min_duration_s : float
+        For so long at least, before the margins are added.
+    merge_gap_s : float
+        Quiet stretches up to this one do not end a span.
+    margin_s : float
+        Added on both sides, as far as neighbours leave room: a gesture begins and ends
+        more slowly than energy shows.
+    """
+
+    high_db: float = 8.0
+    low_db: float = 5.0
+    min_duration_s: float = 0.2
+    merge_gap_s: float = 0.1
+    margin_s: float = 0.3
+
+    def __post_init__(self) -> None:
+        for name in ("high_db", "low_db", "min_duration_s", "merge_gap_s", "margin_s"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0):
+                raise Sd2Error(f"{name} is {value}", "a finite number from 0 on")
+        if not 0 < self.low_db <= self.high_db:
+            raise Sd2Error(
+                f"low_db is {self.low_db:g} and high_db {self.high_db:g}",
+                "a low threshold above 0 dB and not above the high one",
+            )
+
+
+def motion_energy_db(doppler: DopplerMap) -> NDArray[np.float64]:
+    """Energy of every frame over the map's own quiet level, in dB, (frames,).
+
+    A bin's quiet level is what it does not exceed in a quarter of the frames, but at
+    least 30 dB below the strongest frame. A frame's energy is the mean of its bins in
+    units of their quiet levels; its own quiet level, the same quarter, is 0 dB, and so
+    is what lies below. Emptied and unseen bins, and those that are always zero, are left
+    out. Energy is averaged over a tenth of a second, never across a pause or a gap
+    without a person.
+
+    Returns
+    -------
+    float64 array, shape (frames,)
+        From 0 on; NaN in frames without a person.
+
+    Raises
+    ------
+    Sd2Error
+        When the map holds NaN, infinity or negative values.
+    """
+    values = doppler.values.astype(np.float64)  # (bins, T)
+    good = np.isfinite(values) & (values >= 0)
+    if not good.all():
+        bin_, frame = np.argwhere(~good)[0]
+        raise Sd2Error(
+            f"The Doppler map holds {values[bin_, frame]} in bin {bin_} of frame {frame}",
+            "finite values from 0 on",
+        )
+    there = Presence.of(doppler.present, values.shape[1]).there
+    energy_db = np.where(there, 0.0, np.nan)
+    told = np.asarray((values[:, there] > 0).any(axis=1))  # (bins,)
+    told[[*doppler.null_bins, *doppler.unseen_bins]] = False
+    if not told.any():
+        return energy_db
+    seen = _smoothed(values[told], doppler.timebase, there)[:, there]
+    seen /= seen.sum(axis=0).max()
+    quiet = np.maximum(np.quantile(seen, _QUIET_SHARE, axis=1), _FLOOR / len(seen))
+    energy = (seen / quiet[:, None]).mean(axis=0)
+    energy /= max(float(np.quantile(energy, _QUIET_SHARE)), 1.0)
+    energy_db[there] = 10.0 * np.log10(np.maximum(energy, 1.0))
+    return energy_db
+
+
+def suggest_spans(
+    doppler: DopplerMap,
+    options: SuggestOptions | None = None,
+    *,
+    label: str = LABEL,
+    track: str = TRACK,
+    first_id: int = 1,
+) -> tuple[Span, ...]:
+    """Stretches in which something moves, in order; edges are those of frames.
+
+    Parameters
+    ----------
+    doppler : DopplerMap
+        Synthetic, denoised, simulated or real. At least a quarter of its frames with a
+        person must be quiet: what moves all the time is not told from what never does.
+    options : SuggestOptions, optional
+    label, track : str
+        Of all spans.
+    first_id : int
+        Of the first span; the others count on.
+
+    Returns
+    -------
+    tuple of Span
+        Of origin ``"suggestion"``; they do not overlap. The confidence is how far the
+        threshold could be raised before the span was lost: 0 where it only just reaches
+        ``high_db``, 1 from :data:`SURE_DB` on, linear in dB. It is no probability. The
+        note says how loud the span is.
+    """
+    options = options or SuggestOptions()
+    energy_db = motion_energy_db(doppler)
+    first, last = _stretches(doppler.timebase, ~np.isnan(energy_db))
+    ends_s = _ends_s(doppler.timebase, last)
+    starts_s = doppler.times_s
+    found: list[tuple[int, int]] = []
+    for start, stop in _loud(energy_db, options.low_db, first):
+        same = found and first[found[-1][1] - 1] == first[start]
+        if same and starts_s[start] - ends_s[found[-1][1] - 1] <= options.merge_gap_s + _ROUNDING_S:
+            found[-1] = (found[-1][0], stop)
+        else:
+            found.append((start, stop))
+    peaks_db = [float(np.max(energy_db[start:stop])) for start, stop in found]
+    kept = [
+        (frames, peak_db)
+        for frames, peak_db in zip(found, peaks_db, strict=True)
+        if peak_db >= options.high_db
+        and ends_s[frames[1] - 1] - starts_s[frames[0]] >= options.min_duration_s - _ROUNDING_S
+    ]
+    wider = _with_margins(
+        [frames for frames, _ in kept], doppler.timebase, ends_s, first, last, options.margin_s
+    )
+    return tuple(
+        Span(
+            id=first_id + number,
+            track=track,
+            start_s=float(starts_s[start]),
+            end_s=float(ends_s[stop - 1]),
+            label=label,
+            note=f"up to {peak_db:.0f} dB over the quiet level",
+            confidence=_confidence(peak_db, options.high_db),
+            origin="suggestion",
+        )
+        for number, ((start, stop), (_, peak_db)) in enumerate(zip(wider, kept, strict=True))
+    )
+
+
+def _confidence(peak_db: float, high_db: float) -> float:
+    if peak_db >= SURE_DB:
+        return 1.0
+    return (peak_db - high_db) / (SURE_DB - high_db)
+
+
+def _stretches(
+    timebase: Timebase, there: NDArray[np.bool_]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """First and last frame of the stretch of each frame: pauses part as absence does."""
+    presence = Presence.of(there, len(timebase))
+    longest_s = max(_PAUSE_FRAMES * timebase.frame_duration_s, _PAUSE_S)
+    begins = presence.first == np.arange(len(timebase))
+    begins[1:] |= np.diff(timebase.times_s) > longest_s
+    starts = np.flatnonzero(begins)
+    stretch = np.cumsum(begins) - 1
+    return starts[stretch], np.append(starts[1:], len(timebase))[stretch] - 1
+
+
+def _ends_s(timebase: Timebase, last: NDArray[np.int64]) -> NDArray[np.float64]:
+    """When each frame ends, (T,): at the next one, or after its usual time before a pause."""
+    ends_s = np.append(timebase.times_s[1:], timebase.end_s)
+    usual_s = timebase.times_s + timebase.frame_duration_s
+    before_a_break = last == np.arange(len(timebase))
+    return np.where(before_a_break, np.minimum(ends_s, usual_s), ends_s)
+
+
+def _smoothed(
+    values: NDArray[np.float64], timebase: Timebase, there: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Mean over a tenth of a second within the same stretch, (bins, T)."""
+    first, last = _stretches(timebase, there)
+    times_s, half_s = timebase.times_s, 0.5 * _SMOOTHING_S + _ROUNDING_S
+    start = np.maximum(np.searchsorted(times_s, times_s - half_s), first)
+    stop = np.minimum(np.searchsorted(times_s, times_s + half_s, side="right"), last + 1)
+    sums = np.zeros((values.shape[0], values.shape[1] + 1))
+    np.cumsum(values, axis=1, out=sums[:, 1:])
+    # Differences of sums may fall below 0 by rounding.
+    return np.maximum(sums[:, stop] - sums[:, start], 0.0) / (stop - start)
+
+
+def _loud(
+    energy_db: NDArray[np.float64], low_db: float, first: NDArray[np.int64]
+) -> list[tuple[int, int]]:
+    """Half-open runs of frames from the low threshold on, each within one stretch."""
+    found: list[tuple[int, int]] = []
+    with np.errstate(invalid="ignore"):
+        loud = energy_db >= low_db
+    for start, stop in runs(loud):
+        cuts = [at for at in range(start + 1, stop) if first[at] == at]
+        found += zip([start, *cuts], [*cuts, stop], strict=True)
+    return found
+
+
+def _with_margins(
+    spans: list[tuple[int, int]],
+    timebase: Timebase,
+    ends_s: NDArray[np.float64],
+    first: NDArray[np.int64],
+    last: NDArray[np.int64],
+    margin_s: float,
+) -> list[tuple[int, int]]:
+    """The same runs of frames, wider; two that would overlap meet in the middle."""
+    times_s = timebase.times_s
+    wider = []
+    for start, stop in spans:
+        from_s, to_s = times_s[start] - margin_s, ends_s[stop - 1] + margin_s
+        begin = int(np.searchsorted(times_s, from_s - _ROUNDING_S))
+        end = int(np.searchsorted(ends_s, to_s + _ROUNDING_S, side="right"))
+        wider.append((max(begin, int(first[start])), min(end, int(last[stop - 1]) + 1)))
+    for number in range(1, len(spans)):
+        (begin, end), (next_begin, next_end) = wider[number - 1], wider[number]
+        if next_begin < end:
+            stop, start = spans[number - 1][1], spans[number][0]
+            middle_s = 0.5 * (ends_s[stop - 1] + times_s[start])
+            cut = min(max(timebase.nearest_frame(float(middle_s)), stop), start)
+            wider[number - 1], wider[number] = (begin, cut), (cut, next_end)
+    return wider
