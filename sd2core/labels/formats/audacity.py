@@ -1,0 +1,73 @@
+"""Label files of Audacity: start, end and text, separated by tabs.
+
+Source: Audacity manual, "Importing and exporting labels". A line that begins with a backslash
+holds the frequencies of a spectral selection and belongs to the label above it.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from sd2core.atomic import atomic_write_text
+from sd2core.errors import Sd2Error
+from sd2core.labels.formats.losses import LabelFormat, Loss, losses_by_format
+from sd2core.labels.formats.rows import UNNAMED, Row, assemble
+from sd2core.labels.formats.texts import positional, read_text
+from sd2core.labels.spans import Labels
+from sd2core.timebase import Timebase
+
+FORMAT = LabelFormat(
+    name="audacity",
+    title="Audacity",
+    suffixes=(".txt",),
+    made_for="Audacity 2 and 3, labels of one label track",
+    keeps=frozenset(),
+    remark="Frequencies of spectral labels are read over.",
+)
+
+_EXPECTED = "an Audacity label file: start, end and text in each line, separated by tabs"
+
+
+def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = None) -> list[Loss]:
+    """Write all tracks as one label track; what it cannot hold is returned."""
+    lines = [
+        f"{positional(span.start_s, min_digits=6)}\t{positional(span.end_s, min_digits=6)}"
+        f"\t{span.label}\n"
+        for span in labels.spans
+    ]
+    atomic_write_text(path, "".join(lines))
+    return losses_by_format(labels, FORMAT)
+
+
+def read(path: Path, timebase: Timebase | None = None, observation: str | None = None) -> Labels:
+    """Read labels; a point label needs the timebase and becomes one frame.
+
+    Raises
+    ------
+    Sd2Error
+        Naming the line that is no label.
+    """
+    rows: list[Row] = []
+    for number, line in enumerate(read_text(path, _EXPECTED).split("\n"), start=1):
+        line = line.removesuffix("\r")
+        if not line.strip() or line.startswith("\\"):
+            continue
+        cells = line.split("\t", 2)
+        if len(cells) < 2:
+            raise Sd2Error(f"{path}, line {number} is {line[:100]!r}", _EXPECTED)
+        start_s, end_s = (_seconds(path, number, cell) for cell in cells[:2])
+        text = cells[2] if len(cells) > 2 else ""
+        rows.append(Row(f"line {number}", start_s, end_s, text or UNNAMED))
+    return assemble(path, rows, timebase=timebase)
+
+
+def _seconds(path: Path, line: int, text: str) -> float:
+    try:
+        # Some locales of older versions export decimal commas; tabs separate, so they are plain.
+        value = float(text.strip().replace(",", "."))
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise Sd2Error(f"{path}, line {line}: a time is {text[:50]!r}", _EXPECTED)
+    return value

@@ -1,0 +1,319 @@
+"""CSV: one row per span, in seconds and in frames.
+
+RFC 4180, in UTF-8 without a byte order mark, with these columns::
+
+    id,track,overlap,label,start_s,end_s,start_frame,end_frame,note,author,confidence,origin
+
+``start_frame`` is the frame shown at ``start_s``, counted from 0; ``end_frame`` is the first one
+after the span, so that ``range(start_frame, end_frame)`` are its frames, none where it lies
+outside the video. Seconds are exact, and are what counts when a file has both.
+
+Tables of other programs are read by the names of their columns, whatever separates them.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from sd2core.atomic import atomic_write_text
+from sd2core.errors import Sd2Error
+from sd2core.labels.formats.losses import (
+    ASPECTS,
+    DEFAULT_TRACK,
+    LabelFormat,
+    Loss,
+    hold_texts,
+    losses_by_format,
+)
+from sd2core.labels.formats.rows import UNNAMED, Row, assemble, clean_name
+from sd2core.labels.formats.texts import read_text, whole_number
+from sd2core.labels.spans import OVERLAPS, Labels, Overlap
+from sd2core.timebase import Timebase
+
+FORMAT = LabelFormat(
+    name="csv",
+    title="CSV",
+    suffixes=(".csv", ".tsv"),
+    made_for="spreadsheets, pandas, R",
+    keeps=frozenset(ASPECTS) - {"empty tracks", "label set", "colours and keys"},
+    remark="Seconds and frames; the end frame is the first one after the span.",
+)
+
+COLUMNS = (
+    "id", "track", "overlap", "label", "start_s", "end_s", "start_frame", "end_frame",
+    "note", "author", "confidence", "origin",
+)  # fmt: skip
+
+# What other programs call them, the surest name first: ELAN and Audacity, BORIS' aggregated
+# events, BIDS, MNE, pandas. Spaces, dots and brackets of a heading count as one underscore.
+_NAMES = {
+    "id": ("id",),
+    "track": ("track", "tier", "subject"),
+    "overlap": ("overlap",),
+    "label": ("label", "gesture", "behavior", "behaviour", "description", "annotation",
+              "trial_type", "class", "text"),
+    "start_s": ("start_s", "start_time_s", "start_time", "start", "onset_s", "onset", "begin_s",
+                "begin", "begin_time_ss_msec", "tmin"),
+    "end_s": ("end_s", "end_time_s", "end_time", "end", "stop_s", "stop", "offset_s", "offset",
+              "end_time_ss_msec", "tmax"),
+    "duration_s": ("duration_s", "duration", "duration_ss_msec"),
+    "start_frame": ("start_frame", "first_frame"),
+    "end_frame": ("end_frame",),
+    "last_frame": ("last_frame",),
+    "note": ("note", "notes", "comment", "comments", "comment_start"),
+    "author": ("author", "annotator", "coder"),
+    "confidence": ("confidence",),
+    "origin": ("origin",),
+    "observation": ("observation_id",),
+}  # fmt: skip
+
+_BANNED = re.compile("[\0\ud800-\udfff]")
+_NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
+_GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
+_EXPECTED = "a table with a heading that names label, start_s and end_s"
+
+
+def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = None) -> list[Loss]:
+    """Write a table; what it cannot hold is returned."""
+    held, replaced = hold_texts(labels, _BANNED, FORMAT.title)
+    text = io.StringIO(newline="")
+    # Texts in quotes keep the spaces around them, whoever reads them.
+    writer = csv.writer(text, quoting=csv.QUOTE_NONNUMERIC, lineterminator="\n")
+    text.write(",".join(COLUMNS) + "\n")
+    # Track by track, so that their order comes back.
+    by_track = ((track, span) for track in held.tracks for span in held.of_track(track.name))
+    for track, span in by_track:
+        first, end = timebase.frames_between(span.start_s, span.end_s)
+        shown = timebase.frame_at(span.start_s)
+        known = span.confidence
+        writer.writerow(
+            (
+                *(span.id, span.track, track.overlap, span.label),
+                *(float(span.start_s), float(span.end_s), shown, end if end > first else shown),
+                *(span.note, span.author, "" if known is None else float(known), span.origin),
+            )
+        )
+    atomic_write_text(path, text.getvalue())
+    return losses_by_format(labels, FORMAT) + replaced
+
+
+def read(path: Path, timebase: Timebase | None = None, observation: str | None = None) -> Labels:
+    """Read a table, of this program or another.
+
+    Separators may be commas, semicolons, tabs or bars; decimal points may be commas where these
+    do not separate. A table that has frames only needs the timebase.
+
+    Raises
+    ------
+    Sd2Error
+        When columns are missing or it is not certain what a number means.
+    """
+    text = read_text(path, _EXPECTED)
+    heading, lines = _table(path, text)
+    where = _columns(path, heading)
+    if "observation" in where:
+        lines = _of_observation(path, lines, where["observation"], observation)
+    numbers = _Numbers(path, lines, where)
+    found: list[Row] = []
+    overlaps: dict[str, Overlap | None] = {}
+    for line, cells in lines:
+        cell = {name: cells[index] for name, index in where.items()}
+        start_s, end_s = _edges(path, line, numbers, cell, timebase)
+        track = cell.get("track") or DEFAULT_TRACK
+        stated = next((one for one in OVERLAPS if one == cell.get("overlap")), None)
+        overlaps[clean_name(track)] = stated
+        found.append(
+            Row(
+                f"line {line}",
+                start_s,
+                end_s,
+                cell["label"] or UNNAMED,
+                track,
+                cell.get("note", ""),
+                cell.get("author", ""),
+                numbers.of(line, "confidence", cell["confidence"])
+                if cell.get("confidence")
+                else None,
+                cell.get("origin", ""),
+                whole_number(cell.get("id", "")),
+            )
+        )
+    return assemble(path, found, tracks=overlaps.items(), timebase=timebase)
+
+
+def _table(path: Path, text: str) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """Heading and rows, each with the number of its first line."""
+    first = next(line for line in text.splitlines() if line.strip())
+    fitting = [mark for mark in ",;\t|" if _spoken_for(next(csv.reader([first], delimiter=mark)))]
+    if not fitting:
+        raise Sd2Error(
+            f"The first line of {path} is {first[:100]!r}",
+            _EXPECTED,
+            _remedy(first),
+        )
+    if len(fitting) > 1:
+        raise Sd2Error(
+            f"The first line of {path} is {first[:100]!r}, a heading with {fitting[0]!r} and with "
+            f"{fitting[1]!r} between the columns",
+            "one kind of separator",
+            "Save the table with commas",
+        )
+    csv.field_size_limit(max(csv.field_size_limit(), len(text)))
+    reader = csv.reader(
+        io.StringIO(text, newline=""), delimiter=fitting[0], skipinitialspace=True, strict=True
+    )
+    rows: list[tuple[int, list[str]]] = []
+    start = 1
+    try:
+        for cells in reader:
+            if any(cell.strip() for cell in cells):
+                rows.append((start, cells))
+            start = reader.line_num + 1
+    except csv.Error as error:
+        raise Sd2Error(
+            f"{path}, line {start}: {error}", "rows whose quotation marks are closed", "Mend it"
+        ) from None
+    heading = rows[0][1]
+    for line, cells in rows[1:]:
+        if len(cells) != len(heading):
+            hint = (
+                "Decimal commas in a table separated by commas? Save it with semicolons"
+                if len(cells) > len(heading) and fitting[0] == ","
+                else "Mend that line, or export the table again"
+            )
+            raise Sd2Error(
+                f"{path}, line {line} has {len(cells)} columns, its heading {len(heading)}",
+                "as many as the heading",
+                hint,
+            )
+    return heading, rows[1:]
+
+
+def _spoken_for(heading: Sequence[str]) -> bool:
+    names = {_plain(one) for one in heading}
+
+    def has(column: str) -> bool:
+        return any(name in names for name in _NAMES[column])
+
+    seconds = has("start_s") and (has("end_s") or has("duration_s"))
+    frames = has("start_frame") and (has("end_frame") or has("last_frame"))
+    return has("label") and (seconds or frames)
+
+
+def _remedy(first: str) -> str:
+    if "behavior type" in first.casefold():
+        return "In BORIS, export aggregated events: they have a start and a stop in one row"
+    return f"Give it a heading such as {','.join(COLUMNS[3:6])}"
+
+
+def _plain(heading: str) -> str:
+    return re.sub(r"[^\w]+", "_", heading.strip().casefold()).strip("_")
+
+
+def _columns(path: Path, heading: Sequence[str]) -> dict[str, int]:
+    plain = [_plain(one) for one in heading]
+    twice = sorted({name for name in plain if name and plain.count(name) > 1})
+    if any(name in names for name in twice for names in _NAMES.values()):
+        raise Sd2Error(f"{path} has two columns {twice[0]!r}", "columns of different names")
+    found: dict[str, int] = {}
+    for column, names in _NAMES.items():
+        index = next((plain.index(name) for name in names if name in plain), None)
+        if index is not None:
+            found[column] = index
+    return found
+
+
+def _of_observation(
+    path: Path, lines: list[tuple[int, list[str]]], column: int, wanted: str | None
+) -> list[tuple[int, list[str]]]:
+    names = sorted({cells[column] for _, cells in lines})
+    if wanted is None and len(names) <= 1:
+        return lines
+    if wanted not in names:
+        raise Sd2Error(
+            f"{path} holds the observations {', '.join(map(repr, names))}",
+            "one observation" if wanted is None else f"the observation {wanted!r}",
+            "Name the one to read",
+        )
+    return [(line, cells) for line, cells in lines if cells[column] == wanted]
+
+
+class _Numbers:
+    """Numbers of one table, which agree on what a comma means."""
+
+    def __init__(
+        self, path: Path, lines: Sequence[tuple[int, list[str]]], where: dict[str, int]
+    ) -> None:
+        self._path = path
+        columns = [where[one] for one in ("start_s", "end_s", "duration_s") if one in where]
+        texts = [cells[column].strip() for _, cells in lines for column in columns]
+        commas = [text for text in texts if "," in text]
+        points = [text for text in texts if "." in text]
+        if commas and points:
+            raise Sd2Error(
+                f"{path} writes {commas[0]!r} as well as {points[0]!r}",
+                "one kind of decimal point",
+                "Save it again with decimal points",
+            )
+        if commas and all(_GROUPED.fullmatch(text) for text in commas):
+            raise Sd2Error(
+                f"{path} writes {commas[0]!r}: thousands or a decimal comma?",
+                "numbers that can be read in one way only",
+                "Save it again with decimal points",
+            )
+
+    def of(self, line: int, column: str, text: str) -> float:
+        """The number in a cell."""
+        value = math.nan
+        if _NUMBER.fullmatch(text.strip()):
+            value = float(text.strip().replace(",", "."))
+        if not math.isfinite(value):
+            raise Sd2Error(
+                f"{self._path}, line {line}: {column} is {text[:50]!r}", "a finite number"
+            )
+        return value
+
+
+def _edges(
+    path: Path, line: int, numbers: _Numbers, cell: dict[str, str], timebase: Timebase | None
+) -> tuple[float, float]:
+    if "start_s" in cell and "end_s" in cell:
+        return (
+            numbers.of(line, "start_s", cell["start_s"]),
+            numbers.of(line, "end_s", cell["end_s"]),
+        )
+    if "start_s" in cell and "duration_s" in cell:
+        start_s = numbers.of(line, "start_s", cell["start_s"])
+        return start_s, start_s + numbers.of(line, "duration_s", cell["duration_s"])
+    if timebase is None:
+        raise Sd2Error(
+            f"{path} gives frames and no seconds",
+            "columns start_s and end_s",
+            "Read the table together with its recording, which knows the times of frames",
+        )
+    first = _frame(path, line, "start_frame", cell["start_frame"])
+    end = (
+        _frame(path, line, "end_frame", cell["end_frame"])
+        if "end_frame" in cell
+        else _frame(path, line, "last_frame", cell["last_frame"]) + 1
+    )
+    if not first < end <= len(timebase):
+        raise Sd2Error(
+            f"{path}, line {line}: a span from frame {first} up to frame {end}, exclusive",
+            f"frames of the {len(timebase)} of the recording, counted from 0",
+            "Check that the table is of this recording",
+        )
+    end_s = timebase.end_s if end == len(timebase) else timebase.time_of(end)
+    return timebase.time_of(first), end_s
+
+
+def _frame(path: Path, line: int, column: str, text: str) -> int:
+    number = whole_number(text.strip())
+    if number is None:
+        raise Sd2Error(f"{path}, line {line}: {column} is {text[:50]!r}", "a whole number from 0")
+    return number

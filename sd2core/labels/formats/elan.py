@@ -1,0 +1,342 @@
+"""ELAN annotation files (.eaf), format 3.0.
+
+Source: "ELAN Annotation Format 3.0 and ELAN", The Language Archive, MPI for Psycholinguistics.
+Each row of spans is a tier of alignable annotations with the labels as controlled vocabulary.
+Notes, authors, confidence and origin are dependent tiers (symbolic association) below it. Times
+are whole milliseconds. Colours and keys, which ELAN itself keeps elsewhere, are a property of the
+document that ELAN leaves alone.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterator
+from datetime import datetime
+from pathlib import Path
+from urllib.parse import quote
+from xml.etree import ElementTree
+
+from sd2core.atomic import atomic_write
+from sd2core.errors import Sd2Error
+from sd2core.labels.formats.elan_reading import (
+    DETAILS,
+    LABELS,
+    PROPERTY,
+    VOCABULARY_LANGUAGE,
+    vocabulary_id,
+)
+from sd2core.labels.formats.lanes import Lane, lanes_of
+from sd2core.labels.formats.losses import (
+    ASPECTS,
+    LabelFormat,
+    Loss,
+    hold_texts,
+    losses_by_format,
+)
+from sd2core.labels.label_set import LabelSet
+from sd2core.labels.spans import Labels, Span
+from sd2core.relative_paths import plain_path, stored_path
+from sd2core.timebase import Timebase
+
+FORMAT = LabelFormat(
+    name="elan",
+    title="ELAN",
+    suffixes=(".eaf",),
+    made_for="ELAN 6 and 7, EAF 3.0",
+    keeps=frozenset(ASPECTS),
+    resolution_s=0.001,
+    remark="Whole milliseconds from 0 on.",
+)
+
+LAST_MS = 2**32 - 1
+"""The schema's times are unsigned 32-bit integers."""
+
+# What XML 1.0 has no characters for.
+_BANNED = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_SCHEMA = "http://www.mpi.nl/tools/elan/EAFv3.0.xsd"
+_XSI = "http://www.w3.org/2001/XMLSchema-instance"
+_CONSTRAINTS = {
+    "Time_Subdivision": "Time subdivision of parent annotation's time interval, no time gaps "
+    "allowed within this interval",
+    "Symbolic_Subdivision": "Symbolic subdivision of a parent annotation. Annotations refering to "
+    "the same parent are ordered",
+    "Symbolic_Association": "1-1 association with a parent annotation",
+    "Included_In": "Time alignable annotations within the parent annotation's time interval, gaps "
+    "are allowed",
+}
+_MIME = {".mp4": "video/mp4", ".mkv": "video/x-matroska", ".mov": "video/quicktime",
+         ".avi": "video/x-msvideo", ".webm": "video/webm", ".wav": "audio/x-wav"}  # fmt: skip
+
+
+def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = None) -> list[Loss]:
+    """Write an annotation document; what it cannot hold is returned.
+
+    Parameters
+    ----------
+    media : Path, optional
+        The video, linked in full and relative to the file.
+
+    Raises
+    ------
+    Sd2Error
+        When a span ends after 2**32 - 1 ms, about 49 days.
+    """
+    held, replaced = hold_texts(labels, _BANNED, FORMAT.title)
+    held, moved = _in_range(path, held)
+    document = ElementTree.Element(
+        "ANNOTATION_DOCUMENT",
+        {
+            "AUTHOR": _common(span.author for span in held.spans),
+            "DATE": datetime.now().astimezone().isoformat(timespec="seconds"),
+            "FORMAT": "3.0",
+            "VERSION": "3.0",
+            "xmlns:xsi": _XSI,
+            "xsi:noNamespaceSchemaLocation": _SCHEMA,
+        },
+    )
+    lanes = lanes_of(held, edges_ms)
+    details = [
+        (kind, text)
+        for kind, text in _DETAIL_TEXTS.items()
+        if any(text(span) for span in held.spans)
+    ]
+    last = max((span.id for span in held.spans), default=0)
+    _header(document, path, media, held.label_set, last + len(details) * len(held.spans))
+    slots = _time_order(document, lanes)
+    _tiers(document, lanes, slots, details, last)
+    _types(document, held.label_set)
+    ElementTree.indent(document)
+    text = ElementTree.tostring(document, encoding="unicode")
+    # A bare carriage return would be read as a new line.
+    content = '<?xml version="1.0" encoding="UTF-8"?>\n' + text.replace("\r", "&#13;") + "\n"
+    with atomic_write(path) as stream:
+        stream.write(content.encode("utf-8"))
+    return losses_by_format(labels, FORMAT) + replaced + moved
+
+
+def edges_ms(span: Span) -> tuple[int, int]:
+    """Start and end in whole milliseconds, at least one apart."""
+    start_ms = round(span.start_s * 1000)
+    return start_ms, max(round(span.end_s * 1000), start_ms + 1)
+
+
+def _in_range(path: Path, labels: Labels) -> tuple[Labels, list[Loss]]:
+    """Spans that ELAN has times for, and what happened to their edges."""
+    late = max((span.end_s for span in labels.spans), default=0.0)
+    if late * 1000 > LAST_MS - 1:
+        raise Sd2Error(
+            f"A span of the labels for {path} ends at {late:g} s",
+            f"times up to {LAST_MS / 1000:,.0f} s, the last that ELAN has",
+            "Write another format",
+        )
+    losses: list[Loss] = []
+    kept = tuple(span for span in labels.spans if edges_ms(span)[1] > 0 and span.end_s > 0)
+    gone = len(labels.spans) - len(kept)
+    if gone:
+        words = f"ELAN has no times before 0: {gone} earlier span{'s' * (gone > 1)} left out"
+        losses.append(Loss("spans", gone, words))
+    spans = tuple(
+        span
+        if span.start_s >= 0
+        else Span(
+            *(span.id, span.track, 0.0, span.end_s, span.label),
+            *(span.note, span.author, span.confidence, span.origin),
+        )
+        for span in kept
+    )
+    cut = sum(a != b for a, b in zip(spans, kept, strict=True))
+    if cut:
+        words = f"ELAN has no times before 0: {cut} span{'s' * (cut > 1)} cut there"
+        losses.append(Loss("times", cut, words))
+    off_ms = [
+        max(abs(ms - s * 1000) for ms, s in zip(edges_ms(span), _seconds(span), strict=True))
+        for span in spans
+    ]
+    moved = [off for off in off_ms if off > 1e-6]
+    if moved:
+        words = f"ELAN counts whole milliseconds: edges of {len(moved)} "
+        words += f"span{'s' * (len(moved) > 1)} moved by up to {max(moved):.2g} ms"
+        losses.append(Loss("times", len(moved), words))
+    return Labels(labels.tracks, spans, labels.label_set), losses
+
+
+def _seconds(span: Span) -> tuple[float, float]:
+    return span.start_s, span.end_s
+
+
+def _header(
+    document: ElementTree.Element,
+    path: Path,
+    media: Path | None,
+    label_set: LabelSet,
+    last_id: int,
+) -> None:
+    header = ElementTree.SubElement(
+        document, "HEADER", {"MEDIA_FILE": "", "TIME_UNITS": "milliseconds"}
+    )
+    if media is not None:
+        here = plain_path(path).parent
+        relative = stored_path(plain_path(media), here)
+        if not relative.startswith((".", "/")):
+            relative = f"./{relative}"
+        ElementTree.SubElement(
+            header,
+            "MEDIA_DESCRIPTOR",
+            {
+                "MEDIA_URL": plain_path(media).as_uri(),
+                "MIME_TYPE": _MIME.get(media.suffix.lower(), "unknown"),
+                "RELATIVE_MEDIA_URL": quote(relative),
+            },
+        )
+    used = ElementTree.SubElement(header, "PROPERTY", {"NAME": "lastUsedAnnotationId"})
+    used.text = str(last_id)
+    shown = ElementTree.SubElement(header, "PROPERTY", {"NAME": PROPERTY})
+    shown.text = json.dumps(
+        {
+            "label_set": label_set.name,
+            "labels": [[one.name, one.colour, one.key] for one in label_set.labels],
+        }
+    )
+
+
+def _time_order(document: ElementTree.Element, lanes: list[Lane]) -> dict[int, tuple[str, str]]:
+    """Two slots of its own for every span, in the order of time; their names by id."""
+    order = ElementTree.SubElement(document, "TIME_ORDER")
+    edges = sorted(
+        (edge_ms, side, span.id)
+        for lane in lanes
+        for span in lane.spans
+        for side, edge_ms in enumerate(edges_ms(span))
+    )
+    names: dict[tuple[int, int], str] = {}
+    for number, (edge_ms, side, span_id) in enumerate(edges, start=1):
+        names[span_id, side] = f"ts{number}"
+        ElementTree.SubElement(
+            order, "TIME_SLOT", {"TIME_SLOT_ID": f"ts{number}", "TIME_VALUE": str(edge_ms)}
+        )
+    return {
+        span.id: (names[span.id, 0], names[span.id, 1]) for lane in lanes for span in lane.spans
+    }
+
+
+def _tiers(
+    document: ElementTree.Element,
+    lanes: list[Lane],
+    slots: dict[int, tuple[str, str]],
+    details: list[tuple[str, Callable[[Span], str]]],
+    last_id: int,
+) -> None:
+    numbers = _numbers(last_id + 1)
+    taken = {lane.name for lane in lanes}
+    for lane in lanes:
+        attributes = {"LINGUISTIC_TYPE_REF": LABELS, "TIER_ID": lane.name}
+        author = _common(span.author for span in lane.spans)
+        if author:
+            attributes["ANNOTATOR"] = author
+        tier = ElementTree.SubElement(document, "TIER", attributes)
+        for span in lane.spans:
+            first, second = slots[span.id]
+            _annotation(
+                tier,
+                "ALIGNABLE_ANNOTATION",
+                span.label,
+                ANNOTATION_ID=f"a{span.id}",
+                TIME_SLOT_REF1=first,
+                TIME_SLOT_REF2=second,
+            )
+        for kind, text_of in details:
+            name = f"{lane.name} - {kind}"
+            while name in taken:
+                name += "'"
+            taken.add(name)
+            below = ElementTree.SubElement(
+                document,
+                "TIER",
+                {"LINGUISTIC_TYPE_REF": DETAILS[kind], "PARENT_REF": lane.name, "TIER_ID": name},
+            )
+            for span in lane.spans:
+                if text_of(span):
+                    _annotation(
+                        below,
+                        "REF_ANNOTATION",
+                        text_of(span),
+                        ANNOTATION_ID=f"a{next(numbers)}",
+                        ANNOTATION_REF=f"a{span.id}",
+                    )
+
+
+def _annotation(tier: ElementTree.Element, kind: str, value: str, **attributes: str) -> None:
+    outer = ElementTree.SubElement(tier, "ANNOTATION")
+    inner = ElementTree.SubElement(outer, kind, attributes)
+    ElementTree.SubElement(inner, "ANNOTATION_VALUE").text = value
+
+
+def _types(document: ElementTree.Element, label_set: LabelSet) -> None:
+    """Types of tiers, and the labels as vocabulary, in the order of the schema."""
+    ElementTree.SubElement(
+        document,
+        "LINGUISTIC_TYPE",
+        {
+            "CONTROLLED_VOCABULARY_REF": vocabulary_id(label_set.name),
+            "GRAPHIC_REFERENCES": "false",
+            "LINGUISTIC_TYPE_ID": LABELS,
+            "TIME_ALIGNABLE": "true",
+        },
+    )
+    for name in DETAILS.values():
+        ElementTree.SubElement(
+            document,
+            "LINGUISTIC_TYPE",
+            {
+                "CONSTRAINTS": "Symbolic_Association",
+                "GRAPHIC_REFERENCES": "false",
+                "LINGUISTIC_TYPE_ID": name,
+                "TIME_ALIGNABLE": "false",
+            },
+        )
+    language = VOCABULARY_LANGUAGE
+    ElementTree.SubElement(
+        document,
+        "LANGUAGE",
+        {
+            "LANG_DEF": "http://cdb.iso.org/lg/CDB-00130975-001",
+            "LANG_ID": language,
+            "LANG_LABEL": f"undetermined ({language})",
+        },
+    )
+    for stereotype, description in _CONSTRAINTS.items():
+        ElementTree.SubElement(
+            document, "CONSTRAINT", {"DESCRIPTION": description, "STEREOTYPE": stereotype}
+        )
+    vocabulary = ElementTree.SubElement(
+        document, "CONTROLLED_VOCABULARY", {"CV_ID": vocabulary_id(label_set.name)}
+    )
+    ElementTree.SubElement(vocabulary, "DESCRIPTION", {"LANG_REF": language})
+    for number, label in enumerate(label_set.labels):
+        entry = ElementTree.SubElement(vocabulary, "CV_ENTRY_ML", {"CVE_ID": f"cve{number}"})
+        meaning = _BANNED.sub("\N{REPLACEMENT CHARACTER}", label.gesture_class)
+        value = ElementTree.SubElement(
+            entry, "CVE_VALUE", {"DESCRIPTION": meaning, "LANG_REF": language}
+        )
+        value.text = label.name
+
+
+def _common(texts: Iterator[str]) -> str:
+    """The one text that all of them are, or nothing."""
+    different = set(texts)
+    return different.pop() if len(different) == 1 else ""
+
+
+def _numbers(first: int) -> Iterator[int]:
+    while True:
+        yield first
+        first += 1
+
+
+_DETAIL_TEXTS: dict[str, Callable[[Span], str]] = {
+    "note": lambda span: span.note,
+    "author": lambda span: span.author,
+    "confidence": lambda span: "" if span.confidence is None else repr(float(span.confidence)),
+    "origin": lambda span: "" if span.origin == "import" else span.origin,
+}

@@ -1,0 +1,243 @@
+"""ELAN annotation files into labels, those of this program and others."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import Element, ParseError
+
+from defusedxml import DefusedXmlException
+from defusedxml.ElementTree import fromstring
+
+from sd2core.errors import Sd2Error
+from sd2core.labels.formats.lanes import track_of
+from sd2core.labels.formats.rows import Row, assemble, clean_name
+from sd2core.labels.formats.texts import read_content, whole_number
+from sd2core.labels.label_set import GESTURES, Label, LabelSet
+from sd2core.labels.spans import Labels
+from sd2core.timebase import Timebase
+
+LABELS = "sd2-labels"
+DETAILS = {
+    "note": "sd2-note",
+    "author": "sd2-author",
+    "confidence": "sd2-confidence",
+    "origin": "sd2-origin",
+}
+PROPERTY = "sd2-label-set"
+VOCABULARY_LANGUAGE = "und"
+
+
+def vocabulary_id(name: str) -> str:
+    """What a label set is called as a vocabulary: one line, and not nothing."""
+    return clean_name(name)
+
+
+# For labels of a vocabulary without colours: Okabe and Ito's, as in the default set.
+_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#f0e442")
+
+_EXPECTED = "an ELAN file (.eaf)"
+
+
+def read(path: Path, timebase: Timebase | None = None, observation: str | None = None) -> Labels:
+    """Read the tiers of a document; what depends on an annotation becomes its note.
+
+    Raises
+    ------
+    Sd2Error
+        When the file is no such document, has no times, or holds a document type: entities in
+        one can make a small file huge or name other files, and ELAN writes none.
+    """
+    document = _document(path)
+    slots = _slots(path, document)
+    shift_s = _time_origin_s(document)
+    below = _dependents(document)
+    rows: list[Row] = []
+    tracks: list[str] = []
+    for tier in document.iter("TIER"):
+        if tier.find("ANNOTATION/REF_ANNOTATION") is not None or (
+            tier.get("LINGUISTIC_TYPE_REF") in DETAILS.values()
+        ):
+            continue
+        name = tier.get("TIER_ID", "")
+        tracks.append(name)
+        rows.extend(
+            _row(path, tier, annotation, slots, shift_s, below)
+            for annotation in tier.iter("ALIGNABLE_ANNOTATION")
+        )
+    return assemble(
+        path,
+        rows,
+        tracks=[track_of(name) for name in tracks],
+        label_set=_label_set(document),
+        timebase=timebase,
+    )
+
+
+def _document(path: Path) -> Element:
+    content = read_content(path, _EXPECTED)
+    try:
+        document = fromstring(content, forbid_dtd=True)
+    except DefusedXmlException:
+        raise Sd2Error(
+            f"{path} declares a document type or entities",
+            f"{_EXPECTED} without them, as ELAN writes it",
+            "Open it in ELAN, if you trust it, and save it again",
+        ) from None
+    except (ParseError, ValueError, LookupError) as error:
+        raise Sd2Error(
+            f"{path} is not whole XML: {error}",
+            _EXPECTED,
+            "Copy the file again, or save it again in ELAN",
+        ) from None
+    if document.tag != "ANNOTATION_DOCUMENT":
+        raise Sd2Error(
+            f"{path} is XML whose root is {document.tag[:100]!r}",
+            f"{_EXPECTED}, with the root ANNOTATION_DOCUMENT",
+            "Save it as .eaf in ELAN",
+        )
+    units = document.find("HEADER")
+    stated = "milliseconds" if units is None else units.get("TIME_UNITS", "milliseconds")
+    if stated != "milliseconds":
+        raise Sd2Error(f"{path} has times in {stated}", "milliseconds", "Save it again in ELAN")
+    return document
+
+
+def _slots(path: Path, document: Element) -> dict[str, int]:
+    found: dict[str, int] = {}
+    for slot in document.iter("TIME_SLOT"):
+        text = slot.get("TIME_VALUE")
+        if text is None:
+            continue
+        value = whole_number(text)
+        if value is None:
+            name = slot.get("TIME_SLOT_ID")
+            raise Sd2Error(
+                f"{path}: the time slot {name} is at {text[:50]!r}", "whole milliseconds from 0 on"
+            )
+        found[slot.get("TIME_SLOT_ID", "")] = value
+    return found
+
+
+def _time_origin_s(document: Element) -> float:
+    """Where in the linked video ELAN's zero lies."""
+    media = document.find("HEADER/MEDIA_DESCRIPTOR")
+    text = "" if media is None else media.get("TIME_ORIGIN", "")
+    return int(text) / 1000 if re.fullmatch(r"-?\d{1,18}", text) else 0.0
+
+
+def _dependents(document: Element) -> dict[str, list[tuple[str, str, str]]]:
+    """Type, tier and text of what refers to each annotation, by the annotation's id."""
+    found: dict[str, list[tuple[str, str, str]]] = {}
+    for tier in document.iter("TIER"):
+        kind, name = tier.get("LINGUISTIC_TYPE_REF", ""), tier.get("TIER_ID", "")
+        for annotation in tier.iter("REF_ANNOTATION"):
+            text = annotation.findtext("ANNOTATION_VALUE") or ""
+            if text:
+                about = annotation.get("ANNOTATION_REF", "")
+                found.setdefault(about, []).append((kind, name, text))
+    return found
+
+
+def _row(
+    path: Path,
+    tier: Element,
+    annotation: Element,
+    slots: dict[str, int],
+    shift_s: float,
+    below: dict[str, list[tuple[str, str, str]]],
+) -> Row:
+    name = annotation.get("ANNOTATION_ID", "")
+    place = f"annotation {name}"
+    edges = [annotation.get(f"TIME_SLOT_REF{side}", "") for side in (1, 2)]
+    missing = [edge for edge in edges if edge not in slots]
+    if missing:
+        raise Sd2Error(
+            f"{path}, {place}: the time slot {missing[0]!r} has no time",
+            "annotations with a start and an end",
+            "Align it in ELAN, or delete its tier",
+        )
+    texts = dict.fromkeys(DETAILS, "")
+    for kind, dependent, text in below.get(name, []):
+        detail = next((one for one, type_name in DETAILS.items() if type_name == kind), None)
+        if detail is not None:
+            texts[detail] = text
+        else:
+            texts["note"] += f"{dependent}: {text}\n"
+    ours = tier.get("LINGUISTIC_TYPE_REF") == LABELS
+    return Row(
+        place,
+        slots[edges[0]] / 1000 + shift_s,
+        slots[edges[1]] / 1000 + shift_s,
+        annotation.findtext("ANNOTATION_VALUE") or "",
+        track_of(tier.get("TIER_ID", ""))[0],
+        texts["note"] if ours else texts["note"].rstrip("\n"),
+        texts["author"] or ("" if ours else tier.get("ANNOTATOR", "")),
+        _confidence(path, place, texts["confidence"]),
+        texts["origin"] or "import",
+        whole_number(name[1:]) if name.startswith("a") else None,
+    )
+
+
+def _confidence(path: Path, place: str, text: str) -> float | None:
+    if not text.strip():
+        return None
+    try:
+        return float(text)
+    except ValueError:
+        raise Sd2Error(
+            f"{path}, {place}: the confidence is {text[:50]!r}", "a number from 0 to 1"
+        ) from None
+
+
+def _label_set(document: Element) -> LabelSet:
+    """The vocabulary of the labels; the default set where there is none."""
+    used = {
+        kind.get("LINGUISTIC_TYPE_ID"): kind.get("CONTROLLED_VOCABULARY_REF")
+        for kind in document.iter("LINGUISTIC_TYPE")
+    }
+    names = [used.get(tier.get("LINGUISTIC_TYPE_REF")) for tier in document.iter("TIER")]
+    wanted = used.get(LABELS) or next((name for name in names if name), None)
+    vocabulary = next(
+        (one for one in document.iter("CONTROLLED_VOCABULARY") if one.get("CV_ID") == wanted), None
+    )
+    if wanted is None or vocabulary is None:
+        return GESTURES
+    set_name, shown = _kept_label_set(document)
+    labels: dict[str, Label] = {}
+    keys: set[str] = set()
+    for value in _entries(vocabulary):
+        name = clean_name(value.text or "")
+        if name in labels:
+            continue
+        default = (_COLOURS[len(labels) % len(_COLOURS)], "")
+        colour, key = shown.get(name, default)
+        key = "" if key.casefold() in keys else key
+        keys.add(key.casefold())
+        try:
+            labels[name] = Label(name, colour, key, value.get("DESCRIPTION", ""))
+        except Sd2Error:  # somebody edited the property
+            labels[name] = Label(name, default[0], "", value.get("DESCRIPTION", ""))
+    exact = set_name is not None and vocabulary_id(set_name) == wanted
+    return LabelSet(set_name if exact and set_name else wanted, tuple(labels.values()))
+
+
+def _entries(vocabulary: Element) -> list[Element]:
+    """One value of each entry: the first language of EAF 2.8 and later, or EAF 2.7's only one."""
+    values = [entry.find("CVE_VALUE") for entry in vocabulary.iter("CV_ENTRY_ML")]
+    return [one for one in values if one is not None] + list(vocabulary.iter("CV_ENTRY"))
+
+
+def _kept_label_set(document: Element) -> tuple[str | None, dict[str, tuple[str, str]]]:
+    """Name of the set, and colour and key of each label, where this program wrote the file."""
+    text = next(
+        (one.text for one in document.iter("PROPERTY") if one.get("NAME") == PROPERTY), None
+    )
+    try:
+        known: Any = json.loads(text or "{}")
+        shown = {str(name): (str(colour), str(key)) for name, colour, key in known["labels"]}
+        return str(known["label_set"]), shown
+    except (ValueError, KeyError, TypeError, RecursionError):
+        return None, {}

@@ -1,0 +1,151 @@
+"""What a format can hold, and what of given labels is left out for that reason."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from sd2core.labels.label_set import GESTURES
+from sd2core.labels.spans import Labels, Span, Track
+
+Aspect = Literal[
+    "tracks", "overlap", "empty tracks", "ids", "notes", "authors", "confidence", "origin",
+    "label set", "colours and keys",
+]  # fmt: skip
+
+ASPECTS: tuple[Aspect, ...] = (
+    "tracks", "overlap", "empty tracks", "ids", "notes", "authors", "confidence", "origin",
+    "label set", "colours and keys",
+)  # fmt: skip
+"""All that a file may hold besides start, end and label of each span."""
+
+DEFAULT_TRACK = "Gestures"
+"""The track of spans from a file that has no tracks."""
+
+
+@dataclass(frozen=True)
+class LabelFormat:
+    """A kind of label file, as data.
+
+    Parameters
+    ----------
+    name : str
+        What it is called in code and on the command line.
+    title : str
+        What it is called to people.
+    suffixes : tuple of str
+        Lower case, with the dot; the first is the usual one.
+    made_for : str
+        Programs that open it, with the version of the format.
+    keeps : frozenset of Aspect
+        What it holds besides start, end and label of each span.
+    resolution_s : float
+        Step between times that it tells apart; 0 where they are kept exactly.
+    remark : str
+        What one has to know besides, as a sentence; may be empty.
+    """
+
+    name: str
+    title: str
+    suffixes: tuple[str, ...]
+    made_for: str
+    keeps: frozenset[Aspect]
+    resolution_s: float = 0.0
+    remark: str = ""
+
+
+@dataclass(frozen=True)
+class Loss:
+    """Something of the labels that is not in the file as it was.
+
+    Parameters
+    ----------
+    what : str
+        An :data:`Aspect`, or ``"times"``, ``"characters"`` or ``"spans"``.
+    count : int
+        How many spans, tracks or sets it concerns.
+    sentence : str
+        The same for people.
+    """
+
+    what: str
+    count: int
+    sentence: str
+
+    def __str__(self) -> str:
+        return self.sentence
+
+
+def losses_by_format(labels: Labels, file_format: LabelFormat) -> list[Loss]:
+    """What of these labels a file of that format has no room for."""
+    title = file_format.title
+    found: list[Loss] = []
+
+    def leave_out(what: Aspect, count: int, sentence: str) -> None:
+        if count and what not in file_format.keeps:
+            found.append(Loss(what, count, sentence))
+
+    def spans_with(has: Callable[[Span], bool]) -> int:
+        return sum(has(span) for span in labels.spans)
+
+    names = {track.name for track in labels.tracks}
+    if names != {DEFAULT_TRACK}:
+        leave_out(
+            "tracks", len(names), f"{title} keeps no tracks: {_of(len(names), 'track')} become one"
+        )
+    if "tracks" in file_format.keeps and labels.tracks != (Track(DEFAULT_TRACK),):
+        empty = sum(not labels.of_track(track.name) for track in labels.tracks)
+        words = f"{title} keeps no tracks without spans: {_of(empty, 'track')} left out"
+        leave_out("empty tracks", empty, words)
+    apart = sum(track.overlap == "free" for track in labels.tracks)
+    words = f"{title} does not say whether spans may overlap: {_of(apart, 'free track')}"
+    leave_out("overlap", apart, f"{words} may come back as exclusive")
+    count = sum(span.id != number for number, span in enumerate(labels.spans, start=1))
+    leave_out("ids", count, f"{title} keeps no numbers of spans: {_of(count, 'span')} renumbered")
+    count = spans_with(lambda span: bool(span.note))
+    leave_out("notes", count, f"{title} keeps no notes: {_of(count, 'note')} left out")
+    count = spans_with(lambda span: bool(span.author))
+    leave_out("authors", count, f"{title} keeps no authors: those of {_of(count, 'span')} left out")
+    count = spans_with(lambda span: span.confidence is not None)
+    words = f"{title} keeps no confidence: that of {_of(count, 'span')} left out"
+    leave_out("confidence", count, words)
+    count = spans_with(lambda span: span.origin != "import")
+    words = f"{title} does not say who made a span: {_of(count, 'span')} will count as imported"
+    leave_out("origin", count, words)
+    if labels.label_set != GESTURES:
+        name = labels.label_set.name
+        if "label set" not in file_format.keeps:
+            leave_out("label set", 1, f"{title} keeps no label set: {name!r} left out")
+        else:
+            words = f"{title} keeps no colours and keys: those of the set {name!r} left out"
+            leave_out("colours and keys", len(labels.label_set.labels), words)
+    return found
+
+
+def hold_texts(labels: Labels, banned: re.Pattern[str], title: str) -> tuple[Labels, list[Loss]]:
+    """Notes and authors without characters that a format cannot hold; names have none."""
+
+    def held(text: str) -> str:
+        return banned.sub("\N{REPLACEMENT CHARACTER}", text)
+
+    spans = tuple(
+        replace(span, note=held(span.note), author=held(span.author)) for span in labels.spans
+    )
+    count = sum(a != b for a, b in zip(spans, labels.spans, strict=True))
+    if not count:
+        return labels, []
+    words = f"{title} cannot hold control characters: replaced in {_of(count, 'note or author')}"
+    return replace(labels, spans=spans), [Loss("characters", count, words)]
+
+
+def sentences(losses: Iterable[Loss]) -> str:
+    """One after the other, each with its full stop."""
+    return " ".join(f"{loss.sentence}." for loss in losses)
+
+
+def _of(count: int, what: str) -> str:
+    if count == 1:
+        return f"1 {what}"
+    return f"{count} " + " or ".join(f"{word}s" for word in what.split(" or "))

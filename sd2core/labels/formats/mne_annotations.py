@@ -1,0 +1,178 @@
+"""Annotations of MNE-Python in text form: onset, duration, description and further columns.
+
+Source: ``mne.Annotations.save`` and ``mne.read_annotations``. The file has neither quotation marks
+nor escapes, and with NumPy 2 MNE reads only ASCII from it. Texts are therefore percent-encoded
+(RFC 3986) where they hold anything else; a line of the heading says so, and they come back.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from pathlib import Path
+from urllib.parse import quote, unquote
+
+from sd2core.atomic import atomic_write_text
+from sd2core.errors import Sd2Error
+from sd2core.labels.formats.losses import (
+    ASPECTS,
+    DEFAULT_TRACK,
+    LabelFormat,
+    Loss,
+    losses_by_format,
+)
+from sd2core.labels.formats.rows import Row, assemble, clean_name
+from sd2core.labels.formats.texts import positional, read_text, whole_number
+from sd2core.labels.spans import OVERLAPS, Labels, Overlap, Span
+from sd2core.timebase import Timebase
+
+FORMAT = LabelFormat(
+    name="mne",
+    title="MNE",
+    suffixes=(".txt",),
+    made_for="MNE-Python 1.11 and later, text annotations",
+    keeps=frozenset(ASPECTS) - {"empty tracks", "label set", "colours and keys"},
+    resolution_s=1e-9,
+    remark="Texts that are not plain ASCII are percent-encoded.",
+)
+
+_EXPECTED = "MNE annotations: onset, duration and description in each line, separated by commas"
+_ENCODED = "# texts: percent-encoded"
+_PLAIN = " !$&'()*+-./:;<=>?@[]^_{|}~"
+_BASIC = ("onset", "duration", "description")
+_EXTRAS = ("track", "overlap", "id", "note", "author", "confidence", "origin")
+
+
+def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = None) -> list[Loss]:
+    """Write annotations with extra columns; what they cannot hold is returned."""
+    overlap = {track.name: track.overlap for track in labels.tracks}
+    texts: dict[str, Callable[[Span], str]] = {
+        "track": lambda span: span.track,
+        "overlap": lambda span: overlap[span.track],
+        "id": lambda span: str(span.id),
+        "note": lambda span: span.note,
+        "author": lambda span: span.author,
+        "confidence": lambda span: (
+            "" if span.confidence is None else positional(float(span.confidence))
+        ),
+        "origin": lambda span: span.origin,
+    }
+    lines = ["# MNE-Annotations", _ENCODED, f"# {', '.join((*_BASIC, *_EXTRAS))}"]
+    # Track by track, so that their order comes back; MNE sorts by onset.
+    for span in (span for track in labels.tracks for span in labels.of_track(track.name)):
+        edges = (positional(span.start_s), positional(_duration_s(span)))
+        extras = (_encoded(texts[name](span)) for name in _EXTRAS)
+        lines.append(",".join((*edges, _encoded(span.label), *extras)))
+    atomic_write_text(path, "\n".join(lines) + "\n")
+    return losses_by_format(labels, FORMAT) + _changed(labels)
+
+
+def read(path: Path, timebase: Timebase | None = None, observation: str | None = None) -> Labels:
+    """Read annotations; those without a duration need the timebase and become one frame.
+
+    Raises
+    ------
+    Sd2Error
+        Naming the line that is no annotation.
+    """
+    lines = [line.removesuffix("\r") for line in read_text(path, _EXPECTED).split("\n")]
+    heading = [line for line in lines if line.startswith("#")]
+    decode = unquote_exactly if _ENCODED in heading else str
+    columns = _columns(path, heading)
+    rows: list[Row] = []
+    overlaps: dict[str, Overlap | None] = {}
+    for number, line in enumerate(lines, start=1):
+        if line.startswith("#") or not line.strip():
+            continue
+        cells = line.split(",")
+        if columns is None:
+            columns = [*_BASIC, "ch_names"][: max(len(cells), 3)]
+        if len(cells) != len(columns):
+            raise Sd2Error(
+                f"{path}, line {number} has {len(cells)} columns: {line[:100]!r}",
+                f"the {len(columns)} columns {', '.join(columns)}",
+                "Descriptions cannot hold commas: mend that line",
+            )
+        cell = {name: decode(text) for name, text in zip(columns, cells, strict=True)}
+        start_s = _number(path, number, "onset", cell["onset"])
+        end_s = start_s + _number(path, number, "duration", cell["duration"])
+        track = cell.get("track") or DEFAULT_TRACK
+        stated = next((one for one in OVERLAPS if one == cell.get("overlap")), None)
+        overlaps[clean_name(track)] = stated
+        known = cell.get("confidence", "").strip()
+        rows.append(
+            Row(
+                f"line {number}",
+                start_s,
+                end_s,
+                cell["description"],
+                track,
+                cell.get("note", ""),
+                cell.get("author", ""),
+                _number(path, number, "confidence", known) if known else None,
+                cell.get("origin", ""),
+                whole_number(cell.get("id", "")),
+            )
+        )
+    return assemble(path, rows, tracks=overlaps.items(), timebase=timebase)
+
+
+def unquote_exactly(text: str) -> str:
+    """Undo the encoding, also of lone surrogates."""
+    return unquote(text, errors="surrogatepass")
+
+
+def _columns(path: Path, heading: list[str]) -> list[str] | None:
+    for line in heading:
+        names = [name.strip() for name in line[1:].split(",")]
+        if set(_BASIC) <= set(names):
+            return names
+    if heading and not any("MNE-Annotations" in line for line in heading):
+        raise Sd2Error(f"{path} begins with {heading[0][:100]!r}", _EXPECTED)
+    return None
+
+
+def _duration_s(span: Span) -> float:
+    """Duration that leads to the end within rounding, and never past it into the next span."""
+    duration_s = span.end_s - span.start_s
+    while span.start_s + duration_s > span.end_s:
+        duration_s = math.nextafter(duration_s, 0.0)
+    return duration_s
+
+
+def _encoded(text: str) -> str:
+    encoded = quote(text, safe=_PLAIN, errors="surrogatepass")
+    # Spaces at the edges, which readers strip.
+    return re.sub(r"^ +| +$", lambda spaces: "%20" * len(spaces[0]), encoded)
+
+
+def _changed(labels: Labels) -> list[Loss]:
+    losses: list[Loss] = []
+    count = sum(
+        any(_encoded(text) != text for text in (span.label, span.track, span.note, span.author))
+        for span in labels.spans
+    )
+    if count:
+        words = f"MNE's text files hold plain ASCII without commas: texts of {count} "
+        words += f"span{'s' * (count > 1)} are percent-encoded there"
+        losses.append(Loss("characters", count, words))
+    off_s = [abs(span.start_s + _duration_s(span) - span.end_s) for span in labels.spans]
+    moved = [off for off in off_s if off > FORMAT.resolution_s]
+    if moved:
+        words = f"MNE keeps durations: ends of {len(moved)} span{'s' * (len(moved) > 1)} moved by "
+        losses.append(Loss("times", len(moved), words + f"up to {max(moved):.1g} s"))
+    return losses
+
+
+def _number(path: Path, line: int, column: str, text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise Sd2Error(
+            f"{path}, line {line}: {column} is {text[:50]!r}",
+            "a finite number; of times, seconds since the first sample",
+        )
+    return value

@@ -1,0 +1,148 @@
+"""What a reader found, line by line, made into labels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from sd2core.errors import Sd2Error
+from sd2core.labels.formats.losses import DEFAULT_TRACK
+from sd2core.labels.label_set import GESTURES, LONGEST_NAME, LabelSet
+from sd2core.labels.spans import ORIGINS, Labels, Origin, Overlap, Span, Track
+from sd2core.timebase import Timebase
+
+UNNAMED = "unnamed"
+"""Label of a span for which the file has none, and name of a track without one."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """A span as a file has it, not yet checked.
+
+    ``place`` says where it stands, for messages: ``"line 3"``.
+    """
+
+    place: str
+    start_s: float
+    end_s: float
+    label: str
+    track: str = DEFAULT_TRACK
+    note: str = ""
+    author: str = ""
+    confidence: float | None = None
+    origin: str = "import"
+    id: int | None = None
+
+
+def assemble(
+    path: Path,
+    rows: Sequence[Row],
+    *,
+    tracks: Iterable[tuple[str, Overlap | None]] = (),
+    label_set: LabelSet = GESTURES,
+    timebase: Timebase | None = None,
+) -> Labels:
+    """Make labels of rows.
+
+    A row without extent becomes the frame that is shown at that instant. Ids are kept where they
+    are positive and differ; the other spans are numbered after them, in the order of time.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    rows : sequence of Row
+    tracks : iterable of (str, overlap or None)
+        In their order, also those without spans. Further ones of the rows follow. Where the
+        overlap is None it is ``"free"`` when spans do overlap, otherwise ``"exclusive"``.
+    label_set : LabelSet
+    timebase : Timebase, optional
+        Needed for rows without extent only.
+
+    Raises
+    ------
+    Sd2Error
+        Naming the file and the place, when a row is not a span.
+    """
+    ids = _ids(rows)
+    spans = tuple(_span(path, row, number, timebase) for row, number in zip(rows, ids, strict=True))
+    overlaps: dict[str, Overlap | None] = {}
+    for name, overlap in tracks:
+        clean = clean_name(name)
+        overlaps[clean] = overlap or overlaps.get(clean)
+    for span in spans:
+        overlaps.setdefault(span.track, None)
+    if not overlaps:
+        overlaps[DEFAULT_TRACK] = None
+    crowded = _with_overlap(spans)
+    made = tuple(
+        Track(name, "free" if name in crowded else overlap or "exclusive")
+        for name, overlap in overlaps.items()
+    )
+    return Labels(made, spans, label_set)
+
+
+def clean_name(name: str) -> str:
+    """Make a label or a track of any text: one line that can be shown."""
+    if name.isprintable() and name.strip() and len(name) <= LONGEST_NAME:
+        return name
+    line = " ".join("".join(one if one.isprintable() else " " for one in name).split())
+    return line[:LONGEST_NAME].strip() or UNNAMED
+
+
+def _ids(rows: Sequence[Row]) -> list[int]:
+    used: set[int] = set()
+    kept: list[int | None] = []
+    for row in rows:
+        fits = row.id is not None and row.id > 0 and row.id not in used
+        kept.append(row.id if fits else None)
+        if fits and row.id is not None:
+            used.add(row.id)
+    number = max(used, default=0)
+    for index in sorted(range(len(rows)), key=lambda i: (rows[i].start_s, rows[i].end_s)):
+        if kept[index] is None:
+            number += 1
+            kept[index] = number
+    return [number for number in kept if number is not None]
+
+
+def _span(path: Path, row: Row, number: int, timebase: Timebase | None) -> Span:
+    where = f"{path}, {row.place}"
+    start_s, end_s = row.start_s, row.end_s
+    if start_s == end_s:
+        if timebase is None:
+            raise Sd2Error(
+                f"{where}: {row.label!r} at {start_s:g} s has no duration",
+                "spans with a start before the end",
+                "Read the file together with its recording: such a mark becomes one frame",
+            )
+        frame = timebase.frame_at(start_s)
+        last = frame + 1 == len(timebase)
+        start_s = timebase.time_of(frame)
+        end_s = timebase.end_s if last else timebase.time_of(frame + 1)
+    origin: Origin = next((one for one in ORIGINS if one == row.origin), "import")
+    try:
+        return Span(
+            number,
+            clean_name(row.track),
+            start_s,
+            end_s,
+            clean_name(row.label),
+            row.note,
+            row.author,
+            row.confidence,
+            origin,
+        )
+    except Sd2Error as error:
+        raise Sd2Error(f"{where}: {error.found}", error.expected, "Mend that place") from None
+
+
+def _with_overlap(spans: Sequence[Span]) -> set[str]:
+    last_end_s: dict[str, float] = {}
+    found: set[str] = set()
+    for span in sorted(spans, key=lambda one: (one.start_s, one.end_s)):
+        if span.start_s < last_end_s.get(span.track, float("-inf")):
+            found.add(span.track)
+        last_end_s[span.track] = max(span.end_s, last_end_s.get(span.track, span.end_s))
+    return found

@@ -1,0 +1,205 @@
+"""TextGrid files of Praat.
+
+Source: Praat manual, "TextGrid file formats". Written in the long form; the long and the short
+form are read, with interval and point tiers. Reading follows Praat's own rule: quoted texts,
+numbers and flags that stand free count, all other words only explain.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from sd2core.atomic import atomic_write_text
+from sd2core.errors import Sd2Error
+from sd2core.labels.formats.lanes import Lane, lanes_of, track_of
+from sd2core.labels.formats.losses import LabelFormat, Loss, losses_by_format
+from sd2core.labels.formats.rows import Row, assemble
+from sd2core.labels.formats.texts import positional, read_text, whole_number
+from sd2core.labels.spans import Labels, Overlap, Span
+from sd2core.timebase import Timebase
+
+FORMAT = LabelFormat(
+    name="textgrid",
+    title="Praat",
+    suffixes=(".textgrid",),
+    made_for="Praat 6, TextGrid",
+    keeps=frozenset({"tracks", "overlap", "empty tracks"}),
+    remark="Between spans stand empty intervals; read in UTF-8 or UTF-16, long or short.",
+)
+
+_EXPECTED = 'a Praat TextGrid: "ooTextFile", "TextGrid" and its tiers'
+_TOKEN = re.compile(
+    r'"(?P<text>(?:[^"]|"")*)"'
+    r"|(?<!\S)!.*"
+    r"|(?<!\S)(?P<flag><\w+>)(?!\S)"
+    r"|(?<!\S)(?P<number>[-+]?\d[\d.eE+-]*)(?!\S)"
+)
+
+
+def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = None) -> list[Loss]:
+    """Write a TextGrid from the first to the last instant of video and spans.
+
+    What it cannot hold is returned.
+    """
+    start_s = min([timebase.start_s, *(span.start_s for span in labels.spans)])
+    end_s = max([timebase.end_s, *(span.end_s for span in labels.spans)])
+    lanes = lanes_of(labels, _edges)
+    lines = [
+        'File type = "ooTextFile"',
+        'Object class = "TextGrid"',
+        "",
+        f"xmin = {positional(start_s)} ",
+        f"xmax = {positional(end_s)} ",
+        "tiers? <exists> ",
+        f"size = {len(lanes)} ",
+        "item []: ",
+    ]
+    for number, lane in enumerate(lanes, start=1):
+        lines += _tier(number, lane, start_s, end_s)
+    atomic_write_text(path, "\n".join(lines) + "\n")
+    return losses_by_format(labels, FORMAT)
+
+
+def read(path: Path, timebase: Timebase | None = None, observation: str | None = None) -> Labels:
+    """Read all tiers; a point needs the timebase and becomes one frame.
+
+    Raises
+    ------
+    Sd2Error
+        When the file is no TextGrid in text form, or ends too early.
+    """
+    tokens = _Tokens(path, read_text(path, _EXPECTED))
+    tokens.heading()
+    tokens.number("xmin")
+    tokens.number("xmax")
+    rows: list[Row] = []
+    tracks: list[tuple[str, Overlap | None]] = []
+    for _ in range(tokens.count("tiers") if tokens.has_tiers() else 0):
+        kind, name = tokens.text("class of a tier"), tokens.text("name of a tier")
+        if kind not in ("IntervalTier", "TextTier"):
+            raise Sd2Error(f"{path} has a tier of class {kind[:50]!r}", "IntervalTier or TextTier")
+        track, overlap = track_of(name)
+        tracks.append((track, overlap))
+        tokens.number("xmin")
+        tokens.number("xmax")
+        for number in range(tokens.count("intervals")):
+            start_s = tokens.number("start of an interval")
+            end_s = tokens.number("end of an interval") if kind == "IntervalTier" else start_s
+            text = tokens.text("text of an interval")
+            # An interval of nothing is the gap between two spans, a point of nothing is not.
+            if text.strip() or kind == "TextTier":
+                place = f"tier {name!r}, interval {number + 1}"
+                rows.append(Row(place, start_s, end_s, text, track))
+    return assemble(path, rows, tracks=tracks, timebase=timebase)
+
+
+def _edges(span: Span) -> tuple[float, float]:
+    return span.start_s, span.end_s
+
+
+def _tier(number: int, lane: Lane, start_s: float, end_s: float) -> list[str]:
+    intervals: list[tuple[float, float, str]] = []
+    reached_s = start_s
+    for span in lane.spans:
+        if span.start_s > reached_s:
+            intervals.append((reached_s, span.start_s, ""))
+        intervals.append((span.start_s, span.end_s, span.label))
+        reached_s = span.end_s
+    if reached_s < end_s:
+        intervals.append((reached_s, end_s, ""))
+    lines = [
+        f"    item [{number}]:",
+        '        class = "IntervalTier" ',
+        f"        name = {_quoted(lane.name)} ",
+        f"        xmin = {positional(start_s)} ",
+        f"        xmax = {positional(end_s)} ",
+        f"        intervals: size = {len(intervals)} ",
+    ]
+    for index, (first_s, last_s, text) in enumerate(intervals, start=1):
+        lines += [
+            f"        intervals [{index}]:",
+            f"            xmin = {positional(first_s)} ",
+            f"            xmax = {positional(last_s)} ",
+            f"            text = {_quoted(text)} ",
+        ]
+    return lines
+
+
+def _quoted(text: str) -> str:
+    return '"' + text.replace('"', '""') + '"'
+
+
+class _Tokens:
+    """Texts, numbers and flags of a file, one after the other."""
+
+    def __init__(self, path: Path, text: str) -> None:
+        self._path = path
+        self._first_line = text.lstrip().split("\n", 1)[0][:100]
+        self._tokens: Iterator[re.Match[str]] = (
+            match for match in _TOKEN.finditer(text) if match.lastgroup is not None
+        )
+
+    def heading(self) -> None:
+        """Refuse what is no TextGrid in text form."""
+        if "ooBinaryFile" in self._first_line:
+            raise Sd2Error(
+                f"{self._path} is a binary file of Praat", _EXPECTED, "Save it as a text file there"
+            )
+        if "chronological" in self._first_line:
+            raise Sd2Error(
+                f"{self._path} is a chronological TextGrid", _EXPECTED, "Save it as a text file"
+            )
+        if "ooTextFile" not in self._first_line:
+            raise Sd2Error(f"{self._path} begins with {self._first_line!r}", _EXPECTED)
+        self.text("type of the file")
+        found = self.text("class of the object")
+        if found != "TextGrid":
+            raise Sd2Error(
+                f"{self._path} holds a {found[:50]!r}", _EXPECTED, "Save the TextGrid in Praat"
+            )
+
+    def has_tiers(self) -> bool:
+        """Whether the flag says that there are any."""
+        return self._next("flag", "flag <exists>") == "<exists>"
+
+    def text(self, what: str) -> str:
+        """The next token, which is to be a text."""
+        return self._next("text", what).replace('""', '"')
+
+    def number(self, what: str) -> float:
+        """The next token, which is to be a number."""
+        found = self._next("number", what)
+        try:
+            value = float(found)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise Sd2Error(f"{self._path} has {found[:50]!r} for the {what}", "a finite number")
+        return value
+
+    def count(self, what: str) -> int:
+        """The next token, which is to be a number of things."""
+        found = self._next("number", f"number of {what}")
+        value = whole_number(found)
+        if value is None:
+            raise Sd2Error(f"{self._path} has {found[:50]!r} {what}", "a whole number from 0 on")
+        return value
+
+    def _next(self, kind: str, what: str) -> str:
+        match = next(self._tokens, None)
+        if match is None:
+            raise Sd2Error(
+                f"{self._path} ends before the {what}",
+                "a whole TextGrid",
+                "Copy the file again, or save it again in Praat",
+            )
+        if match.lastgroup != kind:
+            raise Sd2Error(
+                f"{self._path} has {match[0][:50]!r} where the {what} should be",
+                "a TextGrid as Praat saves it",
+                "Save it again in Praat",
+            )
+        return str(match[kind])
