@@ -132,11 +132,11 @@ def test_short_gaps_are_merged_and_long_ones_are_not() -> None:
     assert found(doppler_map(values), replace(PLAIN, merge_gap_s=0.09)) == [(39, 61), (63, 81)]
 
 
-def test_margins_end_at_the_ends_and_in_the_middle_between_neighbours() -> None:
+def test_margins_end_at_the_ends_and_leave_a_third_of_the_quiet_between_neighbours() -> None:
     doppler = doppler_map(pulses(100, (2, 20), (30, 60)))
     assert found(doppler) == [(1, 21), (29, 61)]
     assert found(doppler, SuggestOptions(margin_s=0.1)) == [(0, 23), (27, 63)]
-    assert found(doppler, SuggestOptions(margin_s=9.0)) == [(0, 25), (25, 100)]
+    assert found(doppler, SuggestOptions(margin_s=9.0)) == [(0, 23), (27, 100)]
 
 
 @given(
@@ -187,7 +187,7 @@ def test_neither_scale_nor_order_of_bins_nor_clock_matters(gain, seed, offset_s)
 )
 @settings(max_examples=60)
 def test_white_noise_gives_no_span(seed, bins, frames, kind) -> None:
-    """From 8 bins on; 40,000 clips in docs/decisions/0032 gave none either."""
+    """From 8 bins on; the 3,000 clips of docs/decisions/0032 gave none and 4.5 dB at most."""
     rng = np.random.default_rng(seed)
     draw = {"power": rng.exponential, "magnitude": rng.rayleigh, "uniform": rng.uniform}[kind]
     assert suggest_spans(doppler_map(draw(size=(bins, frames)))) == ()
@@ -293,7 +293,7 @@ def test_the_eight_swipes_of_the_sample_are_found() -> None:
     assert len(spans) == 12
     best = [max(spans, key=lambda span, swipe=swipe: overlap(span, swipe)) for swipe in swipes]
     assert len({span.id for span in best}) == 8
-    assert min(overlap(span, swipe) for span, swipe in zip(best, swipes, strict=True)) > 0.7
+    assert min(overlap(span, swipe) for span, swipe in zip(best, swipes, strict=True)) > 0.8
     assert min(span.confidence or 0.0 for span in best) == 1.0
 
 
@@ -310,5 +310,5 @@ def test_real_gestures_are_met_and_backgrounds_left_alone(shared_data: Path) -> 
         (label,) = recorded.labels.spans
         met.append(max(overlap(span, (label.start_s, label.end_s)) for span in spans))
         assert len(spans) <= 2
-    np.testing.assert_allclose(met, [0.61, 0.62, 0.69, 0.69, 1.0, 0.71], atol=0.006)
+    np.testing.assert_allclose(met, [0.61, 0.62, 0.69, 0.69, 0.92, 0.71], atol=0.006)
     assert min(met) >= 0.6
