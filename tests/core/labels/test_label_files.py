@@ -26,6 +26,7 @@ from sd2core.labels.spans import ORIGINS, Labels, Span, Track
 from sd2core.recording_document import Span as InlineSpan
 from sd2core.recording_document import read_document
 from sd2core.resources import resource_path
+from sd2core.timebase import Timebase
 
 names = st.text(st.characters(codec="utf-8", exclude_categories=["C", "Z"]), min_size=1, max_size=9)
 notes = st.text(st.characters(codec="utf-8"), max_size=12)
@@ -118,6 +119,17 @@ def test_an_interrupted_write_leaves_the_old_file(
         write_labels(path, Labels())
     assert read_labels(path).labels == labels
     assert [one.name for one in tmp_path.iterdir()] == [FILE_NAME]
+
+
+def test_the_example_of_the_documentation_is_read(tmp_path: Path) -> None:
+    text = (Path(__file__).resolve().parents[3] / "docs" / "formats.md").read_text("utf-8")
+    example = text.partition("\n## Labels\n")[2].partition("```json\n")[2].partition("```")[0]
+    (tmp_path / FILE_NAME).write_text(example, "utf-8")
+    read = read_labels(tmp_path / FILE_NAME)
+    assert read.recording == tmp_path
+    span = Span(1, "Gestures", 1.6, 2.8, "left-to-right", author="B")
+    assert read.labels == Labels((Track("Gestures"),), (span,), read.labels.label_set)
+    assert Timebase.regular(90, 30.0).frames_between(span.start_s, span.end_s) == (48, 84)
 
 
 SPAN = {"id": 1, "track": "Gestures", "start_s": 1.0, "end_s": 2.0, "label": "wave"}
