@@ -104,7 +104,8 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
     last = max((span.id for span in held.spans), default=0)
     _header(document, path, media, held.label_set, last + len(details) * len(held.spans))
     slots = _time_order(document, lanes)
-    _tiers(document, lanes, slots, details, last)
+    entries = {one.name: f"cve{number}" for number, one in enumerate(held.label_set.labels)}
+    _tiers(document, lanes, slots, entries, details, last)
     _types(document, held.label_set)
     ElementTree.indent(document)
     text = ElementTree.tostring(document, encoding="unicode")
@@ -224,6 +225,7 @@ def _tiers(
     document: ElementTree.Element,
     lanes: list[Lane],
     slots: dict[int, tuple[str, str]],
+    entries: dict[str, str],
     details: list[tuple[str, Callable[[Span], str]]],
     last_id: int,
 ) -> None:
@@ -237,6 +239,8 @@ def _tiers(
         tier = ElementTree.SubElement(document, "TIER", attributes)
         for span in lane.spans:
             first, second = slots[span.id]
+            # The entry of the vocabulary, so that renaming it in ELAN renames the annotation.
+            entry = {"CVE_REF": entries[span.label]} if span.label in entries else {}
             _annotation(
                 tier,
                 "ALIGNABLE_ANNOTATION",
@@ -244,6 +248,7 @@ def _tiers(
                 ANNOTATION_ID=f"a{span.id}",
                 TIME_SLOT_REF1=first,
                 TIME_SLOT_REF2=second,
+                **entry,
             )
         for kind, text_of in details:
             name = f"{lane.name} - {kind}"

@@ -32,7 +32,7 @@ FORMAT = LabelFormat(
 
 _EXPECTED = 'a Praat TextGrid: "ooTextFile", "TextGrid" and its tiers'
 _TOKEN = re.compile(
-    r'"(?P<text>(?:[^"]|"")*)"'
+    r'"(?P<text>[^"]*+(?:""[^"]*+)*+)"'
     r"|(?<!\S)!.*"
     r"|(?<!\S)(?P<flag><\w+>)(?!\S)"
     r"|(?<!\S)(?P<number>[-+]?\d[\d.eE+-]*)(?!\S)"

@@ -209,6 +209,7 @@ def test_elan_documents_follow_the_schema(tmp_path: Path, labels: Labels) -> Non
     assert len(tiers) == len(list(document.iter("TIER")))
     kinds = {k.get("LINGUISTIC_TYPE_ID"): k for k in document.iter("LINGUISTIC_TYPE")}
     vocabularies = {v.get("CV_ID") for v in document.iter("CONTROLLED_VOCABULARY")}
+    entries = {one.get("CVE_ID"): one.findtext("CVE_VALUE") for one in document.iter("CV_ENTRY_ML")}
     ids: list[str] = []
     for tier in tiers.values():
         kind = kinds[tier.get("LINGUISTIC_TYPE_REF")]
@@ -225,6 +226,10 @@ def test_elan_documents_follow_the_schema(tmp_path: Path, labels: Labels) -> Non
                 continue
             start, end = (slots[annotation.get(f"TIME_SLOT_REF{k}")] for k in (1, 2))
             assert reached <= start < end
+            entry = annotation.get("CVE_REF")
+            assert entry is None or entries[entry] == annotation.findtext("ANNOTATION_VALUE")
+            known = annotation.findtext("ANNOTATION_VALUE") in entries.values()
+            assert known == (entry is not None)
             reached = end
     assert len(set(ids)) == len(ids)
     last = document.findtext("HEADER/PROPERTY[@NAME='lastUsedAnnotationId']") or "0"

@@ -6,6 +6,8 @@ import json
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
 from sd2core.labels.formats import FORMATS, read_labels, texts, write_labels
@@ -74,6 +76,30 @@ def test_cut_short_anywhere(tmp_path: Path, name: str) -> None:
     whole = path.read_bytes().rstrip()
     for length in range(1, len(whole) - 3, 97):
         refusal(path, whole[:length], name)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@given(
+    place=st.floats(0, 1),
+    length=st.integers(0, 40),
+    other=st.binary(max_size=4)
+    | st.sampled_from((b"-1", b"9" * 30, b'"', b"null", b"<a>", b"1e9")),
+)
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_a_damaged_file_is_labels_or_a_sentence(
+    tmp_path: Path, name: str, place: float, length: int, other: bytes
+) -> None:
+    path = tmp_path / "x"
+    write_labels(path, SOME, TIMEBASE, name)
+    whole = path.read_bytes()
+    start = int(place * len(whole))
+    path.write_bytes(whole[:start] + other + whole[start + length :])
+    sentence = str(path)
+    try:
+        read_labels(path, TIMEBASE, name)
+    except Sd2Error as error:  # and no other
+        sentence = str(error)
+    assert str(path) in sentence
 
 
 @pytest.mark.parametrize(
