@@ -88,12 +88,9 @@ def describe(path: Path, options: argparse.Namespace) -> Description:
         with open_video(path) as video:
             return describe_video(path, video)
     if kind == "radar":
-        from sd2core.cli.info_recorded_map import describe_recorded_map
-        from sd2core.io.radar import holds_map, load_capture, load_recorded_map
+        from sd2core.cli.info_radar import describe_radar
 
-        if holds_map(path):
-            return describe_recorded_map(path, load_recorded_map(path))
-        return describe_capture(path, load_capture(path))
+        return describe_radar(path)
     if kind == "pairs":
         from sd2core.cli.info_pairs import describe_pairs
         from sd2core.pairs import read_pairs
@@ -121,12 +118,9 @@ def describe_parts(recording: Recording) -> list[Description]:
             mesh = recording.load_mesh(progress)
         parts.append(describe_mesh(recording.mesh, mesh))
     if recording.radar is not None and "radar" not in missing:
-        if recording.holds_radar_map:
-            from sd2core.cli.info_recorded_map import describe_recorded_map
+        from sd2core.cli.info_radar import describe_radar
 
-            parts.append(describe_recorded_map(recording.radar, recording.load_radar_map()))
-        else:
-            parts.append(describe_capture(recording.radar, recording.load_capture()))
+        parts.append(describe_radar(recording.radar))
     return parts
 
 

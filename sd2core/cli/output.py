@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -37,6 +37,17 @@ def print_facts(title: str, facts: Mapping[str, str]) -> None:
     width = max(map(len, shown), default=0)
     for name, value in shown.items():
         print(f"  {name:<{width}}  {value}")
+
+
+def print_rows(rows: Sequence[Sequence[str]], *, right: Collection[int] = ()) -> None:
+    """Print a table whose first row is its heading; ``right`` are columns of numbers."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        cells = (
+            text.rjust(width) if column in right else text.ljust(width)
+            for column, (text, width) in enumerate(zip(row, widths, strict=True))
+        )
+        print("  ".join(cells).rstrip())
 
 
 def finite(value: Any) -> Any:

@@ -13,6 +13,7 @@ from sd2core.cli import (
     fit,
     importing,
     info,
+    labels,
     ladder,
     pairs,
     radar,
@@ -40,6 +41,7 @@ examples:
   sd2 synth walk.npz --out map.npz --sensor 0,0,1
   sd2 radar capture/ --out real.npz
   sd2 denoise map.npz --out denoised.npz      what a radar would show
+  sd2 labels suggest walk.sd2                 where something moves
   sd2 train pairs.zarr --out runs/s4          teach a denoiser from pairs
   sd2 ladder walk.npz --quick                 what accuracy this scene requires
 
@@ -64,6 +66,7 @@ def build_parser() -> tuple[argparse.ArgumentParser, argparse._SubParsersAction]
         synth,
         radar,
         denoise,
+        labels,
         pairs,
         ladder,
         compare_meshes,

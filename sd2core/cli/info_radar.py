@@ -1,14 +1,23 @@
-"""``sd2 info`` of a radar recording that holds a map and labels."""
+"""``sd2 info`` of a radar's recording: raw samples, or a map with labels."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sd2core.cli.info import Description, describe_map
+from sd2core.cli.info import Description, describe_capture, describe_map
 
 if TYPE_CHECKING:
     from sd2core.io.radar import RecordedMap
+
+
+def describe_radar(path: Path) -> Description:
+    """Open a capture or a recorded map and describe it."""
+    from sd2core.io.radar import holds_map, load_capture, load_recorded_map
+
+    if holds_map(path):
+        return describe_recorded_map(path, load_recorded_map(path))
+    return describe_capture(path, load_capture(path))
 
 
 def describe_recorded_map(path: Path, recorded: RecordedMap) -> Description:

@@ -1,0 +1,175 @@
+"""``sd2 labels``: show, convert, suggest and compare labelled spans."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from statistics import median
+from typing import TYPE_CHECKING, Any
+
+from sd2core.cli.label_reading import (
+    add_clock,
+    add_replace,
+    check_label_output,
+    clock_of,
+    labels_at,
+    with_rate,
+    write,
+)
+from sd2core.cli.labels_agree import add_agree
+from sd2core.cli.labels_suggest import add_suggest
+from sd2core.cli.options import add_command, add_json
+from sd2core.cli.output import print_json, print_rows
+
+if TYPE_CHECKING:
+    from sd2core.labels.spans import Labels
+    from sd2core.timebase import Timebase
+
+_FORMATS = "sd2, csv, audacity, elan, textgrid, boris or mne"
+
+
+def add_commands(commands: argparse._SubParsersAction) -> None:
+    """Add ``labels`` with what it does."""
+    parser = add_command(
+        commands,
+        "labels",
+        "show, convert, suggest and compare labelled spans",
+        examples=(
+            "  sd2 labels show walk.sd2\n"
+            "  sd2 labels convert walk.sd2 walk.eaf\n"
+            "  sd2 labels suggest walk.sd2 --out suggested.json\n"
+            "  sd2 labels agree anna.json ben.json --video walk.mp4"
+        ),
+    )
+    kinds = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    show = add_command(
+        kinds,
+        "show",
+        "print labels, and how many and how long they are",
+        handler=_show,
+        description=(
+            "FILE is a labels.json, a recording, the .h5 of a K60168A, or a file of ELAN, Praat,\n"
+            "BORIS, Audacity, MNE-Python or a table (.csv, .tsv). With frame times the frames of\n"
+            "each span are printed as well: half-open, the second is the first one after it."
+        ),
+        examples="  sd2 labels show walk.sd2\n  sd2 labels show walk.eaf --video walk.mp4 --json",
+    )
+    show.add_argument("file", type=Path, metavar="FILE", help="the file with labels")
+    _add_reading(show, "FILE")
+    add_clock(show)
+    add_json(show)
+
+    convert = add_command(
+        kinds,
+        "convert",
+        "write labels as another program reads them",
+        handler=_convert,
+        description=(
+            "The suffix of OUT says which program: .json for SD² Studio, .csv, .tsv, .eaf,\n"
+            ".TextGrid, .boris; a .txt needs --to. Prints what the file could not hold."
+        ),
+        examples=(
+            "  sd2 labels convert walk.sd2 walk.eaf\n"
+            "  sd2 labels convert labels.json labels.txt --to audacity --rate 30\n"
+            "  sd2 labels convert walk.eaf labels.json"
+        ),
+    )
+    convert.add_argument("file", type=Path, metavar="IN", help="the file with labels")
+    convert.add_argument("out", type=Path, metavar="OUT", help="the file to write")
+    _add_reading(convert, "IN")
+    convert.add_argument("--to", metavar="NAME", help="the format of OUT, likewise")
+    add_replace(convert)
+    add_clock(convert)
+    add_json(convert)
+
+    add_suggest(kinds)
+    add_agree(kinds)
+
+
+def _add_reading(parser: argparse.ArgumentParser, name: str) -> None:
+    parser.add_argument("--format", metavar="NAME", help=f"the format of {name}: {_FORMATS}")
+    parser.add_argument(
+        "--observation", metavar="NAME", help="which one of a BORIS project with several"
+    )
+
+
+def _show(options: argparse.Namespace) -> None:
+    clock = clock_of(options, options.file)
+    labels = labels_at(options.file, clock, options.format, options.observation)
+    clock = with_rate(options, clock, labels)
+    if options.json:
+        print_json(described(labels, clock))
+        return
+    if not labels.spans:
+        print(f"{options.file} holds no spans.")
+        return
+    rows = [("id", "start s", "end s", "frames", "label", "track", "note")]
+    for span in labels.spans:
+        first, stop = (0, 0) if clock is None else clock.frames_between(span.start_s, span.end_s)
+        rows.append(
+            (
+                str(span.id),
+                f"{span.start_s:.3f}",
+                f"{span.end_s:.3f}",
+                f"{first}–{stop}" if stop > first else "",
+                span.label,
+                span.track,
+                " ".join(span.note.split()),
+            )
+        )
+    print_rows(rows, right=(0, 1, 2))
+    print()
+    table = [("label", "spans", "total s", "median s")]
+    for label, facts in statistics(labels).items():
+        seconds = (f"{facts['total_s']:.3f}", f"{facts['median_s']:.3f}")
+        table.append((label, f"{facts['count']:.0f}", *seconds))
+    print_rows(table, right=(1, 2, 3))
+
+
+def _convert(options: argparse.Namespace) -> None:
+    check_label_output(options.out, replace=options.replace)
+    clock = clock_of(options, options.file)
+    labels = labels_at(options.file, clock, options.format, options.observation)
+    lost = write(options.out, labels, with_rate(options, clock, labels), options.to)
+    if options.json:
+        print_json({"path": str(options.out), "spans": len(labels.spans), "not_kept": lost})
+        return
+    print(f"Wrote {options.out} with {len(labels.spans)} spans")
+    for sentence in lost:
+        print(f"  not kept: {sentence}")
+
+
+def described(labels: Labels, clock: Timebase | None) -> dict[str, Any]:
+    """Labels for programs."""
+    return {
+        "tracks": [{"name": track.name, "overlap": track.overlap} for track in labels.tracks],
+        "spans": [
+            {
+                "id": span.id,
+                "track": span.track,
+                "start_s": span.start_s,
+                "end_s": span.end_s,
+                "frames": None
+                if clock is None
+                else list(clock.frames_between(span.start_s, span.end_s)),
+                "label": span.label,
+                "note": span.note,
+                "author": span.author,
+                "confidence": span.confidence,
+                "origin": span.origin,
+            }
+            for span in labels.spans
+        ],
+        "labels": statistics(labels),
+    }
+
+
+def statistics(labels: Labels) -> dict[str, dict[str, float]]:
+    """How many spans each label has, and how long they are, in alphabetical order."""
+    durations_s: dict[str, list[float]] = {}
+    for span in labels.spans:
+        durations_s.setdefault(span.label, []).append(span.duration_s)
+    return {
+        label: {"count": len(found), "total_s": sum(found), "median_s": median(found)}
+        for label, found in sorted(durations_s.items())
+    }

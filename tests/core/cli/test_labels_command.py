@@ -1,0 +1,239 @@
+"""``sd2 labels``: show, convert, suggest, agree."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cli_outcome import Sd2
+
+from sd2core.labels import files
+from sd2core.labels.formats import FORMATS, read_labels
+from sd2core.labels.spans import Labels, Span, Track
+from sd2core.recording import Recording
+from sd2core.sensor import VelocityAxis
+from sd2core.spectrum import DopplerMap
+from sd2core.timebase import Timebase
+
+
+def written(path: Path, *spans: tuple[float, float, str]) -> Path:
+    made = [
+        Span(number, "Gestures", start_s, end_s, label, note=f"n{number}")
+        for number, (start_s, end_s, label) in enumerate(spans, start=1)
+    ]
+    files.write_labels(path, Labels((Track("Gestures"),), tuple(made)))
+    return path
+
+
+@pytest.fixture
+def anna(tmp_path: Path) -> Path:
+    return written(
+        tmp_path / "anna.json", (1.0, 2.0, "wave"), (3.0, 3.5, "wave"), (4.0, 7.0, "swipe")
+    )
+
+
+@pytest.fixture
+def ben(tmp_path: Path) -> Path:
+    return written(tmp_path / "ben.json", (1.1, 2.0, "wave"), (4.0, 7.2, "push"))
+
+
+@pytest.fixture
+def moving(tmp_path: Path) -> Path:
+    """Ten seconds at 20 frames/s; something moves from 4 to 5 s."""
+    values = np.ones((16, 200), np.float32)
+    values[:, 80:100] = 100.0
+    doppler = DopplerMap(values, VelocityAxis(16, 2.0), Timebase.regular(200, 20.0), "real")
+    doppler.save(tmp_path / "map.npz")
+    return tmp_path / "map.npz"
+
+
+def cells(line: str) -> list[str]:
+    return line.split()
+
+
+def test_show_prints_spans_and_how_long_they_are(sd2: Sd2, anna: Path) -> None:
+    lines = sd2("labels", "show", anna, "--rate", 10).out.splitlines()
+    assert cells(lines[1]) == ["1", "1.000", "2.000", "10–20", "wave", "Gestures", "n1"]
+    assert cells(lines[-2]) == ["swipe", "1", "3.000", "3.000"]
+    assert cells(lines[-1]) == ["wave", "2", "1.500", "0.750"]
+    without = sd2("labels", "show", anna).out.splitlines()
+    assert cells(without[1]) == ["1", "1.000", "2.000", "wave", "Gestures", "n1"]
+
+
+def test_show_prints_json(sd2: Sd2, anna: Path) -> None:
+    data = json.loads(sd2("labels", "show", anna, "--rate", 10, "--json").out)
+    assert data["spans"][2]["frames"] == [40, 70]
+    assert data["spans"][2]["label"] == "swipe"
+    assert data["labels"]["wave"] == {"count": 2, "total_s": 1.5, "median_s": 0.75}
+    assert json.loads(sd2("labels", "show", anna, "--json").out)["spans"][0]["frames"] is None
+
+
+def test_show_says_when_there_is_nothing(sd2: Sd2, tmp_path: Path) -> None:
+    assert "holds no spans" in sd2("labels", "show", written(tmp_path / "none.json")).out
+
+
+def test_a_mesh_gives_the_times_of_frames(sd2: Sd2, anna: Path, plate: Path) -> None:
+    data = json.loads(sd2("labels", "show", anna, "--mesh", plate, "--json").out)
+    # The plate's clip ends at 0.4 s.
+    assert data["spans"][0]["frames"] == [0, 0]
+
+
+def test_a_recording_shows_its_own_labels_and_frames(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "plate.sd2"
+    assert sd2("import", folder, "--mesh", plate).code == 0
+    assert "holds no spans" in sd2("labels", "show", folder).out
+    written(folder / files.FILE_NAME, (0.1, 0.3, "wave"))
+    data = json.loads(sd2("labels", "show", folder, "--json").out)
+    assert data["spans"][0]["frames"] == [3, 9]
+    # A file that names its recording has that one's frames.
+    alone = tmp_path / "alone.json"
+    files.write_labels(alone, files.read_labels(folder / files.FILE_NAME).labels, recording=folder)
+    assert json.loads(sd2("labels", "show", alone, "--json").out)["spans"][0]["frames"] == [3, 9]
+
+
+def test_spans_of_an_older_recording_are_shown(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "plate.sd2"
+    recording = Recording(folder, mesh=plate).save_as(folder)
+    content = json.loads((recording.folder / "recording.json").read_text())
+    content["spans"] = [{"start_s": 0.1, "end_s": 0.3, "label": "wave"}]
+    (recording.folder / "recording.json").write_text(json.dumps(content))
+    assert json.loads(sd2("labels", "show", folder, "--json").out)["spans"][0]["label"] == "wave"
+
+
+def test_convert_there_and_back_and_what_is_not_kept(sd2: Sd2, anna: Path, tmp_path: Path) -> None:
+    out = tmp_path / "anna.txt"
+    done = sd2("labels", "convert", anna, out, "--to", "audacity", "--rate", 30)
+    assert done.code == 0, done.err
+    assert "with 3 spans" in done.out
+    assert "not kept: Audacity keeps no notes: 3 notes left out" in done.out
+    back = tmp_path / "back.json"
+    assert sd2("labels", "convert", out, back).code == 0
+    before, after = files.read_labels(anna).labels, files.read_labels(back).labels
+    assert [(s.start_s, s.end_s, s.label) for s in after.spans] == [
+        (s.start_s, s.end_s, s.label) for s in before.spans
+    ]
+    table = tmp_path / "anna.csv"
+    data = json.loads(sd2("labels", "convert", anna, table, "--rate", 30, "--json").out)
+    assert data["spans"] == len(read_labels(table).spans) == 3
+
+
+def test_convert_needs_frame_times_and_a_new_file(sd2: Sd2, anna: Path, tmp_path: Path) -> None:
+    out = tmp_path / "anna.csv"
+    refused = sd2("labels", "convert", anna, out)
+    assert refused.code == 1
+    assert "needs the times of frames" in refused.err
+    assert not out.exists()
+    out.write_text("precious")
+    refused = sd2("labels", "convert", anna, out, "--rate", 30)
+    assert refused.code == 1
+    assert "anna.csv exists" in refused.err
+    assert out.read_text() == "precious"
+    assert sd2("labels", "convert", anna, out, "--rate", 30, "--replace").code == 0
+    assert len(read_labels(out).spans) == 3
+
+
+def test_only_one_clock_may_be_named(sd2: Sd2, anna: Path, plate: Path) -> None:
+    assert sd2("labels", "show", anna, "--rate", 30, "--mesh", plate).code == 2
+
+
+def test_a_rate_that_cannot_be_is_a_sentence(sd2: Sd2, anna: Path) -> None:
+    refused = sd2("labels", "show", anna, "--rate", 1e12)
+    assert refused.code == 1
+    assert "frames/s these are" in refused.err
+
+
+def test_suggest_writes_what_it_finds_and_says_why(sd2: Sd2, moving: Path, tmp_path: Path) -> None:
+    out = tmp_path / "found.json"
+    done = sd2("labels", "suggest", moving, "--out", out, "--margin-s", 0, "--label", "wave")
+    assert done.code == 0, done.err
+    assert "1 spans in which something moves, in the real map: 8 dB" in done.out
+    assert "up to 20 dB over the quiet level" in done.out
+    (span,) = files.read_labels(out).labels.spans
+    assert (span.origin, span.label, span.confidence) == ("suggestion", "wave", 1.0)
+    assert (span.start_s, span.end_s) == pytest.approx((3.95, 5.05))
+    data = json.loads(sd2("labels", "suggest", moving, "--json").out)
+    assert data["loudest_db"] == pytest.approx(20.0)
+    assert data["options"]["margin_s"] == 0.3
+    assert data["path"] is None
+
+
+def test_suggest_says_how_far_from_a_span_it_was(sd2: Sd2, moving: Path) -> None:
+    done = sd2("labels", "suggest", moving, "--high-db", 25)
+    assert done.out.startswith("0 spans")
+    assert "The loudest frame is 20.0 dB over the quiet level." in done.out
+
+
+def test_suggest_in_a_recording_uses_its_mesh(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "plate.sd2"
+    assert sd2("import", folder, "--mesh", plate).code == 0
+    # The plate moves in every frame: nothing is quiet, so nothing stands out.
+    assert sd2("labels", "suggest", folder).out.startswith("0 spans")
+    refused = sd2("labels", "suggest", folder, "--of", "radar")
+    assert refused.code == 1
+    assert "holds no radar" in refused.err
+
+
+def test_what_cannot_be_suggested_from_is_refused(sd2: Sd2, plate: Path, moving: Path) -> None:
+    for arguments, words in (
+        ((plate,), "plate.npz is a mesh"),
+        ((moving, "--of", "radar"), "--of is given"),
+        ((moving, "--low-db", 9), "low_db is 9 and high_db 8"),
+        ((moving, "--out", moving), "map.npz exists"),
+    ):
+        refused = sd2("labels", "suggest", *arguments)
+        assert refused.code == 1
+        assert words in refused.err
+
+
+def test_agree_prints_kappas_matches_and_what_is_left(sd2: Sd2, anna: Path, ben: Path) -> None:
+    done = sd2("labels", "agree", anna, ben, "--rate", 10)
+    assert done.code == 0, done.err
+    for text in (
+        "2 spans matched from an IoU of 0.5 on, 1 of them with the same label",
+        "1 only in A, 0 only in B; F1 0.800",
+        "swipe / push",
+        "+0.100",
+        "only in A: 2 wave 3.000–3.500 s",
+    ):
+        assert text in done.out
+
+
+def test_agree_prints_json(sd2: Sd2, anna: Path, ben: Path) -> None:
+    data = json.loads(sd2("labels", "agree", anna, ben, "--rate", 10, "--json").out)
+    assert data["frames"] == 72
+    assert data["answers"] == [[], ["push"], ["swipe"], ["wave"]]
+    # Of 72 frames A has wave in 15 (B in 9 of them) and swipe in 30, which B calls push;
+    # push goes on for 2 more.
+    assert data["confusion"] == [[25, 2, 0, 0], [0, 0, 0, 0], [0, 30, 0, 0], [6, 0, 0, 9]]
+    assert [(one["a"], one["b"], one["end_difference_frames"]) for one in data["matches"]] == [
+        (1, 1, 0),
+        (3, 2, 2),
+    ]
+    same = json.loads(sd2("labels", "agree", anna, anna, "--rate", 10, "--json").out)
+    assert same["overall"]["kappa"] == same["f1"] == same["mean_iou"] == 1.0
+
+
+def test_agree_without_a_number_says_so(sd2: Sd2, tmp_path: Path) -> None:
+    nothing = written(tmp_path / "none.json")
+    done = sd2("labels", "agree", nothing, nothing, "--rate", 10)
+    assert "No kappa: both give one and the same answer in all frames." in done.out
+
+
+def test_agree_refuses_what_it_cannot_do(sd2: Sd2, anna: Path, ben: Path) -> None:
+    for arguments, words in (
+        ((anna, ben), "Comparing labels needs the times of frames"),
+        ((anna, ben, "--rate", 10, "--track", "Other"), "no track 'Other'"),
+        ((anna, ben, "--rate", 10, "--min-iou", 2), "The least IoU of a match is 2"),
+        ((anna, ben.with_name("missing.json"), "--rate", 10), "missing.json does not exist"),
+    ):
+        refused = sd2("labels", "agree", *arguments)
+        assert refused.code == 1
+        assert words in refused.err
+
+
+def test_every_format_is_named_in_the_help(sd2: Sd2) -> None:
+    words = " ".join(sd2("labels", "show", "--help").out.split())
+    for one in FORMATS:
+        assert one.name in words
