@@ -76,6 +76,7 @@ class LabelsEntry(Entry):
         return Labels(tracks, tuple(entry.made() for entry in self.spans), self.label_set.made())
 
 
+_LONGEST_FOUND = 60
 _SPAN_FIELDS = tuple(field.name for field in fields(Span))
 _SPAN_OPTIONAL = {"note": "", "author": "", "confidence": None, "origin": "person"}
 
@@ -121,4 +122,6 @@ def first_fault(error: ValidationError) -> str:
         return f"{where} is missing"
     if first["type"] == "extra_forbidden":
         return f"{where} is nothing that this version knows"
-    return f"{where} is {first['input']!r} ({first['msg']})"
+    found = repr(first["input"])
+    found = found if len(found) <= _LONGEST_FOUND else f"{found[:_LONGEST_FOUND]}…"
+    return f"{where} is {found} ({first['msg']})"

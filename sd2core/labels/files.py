@@ -177,7 +177,7 @@ def _read(path: Path, document: type[_Document], expected: str) -> _Document:
         content = json.loads(text)
     except FileNotFoundError as error:
         raise Sd2Error(f"{path} does not exist", f"a file of the format {expected!r}") from error
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+    except (OSError, ValueError, RecursionError) as error:  # no UTF-8, no JSON, nested too deep
         raise Sd2Error(f"{path} cannot be read ({error})", "JSON written by SD² Studio") from error
     found = content.get("format") if isinstance(content, dict) else None
     if found != expected:

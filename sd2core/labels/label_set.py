@@ -38,7 +38,8 @@ class Label:
             raise Sd2Error(
                 f"The colour of the label {self.name!r} is {self.colour!r}", "#rrggbb, lower case"
             )
-        if len(self.key) > 1 or self.key.isspace():
+        check_text(self.gesture_class, "class of a label")
+        if len(self.key) > 1 or self.key.isspace() or not self.key.isprintable():
             raise Sd2Error(f"The key of the label {self.name!r} is {self.key!r}", "one character")
 
 
@@ -58,6 +59,7 @@ class LabelSet:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "labels", tuple(self.labels))
+        check_text(self.name, "name of a label set")
         for what, values in (
             ("name", [one.name for one in self.labels]),
             ("key", [one.key.casefold() for one in self.labels if one.key]),
@@ -81,6 +83,12 @@ def check_name(name: str, what: str) -> None:
             f"The name of a {what} is {name[: LONGEST_NAME + 1]!r}",
             f"one line of 1 to {LONGEST_NAME} characters",
         )
+
+
+def check_text(text: str, what: str) -> None:
+    """Refuse a text that no file can hold: half of a character of two (a lone surrogate)."""
+    if not text.isascii() and any("\ud800" <= one <= "\udfff" for one in text):
+        raise Sd2Error(f"The {what} is {text[:LONGEST_NAME]!r}", "whole characters")
 
 
 # Two blues and two oranges (Okabe and Ito, colour universal design): classes differ in hue for

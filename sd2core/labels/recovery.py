@@ -21,6 +21,7 @@ import os
 import socket
 import time
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from itertools import groupby
 from pathlib import Path
@@ -146,7 +147,8 @@ class RecoveryPlace:
             return self.held
         self._lock = lock
         holder = Holder(_user(), socket.gethostname(), os.getpid(), time.time())
-        atomic_write_text(self._folder / _HOLDER_NAME, json.dumps(asdict(holder)) + "\n")
+        with suppress(OSError):  # one can edit without having said who one is
+            atomic_write_text(self._folder / _HOLDER_NAME, json.dumps(asdict(holder)) + "\n")
         return True
 
     def release(self) -> None:

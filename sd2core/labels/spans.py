@@ -9,7 +9,7 @@ from operator import attrgetter
 from typing import Literal
 
 from sd2core.errors import Sd2Error
-from sd2core.labels.label_set import GESTURES, LabelSet, check_name
+from sd2core.labels.label_set import GESTURES, LabelSet, check_name, check_text
 
 Origin = Literal["person", "suggestion", "import"]
 Overlap = Literal["exclusive", "free"]
@@ -55,6 +55,8 @@ class Span:
             raise Sd2Error(f"The id of a span is {self.id!r}", "a whole number from 1 on")
         check_name(self.label, "label")
         check_name(self.track, "track")
+        check_text(self.note, "note of a span")
+        check_text(self.author, "author of a span")
         if not (math.isfinite(self.start_s) and math.isfinite(self.end_s)):
             raise Sd2Error(f"{self.words()} is not finite", "finite times in seconds")
         if not self.start_s < self.end_s:

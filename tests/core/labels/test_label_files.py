@@ -178,6 +178,7 @@ def test_what_cannot_be_is_refused(tmp_path: Path, change: dict[str, Any], says:
         (b'{"format": "sd2-labels",', "cannot be read .*line 1 column"),
         (b"\xff\xfe", "cannot be read .*utf-8"),
         (b"[" * 100_000, "cannot be read"),
+        (b'{"format": ' + b"9" * 5000 + b"}", "cannot be read .*integer"),
         (b"[]", "has the format None"),
         (b'{"format": "sd2-recording", "version": 1}', "has the format 'sd2-recording'"),
     ],
@@ -189,6 +190,26 @@ def test_what_is_no_such_file_is_refused(tmp_path: Path, content: bytes, says: s
         with pytest.raises(Sd2Error, match=says) as caught:
             read(path)
         assert str(path) in str(caught.value)
+
+
+def test_a_long_value_is_not_repeated_whole(tmp_path: Path) -> None:
+    path = tmp_path / FILE_NAME
+    for label in ('"\\ud800"', f'["{"x" * 9000}"]'):
+        write_labels(path, Labels(spans=(Span(**SPAN),)))  # type: ignore[arg-type]
+        path.write_text(path.read_text(encoding="utf-8").replace('"wave"', label))
+        with pytest.raises(Sd2Error) as caught:
+            read_labels(path)
+        assert len(str(caught.value)) < 400 + len(str(path))
+
+
+def test_half_characters_are_refused_before_they_spoil_a_file() -> None:
+    with pytest.raises(Sd2Error, match=r"note of a span is .*whole characters"):
+        Span(1, "Gestures", 0.0, 1.0, "wave", note="\ud83d")
+    with pytest.raises(Sd2Error, match="class of a label"):
+        Label("wave", "#000000", gesture_class="\udc00")
+    with pytest.raises(Sd2Error, match="key of the label 'wave'"):
+        Label("wave", "#000000", "\ud83d")
+    assert Label("wave", "#000000", "\U0001f44b", "\U0001f44b").key == "\U0001f44b"
 
 
 def test_times_that_are_no_numbers_are_refused(tmp_path: Path) -> None:
