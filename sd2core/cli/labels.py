@@ -19,7 +19,7 @@ from sd2core.cli.label_reading import (
 from sd2core.cli.labels_agree import add_agree
 from sd2core.cli.labels_suggest import add_suggest
 from sd2core.cli.options import add_command, add_json
-from sd2core.cli.output import print_json, print_rows
+from sd2core.cli.output import counted, print_json, print_rows
 
 if TYPE_CHECKING:
     from sd2core.labels.spans import Labels
@@ -134,7 +134,7 @@ def _convert(options: argparse.Namespace) -> None:
     if options.json:
         print_json({"path": str(options.out), "spans": len(labels.spans), "not_kept": lost})
         return
-    print(f"Wrote {options.out} with {len(labels.spans)} spans")
+    print(f"Wrote {options.out} with {counted(len(labels.spans), 'span')}")
     for sentence in lost:
         print(f"  not kept: {sentence}")
 

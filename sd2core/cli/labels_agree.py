@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.label_reading import add_clock, clock_of, labels_at, needed, with_rate
 from sd2core.cli.options import add_command, add_json, share
-from sd2core.cli.output import print_json, print_rows
+from sd2core.cli.output import counted, print_json, print_rows
 
 if TYPE_CHECKING:
     from sd2core.labels.agreement import Agreement, Answer, Kappa
@@ -77,8 +77,8 @@ def _print(found: Agreement) -> None:
     print()
     same = sum(match.same_label for match in spans.matches)
     print(
-        f"{len(spans.matches)} spans matched from an IoU of {spans.min_iou:g} on, {same} of them"
-        f" with the same label; {len(spans.only_a)} only in A, {len(spans.only_b)} only in B"
+        f"{counted(len(spans.matches), 'span')} matched from an IoU of {spans.min_iou:g} on,"
+        f" {same} of them with the same label; {len(spans.only_a)} only in A, {len(spans.only_b)} only in B"
         + ("" if spans.f1 is None else f"; F1 {spans.f1:.3f}")
     )
     if spans.matches:

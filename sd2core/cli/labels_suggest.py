@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from sd2core.cli.label_reading import add_replace, check_label_output, recording_clock, write
 from sd2core.cli.options import add_command, add_json, not_negative_float
-from sd2core.cli.output import print_json, print_rows, progress_bar
+from sd2core.cli.output import counted, print_json, print_rows, progress_bar
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ def _suggest(options: argparse.Namespace) -> None:
         )
         return
     print(
-        f"{len(spans)} spans in which something moves, in the {doppler.kind} map:"
+        f"{counted(len(spans), 'span')} in which something moves, in the {doppler.kind} map:"
         f" {chosen.high_db:g} dB or more over the quiet level somewhere,"
         f" {chosen.low_db:g} dB throughout"
     )

@@ -39,6 +39,11 @@ def print_facts(title: str, facts: Mapping[str, str]) -> None:
         print(f"  {name:<{width}}  {value}")
 
 
+def counted(number: int, what: str) -> str:
+    """``1 span``, ``2 spans``."""
+    return f"{number:,} {what}" + ("" if number == 1 else "s")
+
+
 def print_rows(rows: Sequence[Sequence[str]], *, right: Collection[int] = ()) -> None:
     """Print a table whose first row is its heading; ``right`` are columns of numbers."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]

@@ -148,7 +148,7 @@ def test_suggest_writes_what_it_finds_and_says_why(sd2: Sd2, moving: Path, tmp_p
     out = tmp_path / "found.json"
     done = sd2("labels", "suggest", moving, "--out", out, "--margin-s", 0, "--label", "wave")
     assert done.code == 0, done.err
-    assert "1 spans in which something moves, in the real map: 8 dB" in done.out
+    assert "1 span in which something moves, in the real map: 8 dB" in done.out
     assert "up to 20 dB over the quiet level" in done.out
     (span,) = files.read_labels(out).labels.spans
     assert (span.origin, span.label, span.confidence) == ("suggestion", "wave", 1.0)

@@ -88,3 +88,13 @@ def test_a_damaged_file_is_a_sentence(sd2: Sd2, swing: Path, tmp_path: Path) -> 
         assert outcome.code == 1
         assert "swing.h5 cannot be read as HDF5" in outcome.err
         assert "Traceback" not in outcome.err
+
+
+def test_its_labels_are_those_of_the_recording(sd2: Sd2, swing: Path, tmp_path: Path) -> None:
+    data = json.loads(sd2("labels", "show", swing, "--json").out)
+    assert [span["frames"] for span in data["spans"]] == [[2, 5]]
+    folder = tmp_path / "swing.sd2"
+    assert sd2("import", folder, "--radar", swing, "--radar-offset-s", 1.5).code == 0
+    moved = json.loads(sd2("labels", "show", folder, "--json").out)["spans"][0]
+    assert moved["start_s"] == pytest.approx(1.5 + 2 * FRAME_S)
+    assert moved["frames"] == [2, 5]
