@@ -78,7 +78,8 @@ def _print(found: Agreement) -> None:
     same = sum(match.same_label for match in spans.matches)
     print(
         f"{counted(len(spans.matches), 'span')} matched from an IoU of {spans.min_iou:g} on,"
-        f" {same} of them with the same label; {len(spans.only_a)} only in A, {len(spans.only_b)} only in B"
+        f" {same} of them with the same label;"
+        f" {len(spans.only_a)} only in A, {len(spans.only_b)} only in B"
         + ("" if spans.f1 is None else f"; F1 {spans.f1:.3f}")
     )
     if spans.matches:
