@@ -9,11 +9,12 @@ from PySide6.QtWidgets import QMenu
 
 from sd2app.actions import ACTIONS, Action
 from sd2app.icons import transport_icon
+from sd2app.label_actions import LabelActions
 
 if TYPE_CHECKING:
     from sd2app.views.window import MainWindow
 
-_MENUS = ("File", "Edit", "View", "Play", "Model", "Help")
+_MENUS = ("File", "Edit", "View", "Play", "Labels", "Model", "Help")
 
 
 class ActionSet:
@@ -43,6 +44,7 @@ class ActionSet:
         menus = {name: bar.addMenu(f"&{name}") for name in _MENUS}
         for menu in menus.values():
             menu.setToolTipsVisible(True)
+        self.labels = LabelActions(self._window, menus["Labels"])
         recent = QMenu("Open recent", menus["File"])
         menus["Model"].addMenu(models)
         for row in ACTIONS:

@@ -26,6 +26,14 @@ def _has_mesh(context: Context) -> bool:
     return context.document.mesh is not None
 
 
+def _has_spans(context: Context) -> bool:
+    return bool(context.labels.labels.spans)
+
+
+def _one_selected(context: Context) -> bool:
+    return len(context.labels.selected) == 1
+
+
 @dataclass(frozen=True)
 class Action:
     """One row.
@@ -52,6 +60,9 @@ MOUSE = (
     ("Wheel over a heatmap", "Zoom in on time, about the pointer"),
     ("Shift+wheel, middle drag", "Pan in time"),
     ("Double click in a heatmap", "Show the whole recording"),
+    ("Drag an empty place of the labels", "Mark a span"),
+    ("Drag a span or an edge of it", "Move or shorten it; Alt: nothing attracts it"),
+    ("Click a span, Ctrl+click", "Select it and go to its start, select several"),
     ("Drag the title of the radar's heatmap", "Align the capture in time"),
     ("Drag the frame or its edges in the overview", "Pan or zoom in time"),
     ("Drag the sensor in the scene", "Move it in the plane of the screen"),
@@ -100,7 +111,7 @@ ACTIONS: tuple[Action, ...] = (
         lambda c: c.document.recording is not None and bool(c.document.recording.missing()),
     ),
     Action(
-        "save", "File", "Save", ("Ctrl+S",), "Save sensor and alignment in the recording",
+        "save", "File", "Save", ("Ctrl+S",), "Save labels, sensor and alignment in the recording",
         lambda w: w.dialogs.save(), _has_content, separator_before=True,
     ),
     Action(
@@ -158,24 +169,24 @@ ACTIONS: tuple[Action, ...] = (
         lambda c: c.synthesis.torso_m is not None,
     ),
     Action(
-        "colour_velocity", "View", "Colour by radial velocity", ("1",),
+        "colour_velocity", "View", "Colour by radial velocity", ("Alt+1",),
         "Blue recedes, red approaches, grey is hidden or still",
         lambda w: w.context.display.set_mesh_colour("velocity"), _has_mesh,
         lambda c: c.display.mesh_colour == "velocity",
     ),
     Action(
-        "colour_range", "View", "Colour by range", ("2",), "Distance from the sensor in metres",
+        "colour_range", "View", "Colour by range", ("Alt+2",), "Distance from the sensor in metres",
         lambda w: w.context.display.set_mesh_colour("range"), _has_mesh,
         lambda c: c.display.mesh_colour == "range",
     ),
     Action(
-        "colour_visibility", "View", "Colour by visibility", ("3",),
+        "colour_visibility", "View", "Colour by visibility", ("Alt+3",),
         "What the sensor sees, and what is hidden from it",
         lambda w: w.context.display.set_mesh_colour("visibility"), _has_mesh,
         lambda c: c.display.mesh_colour == "visibility",
     ),
     Action(
-        "colour_plain", "View", "Plain mesh", ("4",), "One colour",
+        "colour_plain", "View", "Plain mesh", ("Alt+4",), "One colour",
         lambda w: w.context.display.set_mesh_colour("plain"), _has_mesh,
         lambda c: c.display.mesh_colour == "plain",
     ),
@@ -310,6 +321,62 @@ ACTIONS: tuple[Action, ...] = (
         "loop", "Play", "Loop", ("L",), "Start again at the end",
         lambda w: w.context.playback.set_loop(not w.context.playback.loop),
         checked=lambda c: c.playback.loop, icon="loop",
+    ),
+    Action(
+        "end_marks", "Labels", "End what is being marked", ("E",),
+        "End all spans that have begun, before the frame on screen",
+        lambda w: w.context.label_edits.end_marks(),
+        lambda c: bool(c.labels.marks), separator_before=True,
+    ),
+    Action(
+        "drop_marks", "Labels", "Forget what is being marked", ("Esc",),
+        "Let what has begun be, without a span",
+        lambda w: w.context.label_edits.drop_marks(),
+        lambda c: bool(c.labels.marks),
+    ),
+    Action(
+        "span_starts_here", "Labels", "Selected span starts here", ("[",),
+        "The frame on screen is the first one of the selected span",
+        lambda w: w.context.label_edits.edge_here("start"), _one_selected,
+        separator_before=True,
+    ),
+    Action(
+        "span_ends_here", "Labels", "Selected span ends here", ("]",),
+        "The frame on screen is the last one of the selected span",
+        lambda w: w.context.label_edits.edge_here("end"), _one_selected,
+    ),
+    Action(
+        "nudge_back", "Labels", "Move span one frame back", ("Alt+Left",),
+        "It stops at its neighbours",
+        lambda w: w.context.label_edits.nudge(-1), _one_selected,
+    ),
+    Action(
+        "nudge_on", "Labels", "Move span one frame on", ("Alt+Right",),
+        "It stops at its neighbours",
+        lambda w: w.context.label_edits.nudge(1), _one_selected,
+    ),
+    Action(
+        "split_span", "Labels", "Split span here", ("/",),
+        "Cut the span under the cursor in two, before the frame on screen",
+        lambda w: w.context.label_edits.split(), _has_spans,
+    ),
+    Action(
+        "merge_spans", "Labels", "Merge selected spans", ("G",),
+        "One span from the first start to the last end (Ctrl+click selects several)",
+        lambda w: w.context.label_edits.merge(), lambda c: len(c.labels.selected) > 1,
+    ),
+    Action(
+        "delete_spans", "Labels", "Delete selected spans", ("Backspace", "Del"),
+        "Undo brings them back",
+        lambda w: w.context.label_edits.delete(), lambda c: bool(c.labels.selected),
+    ),
+    Action(
+        "next_span", "Labels", "Next span", ("N",), "Select it and go to its start",
+        lambda w: w.context.label_edits.step(1), _has_spans, separator_before=True,
+    ),
+    Action(
+        "previous_span", "Labels", "Previous span", ("P",), "Select it and go to its start",
+        lambda w: w.context.label_edits.step(-1), _has_spans,
     ),
     Action(
         "open_model", "Model", "Open model file…", (),

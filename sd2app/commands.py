@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from sd2core.fmcw.processing import Clutter
 
 
-class _Assign(QUndoCommand):
+class Assign(QUndoCommand):
     """Sets one value of a model; models ignore a value that they have already."""
 
     def __init__(
@@ -27,9 +27,11 @@ class _Assign(QUndoCommand):
         self._assign, self._before, self._after = assign, before, after
 
     def undo(self) -> None:
+        """Assign what was there before."""
         self._assign(self._before)
 
     def redo(self) -> None:
+        """Assign what was there after."""
         self._assign(self._after)
 
 
@@ -127,4 +129,4 @@ class Edits:
         self, text: str, assign: Callable[[Any], None], before: object, after: object
     ) -> None:
         if before != after and self._document.content is not None:
-            self._document.undo_stack.push(_Assign(text, assign, before, after))
+            self._document.undo_stack.push(Assign(text, assign, before, after))

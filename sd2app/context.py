@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from PySide6.QtCore import QObject
 
 from sd2app.commands import Edits
+from sd2app.label_edits import LabelEdits
 from sd2app.models.content import reference_of
 from sd2app.models.denoise import DenoiseModel
 from sd2app.models.denoise_library import DenoiserLibrary, core_library
@@ -20,6 +21,7 @@ from sd2app.models.fit_follower import FitFollower
 from sd2app.models.fit_offer import FitOffer
 from sd2app.models.fit_taker import FitTaker
 from sd2app.models.jobs import JobsModel
+from sd2app.models.labels import LabelsModel
 from sd2app.models.ladder import CORE, Ladder
 from sd2app.models.overlay import OverlayModel
 from sd2app.models.playback import PlaybackModel
@@ -62,6 +64,8 @@ class Context:
     live: LiveDenoiseModel
     difference: DifferenceModel
     edits: Edits
+    labels: LabelsModel
+    label_edits: LabelEdits
     fit: FitModel
     fit_follower: FitFollower
     fit_offer: FitOffer
@@ -134,6 +138,7 @@ def build_context(
         parent,
     )
     training = TrainingModel(settings, parent, train_command or TRAIN_COMMAND)
+    labels = LabelsModel(parent)
     context = Context(
         settings=settings,
         jobs=jobs,
@@ -156,6 +161,8 @@ def build_context(
         live=LiveDenoiseModel(playback, synthetic, denoise, settings, parent),
         difference=DifferenceModel(denoised, real, display, settings, parent),
         edits=edits,
+        labels=labels,
+        label_edits=LabelEdits(document, labels, playback, parent),
         fit=fit,
         fit_follower=follower,
         fit_offer=FitOffer(document, fit, parent),
@@ -182,6 +189,7 @@ def _take_over(context: Context) -> None:
     context.span.set_extent(content.timebase.start_s, content.timebase.end_s)
     context.video.set_reader(content.video)
     context.sensor.set_sensor(content.recording.sensor)
+    context.labels.open(document.labels)
     _follow_capture(context, new=True)
     context.synthesis.take_over()
     # The clock of another recording begins anew, which is nobody's wish to stay.

@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 from sd2core.atomic import atomic_write_text
 from sd2core.errors import Sd2Error
+from sd2core.labels.files import FILE_NAME as LABELS_NAME
+from sd2core.labels.files import labels_of, read_labels, write_labels
 from sd2core.progress import Progress, silent
 from sd2core.recording_document import (
     FILE_NAME,
@@ -44,7 +46,9 @@ from sd2core.sensor import VirtualSensor
 if TYPE_CHECKING:
     from sd2core.io.radar import RadarCapture, RecordedMap
     from sd2core.io.video import VideoReader
+    from sd2core.labels.spans import Labels
     from sd2core.mesh import MeshSequence
+    from sd2core.timebase import Timebase
 
 SUFFIX = ".sd2"
 
@@ -101,6 +105,10 @@ class Recording:
         is not to be denoised. Neither: nobody has chosen.
     sensor : VirtualSensor
     spans : tuple of Span
+        Labels as ``recording.json`` itself can hold them: those of a recording that nobody
+        has labelled here.
+    labels : Labels or None
+        Those in ``labels.json``, which then stand for ``spans``; see :attr:`labelled`.
     title : str
     simulated : bool
         True when no camera and no radar was there.
@@ -119,6 +127,7 @@ class Recording:
     bundled_denoiser: str | None = None
     sensor: VirtualSensor = field(default_factory=VirtualSensor)
     spans: tuple[Span, ...] = ()
+    labels: Labels | None = None
     title: str = ""
     simulated: bool = False
     camera: CameraEntry | None = None
@@ -220,6 +229,11 @@ class Recording:
             if is_absolute(stored_path(path, self.folder))
         )
 
+    @property
+    def labelled(self) -> Labels:
+        """The labels, wherever they are kept."""
+        return labels_of(self.spans) if self.labels is None else self.labels
+
     def missing(self) -> dict[Role, Path]:
         """Files that are not where the recording says."""
         return {role: path for role, path in self._files().items() if not _exists(role, path)}
@@ -269,9 +283,19 @@ class Recording:
         left = tuple(role for role in missing if role not in found and role not in ambiguous)
         return Relinked(found, ambiguous, left)
 
-    def save(self) -> None:
-        """Write ``recording.json`` in one step, keeping fields this version does not know."""
+    def save(self, timebase: Timebase | None = None) -> None:
+        """Write ``recording.json`` in one step, keeping fields this version does not know.
+
+        Labels are written before, to ``labels.json``, with their frames where a timebase
+        is given.
+        """
         document = self._read
+        if self.labels is not None:
+            file = self.folder / LABELS_NAME
+            write_labels(
+                file, self.labels, timebase=timebase, recording=self.folder, video=self.video
+            )
+            document.labels, self.spans = LABELS_NAME, ()
         document.version = VERSION
         document.title = self.title
         document.simulated = self.simulated
@@ -380,6 +404,7 @@ def open_recording(path: Path) -> Recording:
     path = Path(path)
     folder = plain_path(path.parent if path.name == FILE_NAME else path)
     document = read_document(folder / FILE_NAME)
+    labels = located_path(document.labels, folder)
     return Recording(
         folder,
         video=located_path(document.video, folder),
@@ -392,6 +417,7 @@ def open_recording(path: Path) -> Recording:
         radar_offset_s=document.radar_offset_s,
         sensor=_sensor(document, folder / FILE_NAME),
         spans=document.spans,
+        labels=None if labels is None else read_labels(labels).labels,
         title=document.title or folder.stem,
         simulated=document.simulated,
         camera=document.camera,

@@ -108,7 +108,7 @@ class ComparisonWindow(QWidget):
         c, frame = self._context, panel("tracks")
         column = QVBoxLayout()
         for track in self._model.tracks:
-            view = HeatmapView(track, c.span, c.playback, c.display, c.pointer)
+            view = HeatmapView(track, c.span, c.playback, c.display, c.pointer, c.labels)
             column.addWidget(view, 1)
         column.addWidget(JointCurves(self._model, c.span, c.playback, c.display), 1)
         column.addWidget(TimeRuler(c.span, c.playback, c.display))

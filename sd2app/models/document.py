@@ -15,8 +15,9 @@ from sd2app.models.content import Content, load_content, recording_of
 from sd2app.models.denoise_choice import DenoiserChoice
 from sd2app.models.jobs import Job, JobsModel
 from sd2core.body.camera import PinholeCamera
+from sd2core.labels.spans import Labels
 from sd2core.mesh import MeshSequence
-from sd2core.recording import Recording, Relinked, Span
+from sd2core.recording import Recording, Relinked
 from sd2core.sensor import VelocityAxis
 from sd2core.spectrum import DopplerMap
 from sd2core.timebase import Timebase
@@ -108,9 +109,16 @@ class DocumentModel(QObject):
         return self._content is not None and self._content.recording.simulated
 
     @property
-    def spans(self) -> tuple[Span, ...]:
-        """Gesture spans that came with the recording."""
-        return self._content.recording.spans if self._content else ()
+    def labels(self) -> Labels:
+        """Labels that came with the recording, or with a radar file that is all there is."""
+        content = self._content
+        if content is None:
+            return Labels()
+        recording, brought = content.recording, content.radar_labels
+        alone = recording.video is None and recording.mesh is None
+        if brought is not None and alone and recording.labels is None and not recording.spans:
+            return brought
+        return recording.labelled
 
     @property
     def camera(self) -> PinholeCamera:
@@ -251,7 +259,7 @@ class DocumentModel(QObject):
             When the folder cannot be written.
         """
         if self._content is not None and self._content.saved:
-            self._content.recording.save()
+            self._content.recording.save(self._content.timebase)
             self.undo_stack.setClean()
             self.changed.emit()
 
@@ -261,6 +269,7 @@ class DocumentModel(QObject):
             return
         title = "" if not self._content.saved else self.title
         made = replace(self._content.recording, title=title).save_as(folder)
+        made.save(self._content.timebase)
         self._content = replace(self._content, recording=made)
         self.undo_stack.setClean()
         self.changed.emit()

@@ -186,8 +186,9 @@ class TrainingFollower(QObject):
         )  # fmt: skip
         told = self.history.take(look.events)
         if look.exists and self._wish is not None and look.word != self._wish and look.live:
-            # It had no folder when this was asked for.
-            write_control(self.folder.control, self._wish)
+            # It had no folder when this was asked for, and may have cleared up meanwhile.
+            with suppress(FileNotFoundError):
+                write_control(self.folder.control, self._wish)
         self._seen_live |= look.live
         # Once it has been at the folder, a process that still ends is of no interest.
         phase = phase_of(look, self.history, launching and not self._seen_live)

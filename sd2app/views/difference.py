@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QWidget
 from sd2app.colour_maps import signed_table
 from sd2app.models.difference import DifferenceModel
 from sd2app.models.display import DisplayModel
+from sd2app.models.labels import LabelsModel
 from sd2app.models.playback import PlaybackModel
 from sd2app.models.tracks import PointerModel, Reading
 from sd2app.models.visible_span import VisibleSpanModel
@@ -32,9 +33,12 @@ class DifferenceView(HeatmapView):
         playback: PlaybackModel,
         display: DisplayModel,
         pointer: PointerModel,
+        labels: LabelsModel,
         parent: QWidget | None = None,
     ) -> None:
-        super().__init__(difference.denoised, span, playback, display, pointer, parent=parent)
+        super().__init__(
+            difference.denoised, span, playback, display, pointer, labels, parent=parent
+        )
         self._difference = difference
         difference.changed.connect(self.invalidate)
 

@@ -18,9 +18,11 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from sd2app.colour_maps import lookup_table
 from sd2app.models.display import DisplayModel
+from sd2app.models.labels import LabelsModel
 from sd2app.models.playback import PlaybackModel
 from sd2app.models.tracks import UNCERTAIN_SHARE, PointerModel, Reading, TrackModel
 from sd2app.models.visible_span import VisibleSpanModel
+from sd2app.views.label_painting import paint_regions
 from sd2app.views.map_widget import MapWidget, paint_cursor
 from sd2app.views.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, signed_text, ticks
 
@@ -46,6 +48,7 @@ class HeatmapView(MapWidget):
         playback: PlaybackModel,
         display: DisplayModel,
         pointer: PointerModel,
+        labels: LabelsModel,
         *,
         alignable: bool = False,
         parent: QWidget | None = None,
@@ -54,6 +57,7 @@ class HeatmapView(MapWidget):
         self._span = span
         self._playback = playback
         self._pointer = pointer
+        self._labels = labels
         self._alignable = alignable
         self._grab: tuple[str, float] | None = None
         self._hint = ""
@@ -61,7 +65,13 @@ class HeatmapView(MapWidget):
         self.setMinimumHeight(96)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         span.changed.connect(self.invalidate)
-        for signal in (track.status_changed, playback.frame_changed, pointer.changed):
+        for signal in (
+            track.status_changed,
+            playback.frame_changed,
+            pointer.changed,
+            labels.changed,
+            labels.selection_changed,
+        ):
             signal.connect(self.update)
 
     def sizeHint(self) -> QSize:
@@ -145,6 +155,7 @@ class HeatmapView(MapWidget):
         self.paint_map(painter, plot, self._span.start_s, self._span.end_s)
         self._paint_marked_bins(painter, plot)
         self.paint_gaps(painter, plot, self.scale)
+        paint_regions(painter, plot, self.scale, self._labels)
         self._paint_axis(painter, plot)
         self._paint_cursors(painter, plot)
 

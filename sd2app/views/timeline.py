@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QWidget
 
 from sd2app.models.display import DisplayModel
+from sd2app.models.labels import LabelsModel
 from sd2app.models.playback import PlaybackModel
 from sd2app.models.tracks import TrackModel
 from sd2app.models.visible_span import VisibleSpanModel
 from sd2app.views.map_widget import MapWidget, paint_cursor
 from sd2app.views.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, clock_text, tick_step, ticks
-from sd2core.recording import Span
 
-_SPANS_PX = 18
 _EDGE_PX = 6
 
 
@@ -75,53 +72,6 @@ class TimeRuler(QWidget):
         self._playback.seek(self.scale.time_of(event.position().x()))
 
 
-class SpanStrip(QWidget):
-    """Gesture spans on the time axis of the tracks."""
-
-    def __init__(
-        self, span: VisibleSpanModel, display: DisplayModel, parent: QWidget | None = None
-    ) -> None:
-        super().__init__(parent)
-        self._span = span
-        self._display = display
-        self._labels: Sequence[Span] = ()
-        self.setFixedHeight(_SPANS_PX)
-        self.hide()
-        for signal in (span.changed, display.theme_changed):
-            signal.connect(self.update)
-
-    def set_labels(self, labels: Sequence[Span]) -> None:
-        """Show these spans; nothing is drawn where there are none."""
-        self._labels = labels
-        self.setVisible(bool(labels))
-        self.update()
-
-    def paintEvent(self, event: QPaintEvent) -> None:
-        """Each span as a box with its label."""
-        with QPainter(self) as painter:
-            self._paint(painter)
-
-    def _paint(self, painter: QPainter) -> None:
-        colours = self._display.palette
-        scale = TimeScale(self._span.start_s, self._span.end_s, self.width())
-        painter.fillRect(self.rect(), QColor(colours.panel))
-        painter.setClipRect(
-            QRectF(GUTTER_PX, 0, self.width() - GUTTER_PX - MARGIN_PX, self.height())
-        )
-        for label in self._labels:
-            left, right = scale.x_of(label.start_s), scale.x_of(label.end_s)
-            box = QRectF(left, 2, max(right - left, 2), _SPANS_PX - 4)
-            tint = QColor(colours.accent)
-            tint.setAlpha(48)
-            painter.fillRect(box, tint)
-            painter.fillRect(QRectF(left, 2, 2, _SPANS_PX - 4), QColor(colours.accent))
-            text = painter.fontMetrics().elidedText(
-                label.label, Qt.TextElideMode.ElideRight, int(box.width()) - 8
-            )
-            painter.setPen(QColor(colours.text))
-            painter.drawText(box.adjusted(6, 0, -2, 0), Qt.AlignmentFlag.AlignVCenter, text)
-
-
 class Overview(MapWidget):
     """The whole recording; drag the frame to pan, its edges to zoom."""
 
@@ -131,21 +81,17 @@ class Overview(MapWidget):
         span: VisibleSpanModel,
         playback: PlaybackModel,
         display: DisplayModel,
+        labels: LabelsModel,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(track, display, parent)
         self._span = span
         self._playback = playback
-        self._labels: Sequence[Span] = ()
+        self._labels = labels
         self._grab: tuple[str, float] | None = None
         self.setFixedHeight(40)
-        for signal in (span.changed, playback.frame_changed):
+        for signal in (span.changed, playback.frame_changed, labels.changed):
             signal.connect(self.update)
-
-    def set_labels(self, labels: Sequence[Span]) -> None:
-        """Gesture spans to mark in the overview."""
-        self._labels = labels
-        self.update()
 
     def set_track(self, track: TrackModel) -> None:
         """Show another track."""
@@ -197,11 +143,11 @@ class Overview(MapWidget):
         paint_cursor(painter, plot, scale.x_of(self._playback.time_s))
 
     def _paint_labels(self, painter: QPainter, plot: QRectF, scale: TimeScale) -> None:
-        for label in self._labels:
-            left, right = scale.x_of(label.start_s), scale.x_of(label.end_s)
+        for span in self._labels.labels.spans:
+            left, right = scale.x_of(span.start_s), scale.x_of(span.end_s)
             painter.fillRect(
                 QRectF(left, plot.top(), max(right - left, 2), 3),
-                QColor(self._display.palette.accent),
+                QColor(self._labels.colour_of(span.label)),
             )
 
     def _handle_at(self, x: float) -> str:

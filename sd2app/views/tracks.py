@@ -8,8 +8,9 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from sd2app.views.difference import DifferenceView
 from sd2app.views.heatmap import HeatmapView
+from sd2app.views.label_timeline import LabelTimeline
 from sd2app.views.model_menu import ModelButton, ModelMenu
-from sd2app.views.timeline import Overview, SpanStrip, TimeRuler
+from sd2app.views.timeline import Overview, TimeRuler
 
 if TYPE_CHECKING:
     from sd2app.context import Context
@@ -24,7 +25,7 @@ class Tracks(QWidget):
     def __init__(self, context: Context, models: ModelMenu, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._context = c = context
-        common = c.span, c.playback, c.display, c.pointer
+        common = c.span, c.playback, c.display, c.pointer, c.labels
         self.synthetic = HeatmapView(c.synthetic, *common)
         self.denoised = HeatmapView(c.denoised, *common)
         self.before = HeatmapView(c.before, *common)
@@ -38,14 +39,14 @@ class Tracks(QWidget):
         self._offer = ModelButton(c.denoise, models)
         self.synthetic.set_button(self._offer)
         self.denoised.set_button(ModelButton(c.denoise, models))
-        self.spans = SpanStrip(c.span, c.display)
-        self.overview = Overview(c.synthetic, c.span, c.playback, c.display)
+        self.labels = LabelTimeline(c.labels, c.label_edits, c.span, c.playback, c.display)
+        self.overview = Overview(c.synthetic, c.span, c.playback, c.display, c.labels)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
         for view in (self.synthetic, self.denoised, self.before, self.real, self.difference):
             column.addWidget(view, 1)
-        for below in (self.spans, TimeRuler(c.span, c.playback, c.display), self.overview):
+        for below in (self.labels, TimeRuler(c.span, c.playback, c.display), self.overview):
             column.addWidget(below)
         self._shown: object = None
         for track in c.tracks:
@@ -55,8 +56,6 @@ class Tracks(QWidget):
 
     def show_document(self) -> None:
         """Another recording is open."""
-        for view in (self.spans, self.overview):
-            view.set_labels(self._context.document.spans)
         self._follow()
 
     def _follow(self) -> None:

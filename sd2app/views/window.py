@@ -258,6 +258,7 @@ class MainWindow(QMainWindow):
         c.synthesis.failed.connect(self.messages.warn)
         c.trade.failed.connect(self.messages.warn)
         c.uncertainty.failed.connect(self.messages.warn)
+        c.label_edits.failed.connect(self.messages.warn)
         c.denoise.failed.connect(self.messages.warn)
         c.denoise.noted.connect(self.messages.note)
         c.trade.noted.connect(self.messages.note)
@@ -281,6 +282,9 @@ class MainWindow(QMainWindow):
             c.synthesis.completed,
             c.trade.plan_changed,
             c.trade.measured.changed,
+            c.labels.changed,
+            c.labels.selection_changed,
+            c.labels.marks_changed,
         ):
             signal.connect(self._refresh)
         # Without a person in the frame there is nothing to aim at.

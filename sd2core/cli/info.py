@@ -146,7 +146,10 @@ def describe_recording(recording: Recording, parts: list[Description]) -> Descri
         "sensor_position_m": [x, y, z],
         "denoiser": None if recording.denoiser is None else str(recording.denoiser),
         "bundled_denoiser": recording.bundled_denoiser,
-        "spans": [span.model_dump(mode="json") for span in recording.spans],
+        "spans": [
+            {"start_s": span.start_s, "end_s": span.end_s, "label": span.label}
+            for span in recording.labelled.spans
+        ],
         "missing": {role: str(path) for role, path in missing.items()},
         "notes": list(recording.notes),
     }
@@ -377,7 +380,7 @@ def _gaps(present: NDArray[np.bool_] | None, timebase: Timebase) -> str:
 
 def _labels(recording: Recording) -> str:
     counts: dict[str, int] = {}
-    for span in recording.spans:
+    for span in recording.labelled.spans:
         counts[span.label] = counts.get(span.label, 0) + 1
     return ", ".join(f"{count} x {label}" for label, count in counts.items())
 

@@ -96,11 +96,11 @@ def check_text(text: str, what: str) -> None:
 GESTURES = LabelSet(
     "Gestures of the paper",
     (
-        Label("left-to-right", "#0072b2", "r", "horizontal"),
-        Label("right-to-left", "#56b4e9", "l", "horizontal"),
-        Label("up-to-down", "#d55e00", "d", "vertical"),
-        Label("down-to-up", "#e69f00", "u", "vertical"),
-        Label("background", "#999999", "b", "background"),
+        Label("left-to-right", "#0072b2", "1", "horizontal"),
+        Label("right-to-left", "#56b4e9", "2", "horizontal"),
+        Label("up-to-down", "#d55e00", "3", "vertical"),
+        Label("down-to-up", "#e69f00", "4", "vertical"),
+        Label("background", "#999999", "5", "background"),
     ),
 )
 """The default: the paper's four swipes and what is none of them."""

@@ -81,7 +81,7 @@ def make_recording_pairs(
     names = _names(opened, subjects)
     for recording in opened:
         _check(recording)
-    labels = (_BACKGROUND, *sorted({span.label for one in opened for span in one.spans}))
+    labels = (_BACKGROUND, *sorted({span.label for one in opened for span in one.labelled.spans}))
     writer: PairWriter | None = None
     first: tuple[Path, float, bool] | None = None
     found: dict[str, tuple[int, int]] = {}
@@ -187,7 +187,7 @@ def _takes(
     target = radar.values.T[nearest].copy()  # (frames, bins)
     target[:, list(synthetic.null_bins)] = 0.0
     label = np.zeros(len(times_s), np.int8)
-    for span in recording.spans:
+    for span in recording.labelled.spans:
         label[(times_s >= span.start_s) & (times_s < span.end_s)] = labels.index(span.label)
     rate_hz = synthetic.timebase.frames_per_s
     takes: list[Take] = []

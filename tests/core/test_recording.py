@@ -402,7 +402,7 @@ class TestPattern:
 
 def test_the_documented_example_is_complete_and_true() -> None:
     documentation = Path(__file__).resolve().parents[2] / "docs" / "formats.md"
-    section = documentation.read_text(encoding="utf-8").split("## Recordings")[1]
+    section = documentation.read_text(encoding="utf-8").split("\n## Recordings\n")[1]
     example = json.loads(section.split("```json")[1].split("```")[0])
     assert Document.model_validate(example).model_dump(mode="json") == example
     assert example.keys() == Document.model_fields.keys()

@@ -1,0 +1,59 @@
+"""The labels of the label set as actions with their own keys, first in the menu of labels."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from PySide6.QtGui import QAction, QColor, QIcon, QKeySequence, QPixmap
+from PySide6.QtWidgets import QMenu
+
+if TYPE_CHECKING:
+    from sd2app.views.window import MainWindow
+    from sd2core.labels.label_set import Label, LabelSet
+
+_SWATCH_PX = 12
+
+
+class LabelActions:
+    """A key marks while nothing is selected, and gives what is selected another label."""
+
+    def __init__(self, window: MainWindow, menu: QMenu) -> None:
+        self._window, self._menu = window, menu
+        self._first = menu.addSeparator()
+        self._actions: list[QAction] = []
+        self._shown: LabelSet | None = None
+        window.context.labels.changed.connect(self._follow)
+        self._follow()
+
+    def _follow(self) -> None:
+        offered = self._window.context.labels.labels.label_set
+        if offered == self._shown:
+            return
+        self._shown = offered
+        for action in self._actions:
+            self._menu.removeAction(action)
+            action.deleteLater()
+        self._actions = [self._made(label) for label in offered.labels]
+        self._menu.insertActions(self._first, self._actions)
+
+    def _made(self, label: Label) -> QAction:
+        swatch = QPixmap(_SWATCH_PX, _SWATCH_PX)
+        swatch.fill(QColor(label.colour))
+        action = QAction(QIcon(swatch), label.name, self._window)
+        if label.key:
+            action.setShortcut(QKeySequence(label.key.upper()))
+        keys = f" ({label.key.upper()})" if label.key else ""
+        action.setToolTip(
+            f"Begin a span with this frame, or end the one that has begun; with a span selected,"
+            f" give it this label{keys}"
+        )
+        action.setAutoRepeat(False)
+        action.triggered.connect(lambda _=False: self._use(label.name))
+        return action
+
+    def _use(self, label: str) -> None:
+        context = self._window.context
+        if context.labels.selected and not context.playback.playing:
+            context.label_edits.relabel(label)
+        else:
+            context.label_edits.mark(label)

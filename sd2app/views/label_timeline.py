@@ -1,0 +1,275 @@
+"""Tracks of labels under the maps: drawn, moved and shortened by hand."""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+from PySide6.QtCore import QRectF, QSize, Qt, QTimer
+from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPaintEvent
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from sd2app.label_edits import LabelEdits
+from sd2app.models.display import DisplayModel
+from sd2app.models.labels import LabelsModel
+from sd2app.models.playback import PlaybackModel
+from sd2app.models.visible_span import VisibleSpanModel
+from sd2app.views.label_painting import paint_span, span_box
+from sd2app.views.map_widget import paint_cursor
+from sd2app.views.time_axis import GUTTER_PX, MARGIN_PX, TimeScale
+from sd2core.labels.spans import Span
+
+ROW_PX = 24
+_EDGE_PX = 5.0
+_ATTRACT_PX = 8.0
+_MOVED_PX = 3.0
+_SCROLL_MS, _SCROLL_SHARE = 30, 0.03
+
+
+class _Grip(NamedTuple):
+    """What the hand took hold of, and where."""
+
+    part: Literal["start", "end", "span", "nothing"]
+    x_px: float
+    track: str
+    span: Span | None = None
+
+
+class LabelTimeline(QWidget):
+    """A row per track. Drag an empty place, a span or one of its edges; Alt lets nothing attract.
+
+    A click selects a span and goes to its start, with Ctrl it adds to the selection.
+    """
+
+    def __init__(
+        self,
+        labels: LabelsModel,
+        edits: LabelEdits,
+        span: VisibleSpanModel,
+        playback: PlaybackModel,
+        display: DisplayModel,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._labels, self._edits = labels, edits
+        self._span, self._playback, self._display = span, playback, display
+        self._grip: _Grip | None = None
+        self._pointer_px = 0.0
+        self._attracted = True
+        self._scroll = QTimer(self)
+        self._scroll.setInterval(_SCROLL_MS)
+        self._scroll.timeout.connect(self._scroll_on)
+        self.setMouseTracking(True)
+        self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setAccessibleName("Labels")
+        labels.changed.connect(self._follow)
+        for signal in (
+            labels.selection_changed,
+            labels.marks_changed,
+            span.changed,
+            playback.frame_changed,
+            display.theme_changed,
+        ):
+            signal.connect(self.update)
+        self._follow()
+
+    def sizeHint(self) -> QSize:
+        """As high as its tracks."""
+        return QSize(640, ROW_PX * max(len(self._labels.labels.tracks), 1))
+
+    @property
+    def scale(self) -> TimeScale:
+        """Time axis of this widget."""
+        return TimeScale(self._span.start_s, self._span.end_s, self.width())
+
+    def row_of(self, track: str) -> QRectF:
+        """Where a track is drawn."""
+        names = [one.name for one in self._labels.labels.tracks]
+        return QRectF(0, ROW_PX * names.index(track), self.width(), ROW_PX)
+
+    # --- painting -------------------------------------------------------------------------
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Names, spans, what is being marked, cursor."""
+        with QPainter(self) as painter:
+            self._paint(painter)
+
+    def _paint(self, painter: QPainter) -> None:
+        palette, scale, model = self._display.palette, self.scale, self._labels
+        painter.fillRect(self.rect(), QColor(palette.panel))
+        plot = QRectF(GUTTER_PX, 0, self.width() - GUTTER_PX - MARGIN_PX, self.height())
+        rows = {track.name: self.row_of(track.name) for track in model.labels.tracks}
+        for name, row in rows.items():
+            self._paint_name(painter, name, row)
+            well = row.adjusted(GUTTER_PX, 1, -MARGIN_PX, -1)
+            painter.fillRect(well, QColor(palette.well))
+        painter.save()
+        painter.setClipRect(plot)
+        if not model.labels.spans and not model.marks and rows:
+            self._paint_hint(painter, next(iter(rows.values())))
+        for span in model.within(scale.start_s, scale.end_s):
+            paint_span(
+                painter,
+                span_box(span, rows[span.track], scale),
+                span.label,
+                model.colour_of(span.label),
+                palette,
+                selected=model.is_selected(span.id),
+                suggestion=span.origin == "suggestion",
+            )
+        for mark in model.marks:
+            left, right = sorted((scale.x_of(mark.start_s), scale.x_of(self._playback.time_s)))
+            box = rows[mark.track].adjusted(0, 2, 0, -2)
+            box.setLeft(left)
+            box.setRight(max(right, left + 2))
+            paint_span(
+                painter, box, f"{mark.label} …", model.colour_of(mark.label), palette, selected=True
+            )
+        painter.restore()
+        paint_cursor(painter, plot, scale.x_of(self._playback.time_s))
+
+    def _paint_name(self, painter: QPainter, name: str, row: QRectF) -> None:
+        palette = self._display.palette
+        chosen = name == self._labels.track and len(self._labels.labels.tracks) > 1
+        painter.setPen(QColor(palette.accent if chosen else palette.muted))
+        room = row.adjusted(0, 0, GUTTER_PX - 6 - row.width(), 0)
+        metrics = painter.fontMetrics()
+        shown = metrics.elidedText(name, Qt.TextElideMode.ElideRight, int(room.width()))
+        place = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+        painter.drawText(room, place, shown)
+
+    def _paint_hint(self, painter: QPainter, row: QRectF) -> None:
+        keys = [one.key for one in self._labels.labels.label_set.labels if one.key]
+        pressed = f"Press {keys[0]} to {keys[-1]} while it plays" if keys else "Drag here"
+        painter.setPen(QColor(self._display.palette.muted))
+        painter.drawText(
+            row.adjusted(GUTTER_PX + 8, 0, -MARGIN_PX, 0),
+            Qt.AlignmentFlag.AlignVCenter,
+            f"{pressed} to mark a gesture, again to end it – or drag here",
+        )
+
+    def _follow(self) -> None:
+        self.setFixedHeight(self.sizeHint().height())
+        self.update()
+
+    # --- the hand -------------------------------------------------------------------------
+
+    def grip_at(self, x_px: float, y_px: float) -> _Grip | None:
+        """What is under the pointer; edges of what is selected go first."""
+        tracks = self._labels.labels.tracks
+        row = int(y_px // ROW_PX)
+        if not 0 <= row < len(tracks) or x_px < GUTTER_PX:
+            return None
+        track, scale = tracks[row].name, self.scale
+        reach_s = _EDGE_PX * scale.seconds_per_px
+        time_s = scale.time_of(x_px)
+        near = [
+            one
+            for one in self._labels.within(time_s - reach_s, time_s + reach_s)
+            if one.track == track
+        ]
+        near.sort(key=lambda one: not self._labels.is_selected(one.id))
+        for span in near:
+            # The middle third of a short span is for moving it.
+            edge_s = min(reach_s, span.duration_s / 3)
+            for part, at_s in (("start", span.start_s), ("end", span.end_s)):
+                inside = span.start_s <= time_s < span.end_s
+                if abs(time_s - at_s) <= (edge_s if inside else reach_s):
+                    return _Grip(part, x_px, track, span)  # type: ignore[arg-type]
+        held = next((one for one in near if one.start_s <= time_s < one.end_s), None)
+        return _Grip("nothing" if held is None else "span", x_px, track, held)
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Take hold."""
+        if event.button() == Qt.MouseButton.LeftButton:
+            self._grip = self.grip_at(event.position().x(), event.position().y())
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """Show what could be held, or drag what is."""
+        x = event.position().x()
+        if self._grip is None:
+            self._show_grip(self.grip_at(x, event.position().y()))
+            return
+        if not self._edits.dragging:
+            if abs(x - self._grip.x_px) < _MOVED_PX:
+                return
+            self._edits.begin_drag()
+        self._attracted = not event.modifiers() & Qt.KeyboardModifier.AltModifier
+        self._pointer_px = x
+        outside = not GUTTER_PX <= x <= self.width() - MARGIN_PX
+        if outside != self._scroll.isActive():
+            self._scroll.start() if outside else self._scroll.stop()
+        self._drag()
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        """Let go, or click."""
+        self._scroll.stop()
+        grip, self._grip = self._grip, None
+        if grip is None:
+            return
+        if self._edits.dragging:
+            self._edits.end_drag()
+            return
+        self._labels.set_track(grip.track)
+        if grip.span is None:
+            self._labels.select(())
+            self._playback.seek(self.scale.time_of(grip.x_px))
+        elif event.modifiers() & Qt.KeyboardModifier.ControlModifier:
+            chosen = {span.id for span in self._labels.selected}
+            self._labels.select(chosen ^ {grip.span.id})
+        else:
+            self._edits.go_to(grip.span)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Escape takes back what the hand does."""
+        if event.key() == Qt.Key.Key_Escape and self._edits.dragging:
+            self._scroll.stop()
+            self._grip = None
+            self._edits.cancel_drag()
+            return
+        super().keyPressEvent(event)
+
+    def _drag(self) -> None:
+        grip = self._grip
+        assert grip is not None
+        scale = self.scale
+        within_s = _ATTRACT_PX * scale.seconds_per_px if self._attracted else 0.0
+        time_s = scale.time_of(self._pointer_px)
+        if grip.span is None:
+            self._edits.drag_new(grip.track, self._pressed_s(grip), time_s, within_s)
+        elif grip.part == "span":
+            start_s = grip.span.start_s + time_s - self._pressed_s(grip)
+            self._edits.drag_span(grip.span.id, start_s, within_s)
+        else:
+            side: Literal["start", "end"] = "start" if grip.part == "start" else "end"
+            self._edits.drag_edge(grip.span.id, side, time_s, within_s)
+
+    def _pressed_s(self, grip: _Grip) -> float:
+        return self.scale.time_of(grip.x_px)
+
+    def _scroll_on(self) -> None:
+        """The hand is beyond the end: the axis moves on, and what is held with it."""
+        step_s = _SCROLL_SHARE * self._span.duration_s
+        before_s = self._span.start_s
+        self._span.pan(step_s if self._pointer_px > GUTTER_PX else -step_s)
+        assert self._grip is not None
+        moved_px = (self._span.start_s - before_s) / self.scale.seconds_per_px
+        self._grip = self._grip._replace(x_px=self._grip.x_px - moved_px)
+        self._drag()
+
+    def _show_grip(self, grip: _Grip | None) -> None:
+        shapes = {
+            "start": Qt.CursorShape.SizeHorCursor,
+            "end": Qt.CursorShape.SizeHorCursor,
+            "span": Qt.CursorShape.OpenHandCursor,
+        }
+        part = "nothing" if grip is None else grip.part
+        self.setCursor(shapes.get(part, Qt.CursorShape.ArrowCursor))
+        held = grip.span if grip is not None else None
+        self.setToolTip("" if held is None else _words(held))
+
+
+def _words(span: Span) -> str:
+    lines = [f"{span.label}: {span.start_s:.3f} to {span.end_s:.3f} s ({span.duration_s:.3f} s)"]
+    lines += [span.note] if span.note else []
+    return "\n".join(lines)
