@@ -53,9 +53,10 @@ What it makes of synthetic Doppler, measured. Made by
 make denoiser
 ```
 
-(or `python docs/denoiser.py --seeds 0` for the bundled model alone) on {machine}. The people that
-are judged were seen neither in training nor in choosing the best epoch. What the errors are is
-written in `sd2core/denoise/metrics.py`; models and scaling are [decision
+(or `python docs/denoiser.py --seeds 0` for the bundled model alone), here with
+`--campaign-minutes {campaign_minutes} --minutes {minutes:g} --seeds {seeds}`, on {machine}.
+The people that are judged were seen neither in training nor in choosing the best epoch. What the
+errors are is written in `sd2core/denoise/metrics.py`; models and scaling are [decision
 24](decisions/0024-scaling-and-models.md), the S4 itself [decision 23](decisions/0023-s4.md),
 training [decision 25](decisions/0025-training-runs.md).
 
@@ -109,7 +110,7 @@ COMPARISON = """
 
 Every model trained {seeds} times with different seeds for {minutes:g} minutes on one thread each,
 as many at once as there are cores, with a dropout of {dropout:g}. All have about as many
-parameters.
+parameters. Times are by the clock: beside other work a run makes fewer steps.
 
 {tables}
 ![Error of every model, per gesture and per person](images/denoiser-campaign.png)
@@ -129,12 +130,17 @@ a step takes as long (one run each):
 VARIANTS = """\
 ### Variants of the S4
 
-Range synthesis scales input and target of a segment together, as if the person were nearer or
-farther (`--range-factor 2`); `s4-serial` is the paper's literal form, 2,304 samples of one channel.
+`s4-serial` is the paper's literal form, 2,304 samples of one channel.
 `bidirectional` also looks ahead, as the U-Net and the Swin transformer do, and cannot run live.
 Judged on the same takes.
 
 {tables}
+### Range synthesis
+
+Input and target of a segment scaled together, as if the person were up to twice as near or as far
+(`--range-factor 2`); everything else as the S4 above. The campaign itself has people at 1.5 to 4 m.
+
+{range_tables}
 """
 
 REAL = """\
@@ -173,6 +179,8 @@ def main() -> None:
         limits=_limits(bundled, pairs),
         limit_takes=LIMIT_TAKES,
         machine=this_machine(),
+        minutes=options.minutes,
+        seeds=options.seeds,
         campaign_minutes=round(pairs.frames / pairs.frame_rate_hz / 60),
         bundled=_tables(folder, [bundled], campaign),
         compared=_comparison(folder, campaign, options) if options.seeds else "",
@@ -193,14 +201,14 @@ def _comparison(folder: Path, campaign: Path, options: argparse.Namespace) -> st
         Job(f"{name}-step", campaign, ("--model", name, *_set(options_of(name, "time")), *length))
         for name in ("unet", "swin")
     ]
+    ranged = Job("s4-range", campaign, ("--model", "s4", "--range-factor", "2", *length))
     variants = [
-        Job("s4-range", campaign, ("--model", "s4", "--range-factor", "2", *length)),
         Job("s4-both", campaign, ("--model", "s4", *length, *_set({"bidirectional": "true"}))),
         Job("s4-serial", campaign, ("--model", "s4-serial", *length)),
     ]
     real = _real_jobs(mars, options) if mars is not None else {}
     others = (job for jobs in real.values() for job in jobs)
-    _train(folder, [*compared, *same_step, *variants, *others])
+    _train(folder, [*compared, *same_step, *variants, ranged, *others])
     _curves(folder, compared)
     runs = [folder / job.name for job in compared]
     s4 = folder / "s4-0"
@@ -212,7 +220,10 @@ def _comparison(folder: Path, campaign: Path, options: argparse.Namespace) -> st
         dropout=DROPOUT,
         same_step=_tables(folder, small, campaign),
         tables=_tables(folder, runs, campaign, IMAGES / "denoiser-campaign.png"),
-        variants=VARIANTS.format(tables=_tables(folder, varied, campaign)),
+        variants=VARIANTS.format(
+            tables=_tables(folder, varied, campaign),
+            range_tables=_tables(folder, [folder / ranged.name], campaign),
+        ),
         real="" if mars is None else REAL.format(tables=_real_tables(folder, mars, real)),
     )
 

@@ -60,7 +60,9 @@ def draw(evaluation: Evaluation) -> Figure:
         axis.set_xticks(range(len(names)), names, rotation=35, ha="right")
         axis.set_title(("per gesture", "per person")[part], fontsize=9)
     axes[0].set_title("where something moves", fontsize=9)
-    axes[1].legend(fontsize=7, ncols=2)
+    # Beside the bars: inside it would hide some.
+    handles = axes[1].get_legend_handles_labels()
+    figure.legend(*handles, fontsize=7, ncols=8, loc="outside lower center")
     for axis in axes:
         axis.grid(axis="y", alpha=0.25)
         axis.tick_params(labelsize=8)
