@@ -150,12 +150,12 @@ ACTIONS: tuple[Action, ...] = (
     Action(
         "undo", "Edit", "Undo", ("Ctrl+Z",), "Take back the last edit of this recording",
         lambda w: w.context.document.undo_stack.undo(),
-        lambda c: c.document.undo_stack.canUndo(),
+        lambda c: c.document.undo_stack.canUndo() and not c.label_edits.dragging,
     ),
     Action(
         "redo", "Edit", "Redo", ("Ctrl+Shift+Z",), "Do again what was taken back",
         lambda w: w.context.document.undo_stack.redo(),
-        lambda c: c.document.undo_stack.canRedo(),
+        lambda c: c.document.undo_stack.canRedo() and not c.label_edits.dragging,
     ),
     Action(
         "sensor_to_camera", "Edit", "Sensor at the camera", ("Home",),

@@ -86,9 +86,9 @@ class LabelEdits(QObject):
 
     def cancel_drag(self) -> None:
         """Everything as it was before the hand took hold."""
-        if self._before is not None:
-            self._labels.set_labels(self._before)
-        self._before = self._dragged = None
+        before, self._before, self._dragged = self._before, None, None
+        if before is not None:
+            self._labels.set_labels(before)
 
     def _drag(self, change: Change) -> None:
         assert self._before is not None
@@ -175,11 +175,6 @@ class LabelEdits(QObject):
         chosen = self._labels.selected
         if chosen:
             self._do(lambda labels, base: edits.nudge(labels, base, chosen[0].id, frames))
-
-    def fill_gaps(self, label: str) -> None:
-        """Make a span of every gap of the track."""
-        track = self._labels.track
-        self._do(lambda labels, base: edits.fill_gaps(labels, base, track, label))
 
     # --- finding one's way ----------------------------------------------------------------
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from PySide6.QtCore import QObject, Signal
 
-from sd2core.labels.label_set import Label
 from sd2core.labels.spans import Labels, Span
 
 UNKNOWN_COLOUR = "#8a8f98"
@@ -95,12 +94,6 @@ class LabelsModel(QObject):
         """``#rrggbb`` of a label."""
         known = self._labels.label_set.find(label)
         return known.colour if known is not None else UNKNOWN_COLOUR
-
-    def by_key(self, key: str) -> Label | None:
-        """The label that a key marks with."""
-        wanted = key.casefold()
-        offered = self._labels.label_set.labels
-        return next((one for one in offered if one.key and one.key.casefold() == wanted), None)
 
     # --- changing -------------------------------------------------------------------------
 

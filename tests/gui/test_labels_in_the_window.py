@@ -128,6 +128,19 @@ def test_escape_takes_back_what_the_hand_does(labelled, qtbot) -> None:
     assert labelled.context.document.undo_stack.count() == 0
 
 
+def test_nothing_is_undone_under_the_hand(labelled, qtbot) -> None:
+    control, timeline = Qt.KeyboardModifier.ControlModifier, labelled.findChild(LabelTimeline)
+    drag(labelled, 0.5, 0.45)
+    moved = spans(labelled)[0]
+    drag(labelled, 0.5, 0.35, release=False)
+    key(labelled, qtbot, "Z", control)
+    assert spans(labelled)[0] not in (moved, THERE)
+    qtbot.keyClick(timeline, Qt.Key.Key_Escape)
+    assert spans(labelled)[0] == moved
+    key(labelled, qtbot, "Z", control)
+    assert spans(labelled)[0] == THERE
+
+
 def test_a_click_selects_and_goes_there(labelled, qtbot) -> None:
     c, timeline = labelled.context, labelled.findChild(LabelTimeline)
     button = Qt.MouseButton.LeftButton
