@@ -129,6 +129,8 @@ def test_stopping_keeps_the_best(made, qtbot) -> None:
     wait_for(qtbot, model, "stopped")
     assert model.run.folder.best.exists()
     assert len(model.run.history.epoch_points) == 2
+    # The process lets go of the folder a moment after its last word.
+    qtbot.waitUntil(lambda: not model.run.folder.live)
     model.resume()
     wait_for(qtbot, model, "starting", "running")
     # It continues after the second epoch and, this time, has nothing to rest at.
