@@ -172,7 +172,12 @@ class Recording:
         return recording.save_as(Path(folder), copy=copy, progress=progress)
 
     def save_as(
-        self, folder: Path, *, copy: bool = False, progress: Progress = silent
+        self,
+        folder: Path,
+        *,
+        copy: bool = False,
+        timebase: Timebase | None = None,
+        progress: Progress = silent,
     ) -> Recording:
         """Make ``folder`` a recording with the same content, and return it.
 
@@ -180,6 +185,7 @@ class Recording:
         they are; ``copy=True`` copies those outside the folder into it. A
         folder that exists is taken when it is no recording yet, so that files
         may be put into it first. Without a title it is called as its folder.
+        ``timebase`` is that of :meth:`save`.
 
         Raises
         ------
@@ -212,7 +218,7 @@ class Recording:
                 title=self.title or folder.stem,
                 _read=self._read.model_copy(deep=True),
             )
-            made.save()
+            made.save(timebase)
         except BaseException:
             for path in [*copied, *([folder] if created else [])]:
                 remove(path)
@@ -233,6 +239,11 @@ class Recording:
     def labelled(self) -> Labels:
         """The labels, wherever they are kept."""
         return labels_of(self.spans) if self.labels is None else self.labels
+
+    @property
+    def unlabelled(self) -> bool:
+        """Whether nobody has labelled it; a radar file's own labels may then stand for it."""
+        return self.labels is None and not self.spans
 
     def missing(self) -> dict[Role, Path]:
         """Files that are not where the recording says."""
@@ -291,11 +302,14 @@ class Recording:
         """
         document = self._read
         if self.labels is not None:
-            file = self.folder / LABELS_NAME
             write_labels(
-                file, self.labels, timebase=timebase, recording=self.folder, video=self.video
+                self.folder / LABELS_NAME,
+                self.labels,
+                timebase=timebase,
+                recording=self.folder,
+                video=self.video,
             )
-            document.labels, self.spans = LABELS_NAME, ()
+            self.spans = ()
         document.version = VERSION
         document.title = self.title
         document.simulated = self.simulated
@@ -404,7 +418,7 @@ def open_recording(path: Path) -> Recording:
     path = Path(path)
     folder = plain_path(path.parent if path.name == FILE_NAME else path)
     document = read_document(folder / FILE_NAME)
-    labels = located_path(document.labels, folder)
+    labels = folder / LABELS_NAME
     return Recording(
         folder,
         video=located_path(document.video, folder),
@@ -417,7 +431,7 @@ def open_recording(path: Path) -> Recording:
         radar_offset_s=document.radar_offset_s,
         sensor=_sensor(document, folder / FILE_NAME),
         spans=document.spans,
-        labels=None if labels is None else read_labels(labels).labels,
+        labels=read_labels(labels).labels if labels.exists() else None,
         title=document.title or folder.stem,
         simulated=document.simulated,
         camera=document.camera,

@@ -119,7 +119,6 @@ class Document(BaseModel):
     denoiser: StoredPath | None = None
     bundled_denoiser: str | None = None
     sensor: SensorEntry = SensorEntry()
-    labels: StoredPath | None = None
     spans: tuple[Span, ...] = ()
 
 

@@ -110,14 +110,13 @@ class DocumentModel(QObject):
 
     @property
     def labels(self) -> Labels:
-        """Labels that came with the recording, or with a radar file that is all there is."""
+        """Labels of the recording, or those that its radar file brings where it has none."""
         content = self._content
         if content is None:
             return Labels()
         recording, brought = content.recording, content.radar_labels
-        alone = recording.video is None and recording.mesh is None
-        if brought is not None and alone and recording.labels is None and not recording.spans:
-            return brought
+        if recording.unlabelled and brought is not None:
+            return brought.shifted(recording.radar_offset_s)
         return recording.labelled
 
     @property
@@ -268,8 +267,9 @@ class DocumentModel(QObject):
         if self._content is None:
             return
         title = "" if not self._content.saved else self.title
-        made = replace(self._content.recording, title=title).save_as(folder)
-        made.save(self._content.timebase)
+        made = replace(self._content.recording, title=title).save_as(
+            folder, timebase=self._content.timebase
+        )
         self._content = replace(self._content, recording=made)
         self.undo_stack.setClean()
         self.changed.emit()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import math
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -54,12 +53,9 @@ def labels_at(
         return read_labels(path, timebase, file_format, observation=observation)
     if is_recording(path):
         recording = open_recording(path)
-        beside = recording.folder / files.FILE_NAME
-        if beside.exists():
-            return files.read_labels(beside).labels
-        if not recording.spans and recording.holds_radar_map:
-            return _later(recording.load_radar_map().labels, recording.radar_offset_s)
-        return files.labels_of(recording.spans)
+        if recording.unlabelled and recording.holds_radar_map:
+            return recording.load_radar_map().labels.shifted(recording.radar_offset_s)
+        return recording.labelled
     if holds_map(path):
         return load_recorded_map(path).labels
     if path.suffix.lower() == ".json":
@@ -169,14 +165,6 @@ def check_label_output(path: Path, *, replace: bool) -> None:
     if path.exists() and not replace:
         raise Sd2Error(f"{path} exists", "a new file", "Choose another name, or say --replace")
     check_output(path, path.suffix.lower())
-
-
-def _later(labels: Labels, offset_s: float) -> Labels:
-    spans = (
-        replace(span, start_s=span.start_s + offset_s, end_s=span.end_s + offset_s)
-        for span in labels.spans
-    )
-    return replace(labels, spans=tuple(spans))
 
 
 def _video_clock(path: Path) -> Timebase:

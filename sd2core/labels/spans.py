@@ -181,6 +181,14 @@ class Labels:
         known = ", ".join(one.name for one in self.tracks)
         raise Sd2Error(f"No track is called {name!r}", f"one of {known}" if known else "a track")
 
+    def shifted(self, offset_s: float) -> Labels:
+        """The same labels ``offset_s`` later."""
+        moved = (
+            replace(span, start_s=span.start_s + offset_s, end_s=span.end_s + offset_s)
+            for span in self.spans
+        )
+        return replace(self, spans=tuple(moved))
+
     def with_spans(self, changed: Iterable[Span] = (), without: Collection[int] = ()) -> Labels:
         """The same with some spans instead of those with their ids, or besides, or left out.
 

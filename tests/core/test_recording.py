@@ -13,6 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
+from sd2core.labels.files import write_labels
+from sd2core.labels.spans import Labels
+from sd2core.labels.spans import Span as LabelSpan
 from sd2core.recording import (
     FILE_NAME,
     VERSION,
@@ -510,3 +513,13 @@ def test_a_missing_denoiser_is_named_and_hinders_nothing(files: Path) -> None:
     assert open_recording(other.folder).denoiser == files / "gone.safetensors"
     with pytest.raises(Sd2Error, match="would hold nothing"):
         Recording.create(made.folder.with_name("third.sd2"), denoiser=other.folder)
+
+
+def test_labels_beside_a_recording_are_its_labels(files: Path) -> None:
+    made = Recording.create(files.parent / "p.sd2", mesh=files / "walk.npz")
+    assert made.unlabelled
+    labels = Labels(spans=(LabelSpan(1, "Gestures", 0.5, 1.0, "left-to-right"),)).shifted(0.25)
+    assert [(span.start_s, span.end_s) for span in labels.spans] == [(0.75, 1.25)]
+    write_labels(made.folder / "labels.json", labels)
+    assert open_recording(made.folder).labelled == labels
+    assert not open_recording(made.folder).unlabelled
