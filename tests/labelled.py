@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from sd2core.errors import Sd2Error
-from sd2core.labels import span_fields, track_edits
+from sd2core.labels import label_set_edits, span_fields, track_edits
 from sd2core.labels.edits import (
     Edit,
     carve,
@@ -112,7 +112,14 @@ def random_edit(labels: Labels, timebase: Timebase, rng: random.Random) -> Edit:
         lambda: track_edits.set_overlap(labels, track, rng.choice(("exclusive", "free"))),
         lambda: track_edits.move_track(labels, track, rng.randint(0, 2)),
         lambda: track_edits.rename_track(labels, track, rng.choice(("Left", "Right", "Both"))),
-        lambda: track_edits.rename_label(labels, label, f"{label}'"),
+        lambda: label_set_edits.rename_label(labels, label, f"{label}'"),
+        lambda: label_set_edits.add_label(
+            labels, label_set_edits.new_label(labels.label_set), rng.choice((None, 0))
+        ),
+        lambda: label_set_edits.remove_label(labels, label, rng.choice((None, NAMES[0]))),
+        lambda: label_set_edits.move_label(labels, label, rng.randint(0, 3)),
+        lambda: label_set_edits.set_colour(labels, label, rng.choice(("#0072b2", "#332288"))),
+        lambda: label_set_edits.set_key(labels, label, rng.choice(("", "1", "q", "Q"))),
     ]
     if rng.random() < 0.01:
         choices = [

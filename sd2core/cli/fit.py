@@ -110,7 +110,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         "--restart", action="store_true", help="begin anew, not where a stopped run ended"
     )
     kind = parser.add_mutually_exclusive_group()
-    add_json(kind)  # type: ignore[arg-type]
+    add_json(kind)
     kind.add_argument(
         "--progress-json",
         action="store_true",

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from sd2core.timebase import Timebase
 
 _MOST_FRAMES = 100_000_000
+_FORMATS = "sd2, csv, audacity, elan, textgrid, boris or mne"
 
 
 def add_clock(parser: argparse.ArgumentParser) -> None:
@@ -27,6 +28,14 @@ def add_clock(parser: argparse.ArgumentParser) -> None:
     choice.add_argument("--mesh", type=Path, metavar="FILE", help="those of a mesh")
     choice.add_argument(
         "--rate", type=positive_float, metavar="F", help="F frames per second from 0 s on"
+    )
+
+
+def add_reading(parser: argparse.ArgumentParser, name: str) -> None:
+    """Add what says how a file is to be read."""
+    parser.add_argument("--format", metavar="NAME", help=f"the format of {name}: {_FORMATS}")
+    parser.add_argument(
+        "--observation", metavar="NAME", help="which one of a BORIS project with several"
     )
 
 

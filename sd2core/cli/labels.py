@@ -1,14 +1,14 @@
-"""``sd2 labels``: show, convert, suggest and compare labelled spans."""
+"""``sd2 labels``: show, count, convert, suggest and compare labelled spans."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from statistics import median
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.label_reading import (
     add_clock,
+    add_reading,
     add_replace,
     check_label_output,
     clock_of,
@@ -17,6 +17,7 @@ from sd2core.cli.label_reading import (
     write,
 )
 from sd2core.cli.labels_agree import add_agree
+from sd2core.cli.labels_statistics import add_statistics, print_statistics, statistics_of
 from sd2core.cli.labels_suggest import add_suggest
 from sd2core.cli.options import add_command, add_json
 from sd2core.cli.output import counted, print_json, print_rows
@@ -25,17 +26,16 @@ if TYPE_CHECKING:
     from sd2core.labels.spans import Labels
     from sd2core.timebase import Timebase
 
-_FORMATS = "sd2, csv, audacity, elan, textgrid, boris or mne"
-
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``labels`` with what it does."""
     parser = add_command(
         commands,
         "labels",
-        "show, convert, suggest and compare labelled spans",
+        "show, count, convert, suggest and compare labelled spans",
         examples=(
             "  sd2 labels show walk.sd2\n"
+            "  sd2 labels statistics walk.sd2 --csv\n"
             "  sd2 labels convert walk.sd2 walk.eaf\n"
             "  sd2 labels suggest walk.sd2 --out suggested.json\n"
             "  sd2 labels agree anna.json ben.json --video walk.mp4"
@@ -55,7 +55,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         examples="  sd2 labels show walk.sd2\n  sd2 labels show walk.eaf --video walk.mp4 --json",
     )
     show.add_argument("file", type=Path, metavar="FILE", help="the file with labels")
-    _add_reading(show, "FILE")
+    add_reading(show, "FILE")
     add_clock(show)
     add_json(show)
 
@@ -76,21 +76,15 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     )
     convert.add_argument("file", type=Path, metavar="IN", help="the file with labels")
     convert.add_argument("out", type=Path, metavar="OUT", help="the file to write")
-    _add_reading(convert, "IN")
+    add_reading(convert, "IN")
     convert.add_argument("--to", metavar="NAME", help="the format of OUT, likewise")
     add_replace(convert)
     add_clock(convert)
     add_json(convert)
 
+    add_statistics(kinds)
     add_suggest(kinds)
     add_agree(kinds)
-
-
-def _add_reading(parser: argparse.ArgumentParser, name: str) -> None:
-    parser.add_argument("--format", metavar="NAME", help=f"the format of {name}: {_FORMATS}")
-    parser.add_argument(
-        "--observation", metavar="NAME", help="which one of a BORIS project with several"
-    )
 
 
 def _show(options: argparse.Namespace) -> None:
@@ -119,11 +113,7 @@ def _show(options: argparse.Namespace) -> None:
         )
     print_rows(rows, right=(0, 1, 2))
     print()
-    table = [("label", "spans", "total s", "median s")]
-    for label, facts in statistics(labels).items():
-        seconds = (f"{facts['total_s']:.3f}", f"{facts['median_s']:.3f}")
-        table.append((label, f"{facts['count']:.0f}", *seconds))
-    print_rows(table, right=(1, 2, 3))
+    print_statistics(labels, clock)
 
 
 def _convert(options: argparse.Namespace) -> None:
@@ -160,16 +150,5 @@ def described(labels: Labels, clock: Timebase | None) -> dict[str, Any]:
             }
             for span in labels.spans
         ],
-        "labels": statistics(labels),
-    }
-
-
-def statistics(labels: Labels) -> dict[str, dict[str, float]]:
-    """How many spans each label has, and how long they are, in alphabetical order."""
-    durations_s: dict[str, list[float]] = {}
-    for span in labels.spans:
-        durations_s.setdefault(span.label, []).append(span.duration_s)
-    return {
-        label: {"count": len(found), "total_s": sum(found), "median_s": median(found)}
-        for label, found in sorted(durations_s.items())
+        "labels": statistics_of(labels, clock),
     }

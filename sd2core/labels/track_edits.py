@@ -1,12 +1,10 @@
-"""Edits of the tracks and of the label set."""
+"""Edits of the tracks."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from sd2core.errors import Sd2Error
 from sd2core.labels.edits import Edit
-from sd2core.labels.label_set import LabelSet
 from sd2core.labels.spans import Labels, Overlap, Track
 
 
@@ -54,27 +52,6 @@ def set_overlap(labels: Labels, name: str, overlap: Overlap) -> Edit:
     """
     tracks = _instead(labels, name, replace(labels.track(name), overlap=overlap))
     return _edit("Change overlaps of track", labels, replace(labels, tracks=tracks))
-
-
-def set_label_set(labels: Labels, label_set: LabelSet) -> Edit:
-    """Use another label set; spans keep their labels, also those it does not have."""
-    return _edit("Change label set", labels, replace(labels, label_set=label_set))
-
-
-def rename_label(labels: Labels, old: str, new: str) -> Edit:
-    """Give a label another name, in the set and wherever it stands."""
-    label = labels.label_set.find(old)
-    if label is None:
-        raise Sd2Error(
-            f"The set {labels.label_set.name!r} has no label {old!r}",
-            f"one of {', '.join(one.name for one in labels.label_set.labels)}",
-        )
-    named = tuple(
-        replace(one, name=new) if one == label else one for one in labels.label_set.labels
-    )
-    spans = tuple(replace(span, label=new) if span.label == old else span for span in labels.spans)
-    changed = replace(labels, label_set=replace(labels.label_set, labels=named), spans=spans)
-    return _edit("Rename label", labels, changed)
 
 
 def _edit(name: str, before: Labels, after: Labels) -> Edit:

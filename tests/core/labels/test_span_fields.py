@@ -1,4 +1,4 @@
-"""What is said of spans, tracks and label sets changes; times and everything else stay."""
+"""What is said of spans and tracks changes; times and everything else stay."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import pytest
 
 from sd2core.errors import Sd2Error
 from sd2core.labels.edits import Edit
-from sd2core.labels.label_set import GESTURES, Label, LabelSet
 from sd2core.labels.span_fields import (
     accept,
     reject,
@@ -24,9 +23,7 @@ from sd2core.labels.track_edits import (
     add_track,
     move_track,
     remove_track,
-    rename_label,
     rename_track,
-    set_label_set,
     set_overlap,
 )
 from sd2core.timebase import Timebase
@@ -124,24 +121,3 @@ class TestTracks:
             set_overlap(LABELS, "Suggested", "exclusive")
         after = set_overlap(reject(LABELS, [3]).labels, "Suggested", "exclusive").labels
         assert after.track("Suggested").overlap == "exclusive"
-
-
-class TestLabelSets:
-    def test_another_set_keeps_the_spans(self) -> None:
-        other = LabelSet("Other", (Label("wave", "#000000"),))
-        after = set_label_set(LABELS, other).labels
-        assert after.label_set == other
-        assert after.spans == LABELS.spans
-
-    def test_a_label_is_renamed_wherever_it_stands(self) -> None:
-        after = rename_label(LABELS, "up-to-down", "fall").labels
-        assert after.span(1).label == "fall"
-        assert after.span(2) == LABELS.span(2)
-        assert [one.name for one in after.label_set.labels][2] == "fall"
-        assert rename_label(after, "fall", "up-to-down").labels == LABELS
-
-    def test_names_that_are_taken_or_unknown(self) -> None:
-        with pytest.raises(Sd2Error, match="share the name background"):
-            rename_label(LABELS, "up-to-down", "background")
-        with pytest.raises(Sd2Error, match=f"The set {GESTURES.name!r} has no label 'fall'"):
-            rename_label(LABELS, "fall", "up")

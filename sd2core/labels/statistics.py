@@ -1,0 +1,132 @@
+"""How many spans each label has, how long they are, and how much of the recording they hold."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sd2core.labels.spans import Labels, Span
+
+HEADINGS = (
+    "label",
+    "spans",
+    "total s",
+    "mean s",
+    "sd s",
+    "median s",
+    "shortest s",
+    "longest s",
+    "share %",
+)
+NO_NUMBER = "–"
+
+
+@dataclass(frozen=True)
+class LabelStatistics:
+    """The spans of one label.
+
+    Parameters
+    ----------
+    label : str
+    count : int
+    total_s : float
+        Sum of their durations: where spans overlap, an instant counts in each.
+    mean_s, sd_s, median_s, shortest_s, longest_s : float, optional
+        Of their durations; ``sd_s`` is the sample's (n − 1), None below two spans, the
+        others without any.
+    share : float, optional
+        How much of the recording they hold, 0 to 1, an instant counting once. None where
+        nobody said how long it is.
+    """
+
+    label: str
+    count: int
+    total_s: float
+    mean_s: float | None
+    sd_s: float | None
+    median_s: float | None
+    shortest_s: float | None
+    longest_s: float | None
+    share: float | None
+
+
+def label_statistics(
+    labels: Labels, extent_s: tuple[float, float] | None = None
+) -> list[LabelStatistics]:
+    """Statistics of every label of the set, also those without a span, then of any others.
+
+    Parameters
+    ----------
+    labels : Labels
+    extent_s : tuple of float, optional
+        Start and end of the recording.
+    """
+    spans: dict[str, list[Span]] = {one.name: [] for one in labels.label_set.labels}
+    unknown: dict[str, list[Span]] = {}
+    for span in labels.spans:
+        (spans if span.label in spans else unknown).setdefault(span.label, []).append(span)
+    ordered = [*spans.items(), *sorted(unknown.items())]
+    return [_of(label, found, extent_s) for label, found in ordered]
+
+
+def statistics_rows(found: Iterable[LabelStatistics]) -> list[tuple[str, ...]]:
+    """A row of text per label, in the order of :data:`HEADINGS`."""
+    return [
+        (
+            one.label,
+            str(one.count),
+            *(
+                NO_NUMBER if seconds is None else f"{seconds:.3f}"
+                for seconds in (
+                    one.total_s,
+                    one.mean_s,
+                    one.sd_s,
+                    one.median_s,
+                    one.shortest_s,
+                    one.longest_s,
+                )
+            ),
+            NO_NUMBER if one.share is None else f"{100 * one.share:.1f}",
+        )
+        for one in found
+    ]
+
+
+def statistics_text(rows: Iterable[Sequence[str]], separator: str = ",") -> str:
+    """Rows with their headings as CSV, or with a tab as a table to paste."""
+    written = io.StringIO()
+    writer = csv.writer(written, delimiter=separator, lineterminator="\n")
+    writer.writerow(HEADINGS)
+    for label, *cells in rows:
+        writer.writerow([label, *("" if cell == NO_NUMBER else cell for cell in cells)])
+    return written.getvalue()
+
+
+def _of(label: str, spans: Sequence[Span], extent_s: tuple[float, float] | None) -> LabelStatistics:
+    durations_s = np.array([span.duration_s for span in spans])
+    return LabelStatistics(
+        label=label,
+        count=len(spans),
+        total_s=float(durations_s.sum()),
+        mean_s=float(durations_s.mean()) if spans else None,
+        sd_s=float(durations_s.std(ddof=1)) if len(spans) > 1 else None,
+        median_s=float(np.median(durations_s)) if spans else None,
+        shortest_s=float(durations_s.min()) if spans else None,
+        longest_s=float(durations_s.max()) if spans else None,
+        share=None if extent_s is None else _held_s(spans, extent_s) / (extent_s[1] - extent_s[0]),
+    )
+
+
+def _held_s(spans: Iterable[Span], extent_s: tuple[float, float]) -> float:
+    """How much of a stretch spans hold together; they come in the order of their starts."""
+    held_s, until_s = 0.0, extent_s[0]
+    for span in spans:
+        start_s, end_s = max(span.start_s, until_s), min(span.end_s, extent_s[1])
+        if end_s > start_s:
+            held_s += end_s - start_s
+            until_s = end_s
+    return held_s

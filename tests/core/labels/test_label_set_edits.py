@@ -1,0 +1,136 @@
+"""The label set is edited one thing at a time; spans lose nothing by it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sd2core.errors import Sd2Error
+from sd2core.labels.label_set import GESTURES, Label, LabelSet
+from sd2core.labels.label_set_edits import (
+    add_label,
+    move_label,
+    new_label,
+    remove_label,
+    rename_label,
+    set_class,
+    set_colour,
+    set_key,
+    set_label_set,
+)
+from sd2core.labels.spans import Labels, Span, Track
+
+LABELS = Labels(
+    (Track("Gestures"),),
+    (
+        Span(1, "Gestures", 1.0, 2.0, "up-to-down"),
+        Span(2, "Gestures", 2.0, 2.5, "down-to-up"),
+        Span(3, "Gestures", 3.0, 3.5, "up-to-down", note="low"),
+    ),
+)
+NAMES = [one.name for one in GESTURES.labels]
+
+
+def named(labels: Labels) -> list[str]:
+    return [one.name for one in labels.label_set.labels]
+
+
+def test_another_set_keeps_the_spans() -> None:
+    other = LabelSet("Other", (Label("wave", "#000000"),))
+    after = set_label_set(LABELS, other).labels
+    assert after.label_set == other
+    assert after.spans == LABELS.spans
+    assert set_label_set(after, GESTURES).labels == LABELS
+
+
+def test_a_label_is_renamed_wherever_it_stands() -> None:
+    after = rename_label(LABELS, "up-to-down", "fall").labels
+    assert [span.label for span in after.spans] == ["fall", "down-to-up", "fall"]
+    assert named(after)[2] == "fall"
+    assert rename_label(after, "fall", "up-to-down").labels == LABELS
+
+
+def test_names_that_are_taken_or_unknown() -> None:
+    with pytest.raises(Sd2Error, match="share the name background"):
+        rename_label(LABELS, "up-to-down", "background")
+    with pytest.raises(Sd2Error, match=f"The set {GESTURES.name!r} has no label 'fall'"):
+        rename_label(LABELS, "fall", "up")
+
+
+@given(fields=st.fixed_dictionaries({"key": st.sampled_from(["", "q", "ö"])}))
+def test_colour_key_and_class_change_alone(fields: dict[str, str]) -> None:
+    after = set_key(LABELS, "up-to-down", fields["key"]).labels
+    after = set_colour(after, "up-to-down", "#332288").labels
+    after = set_class(after, "up-to-down", "").labels
+    expected = Label("up-to-down", "#332288", fields["key"], "")
+    assert after.label_set.labels == (*GESTURES.labels[:2], expected, *GESTURES.labels[3:])
+    assert after.spans == LABELS.spans
+
+
+@pytest.mark.parametrize("key", ["1", "ab", " ", "\t"])
+def test_a_key_is_one_character_that_no_other_label_has(key: str) -> None:
+    with pytest.raises(Sd2Error, match=r"share the key 1|The key of the label"):
+        set_key(LABELS, "up-to-down", key)
+
+
+@given(name=st.sampled_from(NAMES), place=st.integers(0, 4))
+def test_a_moved_label_stands_where_it_was_put_and_the_others_in_their_order(
+    name: str, place: int
+) -> None:
+    after = move_label(LABELS, name, place).labels
+    assert named(after)[place] == name
+    assert [one for one in named(after) if one != name] == [one for one in NAMES if one != name]
+    assert move_label(after, name, NAMES.index(name)).labels == LABELS
+
+
+def test_spans_keep_a_label_that_is_removed_and_the_step_says_so() -> None:
+    edit = remove_label(LABELS, "up-to-down")
+    assert edit.name == "Remove label, 2 spans keep it"
+    assert edit.labels.spans == LABELS.spans
+    assert named(edit.labels) == [one for one in NAMES if one != "up-to-down"]
+    assert remove_label(LABELS, "down-to-up").name == "Remove label, 1 span keeps it"
+    assert remove_label(LABELS, "background").name == "Remove label"
+
+
+def test_or_get_another_one() -> None:
+    edit = remove_label(LABELS, "up-to-down", "background")
+    assert edit.name == "Remove label, 2 spans become background"
+    assert [span.label for span in edit.labels.spans] == ["background", "down-to-up", "background"]
+    for other in ("up-to-down", "unheard of"):
+        with pytest.raises(Sd2Error, match=r"to get that label itself|has no label"):
+            remove_label(LABELS, "up-to-down", other)
+
+
+@given(count=st.integers(1, 25))
+def test_there_is_always_room_for_a_new_label(count: int) -> None:
+    labels = LABELS
+    for _ in range(count):
+        labels = add_label(labels, new_label(labels.label_set)).labels
+    assert labels.label_set.labels[:5] == GESTURES.labels
+    made = labels.label_set.labels[5:]
+    assert len(made) == count
+    colours = [one.colour for one in labels.label_set.labels]
+    assert len({*colours}) == min(len(colours), 8)
+    assert [one.key for one in made] == [*"6789", *[""] * count][:count]
+
+
+def test_a_label_comes_first_where_it_is_put_there() -> None:
+    made = Label("wave", "#882255")
+    assert add_label(LABELS, made, 0).labels.label_set.labels == (made, *GESTURES.labels)
+    with pytest.raises(Sd2Error, match="share the name"):
+        add_label(LABELS, replace(made, name="background"))
+
+
+def test_what_changes_nothing_gives_the_very_same_labels() -> None:
+    for edit in (
+        set_key(LABELS, "up-to-down", "3"),
+        set_colour(LABELS, "up-to-down", "#d55e00"),
+        set_class(LABELS, "up-to-down", "vertical"),
+        move_label(LABELS, "up-to-down", 2),
+        rename_label(LABELS, "up-to-down", "up-to-down"),
+        set_label_set(LABELS, GESTURES),
+    ):
+        assert edit.labels is LABELS
