@@ -141,7 +141,7 @@ class LabelEdits(QObject):
         """Give the selected spans another label."""
         self._labels.set_label(label)
         ids = self._ids()
-        self._do(lambda labels, base: span_fields.relabel(labels, ids, label))
+        self.apply(lambda labels, base: span_fields.relabel(labels, ids, label))
 
     def edge_here(self, side: Side) -> None:
         """Put an edge of the selected span at the frame on screen."""
@@ -151,30 +151,30 @@ class LabelEdits(QObject):
         # The frame on screen is the first of the span, or its last.
         frame = self._playback.frame + (side == "end")
         time_s = base.time_of(frame) if frame < len(base) else base.end_s
-        self._do(lambda labels, base: edits.resize(labels, base, chosen[0].id, side, time_s))
+        self.apply(lambda labels, base: edits.resize(labels, base, chosen[0].id, side, time_s))
 
     def split(self) -> None:
         """Cut the selected span, or the one on the track, in two at the frame on screen."""
         now_s = self._playback.timebase.time_of(self._playback.frame)
         here = [span for span in self._candidates() if span.start_s < now_s < span.end_s]
         if here:
-            self._do(lambda labels, base: edits.split(labels, base, here[0].id, now_s))
+            self.apply(lambda labels, base: edits.split(labels, base, here[0].id, now_s))
 
     def delete(self) -> None:
         """Delete the selected spans."""
         if ids := self._ids():
-            self._do(lambda labels, base: edits.delete(labels, ids))
+            self.apply(lambda labels, base: edits.delete(labels, ids))
 
     def merge(self) -> None:
         """Join the selected spans."""
         ids = self._ids()
-        self._do(lambda labels, base: edits.merge(labels, ids))
+        self.apply(lambda labels, base: edits.merge(labels, ids))
 
     def nudge(self, frames: int) -> None:
         """Move the selected span by frames."""
         chosen = self._labels.selected
         if chosen:
-            self._do(lambda labels, base: edits.nudge(labels, base, chosen[0].id, frames))
+            self.apply(lambda labels, base: edits.nudge(labels, base, chosen[0].id, frames))
 
     # --- finding one's way ----------------------------------------------------------------
 
@@ -206,23 +206,25 @@ class LabelEdits(QObject):
 
     def _end(self, mark: Mark, now_s: float) -> None:
         self._labels.set_marks(one for one in self._labels.marks if one != mark)
-        self._do(
+        self.apply(
             lambda labels, base: edits.create(
                 labels, base, mark.track, mark.start_s, now_s, mark.label
             )
         )
 
-    def _do(self, change: Change) -> None:
+    def apply(self, change: Change) -> bool:
+        """Make an edit, one step in the history; False where it was refused."""
         before = self._labels.labels
         try:
             done = change(before, self._playback.timebase)
         except Sd2Error as error:
             self.failed.emit(str(error))
-            return
+            return False
         self._assign(done.labels)
         self._push(done, before)
         if done.ids:
             self._labels.select(done.ids)
+        return True
 
     def _assign(self, labels: Labels) -> None:
         self._labels.set_labels(labels)
