@@ -68,6 +68,7 @@ MOUSE = (
     ("Drag the sensor in the scene", "Move it in the plane of the screen"),
     ("Shift+drag, Ctrl+drag the sensor", "Move it vertically, or along the line to the body"),
     ("Drop a model file (.safetensors)", "Denoise this recording with it"),
+    ("Drop a file of labels", "Import them"),
     ("Drag elsewhere, middle drag, wheel in the scene", "Turn, shift, zoom; double click resets"),
 )
 """What the mouse does, for the list of keys."""
@@ -377,6 +378,16 @@ ACTIONS: tuple[Action, ...] = (
     Action(
         "previous_span", "Labels", "Previous span", ("P",), "Select it and go to its start",
         lambda w: w.context.label_edits.step(-1), _has_spans,
+    ),
+    Action(
+        "import_labels", "Labels", "Import labels…", ("Ctrl+I",),
+        "Take the labels of a file: SD² Studio, table, Audacity, ELAN, Praat, BORIS, MNE",
+        lambda w: w.label_files.import_labels(), _has_content, separator_before=True,
+    ),
+    Action(
+        "export_labels", "Labels", "Export labels…", ("Ctrl+Shift+I",),
+        "Write the labels for another program, and say what its file cannot hold",
+        lambda w: w.label_files.export_labels(), _has_content,
     ),
     Action(
         "open_model", "Model", "Open model file…", (),

@@ -29,6 +29,7 @@ from sd2app.views.frames import fill, panel, splitter
 if TYPE_CHECKING:
     from sd2app.context import Context
     from sd2app.dialogs.dialogs import Dialogs
+    from sd2app.dialogs.label_files import LabelFileDialogs
     from sd2app.dialogs.training import TrainingDialogs
     from sd2app.models.denoise_library import DenoiserLibrary
     from sd2app.models.ladder import Ladder
@@ -47,6 +48,7 @@ class MainWindow(QMainWindow):
 
     context: Context
     dialogs: Dialogs
+    label_files: LabelFileDialogs
     train_dialogs: TrainingDialogs
     side: SidePanel
 
@@ -121,6 +123,7 @@ class MainWindow(QMainWindow):
         from sd2app.action_set import ActionSet
         from sd2app.context import build_context
         from sd2app.dialogs.dialogs import Dialogs
+        from sd2app.dialogs.label_files import LabelFileDialogs
         from sd2app.views.message_bar import MessageBar
         from sd2app.views.model_menu import ModelMenu
         from sd2app.views.status import StatusLine
@@ -138,6 +141,7 @@ class MainWindow(QMainWindow):
         context.display.set_dark(is_dark(self._settings))
         self.messages = MessageBar(self)
         self.dialogs = Dialogs(self, context, self.messages.warn)
+        self.label_files = LabelFileDialogs(self, context, self.messages)
         self._actions = ActionSet(self)
         below = [self._actions[name] for name in ("open_model", "model_card")]
         self._models = ModelMenu(context.denoise, self.dialogs.use_model, below, self)
@@ -385,13 +389,15 @@ class MainWindow(QMainWindow):
             event.acceptProposedAction()
 
     def dropEvent(self, event: QDropEvent) -> None:
-        """Open what was dropped; with Shift, add it to what is open. A model is used."""
+        """Open what was dropped; with Shift, add it. A model is used, labels are imported."""
         paths = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
         if not paths:
             return
         event.acceptProposedAction()
         if len(paths) == 1 and paths[0].suffix == ".safetensors":
             self.dialogs.use_model(paths[0])
+        elif len(paths) == 1 and self.label_files.take_dropped(paths[0]):
+            pass
         elif event.modifiers() & Qt.KeyboardModifier.ShiftModifier:
             self.context.document.add(paths)
         elif self.dialogs.may_discard():

@@ -8,6 +8,7 @@ are half-open here and in every file: an end is the first instant after the span
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,6 +39,7 @@ __all__ = [
     "format_for",
     "read_labels",
     "sentences",
+    "would_lose",
     "write_labels",
 ]
 
@@ -140,6 +142,21 @@ def write_labels(
     chosen = format_for(path, writing=True) if format is None else _named(format)
     linked = None if media is None else Path(media)
     return _PROGRAMS[chosen.name].write(path, labels, timebase, linked)
+
+
+def would_lose(
+    labels: Labels, timebase: Timebase, format: str, *, media: Path | str | None = None
+) -> list[Loss]:
+    """What a file of that format would not hold as it was, without a file being left.
+
+    Raises
+    ------
+    Sd2Error
+        When the format cannot hold the times.
+    """
+    with tempfile.TemporaryDirectory(prefix="sd2-") as folder:
+        path = Path(folder) / f"labels{_named(format).suffixes[0]}"
+        return write_labels(path, labels, timebase, format, media=media)
 
 
 def format_for(path: Path, *, writing: bool) -> LabelFormat:

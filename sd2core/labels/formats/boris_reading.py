@@ -80,6 +80,17 @@ def _entries(project: dict[str, Any], key: str) -> list[Any]:
     return [one for one in entries if isinstance(one, dict)]
 
 
+def observations(path: Path) -> tuple[str, ...]:
+    """The ids of the observations of a project; there may be several, one per video.
+
+    Raises
+    ------
+    Sd2Error
+        When the file is no project.
+    """
+    return tuple(_project(path)["observations"])
+
+
 def _chosen(path: Path, observations: dict[str, Any], wanted: str | None) -> str:
     if wanted is not None and wanted in observations:
         return wanted

@@ -92,9 +92,8 @@ def losses_by_format(labels: Labels, file_format: LabelFormat) -> list[Loss]:
 
     names = {track.name for track in labels.tracks}
     if names != {DEFAULT_TRACK}:
-        leave_out(
-            "tracks", len(names), f"{title} keeps no tracks: {_of(len(names), 'track')} become one"
-        )
+        become = f"{len(names)} tracks become one" if len(names) > 1 else "its name is left out"
+        leave_out("tracks", len(names), f"{title} keeps no tracks: {become}")
     if "tracks" in file_format.keeps and labels.tracks != (Track(DEFAULT_TRACK),):
         empty = sum(not labels.of_track(track.name) for track in labels.tracks)
         words = f"{title} keeps no tracks without spans: {_of(empty, 'track')} left out"

@@ -1,0 +1,74 @@
+"""What the menu of labels asks about files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import QDialog, QFileDialog, QWidget
+
+from sd2app.dialogs.label_export import LabelExportDialog
+from sd2app.dialogs.label_import import LabelImportDialog
+from sd2app.models.label_export import LabelExportModel
+from sd2app.models.label_import import LABEL_SUFFIXES, LabelImportModel, is_label_file
+from sd2core.labels.taking_in import take_in
+
+if TYPE_CHECKING:
+    from sd2app.context import Context
+    from sd2app.views.message_bar import MessageBar
+
+_PATTERNS = " ".join(f"*{suffix}" for suffix in LABEL_SUFFIXES)
+LABEL_FILES = f"Labels ({_PATTERNS});;All files (*)"
+
+
+class LabelFileDialogs:
+    """Asks, then calls models and edits; what came of it is said over the window."""
+
+    def __init__(self, parent: QWidget, context: Context, messages: MessageBar) -> None:
+        self._parent, self._context, self._messages = parent, context, messages
+
+    def take_dropped(self, path: Path) -> bool:
+        """Import a file of labels once the drop is over; False where it is none."""
+        if not is_label_file(path):
+            return False
+        # A dialog during the drop would keep the program waiting that it came from.
+        QTimer.singleShot(0, lambda: self.import_labels(path))
+        return True
+
+    def import_labels(self, path: Path | None = None) -> None:
+        """Ask for a file unless there is one, show what it holds, and take it."""
+        c = self._context
+        if c.document.content is None:
+            self._messages.warn("Labels belong to a recording: open it first, then import them.")
+            return
+        if path is None:
+            name, _ = QFileDialog.getOpenFileName(self._parent, "Import labels", "", LABEL_FILES)
+            if not name:
+                return
+            path = Path(name)
+        model = LabelImportModel(path, c.labels.labels, c.playback.timebase, self._parent)
+        dialog = LabelImportDialog(model, self._parent)
+        accepted = dialog.exec() == QDialog.DialogCode.Accepted
+        incoming, way = model.incoming, model.way
+        model.close()
+        for done in (dialog, model):
+            done.deleteLater()
+        if accepted and incoming is not None:
+            c.label_edits.do(lambda labels, _: take_in(labels, incoming, way, path.stem))
+
+    def export_labels(self) -> None:
+        """Show what a format can hold, ask for a file, and write it."""
+        c = self._context
+        content = c.document.content
+        if content is None:
+            return
+        model = LabelExportModel(
+            c.labels.labels, c.playback.timebase, content.recording.video, self._parent
+        )
+        model.written.connect(lambda written: self._messages.note(str(written)))
+        dialog = LabelExportDialog(model, c.document.title, self._parent)
+        dialog.exec()
+        model.close()
+        for done in (dialog, model):
+            done.deleteLater()
