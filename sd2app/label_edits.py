@@ -198,12 +198,6 @@ class LabelEdits(QObject):
 
     # --- doing ----------------------------------------------------------------------------
 
-    def do(self, change: Change) -> bool:
-        """Make any other edit as one step; whether it could be made."""
-        before = self._labels.labels
-        self._do(change)
-        return self._labels.labels is not before
-
     def _candidates(self) -> Iterable[Span]:
         return self._labels.selected or self._labels.labels.of_track(self._labels.track)
 

@@ -55,7 +55,7 @@ class LabelFileDialogs:
         for done in (dialog, model):
             done.deleteLater()
         if accepted and incoming is not None:
-            c.label_edits.do(lambda labels, _: take_in(labels, incoming, way, path.stem))
+            c.label_edits.apply(lambda labels, _: take_in(labels, incoming, way, path.stem))
 
     def export_labels(self) -> None:
         """Show what a format can hold, ask for a file, and write it."""
