@@ -39,9 +39,13 @@ def add_people(kinds: argparse._SubParsersAction) -> None:
         "--held-out", action="store_true", help="with the kinds of motion kept for testing"
     )
     data.add_argument(
-        "--natural",
-        action="store_true",
-        help="with elbows and trunk as people have them, not any way they can",
+        "--manner",
+        choices=("any", "natural", "gestures"),
+        default="any",
+        help=(
+            "how people move: with elbows any way they can be (default), as people have them,"
+            " or gesturing before the camera"
+        ),
     )
     data.add_argument("--processes", type=positive_int, default=2, metavar="P", help="(default: 2)")
     data.add_argument("--models", type=Path, metavar="FOLDER", help="the landmark models")
@@ -97,7 +101,7 @@ def _data(options: argparse.Namespace) -> None:
             options.takes,
             options.seed,
             held_out=options.held_out,
-            natural=options.natural,
+            manner=options.manner,
             processes=options.processes,
             models=options.models,
             progress=progress,

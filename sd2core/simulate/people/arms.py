@@ -73,6 +73,7 @@ ZONES = {
     "across": ((-80.0, -40.0), (-40.0, 10.0), (0.40, 0.85)),
     "forward": ((-35.0, 25.0), (-35.0, 15.0), (0.80, 0.985)),
     "guard": ((-50.0, 10.0), (-40.0, 10.0), (0.35, 0.50)),
+    "reach": ((-55.0, 75.0), (-60.0, 45.0), (0.55, 0.97)),
     "low": ((-40.0, 60.0), (-80.0, -40.0), (0.75, 0.98)),
     "hang": ((-30.0, 60.0), (-89.0, -78.0), (0.93, 0.985)),
 }
@@ -90,6 +91,12 @@ TRAINING_STYLES = {
     "rest": ArmStyle(0.6, 1.5, 0.9, 3.0, (("hang", 0.8), ("any", 0.2)), 0.02),
 }
 """What the lifter is trained on, by name."""
+
+GESTURE_STYLES = {
+    "gestures": ArmStyle(0.3, 1.3, 0.75, 0.5, (("reach", 0.88), ("hang", 0.12)), 0.05),
+    "out and back": ArmStyle(0.3, 1.3, 0.75, 0.5, (("reach", 0.95), ("hang", 0.05)), 0.0, True),
+}
+"""How the arm moves of somebody who gestures before a sensor; trained on too."""
 
 HELD_OUT_STYLES = {
     "boxing": ArmStyle(0.25, 0.5, 0.4, 0.5, (("forward", 0.6), ("guard", 0.4)), 0.0, True),

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from sd2core.body.lifter_features import Seen
 from sd2core.body.rotations import applied
 from sd2core.body.track import LANDMARKS
+from sd2core.simulate.people.motion import Manner
 from sd2core.simulate.people.takes import Stage, Take
 
 Floats = NDArray[np.float64]
@@ -27,8 +28,8 @@ _HIPS = [LANDMARKS.index("hip.L"), LANDMARKS.index("hip.R")]
 _SHOULDERS = [LANDMARKS.index("shoulder.L"), LANDMARKS.index("shoulder.R")]
 _WRISTS = [LANDMARKS.index("wrist.L"), LANDMARKS.index("wrist.R")]
 _WALK = 2  # takes have 0 and 1 in this place
-_ANY_WAY = 4
-"""Every fourth motion holds the arms any way they can be held."""
+_MANNERS: tuple[Manner, ...] = ("any", "natural", "gestures", "gestures")
+"""Of the motions, in turn."""
 _CANDIDATES = 24
 _ROBUST = 0.06
 """Statures; residuals beyond count less."""
@@ -146,8 +147,8 @@ def random_walks(emulator: Emulator, count: int, seed: int) -> list[Walk]:
     stage, walks = Stage(), []
     for number in range(count):
         rng = np.random.default_rng((seed, _WALK, number))
-        natural = number % _ANY_WAY != 0
-        scene = stage.scene(rng, natural=natural, elbows_rest=natural)
+        manner = _MANNERS[number % len(_MANNERS)]
+        scene = stage.scene(rng, manner=manner, elbows_rest=manner == "natural")
         walks.append(emulator.walk(scene.keypoints_m, scene.bone_turns, scene.shape.stature_m))
     return walks
 

@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from sd2core.progress import Progress, silent
+from sd2core.simulate.people.motion import Manner
 from sd2core.simulate.people.takes import Take, TakeMaker
 from sd2core.worker_processes import end_with_parent
 
@@ -20,7 +21,7 @@ def make_lifter_data(
     seed: int = 0,
     *,
     held_out: bool = False,
-    natural: bool = False,
+    manner: Manner = "any",
     processes: int = 2,
     models: Path | None = None,
     progress: Progress = silent,
@@ -36,8 +37,8 @@ def make_lifter_data(
     seed : int
     held_out : bool
         With the motion that is kept for testing.
-    natural : bool
-        With elbows and trunk as people have them, not any way they can.
+    manner : {"any", "natural", "gestures"}
+        How people move.
     processes : int
     models : Path, optional
         Folder of the landmark models.
@@ -53,7 +54,7 @@ def make_lifter_data(
     landmark_models(models)
     folder.mkdir(parents=True, exist_ok=True)
     missing = [n for n in range(takes) if not take_path(folder, n).exists()]
-    job = partial(_make, folder, seed, held_out, natural)
+    job = partial(_make, folder, seed, held_out, manner)
     done = takes - len(missing)
     progress(done, takes)
     context = multiprocessing.get_context("spawn")
@@ -91,7 +92,7 @@ def _start(models: Path | None) -> None:
     _maker = TakeMaker(PoseLandmarker(landmark_models(models).landmarker))
 
 
-def _make(folder: Path, seed: int, held_out: bool, natural: bool, number: int) -> None:
+def _make(folder: Path, seed: int, held_out: bool, manner: Manner, number: int) -> None:
     assert _maker is not None
-    take = _maker.make((seed, int(held_out), number), held_out=held_out, natural=natural)
+    take = _maker.make((seed, int(held_out), number), held_out=held_out, manner=manner)
     take.save(take_path(folder, number))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from sd2core.body.model import Skeleton
 from sd2core.body.rotations import Floats, applied, product, transposed
 from sd2core.simulate.gestures import Motion
 from sd2core.simulate.people.arms import (
+    GESTURE_STYLES,
     HELD_OUT_STYLES,
     TRAINING_STYLES,
     moving_arm,
@@ -25,6 +27,14 @@ _NECK = ("neck01", "neck02", "neck03", "head")
 _FASTEST_MPS = {"lowerarm01": 4.5, "wrist": 6.5, "foot": 6.0}
 _STILL = 0.14
 """Share of takes in which nobody moves."""
+
+Manner = Literal["any", "natural", "gestures"]
+"""How people move: with elbows any way they can be, as people have them, or standing or
+sitting before the camera and making strokes with one hand or both."""
+
+MANNERS: tuple[Manner, ...] = get_args(Manner)
+
+_ARMS = TRAINING_STYLES | GESTURE_STYLES | HELD_OUT_STYLES
 
 
 @dataclass(frozen=True)
@@ -43,6 +53,8 @@ class Deed:
         Elbows and trunk as people have them, not any way they can.
     elbows_rest : bool
         Forearms often turn about elbows that stay.
+    calm : bool
+        The trunk does little of its own.
     """
 
     legs: str
@@ -50,10 +62,15 @@ class Deed:
     still: bool
     natural: bool = False
     elbows_rest: bool = False
+    calm: bool = False
 
 
-def random_deed(rng: np.random.Generator, *, held_out: bool = False, natural: bool = False) -> Deed:
+def random_deed(
+    rng: np.random.Generator, *, held_out: bool = False, manner: Manner = "any"
+) -> Deed:
     """What to do; ``held_out`` takes the arms' styles from those kept for testing."""
+    if manner == "gestures" and not held_out:
+        return _gestures(rng)
     styles = list(HELD_OUT_STYLES if held_out else TRAINING_STYLES)
     legs = str(rng.choice(list(MODES), p=list(MODES.values())))
     if held_out and legs in ("walk", "turn") and rng.random() < 0.5:
@@ -66,7 +83,15 @@ def random_deed(rng: np.random.Generator, *, held_out: bool = False, natural: bo
         other = "rest"
     arms = (one, other) if rng.random() < 0.5 else (other, one)
     still = bool(rng.random() < _STILL)
-    return Deed("stand" if still and legs != "sit" else legs, arms, still, natural)
+    return Deed("stand" if still and legs != "sit" else legs, arms, still, manner != "any")
+
+
+def _gestures(rng: np.random.Generator) -> Deed:
+    legs = str(rng.choice(["stand", "shift", "sit"], p=[0.75, 0.15, 0.1]))
+    one = str(rng.choice(list(GESTURE_STYLES)))
+    other = str(rng.choice(["rest", one], p=[0.85, 0.15]))
+    arms = (one, other) if rng.random() < 0.5 else (other, one)
+    return Deed(legs, arms, bool(rng.random() < _STILL / 2), natural=True, calm=True)
 
 
 def random_motion(
@@ -101,12 +126,11 @@ def _drawn(
 ) -> Motion:
     count = len(times_s)
     feet = footwork(rng, times_s, deed.legs, still=deed.still)
-    styles = TRAINING_STYLES | HELD_OUT_STYLES
     arms = [
         still_arm(rng, times_s)
         if deed.still
         else moving_arm(
-            rng, times_s, styles[name], natural=deed.natural, elbows_rest=deed.elbows_rest
+            rng, times_s, _ARMS[name], natural=deed.natural, elbows_rest=deed.elbows_rest
         )
         for name in deed.arms
     ]
@@ -116,7 +140,7 @@ def _drawn(
         for arm, back in zip(arms, (-1.0, 1.0), strict=True):
             arm[:, 2] += rng.uniform(0.05, 0.35) * back * feet.stride
     rotations = np.tile(np.eye(3), (count, len(skeleton), 1, 1))
-    liveliness = 0.05 if deed.still else rng.uniform(0.2, 1.0)
+    liveliness = 0.05 if deed.still else rng.uniform(*((0.05, 0.4) if deed.calm else (0.2, 1.0)))
     lean_deg = (1.5, 3.0) if deed.natural else (4.0, 7.0)
     _turn_trunk(rng, skeleton, rotations, times_s, arms, liveliness, lean_deg)
     translation = _stand(skeleton, rotations, stature_m, feet)

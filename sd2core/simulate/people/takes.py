@@ -18,7 +18,7 @@ from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.skinning import pose_vertices
 from sd2core.body.track import LANDMARKS
 from sd2core.simulate.people.crops import CropPainter, random_background, random_look
-from sd2core.simulate.people.motion import random_deed, random_motion
+from sd2core.simulate.people.motion import Manner, random_deed, random_motion
 from sd2core.simulate.people.view import random_view
 from sd2core.simulate.people.wardrobe import random_wardrobe
 
@@ -113,7 +113,7 @@ class Stage:
         rng: np.random.Generator,
         *,
         held_out: bool = False,
-        natural: bool = False,
+        manner: Manner = "any",
         elbows_rest: bool = False,
         frames: int = FRAMES,
     ) -> Scene:
@@ -122,7 +122,7 @@ class Stage:
         while True:
             shape = self.space.random(rng)
             skeleton = self.space.skeleton(shape)
-            deed = random_deed(rng, held_out=held_out, natural=natural)
+            deed = random_deed(rng, held_out=held_out, manner=manner)
             deed = replace(deed, elbows_rest=elbows_rest)
             motion = random_motion(rng, skeleton, shape.stature_m, times, deed)
             transforms = skeleton.transforms(*motion)
@@ -157,7 +157,7 @@ class TakeMaker:
         seed: tuple[int, ...],
         *,
         held_out: bool = False,
-        natural: bool = False,
+        manner: Manner = "any",
         frames: int = FRAMES,
     ) -> Take:
         """One take of a random person.
@@ -167,12 +167,12 @@ class TakeMaker:
         seed : tuple of int
         held_out : bool
             With the motion that is kept for testing.
-        natural : bool
-            With elbows and trunk as people have them.
+        manner : {"any", "natural", "gestures"}
+            How people move.
         frames : int
         """
         rng = np.random.default_rng(seed)
-        scene = self._stage.scene(rng, held_out=held_out, natural=natural, frames=frames)
+        scene = self._stage.scene(rng, held_out=held_out, manner=manner, frames=frames)
         camera = scene.camera
         body = self._stage.space.load("medium", scene.shape)
         painter = CropPainter(

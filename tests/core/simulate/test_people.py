@@ -12,11 +12,11 @@ from sd2core.body.camera import PinholeCamera
 from sd2core.body.lifter import POINTS, Lifter
 from sd2core.body.lifter_features import rate
 from sd2core.body.shape import ShapeSpace
-from sd2core.simulate.people.arms import HELD_OUT_STYLES, TRAINING_STYLES
+from sd2core.simulate.people.arms import GESTURE_STYLES, HELD_OUT_STYLES, TRAINING_STYLES
 from sd2core.simulate.people.crops import CropPainter, Look
 from sd2core.simulate.people.emulate import Emulator, Walk, random_walks
 from sd2core.simulate.people.examples import batch, emulated, example, varied
-from sd2core.simulate.people.motion import Deed, random_motion
+from sd2core.simulate.people.motion import Deed, random_deed, random_motion
 from sd2core.simulate.people.signals import Moves, follow, wander
 from sd2core.simulate.people.takes import Stage, Take, TakeMaker
 from sd2core.simulate.people.wardrobe import Wardrobe
@@ -68,8 +68,9 @@ def test_wandering_is_slow_and_of_the_stated_size() -> None:
 
 
 def test_tested_styles_are_never_trained_on() -> None:
-    assert not set(TRAINING_STYLES) & set(HELD_OUT_STYLES)
-    assert not set(TRAINING_STYLES.values()) & set(HELD_OUT_STYLES.values())
+    trained = TRAINING_STYLES | GESTURE_STYLES
+    assert not set(trained) & set(HELD_OUT_STYLES)
+    assert not set(trained.values()) & set(HELD_OUT_STYLES.values())
 
 
 @pytest.mark.parametrize("legs", ["stand", "walk", "turn", "sit", "shift"])
@@ -102,6 +103,23 @@ def test_a_still_deed_is_still() -> None:
     transforms = skeleton.transforms(*random_motion(rng, skeleton, 1.7, TIMES, deed))
     heads = (transforms[..., :3] @ skeleton.heads_m[..., None])[..., 0] + transforms[..., 3]
     assert np.abs(np.gradient(heads, 1.0 / 30.0, axis=0)).max() < 0.08
+
+
+def test_who_gestures_does_not_walk_and_moves_the_hands_before_the_body(stage: Stage) -> None:
+    deeds = [random_deed(np.random.default_rng(n), manner="gestures") for n in range(60)]
+    assert {deed.legs for deed in deeds} == {"stand", "shift", "sit"}
+    assert all(set(deed.arms) & set(GESTURE_STYLES) for deed in deeds)
+    ahead = []
+    for n in range(12):
+        scene = stage.scene(np.random.default_rng(n), manner="gestures", frames=60)
+        places, middle = scene.keypoints_m, scene.keypoints_m[:, [11, 12, 23, 24]].mean(axis=1)
+        across = places[:, 11] - places[:, 12]
+        up = places[:, [11, 12]].mean(axis=1) - places[:, [23, 24]].mean(axis=1)
+        front = np.cross(across, up)
+        front /= np.linalg.norm(front, axis=1, keepdims=True)
+        hands = places[:, [15, 16]] - middle[:, None]
+        ahead.append((hands * front[:, None]).sum(axis=2).max())
+    assert np.median(ahead) > 0.2 and min(ahead) > 0.0
 
 
 def test_scenes_repeat_and_show_the_upper_body(stage: Stage) -> None:
