@@ -12,7 +12,7 @@ COMPILED := .venv/.compiled
 # Among them every module in KERNEL_MODULES of sd2core/compiled.py.
 KERNELS := $(wildcard sd2core/compiled.py sd2core/raster.py sd2core/body/*.py sd2core/scattering/*.py sd2core/doppler/*.py sd2core/fmcw/*.py sd2core/simulate/people/*.py)
 
-.PHONY: help setup demo test test-slow lint format bench wheel screenshots accuracy fitting denoiser clean
+.PHONY: help setup demo test test-slow lint format bench wheel screenshots accuracy fitting denoiser range-synthesis clean
 
 help:
 	@echo "make demo         set up, and open the sample recording in the window"
@@ -27,6 +27,7 @@ help:
 	@echo "make accuracy     docs/accuracy-and-speed.md, measured (some five minutes)"
 	@echo "make fitting      docs/fitting.md, measured (some ten minutes)"
 	@echo "make denoiser     docs/denoiser.md, trained and measured (hours)"
+	@echo "make range-synthesis  docs/range-synthesis.md, trained (an hour)"
 	@echo "make clean        remove what the above made, .venv included"
 
 setup: system-packages $(COMPILED) landmark-models
@@ -88,6 +89,9 @@ fitting: setup
 
 denoiser: setup
 	$(BIN)/python docs/denoiser.py
+
+range-synthesis: setup
+	$(BIN)/python docs/range_synthesis.py
 
 clean:
 	rm -rf .venv build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks \

@@ -11,15 +11,12 @@ from __future__ import annotations
 
 import argparse
 import os
-import subprocess
-import sys
-from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
+from runs import Job, sd2, settings, tables, train
 
 from sd2core.atomic import atomic_write_text
 from sd2core.denoise.files import load_model
@@ -157,15 +154,6 @@ steps are longer. These settings were found on 4-validate; the other parts were 
 """
 
 
-@dataclass(frozen=True)
-class Job:
-    """One run of ``sd2 train``."""
-
-    name: str
-    data: Path
-    options: tuple[str, ...]
-
-
 def main() -> None:
     """Make what is missing, measure everything and write the page."""
     options = _options()
@@ -182,7 +170,7 @@ def main() -> None:
         minutes=options.minutes,
         seeds=options.seeds,
         campaign_minutes=round(pairs.frames / pairs.frame_rate_hz / 60),
-        bundled=_tables(folder, [bundled], campaign),
+        bundled=tables(folder, [bundled], campaign),
         compared=_comparison(folder, campaign, options) if options.seeds else "",
     )
     atomic_write_text(DOCS / "denoiser.md", page)
@@ -191,24 +179,28 @@ def main() -> None:
 def _comparison(folder: Path, campaign: Path, options: argparse.Namespace) -> str:
     """Everything that has to be trained first."""
     mars = _mars(folder)
-    length = ("--minutes", f"{options.minutes:g}", *_set({"dropout": DROPOUT}))
+    length = ("--minutes", f"{options.minutes:g}", *settings({"dropout": DROPOUT}))
     compared = [
         Job(f"{name}-{seed}", campaign, ("--model", name, "--seed", str(seed), *length))
         for seed in range(options.seeds)
         for name in options.models
     ]
     same_step = [
-        Job(f"{name}-step", campaign, ("--model", name, *_set(options_of(name, "time")), *length))
+        Job(
+            f"{name}-step",
+            campaign,
+            ("--model", name, *settings(options_of(name, "time")), *length),
+        )
         for name in ("unet", "swin")
     ]
     ranged = Job("s4-range", campaign, ("--model", "s4", "--range-factor", "2", *length))
     variants = [
-        Job("s4-both", campaign, ("--model", "s4", *length, *_set({"bidirectional": "true"}))),
+        Job("s4-both", campaign, ("--model", "s4", *length, *settings({"bidirectional": "true"}))),
         Job("s4-serial", campaign, ("--model", "s4-serial", *length)),
     ]
     real = _real_jobs(mars, options) if mars is not None else {}
     others = (job for jobs in real.values() for job in jobs)
-    _train(folder, [*compared, *same_step, *variants, ranged, *others])
+    train(folder, [*compared, *same_step, *variants, ranged, *others])
     _curves(folder, compared)
     runs = [folder / job.name for job in compared]
     s4 = folder / "s4-0"
@@ -218,11 +210,11 @@ def _comparison(folder: Path, campaign: Path, options: argparse.Namespace) -> st
         seeds=options.seeds,
         minutes=options.minutes,
         dropout=DROPOUT,
-        same_step=_tables(folder, small, campaign),
-        tables=_tables(folder, runs, campaign, IMAGES / "denoiser-campaign.png"),
+        same_step=tables(folder, small, campaign),
+        tables=tables(folder, runs, campaign, "--plot", IMAGES / "denoiser-campaign.png"),
         variants=VARIANTS.format(
-            tables=_tables(folder, varied, campaign),
-            range_tables=_tables(folder, [folder / ranged.name], campaign),
+            tables=tables(folder, varied, campaign),
+            range_tables=tables(folder, [folder / ranged.name], campaign),
         ),
         real="" if mars is None else REAL.format(tables=_real_tables(folder, mars, real)),
     )
@@ -240,14 +232,9 @@ def _options() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def _set(given: Mapping[str, object]) -> list[str]:
-    """Options of a model for the command line."""
-    return [word for name, value in given.items() for word in ("--set", f"{name}={value}")]
-
-
 def _campaign(folder: Path, minutes: float) -> Path:
     path = folder / "campaign.zarr"
-    _sd2("simulate", "campaign", path, "--subjects", 6, "--minutes", minutes, "--seed", 1)
+    sd2("simulate", "campaign", path, "--subjects", 6, "--minutes", minutes, "--seed", 1)
     return path
 
 
@@ -256,7 +243,7 @@ def _mars(folder: Path) -> Path | None:
         return None
     path = folder / "mars.zarr"
     if not path.exists():
-        _sd2("pairs", "mars", *MARS, "--out", path)
+        sd2("pairs", "mars", *MARS, "--out", path)
     return path
 
 
@@ -274,7 +261,7 @@ def _real_jobs(mars: Path, options: argparse.Namespace) -> dict[str, list[Job]]:
                 f"mars-{judged}-{model}-{seed}",
                 mars,
                 (
-                    *("--model", model, "--seed", str(seed), *_set({"dropout": 0.3, **given})),
+                    *("--model", model, "--seed", str(seed), *settings({"dropout": 0.3, **given})),
                     *("--minutes", f"{options.real_minutes:g}", "--batch-size", "16"),
                     *("--validation-subjects", "none", "--test-subjects", ",".join(kept_out)),
                 ),
@@ -290,59 +277,12 @@ def _strange(name: str, judged: str) -> bool:
     return not set(name.split("-")) & set(judged.split("-"))
 
 
-def _train(folder: Path, jobs: Iterable[Job]) -> None:
-    pending = [job for job in jobs if not _finished(folder / job.name)]
-    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        codes = pool.map(lambda job: _run(folder, job), pending)
-        failed = [job.name for job, code in zip(pending, codes, strict=True) if code]
-    if failed:
-        sys.exit(f"{', '.join(failed)} failed; what is done is kept")
-
-
-def _finished(run: Path) -> bool:
-    return RunFolder(run).exists and RunFolder(run).status().state == "finished"
-
-
-def _run(folder: Path, job: Job) -> int:
-    path = folder / job.name
-    how = (
-        ["--resume", str(path)]
-        if RunFolder(path).exists
-        else [str(job.data), *job.options, "--out", str(path), "--threads", "1"]
-    )
-    return subprocess.run([sys.executable, "-m", "sd2core.cli", "train", *how]).returncode
-
-
-def _tables(
-    folder: Path,
-    models: Sequence[Path],
-    data: Path,
-    plot: Path | None = None,
-    subjects: str | None = None,
-) -> str:
-    tables = folder / "tables.md"
-    _sd2(
-        "eval",
-        *models,
-        *("--data", data, "--markdown", tables),
-        *(("--plot", plot) if plot is not None else ()),
-        *(("--subjects", subjects) if subjects is not None else ()),
-    )
-    return tables.read_text("utf-8")
-
-
 def _real_tables(folder: Path, mars: Path, jobs: dict[str, list[Job]]) -> str:
     return "\n".join(
         f"### {judged}\n\n"
-        + _tables(folder, [folder / job.name for job in parts], mars, subjects=judged)
+        + tables(folder, [folder / job.name for job in parts], mars, "--subjects", judged)
         for judged, parts in jobs.items()
     )
-
-
-def _sd2(*arguments: object) -> None:
-    command = [sys.executable, "-m", "sd2core.cli", *map(str, arguments)]
-    if code := subprocess.run(command).returncode:
-        sys.exit(code)
 
 
 def _curves(folder: Path, jobs: Sequence[Job]) -> None:
