@@ -57,10 +57,15 @@ class ActionSet:
 
     def refresh(self) -> None:
         """Follow the models."""
+        refusal = self._context.label_edits.refusal
+        self.labels.refresh(refusal)
         for row in ACTIONS:
             action = self._actions[row.id]
-            action.setEnabled(row.enabled(self._context))
-            if row.why_not is not None:
+            refused = row.edits_labels and refusal
+            action.setEnabled(row.enabled(self._context) and not refused)
+            if row.edits_labels:
+                action.setToolTip(refusal or _tip(row))
+            elif row.why_not is not None:
                 action.setToolTip(row.why_not(self._context) or _tip(row))
             if row.checked is not None:
                 action.setChecked(row.checked(self._context))

@@ -39,7 +39,8 @@ class Action:
     """One row.
 
     ``checked`` makes it checkable and says whether it is on; ``why_not`` says in place
-    of the tip why it is not enabled.
+    of the tip why it is not enabled. What ``edits_labels`` is not enabled where labels
+    cannot be edited, and says that.
     """
 
     id: str
@@ -53,6 +54,7 @@ class Action:
     separator_before: bool = False
     icon: str = ""
     why_not: Callable[[Context], str] | None = None
+    edits_labels: bool = False
 
 
 MOUSE = (
@@ -143,6 +145,11 @@ ACTIONS: tuple[Action, ...] = (
         "Write frames side by side, the video above its mesh (.png, .svg, .pdf)",
         lambda w: w.dialogs.export_strip(),
         lambda c: c.document.video is not None or _has_mesh(c),
+    ),
+    Action(
+        "recover_labels", "File", "Recover labels…", (),
+        "Labels that were not saved when the program ended, or that were not wanted back then",
+        lambda w: w.dialogs.recover_labels(), separator_before=True,
     ),
     Action(
         "quit", "File", "Quit", ("Ctrl+Q",), "Close the window", lambda w: w.close_window(),
@@ -327,49 +334,51 @@ ACTIONS: tuple[Action, ...] = (
         "end_marks", "Labels", "End what is being marked", ("E",),
         "End all spans that have begun, before the frame on screen",
         lambda w: w.context.label_edits.end_marks(),
-        lambda c: bool(c.labels.marks), separator_before=True,
+        lambda c: bool(c.labels.marks), separator_before=True, edits_labels=True,
     ),
     Action(
         "drop_marks", "Labels", "Forget what is being marked", ("Esc",),
         "Let what has begun be, without a span",
         lambda w: w.context.label_edits.drop_marks(),
-        lambda c: bool(c.labels.marks),
+        lambda c: bool(c.labels.marks), edits_labels=True,
     ),
     Action(
         "span_starts_here", "Labels", "Selected span starts here", ("[",),
         "The frame on screen is the first one of the selected span",
         lambda w: w.context.label_edits.edge_here("start"), _one_selected,
-        separator_before=True,
+        separator_before=True, edits_labels=True,
     ),
     Action(
         "span_ends_here", "Labels", "Selected span ends here", ("]",),
         "The frame on screen is the last one of the selected span",
-        lambda w: w.context.label_edits.edge_here("end"), _one_selected,
+        lambda w: w.context.label_edits.edge_here("end"), _one_selected, edits_labels=True,
     ),
     Action(
         "nudge_back", "Labels", "Move span one frame back", ("Alt+Left",),
         "It stops at its neighbours",
-        lambda w: w.context.label_edits.nudge(-1), _one_selected,
+        lambda w: w.context.label_edits.nudge(-1), _one_selected, edits_labels=True,
     ),
     Action(
         "nudge_on", "Labels", "Move span one frame on", ("Alt+Right",),
         "It stops at its neighbours",
-        lambda w: w.context.label_edits.nudge(1), _one_selected,
+        lambda w: w.context.label_edits.nudge(1), _one_selected, edits_labels=True,
     ),
     Action(
         "split_span", "Labels", "Split span here", ("/",),
         "Cut the span under the cursor in two, before the frame on screen",
-        lambda w: w.context.label_edits.split(), _has_spans,
+        lambda w: w.context.label_edits.split(), _has_spans, edits_labels=True,
     ),
     Action(
         "merge_spans", "Labels", "Merge selected spans", ("G",),
         "One span from the first start to the last end (Ctrl+click selects several)",
         lambda w: w.context.label_edits.merge(), lambda c: len(c.labels.selected) > 1,
+        edits_labels=True,
     ),
     Action(
         "delete_spans", "Labels", "Delete selected spans", ("Backspace", "Del"),
         "Undo brings them back",
         lambda w: w.context.label_edits.delete(), lambda c: bool(c.labels.selected),
+        edits_labels=True,
     ),
     Action(
         "next_span", "Labels", "Next span", ("N",), "Select it and go to its start",
@@ -383,11 +392,23 @@ ACTIONS: tuple[Action, ...] = (
         "import_labels", "Labels", "Import labels…", ("Ctrl+I",),
         "Take the labels of a file: SD² Studio, table, Audacity, ELAN, Praat, BORIS, MNE",
         lambda w: w.label_files.import_labels(), _has_content, separator_before=True,
+        edits_labels=True,
     ),
     Action(
         "export_labels", "Labels", "Export labels…", ("Ctrl+Shift+I",),
         "Write the labels for another program, and say what its file cannot hold",
         lambda w: w.label_files.export_labels(), _has_content,
+    ),
+    Action(
+        "restore_labels", "Labels", "Restore labels that were not saved", (),
+        "Take over what an earlier session left behind; one undo takes that back",
+        lambda w: w.context.label_edits.restore(),
+        lambda c: c.label_session.offer is not None, separator_before=True, edits_labels=True,
+    ),
+    Action(
+        "edit_labels_here", "Labels", "Try again to edit labels here", (),
+        "Where another window edited them: take them over, once it is closed",
+        lambda w: w.context.label_session.try_again(), lambda c: c.label_session.read_only,
     ),
     Action(
         "open_model", "Model", "Open model file…", (),

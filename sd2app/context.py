@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from PySide6.QtCore import QObject
 
@@ -21,6 +22,7 @@ from sd2app.models.fit_follower import FitFollower
 from sd2app.models.fit_offer import FitOffer
 from sd2app.models.fit_taker import FitTaker
 from sd2app.models.jobs import JobsModel
+from sd2app.models.label_session import LabelSession
 from sd2app.models.labels import LabelsModel
 from sd2app.models.ladder import CORE, Ladder
 from sd2app.models.overlay import OverlayModel
@@ -37,6 +39,7 @@ from sd2app.models.video import VideoModel
 from sd2app.models.visible_span import VisibleSpanModel
 from sd2app.settings import Settings
 from sd2core.denoise.files import user_models_folder
+from sd2core.labels.recovery import recovery_folder
 
 
 @dataclass(frozen=True)
@@ -65,6 +68,7 @@ class Context:
     difference: DifferenceModel
     edits: Edits
     labels: LabelsModel
+    label_session: LabelSession
     label_edits: LabelEdits
     fit: FitModel
     fit_follower: FitFollower
@@ -96,6 +100,7 @@ class Context:
         self.synthesis.close()
         self.trade.close()
         self.video.close()
+        self.label_session.close()
         self.document.close()
 
 
@@ -106,11 +111,12 @@ def build_context(
     fit_command: Sequence[str] | None = None,
     denoisers: DenoiserLibrary | None = None,
     train_command: Sequence[str] | None = None,
+    recovery: Path | None = None,
 ) -> Context:
     """Make the models and let them follow the document.
 
-    Ladder and denoisers are the library's and the commands that fit and train ``sd2``
-    itself by default.
+    Ladder and denoisers are the library's, the commands that fit and train ``sd2``
+    itself, and the recovery folder of labels is the user's by default.
     """
     jobs = JobsModel(parent)
     document = DocumentModel(jobs, parent)
@@ -139,6 +145,7 @@ def build_context(
     )
     training = TrainingModel(settings, parent, train_command or TRAIN_COMMAND)
     labels = LabelsModel(parent)
+    label_session = LabelSession(document, labels, recovery or recovery_folder(), parent)
     context = Context(
         settings=settings,
         jobs=jobs,
@@ -162,7 +169,8 @@ def build_context(
         difference=DifferenceModel(denoised, real, display, settings, parent),
         edits=edits,
         labels=labels,
-        label_edits=LabelEdits(document, labels, playback, parent),
+        label_session=label_session,
+        label_edits=LabelEdits(document, labels, playback, label_session, parent),
         fit=fit,
         fit_follower=follower,
         fit_offer=FitOffer(document, fit, parent),
@@ -189,7 +197,7 @@ def _take_over(context: Context) -> None:
     context.span.set_extent(content.timebase.start_s, content.timebase.end_s)
     context.video.set_reader(content.video)
     context.sensor.set_sensor(content.recording.sensor)
-    context.labels.open(document.labels)
+    context.label_session.take_over()
     _follow_capture(context, new=True)
     context.synthesis.take_over()
     # The clock of another recording begins anew, which is nobody's wish to stay.

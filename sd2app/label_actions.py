@@ -25,6 +25,13 @@ class LabelActions:
         window.context.labels.changed.connect(self._follow)
         self._follow()
 
+    def refresh(self, refusal: str) -> None:
+        """Follow whether labels can be edited; ``refusal`` says why not."""
+        labels = self._shown.labels if self._shown is not None else ()
+        for action, label in zip(self._actions, labels, strict=True):
+            action.setEnabled(not refusal)
+            action.setToolTip(refusal or _tip(label))
+
     def _follow(self) -> None:
         offered = self._window.context.labels.labels.label_set
         if offered == self._shown:
@@ -42,11 +49,7 @@ class LabelActions:
         action = QAction(QIcon(swatch), label.name, self._window)
         if label.key:
             action.setShortcut(QKeySequence(label.key.upper()))
-        keys = f" ({label.key.upper()})" if label.key else ""
-        action.setToolTip(
-            f"Begin a span with this frame, or end the one that has begun; with a span selected,"
-            f" give it this label{keys}"
-        )
+        action.setToolTip(_tip(label))
         action.setAutoRepeat(False)
         action.triggered.connect(lambda _=False: self._use(label.name))
         return action
@@ -57,3 +60,11 @@ class LabelActions:
             context.label_edits.relabel(label)
         else:
             context.label_edits.mark(label)
+
+
+def _tip(label: Label) -> str:
+    keys = f" ({label.key.upper()})" if label.key else ""
+    return (
+        "Begin a span with this frame, or end the one that has begun; with a span selected,"
+        f" give it this label{keys}"
+    )

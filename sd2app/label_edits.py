@@ -6,9 +6,10 @@ from collections.abc import Callable, Iterable
 from typing import Literal
 
 from PySide6.QtCore import QObject, Signal
+from PySide6.QtGui import QUndoCommand
 
-from sd2app.commands import Assign
 from sd2app.models.document import DocumentModel
+from sd2app.models.label_session import LabelSession
 from sd2app.models.labels import LabelsModel, Mark
 from sd2app.models.playback import PlaybackModel
 from sd2core.errors import Sd2Error
@@ -21,9 +22,30 @@ from sd2core.timebase import Timebase
 Change = Callable[[Labels, Timebase], Edit]
 
 
+class _Step(QUndoCommand):
+    """One edit, taken back and done again."""
+
+    def __init__(
+        self,
+        name: str,
+        become: Callable[[str, Labels, Labels], None],
+        before: Labels,
+        after: Labels,
+    ) -> None:
+        super().__init__(name)
+        self._become, self._before, self._after = become, before, after
+
+    def undo(self) -> None:
+        self._become(f"Undo {self.text().lower()}", self._after, self._before)
+
+    def redo(self) -> None:
+        self._become(self.text(), self._before, self._after)
+
+
 class LabelEdits(QObject):
     """What the user can do to labels. A drag is one step in the history.
 
+    Each edit is on disk when it is made (see :class:`.models.label_session.LabelSession`).
     Times are the frames of the playback clock. What cannot be done changes nothing, and
     ``failed`` says why; while a hand drags it is silent, for the hand sees that it stops.
     """
@@ -35,12 +57,19 @@ class LabelEdits(QObject):
         document: DocumentModel,
         labels: LabelsModel,
         playback: PlaybackModel,
+        session: LabelSession,
         parent: QObject | None = None,
     ) -> None:
         super().__init__(parent)
         self._document, self._labels, self._playback = document, labels, playback
+        self._session = session
         self._before: Labels | None = None
         self._dragged: Edit | None = None
+
+    @property
+    def refusal(self) -> str:
+        """Why nothing can be edited; empty where it can."""
+        return self._session.refusal
 
     # --- a hand on the timeline -----------------------------------------------------------
 
@@ -49,9 +78,12 @@ class LabelEdits(QObject):
         """Whether a hand holds something."""
         return self._before is not None
 
-    def begin_drag(self) -> None:
-        """A hand takes hold of a span, an edge, or an empty place."""
+    def begin_drag(self) -> bool:
+        """A hand takes hold of a span, an edge, or an empty place; False where it may not."""
+        if self._refused():
+            return False
         self._before, self._dragged = self._labels.labels, None
+        return True
 
     def drag_edge(self, span_id: int, side: Side, time_s: float, within_s: float) -> None:
         """The hand has an edge of a span at a time, and spans within a distance attract it."""
@@ -79,9 +111,7 @@ class LabelEdits(QObject):
         """The hand lets go."""
         before, self._before = self._before, None
         if before is not None and self._dragged is not None:
-            self._assign(self._dragged.labels)
-            self._push(self._dragged, before)
-            self._labels.select(self._dragged.ids)
+            self._make(self._dragged, before)
         self._dragged = None
 
     def cancel_drag(self) -> None:
@@ -112,7 +142,7 @@ class LabelEdits(QObject):
         On a track without overlaps what else is being marked ends where this begins.
         """
         track = self._labels.track
-        if not track or self._document.content is None:
+        if not track or self._refused():
             return
         self._labels.set_label(label)
         now_s = self._playback.timebase.time_of(self._playback.frame)
@@ -176,6 +206,16 @@ class LabelEdits(QObject):
         if chosen:
             self.apply(lambda labels, base: edits.nudge(labels, base, chosen[0].id, frames))
 
+    def restore(self) -> None:
+        """Take over what an earlier session left behind."""
+        recording = self._document.recording
+        if recording is None or self._session.offer is None or self._refused():
+            return
+        before = self._labels.labels
+        recording.labels = self._session.take_offer()  # on disk already, as a session of its own
+        self._labels.set_labels(recording.labels)
+        self._make(Edit("Restore labels", recording.labels), before)
+
     # --- finding one's way ----------------------------------------------------------------
 
     def step(self, towards: Literal[-1, 1]) -> None:
@@ -214,24 +254,35 @@ class LabelEdits(QObject):
 
     def apply(self, change: Change) -> bool:
         """Make an edit, one step in the history; False where it was refused."""
+        if self._refused():
+            return False
         before = self._labels.labels
         try:
             done = change(before, self._playback.timebase)
         except Sd2Error as error:
             self.failed.emit(str(error))
             return False
-        self._assign(done.labels)
-        self._push(done, before)
-        if done.ids:
-            self._labels.select(done.ids)
+        self._make(done, before)
         return True
 
-    def _assign(self, labels: Labels) -> None:
-        self._labels.set_labels(labels)
-        if self._document.recording is not None:
-            self._document.recording.labels = labels
+    def _refused(self) -> bool:
+        if self.refusal:
+            self.failed.emit(self.refusal)
+        return bool(self.refusal)
 
-    def _push(self, done: Edit, before: Labels) -> None:
-        if done.labels is not before and self._document.content is not None:
-            step = Assign(done.name, self._assign, before, done.labels)
+    def _make(self, done: Edit, before: Labels) -> None:
+        if done.labels is not before:
+            step = _Step(done.name, self._become, before, done.labels)
+            step.redo()
             self._document.undo_stack.push(step)
+        if done.ids:
+            self._labels.select(done.ids)
+
+    def _become(self, name: str, before: Labels, after: Labels) -> None:
+        """The one way by which labels of a recording change: on disk first, then on screen."""
+        recording = self._document.recording
+        if recording is None or recording.labels is after:
+            return
+        self._session.keep(name, before, after)
+        recording.labels = after
+        self._labels.set_labels(after)

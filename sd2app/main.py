@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 _SCREENSHOT_LIMIT_S = 120
 
@@ -41,12 +42,16 @@ def run(paths: Sequence[Path] = (), *, screenshot: Path | None = None) -> int:
     application.setDesktopFileName("sd2-studio")
     settings = Settings() if screenshot is None else Settings.forgetful()
     apply_theme(application, is_dark(settings))
-    window = MainWindow(settings)
+    # A picture neither keeps anybody from editing labels nor says that somebody does.
+    aside = None if screenshot is None else TemporaryDirectory()
+    window = MainWindow(settings, recovery=None if aside is None else Path(aside.name))
 
     def fill() -> None:
         window.populate()
         if paths:
             window.open_paths(list(paths))
+        else:
+            window.context.label_session.look_around()
 
     # Queued, so that the skeleton reaches the screen before the imports begin.
     window.first_painted.connect(lambda: QTimer.singleShot(0, fill))

@@ -109,6 +109,8 @@ class Recording:
         has labelled here.
     labels : Labels or None
         Those in ``labels.json``, which then stand for ``spans``; see :attr:`labelled`.
+    labels_elsewhere : bool
+        Whether somebody else edits them now: ``labels.json`` is then left as it is.
     title : str
     simulated : bool
         True when no camera and no radar was there.
@@ -128,6 +130,7 @@ class Recording:
     sensor: VirtualSensor = field(default_factory=VirtualSensor)
     spans: tuple[Span, ...] = ()
     labels: Labels | None = None
+    labels_elsewhere: bool = False
     title: str = ""
     simulated: bool = False
     camera: CameraEntry | None = None
@@ -216,6 +219,7 @@ class Recording:
                 folder=folder,
                 **files,  # type: ignore[arg-type]
                 title=self.title or folder.stem,
+                labels_elsewhere=False,
                 _read=self._read.model_copy(deep=True),
             )
             made.save(timebase)
@@ -298,10 +302,10 @@ class Recording:
         """Write ``recording.json`` in one step, keeping fields this version does not know.
 
         Labels are written before, to ``labels.json``, with their frames where a timebase
-        is given.
+        is given; but see :attr:`labels_elsewhere`.
         """
         document = self._read
-        if self.labels is not None:
+        if self.labels is not None and not self.labels_elsewhere:
             write_labels(
                 self.folder / LABELS_NAME,
                 self.labels,
@@ -325,6 +329,18 @@ class Recording:
             setattr(document, role, None if path is None else stored_path(path, self.folder))
         text = json.dumps(document.model_dump(mode="json"), indent=2, ensure_ascii=False)
         atomic_write_text(self.folder / FILE_NAME, text + "\n")
+
+    def read_labels_again(self) -> None:
+        """Take over what ``labels.json`` holds by now, where there is one.
+
+        Raises
+        ------
+        Sd2Error
+            When it is damaged; the labels are then as they were.
+        """
+        labels = self.folder / LABELS_NAME
+        if labels.exists():
+            self.labels = read_labels(labels).labels
 
     def focal_px(self, width: int, height: int) -> float | None:
         """Focal length in pixels of pictures of this size, None where nobody said.
@@ -418,8 +434,7 @@ def open_recording(path: Path) -> Recording:
     path = Path(path)
     folder = plain_path(path.parent if path.name == FILE_NAME else path)
     document = read_document(folder / FILE_NAME)
-    labels = folder / LABELS_NAME
-    return Recording(
+    recording = Recording(
         folder,
         video=located_path(document.video, folder),
         mesh=located_path(document.mesh, folder),
@@ -431,12 +446,13 @@ def open_recording(path: Path) -> Recording:
         radar_offset_s=document.radar_offset_s,
         sensor=_sensor(document, folder / FILE_NAME),
         spans=document.spans,
-        labels=read_labels(labels).labels if labels.exists() else None,
         title=document.title or folder.stem,
         simulated=document.simulated,
         camera=document.camera,
         _read=document,
     )
+    recording.read_labels_again()
+    return recording
 
 
 def _sensor(document: Document, file: Path) -> VirtualSensor:

@@ -26,6 +26,7 @@ from sd2app.dialogs.comparison import ComparisonWindow
 from sd2app.dialogs.figure_filter import FIGURES
 from sd2app.dialogs.model_card import ModelCardDialog
 from sd2app.dialogs.new_from_video import VIDEOS, NewFromVideoDialog
+from sd2app.dialogs.recover_labels import choose_recovery
 from sd2app.dialogs.strip import StripDialog
 from sd2app.models.comparison import ComparisonModel
 from sd2app.models.denoise_words import denoised_words
@@ -290,6 +291,18 @@ class Dialogs:
         model.close()
         model.deleteLater()
         dialog.deleteLater()
+
+    def recover_labels(self) -> None:
+        """List what was not saved, and open the recording of what is chosen."""
+        session = self._context.label_session
+        offer = choose_recovery(session, self._parent)
+        if offer is None:
+            return
+        if session.is_of_open(offer):
+            session.ask_for(offer)
+        elif self.may_discard():
+            session.ask_for(offer)
+            self._context.document.open([offer.recording])
 
     def may_discard(self) -> bool:
         """Whether unsaved edits are saved or given up by the user's word."""

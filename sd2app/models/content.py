@@ -72,7 +72,7 @@ def recording_of(paths: Sequence[Path], base: Recording | None = None) -> Record
     Raises
     ------
     Sd2Error
-        When a path is of no known kind, or two are of the same.
+        When a path is of no known kind, two are of the same, or a recording is to be added.
     """
     kinds: dict[Kind, Path] = {}
     for path in paths:
@@ -91,6 +91,12 @@ def recording_of(paths: Sequence[Path], base: Recording | None = None) -> Record
                 f"{kinds['recording']} was given together with other files",
                 "a recording alone",
                 "Open it first, then add the others",
+            )
+        if base is not None:
+            raise Sd2Error(
+                f"{kinds['recording']} is a recording: it cannot be added to another",
+                "a video, mesh or radar capture",
+                "Open it with File → Open folder…",
             )
         return open_recording(kinds["recording"])
     recording = base or Recording(UNTITLED, title=Path(paths[0]).stem)

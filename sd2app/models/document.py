@@ -37,12 +37,15 @@ class DocumentModel(QObject):
         Another recording (or none) is there now.
     changed
         Something in it or its place on disk changed.
+    saved
+        It is on disk with all edits, maybe in another place than before.
     noted, failed : str
         Sentences for the user.
     """
 
     opened = Signal()
     changed = Signal()
+    saved = Signal()
     noted = Signal(str)
     failed = Signal(str)
 
@@ -52,6 +55,8 @@ class DocumentModel(QObject):
         self._jobs = jobs
         self._job: Job | None = None
         self._content: Content | None = None
+        self._base: Recording | None = None
+        self._goes_on = False
         self._clutter: Clutter = "mean"
         self._runner = LatestRunner("open", self)
         self._runner.partial.connect(self._report)
@@ -140,6 +145,11 @@ class DocumentModel(QObject):
         """Whether there are edits that were not saved."""
         return self._content is not None and not self.undo_stack.isClean()
 
+    @property
+    def goes_on(self) -> bool:
+        """Whether what was opened is what was open before, with other files."""
+        return self._goes_on
+
     # --- opening --------------------------------------------------------------------------
 
     def open(self, paths: Sequence[Path]) -> None:
@@ -172,6 +182,7 @@ class DocumentModel(QObject):
     def _start(self, base: Recording | None, paths: list[Path]) -> None:
         name = paths[0].name if paths else (base.title if base else "")
         clutter = self._clutter
+        self._base = base
 
         def read(emit: Emit) -> Content:
             recording = recording_of(paths, base) if paths or base is None else base
@@ -190,7 +201,13 @@ class DocumentModel(QObject):
         before, self._content = self._content, content
         if before is not None and before.video is not content.video:
             before.close()
+        self._goes_on = before is not None and content.recording is self._base
+        unsaved = self._goes_on and self.modified
+        if before is not None and self._goes_on:
+            _keep_edits(before.recording, content.recording)
         self.undo_stack.clear()
+        if unsaved:
+            self.undo_stack.resetClean()
         self.opened.emit()
         self.changed.emit()
         for problem in content.problems:
@@ -259,8 +276,7 @@ class DocumentModel(QObject):
         """
         if self._content is not None and self._content.saved:
             self._content.recording.save(self._content.timebase)
-            self.undo_stack.setClean()
-            self.changed.emit()
+            self._tell_saved()
 
     def save_as(self, folder: Path) -> None:
         """Make a recording folder that refers to the files where they are."""
@@ -271,8 +287,7 @@ class DocumentModel(QObject):
             folder, timebase=self._content.timebase
         )
         self._content = replace(self._content, recording=made)
-        self.undo_stack.setClean()
-        self.changed.emit()
+        self._tell_saved()
 
     def relink(self, folder: Path) -> Relinked | None:
         """Look for missing files under one folder, and read again what was found."""
@@ -280,5 +295,28 @@ class DocumentModel(QObject):
             return None
         relinked = self.recording.relink(folder)
         if relinked.found:
+            self._tell_saved()
             self.reload()
         return relinked
+
+    def read_labels_again(self) -> None:
+        """Take over what somebody else has made of the labels meanwhile.
+
+        Raises
+        ------
+        Sd2Error
+            When their file is damaged.
+        """
+        if self._content is not None and self._content.saved:
+            self._content.recording.read_labels_again()
+
+    def _tell_saved(self) -> None:
+        self.undo_stack.setClean()
+        self.saved.emit()
+        self.changed.emit()
+
+
+def _keep_edits(before: Recording, after: Recording) -> None:
+    """What was edited while files were read holds for what was read."""
+    for name in ("labels", "sensor", "radar_offset_s", "denoiser", "bundled_denoiser"):
+        setattr(after, name, getattr(before, name))

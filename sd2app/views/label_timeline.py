@@ -193,7 +193,9 @@ class LabelTimeline(QWidget):
         if not self._edits.dragging:
             if abs(x - self._grip.x_px) < _MOVED_PX:
                 return
-            self._edits.begin_drag()
+            if not self._edits.begin_drag():
+                self._grip = None
+                return
         self._attracted = not event.modifiers() & Qt.KeyboardModifier.AltModifier
         self._pointer_px = x
         outside = not GUTTER_PX <= x <= self.width() - MARGIN_PX

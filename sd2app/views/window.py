@@ -59,6 +59,7 @@ class MainWindow(QMainWindow):
         fit_command: Sequence[str] | None = None,
         denoisers: DenoiserLibrary | None = None,
         train_command: Sequence[str] | None = None,
+        recovery: Path | None = None,
     ) -> None:
         super().__init__()
         self._settings = settings
@@ -66,6 +67,7 @@ class MainWindow(QMainWindow):
         self._fit_command = fit_command
         self._denoisers = denoisers
         self._train_command = train_command
+        self._recovery = recovery
         self._scene: SceneView | None = None
         self._ready = False
         self._painted = False
@@ -136,6 +138,7 @@ class MainWindow(QMainWindow):
             self._fit_command,
             self._denoisers,
             self._train_command,
+            self._recovery,
         )
         context = self.context
         context.display.set_dark(is_dark(self._settings))
@@ -149,7 +152,8 @@ class MainWindow(QMainWindow):
         self._recent_menu.aboutToShow.connect(self._list_recent)
         self._fill_panels()
         self._column.insertWidget(0, self.messages)
-        self._column.insertWidget(1, self._fit_bar())
+        self._column.insertWidget(1, self._label_bar())
+        self._column.insertWidget(2, self._fit_bar())
         self._column.addWidget(TransportBar(context.playback, self._actions, self))
         self._column.addWidget(
             StatusLine(context.pointer, context.jobs, context.trade, context.synthesis, self)
@@ -230,6 +234,13 @@ class MainWindow(QMainWindow):
             resume=self.dialogs.resume_fit,
         )
 
+    def _label_bar(self) -> QWidget:
+        from sd2app.views.label_bar import LabelBar
+
+        c = self.context
+        restore, recover = c.label_edits.restore, self.dialogs.recover_labels
+        return LabelBar(c.label_session, c.document, restore, recover)
+
     def _add_scene(self) -> None:
         if not self._ready:
             return
@@ -262,7 +273,9 @@ class MainWindow(QMainWindow):
         c.synthesis.failed.connect(self.messages.warn)
         c.trade.failed.connect(self.messages.warn)
         c.uncertainty.failed.connect(self.messages.warn)
-        c.label_edits.failed.connect(self.messages.warn)
+        for model in (c.label_session, c.label_edits):
+            model.failed.connect(self.messages.warn)
+        c.label_session.noted.connect(self.messages.note)
         c.denoise.failed.connect(self.messages.warn)
         c.denoise.noted.connect(self.messages.note)
         c.trade.noted.connect(self.messages.note)
@@ -286,6 +299,7 @@ class MainWindow(QMainWindow):
             c.synthesis.completed,
             c.trade.plan_changed,
             c.trade.measured.changed,
+            c.label_session.changed,
             c.labels.changed,
             c.labels.selection_changed,
             c.labels.marks_changed,

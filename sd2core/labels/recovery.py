@@ -7,6 +7,7 @@ Below a folder of the caller's choice every recording has a place of its own::
         holder.json            who that is
         000003-000001.journal  session 3, part 1
         000002-000004.declined parts of a session that the user did not want back
+        000001-000001.damaged  what nobody can read, once that was said
 
 Nothing that cannot be read is deleted, and nothing that the user has not saved, unless he
 says so.
@@ -20,25 +21,35 @@ import json
 import os
 import socket
 import time
-from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import asdict, dataclass
-from itertools import groupby
 from pathlib import Path
-
-from pydantic import ValidationError
 
 from sd2core.atomic import atomic_write_text, remove_leftovers
 from sd2core.errors import Sd2Error
 from sd2core.file_lock import FileLock, is_locked
-from sd2core.labels.entries import first_fault
 from sd2core.labels.journal import SUFFIX, Journal
-from sd2core.labels.journal_records import Replayed, replay, unpacked
+from sd2core.labels.recovery_offers import (
+    DAMAGED,
+    DECLINED,
+    Found,
+    Offer,
+    journals,
+    listed,
+    search,
+    session_of,
+)
 from sd2core.labels.spans import Labels
 
-DECLINED = ".declined"
 _LOCK_NAME = "lock"
 _HOLDER_NAME = "holder.json"
+
+
+def recovery_folder() -> Path:
+    """Recovery folder of the user; it need not be there yet."""
+    import platformdirs
+
+    return Path(platformdirs.user_data_dir("sd2-studio", appauthor=False)) / "recovery"
 
 
 @dataclass(frozen=True)
@@ -62,53 +73,6 @@ class Holder:
         return f"{who} on {self.host} (process {self.pid})" if self.host else who
 
 
-@dataclass(frozen=True)
-class Offer:
-    """Labels that a session left behind, with edits that the user's file does not hold.
-
-    Parameters
-    ----------
-    recording : Path
-        Absolute path of what was labelled.
-    labels : Labels
-        After the last whole edit.
-    edits : int
-        How many were not saved.
-    last : str
-        Name of the last one, such as "Move span".
-    time_unix_s : float
-        When it was made.
-    declined : bool
-        Whether the user did not want it.
-    files : tuple of Path
-        Where it is.
-    """
-
-    recording: Path
-    labels: Labels
-    edits: int
-    last: str
-    time_unix_s: float
-    declined: bool
-    files: tuple[Path, ...]
-
-
-@dataclass(frozen=True)
-class Found:
-    """What is in a recovery folder.
-
-    Parameters
-    ----------
-    offers : tuple of Offer
-        The newest of a recording first.
-    notes : tuple of str
-        What could not be read, or only in part.
-    """
-
-    offers: tuple[Offer, ...] = ()
-    notes: tuple[str, ...] = ()
-
-
 class RecoveryPlace:
     """Where the journals of one recording are.
 
@@ -127,6 +91,12 @@ class RecoveryPlace:
         name = "".join(one if one.isalnum() else "-" for one in self._recording.stem[:40])
         self._folder = Path(root) / f"{name}-{number}"
         self._lock: FileLock | None = None
+        self._begun: set[int] = set()
+
+    @property
+    def recording(self) -> Path:
+        """What is labelled, with links followed."""
+        return self._recording
 
     @property
     def held(self) -> bool:
@@ -168,11 +138,9 @@ class RecoveryPlace:
             return Holder()
 
     def offers(self, *, declined: bool = False) -> Found:
-        """What earlier sessions left here; those that were declined only when asked for.
-
-        Call it before :meth:`begin`, whose session is no earlier one.
-        """
-        return _search(self._folder, (SUFFIX, DECLINED) if declined else (SUFFIX,)).found
+        """What earlier sessions left here; those that were declined only when asked for."""
+        suffixes = (SUFFIX, DECLINED) if declined else (SUFFIX,)
+        return search(self._folder, suffixes, without=self._begun).found
 
     def begin(self, labels: Labels, recovered: Offer | None = None) -> Journal:
         """Begin a session, with the labels of the user's file or of an offer.
@@ -193,20 +161,25 @@ class RecoveryPlace:
         """
         self._check_held()
         remove_leftovers(self._folder)
-        earlier = _search(self._folder, (SUFFIX,))
-        sessions = [_session_of(path) for path in _journals(self._folder, (SUFFIX, DECLINED))]
+        earlier = search(self._folder, (SUFFIX,), without=self._begun)
+        known = journals(self._folder, (SUFFIX, DECLINED, DAMAGED))
+        session = max(map(session_of, known), default=0) + 1
         journal = Journal(
             self._folder,
-            max(sessions, default=0) + 1,
+            session,
             self._recording,
             labels,
             unsaved=recovered.edits if recovered else 0,
             last=recovered.last if recovered else "",
         )
+        self._begun.add(session)
         if recovered is not None:
             self.delete(recovered)
         for path in earlier.settled:
             path.unlink(missing_ok=True)
+        # It has been said: nobody needs to hear of it again at every start.
+        for path in earlier.damaged:
+            path.rename(path.with_suffix(DAMAGED))
         return journal
 
     def decline(self, offer: Offer) -> None:
@@ -231,95 +204,20 @@ class RecoveryPlace:
             )
 
 
-def offers_in(root: Path) -> Found:
-    """What sessions of all recordings left behind that nobody edits now."""
+def offers_in(root: Path, *, declined: bool = False) -> Found:
+    """What sessions of all recordings left behind that nobody edits now, the newest first.
+
+    Those that were declined only when asked for.
+    """
+    suffixes = (SUFFIX, DECLINED) if declined else (SUFFIX,)
     found = [
-        _search(folder, (SUFFIX,)).found
-        for folder in _listed(Path(root))
+        search(folder, suffixes).found
+        for folder in listed(Path(root))
         if folder.is_dir() and not is_locked(folder / _LOCK_NAME)
     ]
     offers = [offer for one in found for offer in one.offers]
     notes = [note for one in found for note in one.notes]
     return Found(tuple(sorted(offers, key=lambda one: -one.time_unix_s)), tuple(notes))
-
-
-@dataclass(frozen=True)
-class _Search:
-    found: Found
-    settled: tuple[Path, ...]
-    """Parts of sessions that hold nothing but what the user's file holds as well."""
-
-
-def _search(folder: Path, suffixes: Iterable[str]) -> _Search:
-    offers, notes, settled = [], [], []
-    for _, group in groupby(_journals(folder, suffixes), key=_session_of):
-        parts = list(group)
-        while parts:  # the newest first; one before it only where that cannot be read
-            path = parts[0]
-            try:
-                replayed, note = _replayed(path)
-            except (OSError, ValueError, Sd2Error) as error:
-                notes.append(f"{path} cannot be read and is left where it is ({_words(error)})")
-                parts = parts[1:]
-                continue
-            if note:
-                notes.append(note)
-            if replayed.unsaved:
-                offers.append(_offer(replayed, tuple(parts)))
-            elif not note:
-                settled += parts
-            break
-    return _Search(Found(tuple(offers), tuple(notes)), tuple(settled))
-
-
-def _offer(replayed: Replayed, files: tuple[Path, ...]) -> Offer:
-    return Offer(
-        Path(replayed.recording),
-        replayed.labels,
-        replayed.unsaved,
-        replayed.last,
-        replayed.time_unix_s,
-        files[0].suffix == DECLINED,
-        files,
-    )
-
-
-def _replayed(path: Path) -> tuple[Replayed, str]:
-    content = path.read_bytes()
-    records, end = unpacked(content)
-    if not records:
-        raise ValueError("it does not begin with a whole record")
-    left = len(content) - end
-    note = f"{path} ends within an edit: {left} bytes are left out" if left else ""
-    return replay(records), note
-
-
-def _journals(folder: Path, suffixes: Iterable[str]) -> list[Path]:
-    """Parts by their names, newest session first, and its newest part first."""
-    named = [path for path in _listed(folder) if path.suffix in suffixes and _numbers(path)]
-    return sorted(named, key=_numbers, reverse=True)
-
-
-def _numbers(path: Path) -> tuple[int, ...]:
-    parts = path.stem.split("-")
-    return tuple(map(int, parts)) if len(parts) == 2 and all(map(str.isdecimal, parts)) else ()
-
-
-def _session_of(path: Path) -> int:
-    return _numbers(path)[0]
-
-
-def _listed(folder: Path) -> list[Path]:
-    try:
-        return sorted(folder.iterdir())
-    except OSError:
-        return []
-
-
-def _words(error: Exception) -> str:
-    if isinstance(error, ValidationError):
-        return first_fault(error)
-    return str(error)
 
 
 def _user() -> str:

@@ -523,3 +523,24 @@ def test_labels_beside_a_recording_are_its_labels(files: Path) -> None:
     write_labels(made.folder / "labels.json", labels)
     assert open_recording(made.folder).labelled == labels
     assert not open_recording(made.folder).unlabelled
+
+
+def test_labels_that_somebody_else_edits_are_left_alone(files: Path) -> None:
+    made = Recording.create(files.parent / "walk.sd2", video=files / "walk.mkv")
+    theirs = Labels(spans=(LabelSpan(1, "Gestures", 0.5, 1.0, "left-to-right"),))
+    write_labels(made.folder / "labels.json", theirs)
+    made.labels, made.labels_elsewhere = Labels(), True
+    made.sensor = VirtualSensor(position_m=(1.0, 0.0, 0.0))
+    made.save()
+    again = open_recording(made.folder)
+    assert (again.labels, again.sensor) == (theirs, made.sensor)
+    # A recording of one's own is another matter.
+    own = made.save_as(files.parent / "own.sd2")
+    assert not own.labels_elsewhere
+    assert open_recording(own.folder).labels == Labels()
+    made.read_labels_again()
+    assert made.labels == theirs
+    (made.folder / "labels.json").write_text("{")
+    with pytest.raises(Sd2Error, match=r"labels\.json cannot be read"):
+        made.read_labels_again()
+    assert made.labels == theirs

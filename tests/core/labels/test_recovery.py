@@ -148,6 +148,9 @@ class TestOffers:
         place.decline(offer)
         assert place.offers() == Found()
         assert offers_in(root) == Found()
+        place.release()
+        assert offers_in(root, declined=True).offers[0].declined
+        assert place.take()
         (declined,) = place.offers(declined=True).offers
         assert declined.declined
         assert declined.labels == edited(3)
@@ -177,7 +180,7 @@ class TestDamage:
             (b"hello\n", "does not begin with a whole record"),
         ],
     )
-    def test_is_noted_and_left(
+    def test_is_noted_once_and_kept(
         self, taken: Take, root: Path, recording: Path, content: bytes, says: str
     ) -> None:
         crashed(root, recording, 2)
@@ -190,7 +193,8 @@ class TestDamage:
         assert str(newest) in found.notes[0]
         assert says in found.notes[0]
         place.begin(START, found.offers[0]).close()
-        assert newest.read_bytes() == content
+        assert place.offers() == Found()
+        assert newest.with_suffix(".damaged").read_bytes() == content
 
     def test_of_the_newest_part_costs_that_part(
         self, taken: Take, root: Path, recording: Path, monkeypatch: pytest.MonkeyPatch
@@ -210,7 +214,7 @@ class TestDamage:
         assert found.offers[0].files == (older,)
         assert 30 < found.offers[0].edits < 60
         assert found.offers[0].labels.spans == made.spans[: found.offers[0].edits]
-        assert "left where it is" in found.notes[0]
+        assert "is kept" in found.notes[0]
 
     def test_a_torn_end_is_noted(self, taken: Take, root: Path, recording: Path) -> None:
         crashed(root, recording, 3)
@@ -220,15 +224,31 @@ class TestDamage:
         assert found.offers[0].labels == edited(2)
         assert "ends within an edit" in found.notes[0]
 
+    def test_half_an_edit_and_nothing_else_is_noted_once(
+        self, taken: Take, root: Path, recording: Path
+    ) -> None:
+        crashed(root, recording, 3, saved_after=2)
+        (path,) = root.rglob("*.journal")
+        path.write_bytes(path.read_bytes()[:-7])
+        place = taken(root, recording)
+        found = place.offers()
+        assert found.offers == ()
+        assert "ends within an edit" in found.notes[0]
+        place.begin(START).close()
+        assert place.offers() == Found()
+
     def test_a_later_version_is_left_alone(
         self, taken: Take, root: Path, recording: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         with monkeypatch.context() as patch:
             patch.setattr("sd2core.labels.journal_records.VERSION", 2)
             crashed(root, recording, 1)
-        found = taken(root, recording).offers()
+        place = taken(root, recording)
+        found = place.offers()
         assert found.offers == ()
         assert "version is 2" in found.notes[0]
+        place.begin(START).close()
+        assert place.offers() == found
 
     def test_strange_names_are_nothing(self, taken: Take, root: Path, recording: Path) -> None:
         crashed(root, recording, 1)
