@@ -6,12 +6,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
+from sd2app.models.span_arrays import UNKNOWN_COLOUR, SpanArrays, SpanColumns
 from sd2core.labels.spans import Labels, Span
 
-UNKNOWN_COLOUR = "#8a8f98"
-"""Of labels that the label set does not have."""
+_COLUMNS_KEPT = 4
+"""Maps, timeline and overview ask for few scales, but at every frame that is played."""
 
 
 @dataclass(frozen=True)
@@ -49,11 +51,12 @@ class LabelsModel(QObject):
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._labels = Labels()
-        self._selected: tuple[int, ...] = ()
+        self._selected: frozenset[int] = frozenset()
         self._track = self._labels.tracks[0].name
         self._label = self._labels.label_set.labels[0].name
         self._marks: tuple[Mark, ...] = ()
-        self._edges_s = np.empty((2, 0))
+        self._arrays = SpanArrays.of(self._labels)
+        self._columns: dict[object, SpanColumns] = {}
 
     @property
     def labels(self) -> Labels:
@@ -63,7 +66,19 @@ class LabelsModel(QObject):
     @property
     def selected(self) -> tuple[Span, ...]:
         """The spans that are selected, in the order of time."""
-        return tuple(span for span in self._labels.spans if span.id in self._selected)
+        spans = self._labels.spans
+        return tuple(spans[row] for row in self.selected_rows)
+
+    @property
+    def selected_rows(self) -> NDArray[np.int64]:
+        """The same as rows of :attr:`arrays`."""
+        chosen = np.fromiter(self._selected, np.int64, len(self._selected))
+        return np.flatnonzero(np.isin(self._arrays.ids, chosen))
+
+    @property
+    def arrays(self) -> SpanArrays:
+        """The spans as arrays."""
+        return self._arrays
 
     @property
     def track(self) -> str:
@@ -86,9 +101,27 @@ class LabelsModel(QObject):
 
     def within(self, start_s: float, end_s: float) -> list[Span]:
         """The spans of which something lies between two times, in order."""
-        starts_s, ends_s = self._edges_s
-        rows = np.flatnonzero((starts_s < end_s) & (ends_s > start_s))
-        return [self._labels.spans[row] for row in rows]
+        return [self._labels.spans[row] for row in self._arrays.within(start_s, end_s)]
+
+    def columns(
+        self,
+        start_s: float,
+        end_s: float,
+        columns: int,
+        wide_columns: float,
+        *,
+        together: bool = False,
+    ) -> SpanColumns:
+        """What of the spans is to be seen at a scale (:meth:`SpanArrays.columns`), and kept."""
+        key = start_s, end_s, columns, wide_columns, together
+        found = self._columns.get(key)
+        if found is None:
+            while len(self._columns) >= _COLUMNS_KEPT:
+                del self._columns[next(iter(self._columns))]
+            found = self._columns[key] = self._arrays.columns(
+                start_s, end_s, columns, wide_columns, self.selected_rows, together=together
+            )
+        return found
 
     def colour_of(self, label: str) -> str:
         """``#rrggbb`` of a label."""
@@ -99,7 +132,8 @@ class LabelsModel(QObject):
 
     def open(self, labels: Labels) -> None:
         """Take over another recording's labels; nothing is selected or being marked."""
-        self._selected, self._marks = (), ()
+        self._marks = ()
+        self._choose(frozenset())
         self._assign(labels)
         self.selection_changed.emit()
         self.marks_changed.emit()
@@ -109,21 +143,20 @@ class LabelsModel(QObject):
         if labels is self._labels:
             return
         there = {span.id for span in labels.spans}
-        kept = tuple(one for one in self._selected if one in there)
-        pruned, self._selected = kept != self._selected, kept
+        pruned = not self._selected <= there
+        self._choose(self._selected & there)
         self._assign(labels)
         if pruned:
             self.selection_changed.emit()
 
     def select(self, ids: Iterable[int]) -> None:
         """Select these spans and no others; new ones come on the track of the first."""
-        wanted = set(ids)
-        chosen = tuple(span.id for span in self._labels.spans if span.id in wanted)
-        if chosen == self._selected:
+        wanted = frozenset(ids) & frozenset(self._arrays.ids.tolist())
+        if wanted == self._selected:
             return
-        self._selected = chosen
-        if chosen:
-            self._track = self._labels.span(chosen[0]).track
+        self._choose(wanted)
+        if wanted:
+            self._track = self._labels.spans[self.selected_rows[0]].track
         self.selection_changed.emit()
 
     def set_track(self, name: str) -> None:
@@ -145,13 +178,21 @@ class LabelsModel(QObject):
             self._marks = marks
             self.marks_changed.emit()
 
+    def _choose(self, ids: frozenset[int]) -> None:
+        self._selected = ids
+        self._columns.clear()
+
     def _assign(self, labels: Labels) -> None:
         self._labels = labels
-        edges_s = [(span.start_s, span.end_s) for span in labels.spans]
-        self._edges_s = np.array(edges_s, np.float64).reshape(-1, 2).T
+        self._arrays = SpanArrays.of(labels)
+        self._columns.clear()
         names = [track.name for track in labels.tracks]
+        left = tuple(mark for mark in self._marks if mark.track in names)
+        dropped, self._marks = left != self._marks, left
         if self._track not in names:
             self._track = names[0] if names else ""
         if labels.label_set.find(self._label) is None and labels.label_set.labels:
             self._label = labels.label_set.labels[0].name
         self.changed.emit()
+        if dropped:
+            self.marks_changed.emit()

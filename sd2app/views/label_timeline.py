@@ -10,15 +10,15 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from sd2app.label_edits import LabelEdits
 from sd2app.models.display import DisplayModel
+from sd2app.models.label_rows import ROW_PX, LabelRows
 from sd2app.models.labels import LabelsModel
 from sd2app.models.playback import PlaybackModel
 from sd2app.models.visible_span import VisibleSpanModel
-from sd2app.views.label_painting import paint_span, span_box
+from sd2app.views.label_painting import lane_box, paint_span, paint_spans
 from sd2app.views.map_widget import paint_cursor
 from sd2app.views.time_axis import GUTTER_PX, MARGIN_PX, TimeScale
 from sd2core.labels.spans import Span
 
-ROW_PX = 24
 _EDGE_PX = 5.0
 _ATTRACT_PX = 8.0
 _MOVED_PX = 3.0
@@ -55,6 +55,7 @@ class LabelTimeline(QWidget):
         self._grip: _Grip | None = None
         self._pointer_px = 0.0
         self._attracted = True
+        self._rows = LabelRows.of(labels.labels.tracks, labels.arrays, labels.marks)
         self._scroll = QTimer(self)
         self._scroll.setInterval(_SCROLL_MS)
         self._scroll.timeout.connect(self._scroll_on)
@@ -62,10 +63,10 @@ class LabelTimeline(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAccessibleName("Labels")
-        labels.changed.connect(self._follow)
+        for signal in (labels.changed, labels.marks_changed):
+            signal.connect(self._follow)
         for signal in (
             labels.selection_changed,
-            labels.marks_changed,
             span.changed,
             playback.frame_changed,
             display.theme_changed,
@@ -75,17 +76,17 @@ class LabelTimeline(QWidget):
 
     def sizeHint(self) -> QSize:
         """As high as its tracks."""
-        return QSize(640, ROW_PX * max(len(self._labels.labels.tracks), 1))
+        return QSize(640, round(self._rows.height_px))
 
     @property
     def scale(self) -> TimeScale:
         """Time axis of this widget."""
         return TimeScale(self._span.start_s, self._span.end_s, self.width())
 
-    def row_of(self, track: str) -> QRectF:
-        """Where a track is drawn."""
-        names = [one.name for one in self._labels.labels.tracks]
-        return QRectF(0, ROW_PX * names.index(track), self.width(), ROW_PX)
+    @property
+    def rows(self) -> LabelRows:
+        """Where tracks and lanes stand."""
+        return self._rows
 
     # --- painting -------------------------------------------------------------------------
 
@@ -98,30 +99,20 @@ class LabelTimeline(QWidget):
         palette, scale, model = self._display.palette, self.scale, self._labels
         painter.fillRect(self.rect(), QColor(palette.panel))
         plot = QRectF(GUTTER_PX, 0, self.width() - GUTTER_PX - MARGIN_PX, self.height())
-        rows = {track.name: self.row_of(track.name) for track in model.labels.tracks}
-        for name, row in rows.items():
-            self._paint_name(painter, name, row)
-            well = row.adjusted(GUTTER_PX, 1, -MARGIN_PX, -1)
+        rows = self._rows
+        for row in rows.tracks:
+            whole = QRectF(0, row.top_px, self.width(), row.height_px)
+            self._paint_name(painter, row.name, whole)
+            well = whole.adjusted(GUTTER_PX, 1, -MARGIN_PX, -1)
             painter.fillRect(well, QColor(palette.well))
         painter.save()
         painter.setClipRect(plot)
-        if not model.labels.spans and not model.marks and rows:
-            self._paint_hint(painter, next(iter(rows.values())))
-        for span in model.within(scale.start_s, scale.end_s):
-            paint_span(
-                painter,
-                span_box(span, rows[span.track], scale),
-                span.label,
-                model.colour_of(span.label),
-                palette,
-                selected=model.is_selected(span.id),
-                suggestion=span.origin == "suggestion",
-            )
-        for mark in model.marks:
+        if not model.labels.spans and not model.marks and rows.tracks:
+            self._paint_hint(painter, QRectF(0, 0, self.width(), ROW_PX))
+        paint_spans(painter, plot, scale, model, rows.tracks, palette)
+        for mark, lane in zip(model.marks, rows.mark_lanes, strict=True):
             left, right = sorted((scale.x_of(mark.start_s), scale.x_of(self._playback.time_s)))
-            box = rows[mark.track].adjusted(0, 2, 0, -2)
-            box.setLeft(left)
-            box.setRight(max(right, left + 2))
+            box = lane_box(rows.row_of(mark.track), lane, left, right)
             paint_span(
                 painter, box, f"{mark.label} …", model.colour_of(mark.label), palette, selected=True
             )
@@ -149,6 +140,8 @@ class LabelTimeline(QWidget):
         )
 
     def _follow(self) -> None:
+        labels = self._labels
+        self._rows = LabelRows.of(labels.labels.tracks, labels.arrays, labels.marks)
         self.setFixedHeight(self.sizeHint().height())
         self.update()
 
@@ -156,17 +149,17 @@ class LabelTimeline(QWidget):
 
     def grip_at(self, x_px: float, y_px: float) -> _Grip | None:
         """What is under the pointer; edges of what is selected go first."""
-        tracks = self._labels.labels.tracks
-        row = int(y_px // ROW_PX)
-        if not 0 <= row < len(tracks) or x_px < GUTTER_PX:
+        row = self._rows.row_at(y_px)
+        if row is None or x_px < GUTTER_PX:
             return None
-        track, scale = tracks[row].name, self.scale
+        track, scale, arrays = row.name, self.scale, self._labels.arrays
         reach_s = _EDGE_PX * scale.seconds_per_px
         time_s = scale.time_of(x_px)
+        lane = row.lane_at(y_px)
         near = [
-            one
-            for one in self._labels.within(time_s - reach_s, time_s + reach_s)
-            if one.track == track
+            arrays.spans[one]
+            for one in arrays.within(time_s - reach_s, time_s + reach_s)
+            if arrays.spans[one].track == track and arrays.lanes[one] == lane
         ]
         near.sort(key=lambda one: not self._labels.is_selected(one.id))
         for span in near:

@@ -11,10 +11,12 @@ from sd2app.models.labels import LabelsModel
 from sd2app.models.playback import PlaybackModel
 from sd2app.models.tracks import TrackModel
 from sd2app.models.visible_span import VisibleSpanModel
+from sd2app.views.label_painting import paint_strip
 from sd2app.views.map_widget import MapWidget, paint_cursor
 from sd2app.views.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, clock_text, tick_step, ticks
 
 _EDGE_PX = 6
+_LABELS_PX = 4.0
 
 
 class TimeRuler(QWidget):
@@ -130,7 +132,8 @@ class Overview(MapWidget):
         if self._track.map is not None:
             self.paint_map(painter, plot, *self._span.extent_s)
             self.paint_gaps(painter, plot, scale)
-        self._paint_labels(painter, plot, scale)
+        strip = QRectF(plot.left(), plot.top(), plot.width(), _LABELS_PX)
+        paint_strip(painter, strip, scale, self._labels)
         left, right = scale.x_of(self._span.start_s), scale.x_of(self._span.end_s)
         veil = QColor(colours.panel)
         veil.setAlpha(150)
@@ -141,14 +144,6 @@ class Overview(MapWidget):
             QRectF(left, plot.top(), right - left, plot.height()).adjusted(0, 1, 0, -1), 2, 2
         )
         paint_cursor(painter, plot, scale.x_of(self._playback.time_s))
-
-    def _paint_labels(self, painter: QPainter, plot: QRectF, scale: TimeScale) -> None:
-        for span in self._labels.labels.spans:
-            left, right = scale.x_of(span.start_s), scale.x_of(span.end_s)
-            painter.fillRect(
-                QRectF(left, plot.top(), max(right - left, 2), 3),
-                QColor(self._labels.colour_of(span.label)),
-            )
 
     def _handle_at(self, x: float) -> str:
         scale = self.scale

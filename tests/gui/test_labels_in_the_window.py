@@ -8,7 +8,8 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
-from sd2app.views.label_timeline import ROW_PX, LabelTimeline
+from sd2app.models.label_rows import ROW_PX
+from sd2app.views.label_timeline import LabelTimeline
 from sd2core.recording import Recording, Span, open_recording
 
 NONE = Qt.KeyboardModifier.NoModifier
@@ -37,7 +38,7 @@ def key(window, qtbot, name: str, modifier=NONE) -> None:
 
 def at(window, time_s: float) -> QPoint:
     timeline = window.findChild(LabelTimeline)
-    return QPoint(round(timeline.scale.x_of(time_s)), ROW_PX // 2)
+    return QPoint(round(timeline.scale.x_of(time_s)), round(ROW_PX / 2))
 
 
 def drag(window, from_s: float, to_s: float, modifier=NONE, release: bool = True) -> None:

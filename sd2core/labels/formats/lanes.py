@@ -40,7 +40,7 @@ def lanes_of(labels: Labels, edges: Callable[[Span], tuple[Time, Time]]) -> list
     """
     found: list[Lane] = []
     for track in labels.tracks:
-        rows = _apart(labels.of_track(track.name), edges)
+        rows = apart(labels.of_track(track.name), edges)
         free = track.overlap == "free" or len(rows) > 1
         first = 1 if free else 0
         bare = not free and not _ROW.fullmatch(track.name)
@@ -58,7 +58,8 @@ def track_of(row: str) -> tuple[str, Overlap | None]:
     return match[1], "exclusive" if int(match[2]) == 0 else "free"
 
 
-def _apart(spans: Sequence[Span], edges: Callable[[Span], tuple[Time, Time]]) -> list[list[Span]]:
+def apart(spans: Sequence[Span], edges: Callable[[Span], tuple[Time, Time]]) -> list[list[Span]]:
+    """Rows in which nothing overlaps: first fit in the order of start; one row at least."""
     rows: list[list[Span]] = [[]]
     ends: list[Time | None] = [None]
     for span in sorted(spans, key=lambda one: (*edges(one), one.id)):
