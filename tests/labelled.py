@@ -25,6 +25,7 @@ from sd2core.labels.edits import (
     resize,
     split,
 )
+from sd2core.labels.group_edits import duplicate_together, move_together, nudge_together
 from sd2core.labels.spans import ORIGINS, Labels, Span, Track
 from sd2core.timebase import Timebase
 
@@ -99,6 +100,9 @@ def random_edit(labels: Labels, timebase: Timebase, rng: random.Random) -> Edit:
         lambda: move(labels, timebase, span_id, time_s()),
         lambda: nudge(labels, timebase, span_id, rng.randint(-12, 12)),
         lambda: nudge_edge(labels, timebase, span_id, side, rng.randint(-12, 12)),
+        lambda: move_together(labels, timebase, some, span_id, near_s()),
+        lambda: nudge_together(labels, timebase, some, rng.randint(-12, 12)),
+        lambda: duplicate_together(labels, timebase, some, time_s()),
         lambda: split(labels, timebase, span_id, near_s()),
         lambda: merge(labels, some),
         lambda: meet(labels, timebase, span_id, rng.choice(ids or [1]), near_s()),

@@ -29,7 +29,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from sd2core.errors import Sd2Error
-from sd2core.labels.rooms import Frames, clipped, free_parts, room_around
+from sd2core.labels.rooms import Frames, clipped, free_parts, room_around, steps_free
 from sd2core.labels.spans import Labels, Span
 from sd2core.timebase import Timebase
 
@@ -126,21 +126,14 @@ def nudge(labels: Labels, timebase: Timebase, span_id: int, count: int) -> Edit:
     """
     frames = Frames.of(timebase)
     span = labels.span(span_id)
-    low_s, high_s = room_around(labels, span, frames)
-    if count < 0:
-        wall = int(frames.edges_s.searchsorted(low_s))
-        here = int(frames.edges_s.searchsorted(span.start_s))
-        count = max(count, min(wall - here, 0))
-    elif count > 0:
-        wall = int(frames.edges_s.searchsorted(high_s, "right"))
-        here = int(frames.edges_s.searchsorted(span.end_s, "right"))
-        count = min(count, max(wall - here, 0))
+    room = room_around(labels, span, frames)
+    count = steps_free(frames, span, room, count)
     if count == 0:
         return Edit("Nudge span", labels, (span_id,))
     start_s, end_s = (frames.stepped(time_s, count) for time_s in (span.start_s, span.end_s))
     if not frames.held(start_s, end_s):  # one that lay between two frames
         start_s, end_s = frames.stretch(start_s, start_s)
-        end_s = min(end_s, high_s)
+        end_s = min(end_s, room[1])
     changed = _timed(span, start_s, end_s, frames)
     return Edit("Nudge span", labels.with_spans([changed]), (span_id,))
 

@@ -116,6 +116,18 @@ def room_around(labels: Labels, span: Span, frames: Frames) -> Stretch:
     return low_s, high_s
 
 
+def steps_free(frames: Frames, span: Span, room: Stretch, count: int) -> int:
+    """How many of so many frames a span can be moved by before it meets a wall of its room."""
+    low_s, high_s = room
+    if count < 0:
+        wall = int(frames.edges_s.searchsorted(low_s))
+        here = int(frames.edges_s.searchsorted(span.start_s))
+        return max(count, min(wall - here, 0))
+    wall = int(frames.edges_s.searchsorted(high_s, "right"))
+    here = int(frames.edges_s.searchsorted(span.end_s, "right"))
+    return min(count, max(wall - here, 0))
+
+
 def free_parts(
     labels: Labels, track: str, wanted: Stretch, ignore: Collection[int] = ()
 ) -> list[Stretch]:
