@@ -30,6 +30,10 @@ def _has_spans(context: Context) -> bool:
     return bool(context.labels.labels.spans)
 
 
+def _has_suggestions(context: Context) -> bool:
+    return bool(context.suggestions.pending)
+
+
 def _one_selected(context: Context) -> bool:
     return len(context.labels.selected) == 1
 
@@ -387,6 +391,32 @@ ACTIONS: tuple[Action, ...] = (
     Action(
         "previous_span", "Labels", "Previous span", ("P",), "Select it and go to its start",
         lambda w: w.context.label_edits.step(-1), _has_spans,
+    ),
+    Action(
+        "suggest", "Labels", "Suggest spans", ("F",),
+        "Find where something moves in a map; each suggestion is then accepted or rejected",
+        lambda w: w.context.suggestions.start(),
+        lambda c: c.suggestions.source is not None, separator_before=True, edits_labels=True,
+    ),
+    Action(
+        "accept_suggestion", "Labels", "Accept suggestion", ("Y",),
+        "Take the one that is selected, or the next; a label's own key takes it as that",
+        lambda w: w.context.suggestions.accept(), _has_suggestions, edits_labels=True,
+    ),
+    Action(
+        "reject_suggestion", "Labels", "Reject suggestion", ("W",),
+        "Let the one that is selected go, or the next; it is not suggested again",
+        lambda w: w.context.suggestions.reject(), _has_suggestions, edits_labels=True,
+    ),
+    Action(
+        "accept_suggestions", "Labels", "Accept all suggestions", ("Shift+Y",),
+        "Take all that there is room for",
+        lambda w: w.context.suggestions.accept_all(), _has_suggestions, edits_labels=True,
+    ),
+    Action(
+        "reject_suggestions", "Labels", "Reject all suggestions", ("Shift+W",),
+        "Let all go; they are not suggested again",
+        lambda w: w.context.suggestions.reject_all(), _has_suggestions, edits_labels=True,
     ),
     Action(
         "import_labels", "Labels", "Import labels…", ("Ctrl+I",),

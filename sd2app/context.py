@@ -28,6 +28,7 @@ from sd2app.models.ladder import CORE, Ladder
 from sd2app.models.overlay import OverlayModel
 from sd2app.models.playback import PlaybackModel
 from sd2app.models.sensor import SensorModel
+from sd2app.models.suggestions import SuggestionsModel
 from sd2app.models.synthesis import SynthesisModel
 from sd2app.models.tracks import PointerModel, TrackModel
 from sd2app.models.trade import TradeModel
@@ -70,6 +71,7 @@ class Context:
     labels: LabelsModel
     label_session: LabelSession
     label_edits: LabelEdits
+    suggestions: SuggestionsModel
     fit: FitModel
     fit_follower: FitFollower
     fit_offer: FitOffer
@@ -91,6 +93,7 @@ class Context:
     def close(self) -> None:
         """Stop every thread and let go of the files."""
         self.playback.pause()
+        self.suggestions.close()
         self.fit.close()
         self.training_use.close()
         self.training.close()
@@ -146,6 +149,7 @@ def build_context(
     training = TrainingModel(settings, parent, train_command or TRAIN_COMMAND)
     labels = LabelsModel(parent)
     label_session = LabelSession(document, labels, recovery or recovery_folder(), parent)
+    label_edits = LabelEdits(document, labels, playback, label_session, parent)
     context = Context(
         settings=settings,
         jobs=jobs,
@@ -170,7 +174,15 @@ def build_context(
         edits=edits,
         labels=labels,
         label_session=label_session,
-        label_edits=LabelEdits(document, labels, playback, label_session, parent),
+        label_edits=label_edits,
+        suggestions=SuggestionsModel(
+            labels,
+            playback,
+            (synthetic, denoised, real),
+            document.undo_stack,
+            label_edits.apply,
+            parent,
+        ),
         fit=fit,
         fit_follower=follower,
         fit_offer=FitOffer(document, fit, parent),
@@ -198,6 +210,7 @@ def _take_over(context: Context) -> None:
     context.video.set_reader(content.video)
     context.sensor.set_sensor(content.recording.sensor)
     context.label_session.take_over()
+    context.suggestions.open()
     _follow_capture(context, new=True)
     context.synthesis.take_over()
     # The clock of another recording begins anew, which is nobody's wish to stay.

@@ -56,7 +56,10 @@ class LabelActions:
 
     def _use(self, label: str) -> None:
         context = self._window.context
-        if context.labels.selected and not context.playback.playing:
+        chosen = context.labels.selected
+        if any(span.origin == "suggestion" for span in chosen):
+            context.suggestions.accept(label)
+        elif chosen and not context.playback.playing:
             context.label_edits.relabel(label)
         else:
             context.label_edits.mark(label)

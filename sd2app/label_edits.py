@@ -253,9 +253,13 @@ class LabelEdits(QObject):
         )
 
     def apply(self, change: Change) -> bool:
-        """Make an edit, one step in the history; False where it was refused."""
+        """Make an edit, one step in the history; False where it was refused.
+
+        What a hand has dragged until then is a step before it.
+        """
         if self._refused():
             return False
+        self.end_drag()
         before = self._labels.labels
         try:
             done = change(before, self._playback.timebase)

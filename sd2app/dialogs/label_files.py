@@ -39,8 +39,8 @@ class LabelFileDialogs:
     def import_labels(self, path: Path | None = None) -> None:
         """Ask for a file unless there is one, show what it holds, and take it."""
         c = self._context
-        if c.document.content is None:
-            self._messages.warn("Labels belong to a recording: open it first, then import them.")
+        if c.label_edits.refusal:
+            self._messages.warn(c.label_edits.refusal)
             return
         if path is None:
             name, _ = QFileDialog.getOpenFileName(self._parent, "Import labels", "", LABEL_FILES)

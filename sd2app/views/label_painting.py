@@ -11,6 +11,7 @@ from sd2app.models.labels import LabelsModel
 from sd2app.models.span_arrays import WIDE_PX, SpanColumns
 from sd2app.palette import Palette
 from sd2app.views.time_axis import TimeScale
+from sd2core.labels.spans import Span
 
 _TINT, _SELECTED_TINT = 64, 136
 _NARROW_TINTS = 90, 255
@@ -39,10 +40,14 @@ def paint_span(
     tint.setAlpha(_SELECTED_TINT if selected else _TINT)
     if suggestion:
         painter.fillRect(box, QBrush(tint, Qt.BrushStyle.BDiagPattern))
+        painter.setPen(QPen(full, 1.0, Qt.PenStyle.DashLine))
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        painter.drawRect(box.adjusted(0.5, 0.5, -0.5, -0.5))
     else:
         painter.fillRect(box, tint)
-    painter.fillRect(QRectF(box.left(), box.top(), 2.0, box.height()), full)
-    painter.fillRect(QRectF(box.right() - 2.0, box.top(), 2.0, box.height()), full)
+    if not suggestion:
+        painter.fillRect(QRectF(box.left(), box.top(), 2.0, box.height()), full)
+        painter.fillRect(QRectF(box.right() - 2.0, box.top(), 2.0, box.height()), full)
     if selected:
         painter.setPen(QPen(QColor(palette.text), 1.0))
         painter.setBrush(Qt.BrushStyle.NoBrush)
@@ -94,12 +99,19 @@ def paint_spans(
         paint_span(
             painter,
             lane_box(row, int(arrays.lanes[number]), left, right),
-            span.label,
+            _text(span),
             arrays.colours[arrays.tones[number]],
             palette,
             selected=model.is_selected(span.id),
             suggestion=span.origin == "suggestion",
         )
+
+
+def _text(span: Span) -> str:
+    """The label, after how sure it is where it is a suggestion."""
+    if span.origin == "suggestion" and span.confidence is not None:
+        return f"{span.confidence:.0%} {span.label}"
+    return span.label
 
 
 def paint_regions(painter: QPainter, plot: QRectF, scale: TimeScale, model: LabelsModel) -> None:

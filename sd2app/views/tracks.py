@@ -10,9 +10,11 @@ from sd2app.views.difference import DifferenceView
 from sd2app.views.heatmap import HeatmapView
 from sd2app.views.label_timeline import LabelTimeline
 from sd2app.views.model_menu import ModelButton, ModelMenu
+from sd2app.views.suggestion_bar import SuggestionBar
 from sd2app.views.timeline import Overview, TimeRuler
 
 if TYPE_CHECKING:
+    from sd2app.action_set import ActionSet
     from sd2app.context import Context
 
 _LOWEST_PX = {1: 96, 2: 96, 3: 72, 4: 54}
@@ -22,7 +24,13 @@ _LOWEST_PX = {1: 96, 2: 96, 3: 72, 4: 54}
 class Tracks(QWidget):
     """A track that has nothing to show is not drawn."""
 
-    def __init__(self, context: Context, models: ModelMenu, parent: QWidget | None = None) -> None:
+    def __init__(
+        self,
+        context: Context,
+        models: ModelMenu,
+        actions: ActionSet,
+        parent: QWidget | None = None,
+    ) -> None:
         super().__init__(parent)
         self._context = c = context
         common = c.span, c.playback, c.display, c.pointer, c.labels
@@ -46,7 +54,8 @@ class Tracks(QWidget):
         column.setSpacing(0)
         for view in (self.synthetic, self.denoised, self.before, self.real, self.difference):
             column.addWidget(view, 1)
-        for below in (self.labels, TimeRuler(c.span, c.playback, c.display), self.overview):
+        bar = SuggestionBar(c.suggestions, actions)
+        for below in (bar, self.labels, TimeRuler(c.span, c.playback, c.display), self.overview):
             column.addWidget(below)
         self._shown: object = None
         for track in c.tracks:

@@ -200,7 +200,7 @@ class MainWindow(QMainWindow):
         from sd2app.views.tracks import Tracks
 
         c = self.context
-        self._tracks = Tracks(c, self._models)
+        self._tracks = Tracks(c, self._models, self._actions)
         fill(self._panels["tracks"], self._tracks)
         side = QVBoxLayout()
         curves = tuple(
@@ -303,6 +303,7 @@ class MainWindow(QMainWindow):
             c.labels.changed,
             c.labels.selection_changed,
             c.labels.marks_changed,
+            c.suggestions.changed,
         ):
             signal.connect(self._refresh)
         # Without a person in the frame there is nothing to aim at.

@@ -220,7 +220,7 @@ def match_spans(
     """
     if not 0.0 < min_iou <= 1.0:
         raise Sd2Error(f"The least IoU of a match is {min_iou:g}", "above 0 and up to 1")
-    iou = _iou(a, b)  # (len(a), len(b))
+    iou = iou_of(a, b)
     same = np.array([[x.label == y.label for y in b] for x in a]).reshape(iou.shape)
     # Rounding must not lose the match of a span with itself at a threshold of 1.
     allowed = iou >= min_iou - 1e-12
@@ -277,7 +277,8 @@ def _confusion(a: NDArray[np.int64], b: NDArray[np.int64], answers: int) -> NDAr
     return np.bincount(a * answers + b, minlength=answers**2).reshape(answers, answers)
 
 
-def _iou(a: Sequence[Span], b: Sequence[Span]) -> NDArray[np.float64]:
+def iou_of(a: Sequence[Span], b: Sequence[Span]) -> NDArray[np.float64]:
+    """Intersection over union of the times of spans, (len(a), len(b))."""
     start_a, end_a = np.array([(s.start_s, s.end_s) for s in a]).reshape(-1, 2).T[:, :, None]
     start_b, end_b = np.array([(s.start_s, s.end_s) for s in b]).reshape(-1, 2).T[:, None, :]
     both = np.maximum(np.minimum(end_a, end_b) - np.maximum(start_a, start_b), 0.0)

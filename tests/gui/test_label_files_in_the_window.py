@@ -94,7 +94,7 @@ def test_cancelled_is_cancelled(window, theirs, qtbot, monkeypatch) -> None:
 
 def test_without_a_recording_it_says_what_to_do(empty_window, tmp_path) -> None:
     empty_window.label_files.import_labels(tmp_path / "ben.eaf")
-    assert "open it first" in empty_window.messages.text
+    assert "Nothing is open" in empty_window.messages.text
 
 
 def test_export_to_every_format_and_back(window, qtbot, monkeypatch, tmp_path) -> None:

@@ -1,0 +1,288 @@
+"""Suggested spans: found in a map in the background, then accepted or rejected one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtGui import QUndoStack
+
+from sd2app.jobs.latest import Emit, LatestRunner
+from sd2app.models.labels import LabelsModel
+from sd2app.models.playback import PlaybackModel
+from sd2app.models.tracks import TrackModel
+from sd2core.labels.edits import Edit
+from sd2core.labels.offering import offer, pending, take, turn_down
+from sd2core.labels.spans import Labels, Span
+from sd2core.labels.suggest import TRACK, SuggestOptions, motion_energy_db, suggest_spans
+from sd2core.timebase import Timebase
+
+LOWEST_DB, HIGHEST_DB = 3.0, 40.0
+Apply = Callable[[Callable[[Labels, Timebase], Edit]], bool]
+
+
+class _Found(NamedTuple):
+    spans: tuple[Span, ...]
+    loudest_db: float
+
+
+class SuggestionsModel(QObject):
+    """What moves, as spans to be decided on; the spans themselves are among the labels.
+
+    Another threshold takes the place of the step before as long as nothing else was done, so
+    that trying thresholds is one step. What was rejected does not come again while the
+    recording is open.
+
+    Signals
+    -------
+    changed
+        Whether suggestions are asked for, how many there are, what they are made of.
+    """
+
+    changed = Signal()
+
+    def __init__(
+        self,
+        labels: LabelsModel,
+        playback: PlaybackModel,
+        maps: Sequence[TrackModel],
+        undo_stack: QUndoStack,
+        apply: Apply,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._labels, self._playback, self._maps = labels, playback, tuple(maps)
+        self._stack, self._apply = undo_stack, apply
+        self._active = False
+        self._wanted = False
+        self._source: TrackModel | None = None
+        self._threshold_db = SuggestOptions().high_db
+        self._loudest_db: float | None = None
+        self._problem = ""
+        self._declined: tuple[Span, ...] = ()
+        self._home = labels.track
+        self._made: tuple[Labels, int] | None = None
+        self._pending: tuple[Span, ...] = ()
+        self._runner = LatestRunner("suggest", self)
+        self._runner.finished.connect(self._receive)
+        self._runner.failed.connect(self._fail)
+        self._runner.idle_changed.connect(lambda _: self.changed.emit())
+        labels.changed.connect(self._follow)
+        labels.selection_changed.connect(self._remember_home)
+        for track in self._maps:
+            track.changed.connect(self._begin_if_complete)
+
+    # --- what is there --------------------------------------------------------------------
+
+    @property
+    def active(self) -> bool:
+        """Whether suggestions are asked for: their bar is shown."""
+        return self._active
+
+    @property
+    def busy(self) -> bool:
+        """Whether they are being looked for, or a map for them is being computed."""
+        return self._runner.busy or self._wanted
+
+    @property
+    def pending(self) -> tuple[Span, ...]:
+        """Those that nobody has decided on."""
+        return self._pending
+
+    @property
+    def sources(self) -> tuple[TrackModel, ...]:
+        """Maps to look in."""
+        return tuple(track for track in self._maps if track.map is not None)
+
+    @property
+    def source(self) -> TrackModel | None:
+        """The map that is looked in: the one chosen, else the first."""
+        there = self.sources
+        if self._source in there:
+            return self._source
+        return there[0] if there else None
+
+    @property
+    def threshold_db(self) -> float:
+        """Energy over the quiet level that a suggestion reaches somewhere."""
+        return self._threshold_db
+
+    @property
+    def accepted_as(self) -> str:
+        """The label that accepting gives to what has none of the label set."""
+        return self._labels.label
+
+    @property
+    def text(self) -> str:
+        """How it stands, in words."""
+        source = self.source
+        if self._problem:
+            return self._problem
+        if source is None:
+            return "There is no map to look in"
+        if self._wanted:
+            return f"Waiting for the map: {source.title.lower()}"
+        if self._runner.busy:
+            return "Looking for what moves…"
+        count = len(self._pending)
+        if count:
+            return f"{count} suggestion{'s' * (count != 1)} to decide on"
+        if self._loudest_db is not None and self._loudest_db < self._threshold_db:
+            return f"Nothing: the loudest frame has {self._loudest_db:.1f} dB"
+        return "No suggestions left to decide on"
+
+    # --- asking ---------------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Look for what moves."""
+        if self.source is not None:
+            self._active = True
+            self._made = None
+            self._look()
+
+    def stop(self) -> None:
+        """No more suggestions are wanted; those that are there stay."""
+        self._runner.cancel()
+        self._active = self._wanted = False
+        self.changed.emit()
+
+    def set_threshold(self, threshold_db: float) -> None:
+        """Suggest what is louder."""
+        if threshold_db != self._threshold_db:
+            self._threshold_db = threshold_db
+            self._look()
+
+    def set_source(self, source: TrackModel) -> None:
+        """Look in another map."""
+        if source is not self.source:
+            self._source = source
+            self._look()
+
+    def open(self) -> None:
+        """Another recording is there: of the one before nothing is remembered."""
+        self._declined, self._made, self._loudest_db, self._problem = (), None, None, ""
+        self._source = None
+        self.stop()
+        self._active = bool(self._pending)
+
+    def close(self) -> None:
+        """Stop looking."""
+        self._runner.close()
+
+    # --- deciding -------------------------------------------------------------------------
+
+    def current(self) -> tuple[Span, ...]:
+        """What accepting and rejecting are about: those selected, else the next in time."""
+        chosen = tuple(span for span in self._labels.selected if span.origin == "suggestion")
+        if chosen:
+            return chosen
+        now_s = self._playback.time_s
+        return tuple(span for span in self._pending if span.end_s > now_s)[:1] or self._pending[:1]
+
+    def accept(self, label: str | None = None) -> None:
+        """Take the current one, under a label, and go on to the next."""
+        self._take(self.current(), label)
+
+    def accept_all(self) -> None:
+        """Take all that there are."""
+        self._take(self._pending, None)
+
+    def reject(self) -> None:
+        """Let the current one go, and go on to the next."""
+        self._reject(self.current())
+
+    def reject_all(self) -> None:
+        """Let all go."""
+        self._reject(self._pending)
+
+    def _take(self, spans: Sequence[Span], label: str | None) -> None:
+        if not spans:
+            return
+        ids = [span.id for span in spans]
+        track, given = self._target(), label or self.accepted_as
+        done = self._apply(
+            lambda labels, base: take(labels, base, ids, track, given, keep_known=label is None)
+        )
+        if done:
+            self._go_on(spans[-1].start_s)
+
+    def _reject(self, spans: Sequence[Span]) -> None:
+        if not spans:
+            return
+        ids = [span.id for span in spans]
+        if self._apply(lambda labels, base: turn_down(labels, ids)):
+            self._declined = (*self._declined, *spans)
+            self._go_on(spans[-1].start_s)
+
+    def _go_on(self, from_s: float) -> None:
+        after = [span for span in self._pending if span.start_s >= from_s] or self._pending
+        self._labels.select([after[0].id] if after else [])
+        if after and not self._playback.playing:
+            self._playback.seek(after[0].start_s)
+
+    def _target(self) -> str:
+        """The track in use; that of suggestions is not for what was accepted."""
+        names = [track.name for track in self._labels.labels.tracks]
+        others = [name for name in names if name != TRACK]
+        return self._home if self._home in others else (others[0] if others else TRACK)
+
+    # --- looking --------------------------------------------------------------------------
+
+    def _look(self) -> None:
+        source = self.source
+        if not self._active or source is None or source.map is None:
+            return
+        self._problem = ""
+        self._wanted = source.covered is not None
+        if self._wanted:
+            self.changed.emit()
+            return
+        doppler, high_db = source.map.shifted(source.offset_s), self._threshold_db
+        usual = SuggestOptions()
+        options = SuggestOptions(high_db=high_db, low_db=min(usual.low_db, high_db))
+
+        def look(emit: Emit) -> _Found:
+            spans = suggest_spans(doppler, options)
+            return _Found(spans, float(np.nanmax(motion_energy_db(doppler), initial=0.0)))
+
+        self._runner.submit(look)
+        self.changed.emit()
+
+    def _begin_if_complete(self) -> None:
+        if self._wanted:
+            self._look()
+
+    def _receive(self, found: _Found) -> None:
+        self._loudest_db = found.loudest_db
+        if self._made is not None and self._nothing_since(*self._made):
+            self._stack.undo()
+        # What was rejected and brought back by an undo is not rejected any more.
+        here = {(span.start_s, span.end_s) for span in self._pending}
+        declined = tuple(one for one in self._declined if (one.start_s, one.end_s) not in here)
+        self._declined = declined
+        before = self._labels.labels
+        self._apply(lambda labels, base: offer(labels, base, found.spans, declined))
+        after = self._labels.labels
+        self._made = (after, self._stack.index()) if after is not before else None
+        self._go_on(self._playback.time_s)
+        self.changed.emit()
+
+    def _nothing_since(self, labels: Labels, step: int) -> bool:
+        return labels is self._labels.labels and step == self._stack.index()
+
+    def _fail(self, error: Exception) -> None:
+        self._problem = str(error)
+        self.changed.emit()
+
+    def _follow(self) -> None:
+        now = pending(self._labels.labels)
+        if now != self._pending:
+            self._pending = now
+            self.changed.emit()
+
+    def _remember_home(self) -> None:
+        if self._labels.track != TRACK:
+            self._home = self._labels.track
+        self.changed.emit()

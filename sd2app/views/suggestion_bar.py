@@ -1,0 +1,87 @@
+"""Over the labels while there are suggestions: how many, from what, and what to do with them."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QSignalBlocker, Qt
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QWidget
+
+from sd2app.action_set import ActionSet
+from sd2app.models.suggestions import HIGHEST_DB, LOWEST_DB, SuggestionsModel
+from sd2app.views.elided import ElidedLabel
+from sd2app.views.inputs import Choice, NumberBox, action_button
+
+_BUTTONS = (
+    ("accept_suggestion", "Accept"),
+    ("reject_suggestion", "Reject"),
+    ("accept_suggestions", "Accept all"),
+    ("reject_suggestions", "Reject all"),
+)
+
+
+class SuggestionBar(QWidget):
+    """A view of :class:`SuggestionsModel`; hidden until suggestions are asked for."""
+
+    def __init__(
+        self, model: SuggestionsModel, actions: ActionSet, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._model = model
+        self._text = ElidedLabel(self)
+        self._text.setAccessibleName("Suggestions")
+        self._as = QLabel(self)
+        self._as.setObjectName("muted")
+        self._source = Choice("The map in which suggestions are looked for", self)
+        self._source.activated.connect(lambda at: model.set_source(model.sources[at]))
+        self._threshold = NumberBox(
+            LOWEST_DB,
+            HIGHEST_DB,
+            " dB",
+            "How far over the quiet level a suggestion must reach",
+            decimals=1,
+            step=0.5,
+        )
+        self._threshold.valueChanged.connect(model.set_threshold)
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(8, 2, 8, 2)
+        layout.setSpacing(6)
+        layout.addWidget(self._text, 1)
+        layout.addWidget(self._as)
+        for name, text in _BUTTONS:
+            layout.addWidget(_outlined(action_button(actions[name], text)))
+        layout.addSpacing(8)
+        layout.addWidget(self._source)
+        layout.addWidget(self._threshold)
+        layout.addWidget(self._close_button())
+        model.changed.connect(self._refresh)
+        self._refresh()
+
+    def _close_button(self) -> QToolButton:
+        close = QToolButton(self)
+        close.setText("✕")
+        close.setToolTip("Close; the suggestions stay")
+        close.setAccessibleName("Close the suggestions")
+        close.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        close.clicked.connect(self._model.stop)
+        return close
+
+    def _refresh(self) -> None:
+        model = self._model
+        self.setVisible(model.active)
+        self._text.setText(model.text)
+        self._as.setText(f"Y: {model.accepted_as}" if model.pending else "")
+        self._as.setToolTip("What accepting calls it; the key of another label calls it that")
+        titles = [track.title for track in model.sources]
+        with QSignalBlocker(self._source):
+            if titles != [self._source.itemText(at) for at in range(self._source.count())]:
+                self._source.clear()
+                self._source.addItems(titles)
+            if model.source is not None:
+                self._source.setCurrentText(model.source.title)
+        self._source.setVisible(len(titles) > 1)
+        self._threshold.show_value(model.threshold_db)
+
+
+def _outlined(button: QToolButton) -> QToolButton:
+    button.setObjectName("outlined")
+    button.setAccessibleName(button.text())
+    return button

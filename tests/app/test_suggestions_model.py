@@ -1,0 +1,169 @@
+"""Suggestions found, decided on and found again; no window, real edits and history."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from sd2app.label_edits import LabelEdits
+from sd2app.models.labels import LabelsModel
+from sd2app.models.playback import PlaybackModel
+from sd2app.models.suggestions import SuggestionsModel
+from sd2app.models.tracks import TrackModel
+from sd2core.labels.spans import Labels, Span, Track
+from sd2core.sensor import VelocityAxis
+from sd2core.spectrum import DopplerMap
+from sd2core.timebase import Timebase
+
+RATE = 20.0
+
+
+def moving(*loud: tuple[int, int, float]) -> DopplerMap:
+    """Thirty seconds; from one frame to another so much over the quiet level."""
+    values = np.ones((16, 600), np.float32)
+    for start, stop, factor in loud:
+        values[:, start:stop] = factor
+    return DopplerMap(values, VelocityAxis(16, 2.0), Timebase.regular(600, RATE), "real")
+
+
+@pytest.fixture
+def set_up(qtbot):
+    from PySide6.QtGui import QUndoStack
+
+    recording = SimpleNamespace(labels=None)
+    document = SimpleNamespace(recording=recording, undo_stack=QUndoStack())
+    session = SimpleNamespace(refusal="", keep=lambda *_: None)
+    labels, playback = LabelsModel(), PlaybackModel()
+    playback.set_timebase(Timebase.regular(600, RATE))
+    labels.open(Labels((Track("Gestures"),), (Span(1, "Gestures", 20.0, 21.0, "up-to-down"),)))
+    real = TrackModel("Real")
+    real.set_map(moving((100, 130, 100.0), (200, 230, 20.0), (300, 330, 100.0), (400, 420, 100.0)))
+    edits = LabelEdits(document, labels, playback, session)
+    model = SuggestionsModel(
+        labels, playback, (TrackModel("Synthetic"), real), document.undo_stack, edits.apply
+    )
+
+    def look(threshold_db: float | None = None) -> None:
+        model.start() if threshold_db is None else model.set_threshold(threshold_db)
+        qtbot.waitUntil(lambda: not model.busy, timeout=10_000)
+
+    yield SimpleNamespace(
+        model=model, labels=labels, playback=playback, real=real, edits=edits,
+        stack=document.undo_stack, look=look,
+    )  # fmt: skip
+    model.close()
+
+
+def starts(spans) -> list[int]:
+    return [round(span.start_s) for span in spans]
+
+
+def test_what_moves_is_offered_but_for_what_is_marked(set_up) -> None:
+    set_up.look()
+    # The one at 20 s is marked already.
+    assert starts(set_up.model.pending) == [5, 10, 15]
+    assert set_up.model.text == "3 suggestions to decide on"
+    assert starts(set_up.labels.selected) == [5]
+    assert set_up.stack.undoText() == "Suggest 3 spans"
+    set_up.stack.undo()
+    assert not set_up.model.pending
+
+
+def test_trying_thresholds_is_one_step(set_up) -> None:
+    set_up.look()
+    set_up.look(16.0)
+    assert starts(set_up.model.pending) == [5, 15]
+    assert set_up.stack.count() == 1
+    set_up.look(35.0)
+    assert set_up.model.text == "Nothing: the loudest frame has 20.0 dB"
+    assert set_up.stack.index() == 0
+    set_up.look(8.0)
+    assert len(set_up.model.pending) == 3
+    # Once something was decided, it is a step of its own.
+    set_up.model.accept()
+    set_up.look(16.0)
+    assert [set_up.stack.text(k) for k in range(set_up.stack.count())] == [
+        "Suggest 3 spans",
+        "Accept suggestion",
+        "Suggest 1 span",
+    ]
+
+
+def test_one_after_the_other(set_up) -> None:
+    model, labels = set_up.model, set_up.labels
+    labels.set_label("down-to-up")
+    set_up.look()
+    model.accept()
+    assert starts(labels.selected) == [10]
+    assert set_up.playback.time_s == pytest.approx(labels.selected[0].start_s)
+    model.reject()
+    model.accept("background")
+    assert [(round(span.start_s), span.label, span.track) for span in labels.labels.spans] == [
+        (5, "down-to-up", "Gestures"),
+        (15, "background", "Gestures"),
+        (20, "up-to-down", "Gestures"),
+    ]
+    assert [track.name for track in labels.labels.tracks] == ["Gestures"]
+    for _ in range(3):
+        set_up.stack.undo()
+    assert starts(model.pending) == [5, 10, 15]
+
+
+def test_what_was_rejected_does_not_come_again(set_up) -> None:
+    model = set_up.model
+    set_up.look()
+    model.reject()
+    set_up.look()
+    assert starts(model.pending) == [10, 15]
+    # Taking the rejection back is no rejection.
+    model.reject()
+    set_up.stack.undo()
+    assert starts(model.pending) == [10, 15]
+    set_up.look(7.0)
+    assert starts(model.pending) == [10, 15]
+    model.open()
+    set_up.look()
+    assert starts(model.pending) == [5, 10, 15]
+
+
+def test_all_at_once(set_up) -> None:
+    set_up.look()
+    set_up.model.accept_all()
+    assert not set_up.model.pending
+    assert len(set_up.labels.labels.of_track("Gestures")) == 4
+    assert set_up.stack.undoText() == "Accept 3 suggestions"
+    set_up.stack.undo()
+    set_up.model.reject_all()
+    assert len(set_up.labels.labels.spans) == 1
+    set_up.look()
+    assert not set_up.model.pending
+    assert set_up.model.text == "No suggestions left to decide on"
+
+
+def test_a_map_that_is_being_computed_is_waited_for(set_up, qtbot) -> None:
+    model, real = set_up.model, set_up.real
+    whole = real.map
+    real.set_map(whole, np.arange(600) < 300)
+    model.start()
+    assert model.busy
+    assert model.text == "Waiting for the map: real"
+    real.set_map(whole)
+    qtbot.waitUntil(lambda: not model.busy, timeout=10_000)
+    assert len(model.pending) == 3
+
+
+def test_what_a_hand_holds_is_a_step_before(set_up) -> None:
+    set_up.edits.begin_drag()
+    set_up.edits.drag_new("Gestures", 1.0, 2.0, 0.0)
+    set_up.look()
+    texts = [set_up.stack.text(k) for k in range(set_up.stack.count())]
+    assert texts == ["Create span", "Suggest 3 spans"]
+
+
+def test_without_a_map_there_is_nothing_to_look_in(set_up) -> None:
+    set_up.real.set_map(None)
+    set_up.model.start()
+    assert not set_up.model.active
+    assert set_up.model.text == "There is no map to look in"
