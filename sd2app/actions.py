@@ -281,6 +281,11 @@ ACTIONS: tuple[Action, ...] = (
         lambda w: w.side.bring_up("Train"),
     ),
     Action(
+        "show_labels", "View", "Labels panel", ("Shift+L",),
+        "The spans as a table, statistics of them, and the label set",
+        lambda w: w.show_labels(),
+    ),
+    Action(
         "measure", "View", "Measure this scene", ("Ctrl+M",),
         "Measure error and cost of every plan with the sensor where it is; takes a while",
         lambda w: w.measure_scene(),
@@ -439,6 +444,11 @@ ACTIONS: tuple[Action, ...] = (
         "edit_labels_here", "Labels", "Try again to edit labels here", (),
         "Where another window edited them: take them over, once it is closed",
         lambda w: w.context.label_session.try_again(), lambda c: c.label_session.read_only,
+    ),
+    Action(
+        "find_spans", "Labels", "Find spans…", ("Ctrl+F",),
+        "Search the table of spans for a label, a note or a track",
+        lambda w: w.show_labels(find=True), _has_content,
     ),
     Action(
         "open_model", "Model", "Open model file…", (),

@@ -1,11 +1,14 @@
-"""Transport icons, drawn so that they follow the theme."""
+"""Transport icons, drawn so that they follow the theme, and squares in the colours of labels."""
 
 from __future__ import annotations
+
+from functools import lru_cache
 
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QIcon, QPainter, QPainterPath, QPen, QPixmap
 
 _SIZE = 16
+_SWATCH = 12
 _SCALES = (1, 2, 3)
 
 
@@ -21,6 +24,16 @@ def transport_icon(name: str, colour: str) -> QIcon:
         _DRAW[name](painter, QColor(colour))
         painter.end()
         icon.addPixmap(pixmap)
+    return icon
+
+
+@lru_cache(maxsize=64)
+def swatch_icon(colour: str) -> QIcon:
+    """A square in the colour of a label, which no selection tints."""
+    swatch = QPixmap(_SWATCH, _SWATCH)
+    swatch.fill(QColor(colour))
+    icon = QIcon(swatch)
+    icon.addPixmap(swatch, QIcon.Mode.Selected)
     return icon
 
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from PySide6.QtGui import QAction, QColor, QIcon, QKeySequence, QPixmap
+from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtWidgets import QMenu
+
+from sd2app.icons import swatch_icon
 
 if TYPE_CHECKING:
     from sd2app.views.window import MainWindow
     from sd2core.labels.label_set import Label, LabelSet
-
-_SWATCH_PX = 12
 
 
 class LabelActions:
@@ -44,9 +44,7 @@ class LabelActions:
         self._menu.insertActions(self._first, self._actions)
 
     def _made(self, label: Label) -> QAction:
-        swatch = QPixmap(_SWATCH_PX, _SWATCH_PX)
-        swatch.fill(QColor(label.colour))
-        action = QAction(QIcon(swatch), label.name, self._window)
+        action = QAction(swatch_icon(label.colour), label.name, self._window)
         if label.key:
             action.setShortcut(QKeySequence(label.key.upper()))
         action.setToolTip(_tip(label))

@@ -84,6 +84,15 @@ def _style_sheet(c: Palette) -> str:
     QTabBar::tab:selected {{ color: {c.text}; border-bottom-color: {c.accent}; }}
     QTabBar::tab:hover, QTabBar::tab:focus {{ color: {c.text}; background: {c.well}; }}
     QToolButton:focus {{ border-color: {c.accent}; }}
+    QTableView {{ border: 1px solid {c.border}; border-radius: 4px; }}
+    QTableView:focus {{ border-color: {c.accent}; }}
+    QHeaderView::section {{
+        background: {c.panel}; color: {c.muted}; border: none; border-bottom: 1px solid {c.border};
+        padding: 4px 4px 2px 4px;
+    }}
+    QHeaderView::up-arrow, QHeaderView::down-arrow {{
+        subcontrol-position: top center; width: 9px; height: 6px;
+    }}
     QScrollArea {{ border: none; background: transparent; }}
     QScrollArea > QWidget > QWidget#page {{ background: transparent; }}
     QFrame#rule {{ border: none; background: {c.border}; max-height: 1px; }}

@@ -33,11 +33,14 @@ if TYPE_CHECKING:
     from sd2app.dialogs.training import TrainingDialogs
     from sd2app.models.denoise_library import DenoiserLibrary
     from sd2app.models.ladder import Ladder
+    from sd2app.views.labels_panel import LabelsPanel
     from sd2app.views.scene3d import SceneView
     from sd2app.views.side_panel import SidePanel
 
 _SHARED_KEYS = ("play", "previous_frame", "next_frame", "back_second", "on_second", "zoom_fit")
 """Actions that work in the window of a comparison too."""
+_LABELS_PX = 560
+"""Room for the usual columns of the table of spans."""
 _PANELS = ("video", "scene", "sensor", "tracks", "spectrum")
 
 
@@ -51,6 +54,7 @@ class MainWindow(QMainWindow):
     label_files: LabelFileDialogs
     train_dialogs: TrainingDialogs
     side: SidePanel
+    labels_panel: LabelsPanel
 
     def __init__(
         self,
@@ -174,6 +178,8 @@ class MainWindow(QMainWindow):
 
     def _fill_panels(self) -> None:
         from sd2app.dialogs.training import TrainingDialogs
+        from sd2app.views.labels_panel import LabelsPanel
+        from sd2app.views.page_widths import PageWidths
         from sd2app.views.sensor_panel import SensorPanel
         from sd2app.views.side_panel import SidePanel
         from sd2app.views.trade_panel import TradePanel
@@ -190,8 +196,11 @@ class MainWindow(QMainWindow):
         trade = TradePanel(c.trade, c.display, self._actions["measure"])
         self.train_dialogs = TrainingDialogs(self, c.training, c.training_use, self.messages.warn)
         train = TrainingPanel(c.training, c.training_use, c.display, self.train_dialogs)
-        self.side = SidePanel({"Sensor": sensor, "Trade": trade, "Train": train})
+        self.labels_panel = LabelsPanel(c, self._actions)
+        pages = {"Sensor": sensor, "Trade": trade, "Train": train, "Labels": self.labels_panel}
+        self.side = SidePanel(pages)
         fill(self._panels["sensor"], self.side)
+        self._widths = PageWidths(self._top, self.side, {"Labels": _LABELS_PX}, self._settings)
         self._fill_tracks()
 
     def _fill_tracks(self) -> None:
@@ -276,6 +285,7 @@ class MainWindow(QMainWindow):
         for model in (c.label_session, c.label_edits):
             model.failed.connect(self.messages.warn)
         c.label_session.noted.connect(self.messages.note)
+        self.labels_panel.model.noted.connect(self.messages.note)
         c.denoise.failed.connect(self.messages.warn)
         c.denoise.noted.connect(self.messages.note)
         c.trade.noted.connect(self.messages.note)
@@ -372,6 +382,11 @@ class MainWindow(QMainWindow):
         self.side.bring_up("Trade")
         self.context.trade.measured.measure()
 
+    def show_labels(self, find: bool = False) -> None:
+        """Bring up the table of spans, or the search in it, with the keyboard."""
+        self.side.bring_up("Labels")
+        self.labels_panel.find() if find else self.labels_panel.show_spans()
+
     def close_window(self) -> None:
         """Close, after asking when edits would be lost."""
         self.close()
@@ -428,6 +443,7 @@ class MainWindow(QMainWindow):
             event.ignore()
             return
         self._settings.set_layout("window", self.saveGeometry())
+        self._widths.remember()
         for name in ("top", "bottom", "rows"):
             self._settings.set_layout(name, getattr(self, f"_{name}").saveState())
         self._ready = False

@@ -30,7 +30,7 @@ def add_statistics(kinds: argparse._SubParsersAction) -> None:
         ),
         examples=(
             "  sd2 labels statistics walk.sd2\n"
-            "  sd2 labels statistics walk.eaf --video walk.mp4 --csv > statistics.csv"
+            "  sd2 labels statistics walk.eaf --video walk.mp4 --csv"
         ),
     )
     parser.add_argument("file", type=Path, metavar="FILE", help="the file with labels")

@@ -18,8 +18,8 @@ HEADINGS = (
     "mean s",
     "sd s",
     "median s",
-    "shortest s",
-    "longest s",
+    "min s",
+    "max s",
     "share %",
 )
 NO_NUMBER = "–"

@@ -1,0 +1,71 @@
+"""Times of spans as people type them: seconds, or frames.
+
+``1.5``, ``1,5`` and ``1.5 s`` are seconds, ``1:02.5`` is a minute and 2.5 s, ``0:01:02.5``
+the same with hours; ``f48`` and ``48 f`` are a frame. A frame typed as a start is the first
+one that a span holds, as an end the last one, as a duration it is how many.
+"""
+
+from __future__ import annotations
+
+import re
+
+from sd2core.errors import Sd2Error
+from sd2core.timebase import Timebase
+
+_FRAMES = re.compile(r"(?:f(?:rame)?\s*(\d{1,9}))|(?:(\d{1,9})\s*f(?:rames?)?)", re.IGNORECASE)
+_SECONDS = re.compile(
+    r"(?P<sign>[-−]?)(?:(?:(?P<h>\d{1,5}):)?(?P<min>\d{1,5}):)?(?P<s>\d{1,9}(?:[.,]\d*)?|[.,]\d+)\s*s?"
+)
+_LONGEST_SHOWN = 40
+
+
+def typed_start(text: str, timebase: Timebase) -> float:
+    """When a span is to begin, in seconds.
+
+    Raises
+    ------
+    Sd2Error
+        When it is neither seconds nor a frame of the recording.
+    """
+    frame = _typed_frames(text)
+    return _typed_seconds(text) if frame is None else timebase.time_of(_known(frame, timebase))
+
+
+def typed_end(text: str, timebase: Timebase) -> float:
+    """When a span is to end, in seconds; errors are those of :func:`typed_start`."""
+    frame = _typed_frames(text)
+    return _typed_seconds(text) if frame is None else _end_of(_known(frame, timebase), timebase)
+
+
+def typed_duration_end(text: str, start_s: float, timebase: Timebase) -> float:
+    """When a span that begins at ``start_s`` is to end, from how long it is to last."""
+    frames = _typed_frames(text)
+    if frames is None:
+        return start_s + _typed_seconds(text)
+    last = timebase.frame_at(start_s) + frames - 1
+    return _end_of(min(max(last, 0), len(timebase) - 1), timebase)
+
+
+def _typed_frames(text: str) -> int | None:
+    found = _FRAMES.fullmatch(text.strip())
+    return None if found is None else int(found[1] or found[2])
+
+
+def _typed_seconds(text: str) -> float:
+    found = _SECONDS.fullmatch(text.strip())
+    if found is None:
+        shown = text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}…"
+        raise Sd2Error(f"{shown!r} was typed as a time", "seconds (1.5 or 1:02.5) or a frame (f48)")
+    hours, minutes = (int(found[name] or 0) for name in ("h", "min"))
+    seconds = 3600.0 * hours + 60.0 * minutes + float(found["s"].replace(",", "."))
+    return -seconds if found["sign"] else seconds
+
+
+def _known(frame: int, timebase: Timebase) -> int:
+    if frame >= len(timebase):
+        raise Sd2Error(f"Frame {frame} was typed", f"a frame from 0 to {len(timebase) - 1}")
+    return frame
+
+
+def _end_of(frame: int, timebase: Timebase) -> float:
+    return timebase.time_of(frame + 1) if frame + 1 < len(timebase) else timebase.end_s
