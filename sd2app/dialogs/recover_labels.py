@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import (
     QDialog,
     QDialogButtonBox,
@@ -25,10 +25,11 @@ from sd2core.labels.files import write_labels
 from sd2core.labels.recovery_offers import Offer
 
 _SAID = (
-    "Edits of labels that were not saved when the program ended. Open the recording to see what"
-    " they change and to take them over."
+    "Edits of labels that were not saved when the program ended. Open a recording to see what"
+    " they change."
 )
 _NOTHING = "There is nothing to recover: whatever was edited was saved, or was not wanted."
+_ROW_PX = 24
 _HEADINGS = ("Recording", "Edits that were not saved", "Holds", "")
 
 
@@ -89,6 +90,7 @@ class RecoverLabelsDialog(QDialog):
             )
             item.setData(0, Qt.ItemDataRole.UserRole, offer)
             item.setToolTip(0, str(offer.recording))
+            item.setSizeHint(0, QSize(0, _ROW_PX))
             self._list.addTopLevelItem(item)
         self._said.setText(_SAID if found.offers else _NOTHING)
         self._list.setVisible(bool(found.offers))

@@ -107,7 +107,7 @@ class LabelTimeline(QWidget):
             painter.fillRect(well, QColor(palette.well))
         painter.save()
         painter.setClipRect(plot)
-        if not model.labels.spans and not model.marks and rows.tracks:
+        if not model.labels.spans and not model.marks and rows.tracks and not self._edits.refusal:
             self._paint_hint(painter, QRectF(0, 0, self.width(), ROW_PX))
         paint_spans(painter, plot, scale, model, rows.tracks, palette)
         for mark, lane in zip(model.marks, rows.mark_lanes, strict=True):
@@ -258,7 +258,7 @@ class LabelTimeline(QWidget):
             "end": Qt.CursorShape.SizeHorCursor,
             "span": Qt.CursorShape.OpenHandCursor,
         }
-        part = "nothing" if grip is None else grip.part
+        part = "nothing" if grip is None or self._edits.refusal else grip.part
         self.setCursor(shapes.get(part, Qt.CursorShape.ArrowCursor))
         held = grip.span if grip is not None else None
         self.setToolTip("" if held is None else _words(held))

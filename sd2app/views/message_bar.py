@@ -32,9 +32,9 @@ class MessageBar(QFrame):
         return "" if self.isHidden() else self._text.text()
 
     def warn(self, text: str) -> None:
-        """Say what failed; several failures stand below each other."""
-        warning = self._text.objectName() == "warning" and bool(self.text)
-        self._say(f"{self.text}\n{text}" if warning else text, "warning")
+        """Say what failed; several failures stand below each other, each once."""
+        said = self.text.splitlines() if self._text.objectName() == "warning" else []
+        self._say("\n".join(dict.fromkeys([*said, *text.splitlines()])), "warning")
 
     def note(self, text: str) -> None:
         """Say what is good to know; a failure on show stays."""
