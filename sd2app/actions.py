@@ -30,6 +30,10 @@ def _has_spans(context: Context) -> bool:
     return bool(context.labels.labels.spans)
 
 
+def _disagree(context: Context) -> bool:
+    return bool(context.agreement.disagreements)
+
+
 def _has_suggestions(context: Context) -> bool:
     return bool(context.suggestions.pending)
 
@@ -286,6 +290,11 @@ ACTIONS: tuple[Action, ...] = (
         lambda w: w.show_labels(),
     ),
     Action(
+        "show_agree", "View", "Agree panel", ("Shift+A",),
+        "How far another person's labels agree with these",
+        lambda w: w.side.bring_up("Agree"),
+    ),
+    Action(
         "measure", "View", "Measure this scene", ("Ctrl+M",),
         "Measure error and cost of every plan with the sensor where it is; takes a while",
         lambda w: w.measure_scene(),
@@ -449,6 +458,26 @@ ACTIONS: tuple[Action, ...] = (
         "find_spans", "Labels", "Find spans…", ("Ctrl+F",),
         "Search the table of spans for a label, a note or a track",
         lambda w: w.show_labels(find=True), _has_content,
+    ),
+    Action(
+        "compare_labels", "Labels", "Compare with another's labels…", ("Ctrl+K",),
+        "Show how far another person's labels agree with these, and where they do not",
+        lambda w: w.label_files.compare_labels(), _has_content, separator_before=True,
+    ),
+    Action(
+        "next_disagreement", "Labels", "Next disagreement", ("Shift+N",),
+        "Go to where the labels differ next",
+        lambda w: w.context.agreement.step(1), _disagree,
+    ),
+    Action(
+        "previous_disagreement", "Labels", "Previous disagreement", ("Shift+P",),
+        "Go to where the labels differ before",
+        lambda w: w.context.agreement.step(-1), _disagree,
+    ),
+    Action(
+        "end_comparison", "Labels", "End the comparison of labels", (),
+        "Take the other's labels away",
+        lambda w: w.context.agreement.clear(), lambda c: c.agreement.active,
     ),
     Action(
         "open_model", "Model", "Open model file…", (),

@@ -10,6 +10,7 @@ from PySide6.QtCore import QObject
 
 from sd2app.commands import Edits
 from sd2app.label_edits import LabelEdits
+from sd2app.models.agreement import AgreementModel
 from sd2app.models.content import reference_of
 from sd2app.models.denoise import DenoiseModel
 from sd2app.models.denoise_library import DenoiserLibrary, core_library
@@ -72,6 +73,7 @@ class Context:
     label_session: LabelSession
     label_edits: LabelEdits
     suggestions: SuggestionsModel
+    agreement: AgreementModel
     fit: FitModel
     fit_follower: FitFollower
     fit_offer: FitOffer
@@ -94,6 +96,7 @@ class Context:
         """Stop every thread and let go of the files."""
         self.playback.pause()
         self.suggestions.close()
+        self.agreement.close()
         self.fit.close()
         self.training_use.close()
         self.training.close()
@@ -183,6 +186,7 @@ def build_context(
             label_edits.apply,
             parent,
         ),
+        agreement=AgreementModel(labels, playback, span, parent),
         fit=fit,
         fit_follower=follower,
         fit_offer=FitOffer(document, fit, parent),
@@ -211,6 +215,7 @@ def _take_over(context: Context) -> None:
     context.sensor.set_sensor(content.recording.sensor)
     context.label_session.take_over()
     context.suggestions.open()
+    context.agreement.clear()
     _follow_capture(context, new=True)
     context.synthesis.take_over()
     # The clock of another recording begins anew, which is nobody's wish to stay.

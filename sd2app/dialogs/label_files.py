@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,8 +26,15 @@ LABEL_FILES = f"Labels ({_PATTERNS});;All files (*)"
 class LabelFileDialogs:
     """Asks, then calls models and edits; what came of it is said over the window."""
 
-    def __init__(self, parent: QWidget, context: Context, messages: MessageBar) -> None:
+    def __init__(
+        self,
+        parent: QWidget,
+        context: Context,
+        messages: MessageBar,
+        show_agreement: Callable[[], object],
+    ) -> None:
         self._parent, self._context, self._messages = parent, context, messages
+        self._show_agreement = show_agreement
 
     def take_dropped(self, path: Path) -> bool:
         """Import a file of labels once the drop is over; False where it is none."""
@@ -72,3 +80,12 @@ class LabelFileDialogs:
         model.close()
         for done in (dialog, model):
             done.deleteLater()
+
+    def compare_labels(self) -> None:
+        """Ask for the file of another person, and show how far the two agree."""
+        name, _ = QFileDialog.getOpenFileName(
+            self._parent, "Compare with another's labels", "", LABEL_FILES
+        )
+        if name:
+            self._context.agreement.open(Path(name))
+            self._show_agreement()

@@ -110,7 +110,7 @@ def paint_spans(
 def _text(span: Span) -> str:
     """The label, after how sure it is where it is a suggestion."""
     if span.origin == "suggestion" and span.confidence is not None:
-        return f"{span.confidence:.0%} {span.label}"
+        return f"{100 * span.confidence:.0f} % {span.label}"
     return span.label
 
 

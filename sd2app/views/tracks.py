@@ -10,6 +10,7 @@ from sd2app.views.difference import DifferenceView
 from sd2app.views.heatmap import HeatmapView
 from sd2app.views.label_timeline import LabelTimeline
 from sd2app.views.model_menu import ModelButton, ModelMenu
+from sd2app.views.other_timeline import OtherTimeline
 from sd2app.views.suggestion_bar import SuggestionBar
 from sd2app.views.timeline import Overview, TimeRuler
 
@@ -55,7 +56,14 @@ class Tracks(QWidget):
         for view in (self.synthetic, self.denoised, self.before, self.real, self.difference):
             column.addWidget(view, 1)
         bar = SuggestionBar(c.suggestions, actions)
-        for below in (bar, self.labels, TimeRuler(c.span, c.playback, c.display), self.overview):
+        other = OtherTimeline(c.agreement, c.span, c.playback, c.display)
+        for below in (
+            bar,
+            self.labels,
+            other,
+            TimeRuler(c.span, c.playback, c.display),
+            self.overview,
+        ):
             column.addWidget(below)
         self._shown: object = None
         for track in c.tracks:

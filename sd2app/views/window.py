@@ -148,7 +148,9 @@ class MainWindow(QMainWindow):
         context.display.set_dark(is_dark(self._settings))
         self.messages = MessageBar(self)
         self.dialogs = Dialogs(self, context, self.messages.warn)
-        self.label_files = LabelFileDialogs(self, context, self.messages)
+        self.label_files = LabelFileDialogs(
+            self, context, self.messages, lambda: self.side.bring_up("Agree")
+        )
         self._actions = ActionSet(self)
         below = [self._actions[name] for name in ("open_model", "model_card")]
         self._models = ModelMenu(context.denoise, self.dialogs.use_model, below, self)
@@ -178,6 +180,7 @@ class MainWindow(QMainWindow):
 
     def _fill_panels(self) -> None:
         from sd2app.dialogs.training import TrainingDialogs
+        from sd2app.views.agreement_panel import AgreementPanel
         from sd2app.views.labels_panel import LabelsPanel
         from sd2app.views.page_widths import PageWidths
         from sd2app.views.sensor_panel import SensorPanel
@@ -197,8 +200,9 @@ class MainWindow(QMainWindow):
         self.train_dialogs = TrainingDialogs(self, c.training, c.training_use, self.messages.warn)
         train = TrainingPanel(c.training, c.training_use, c.display, self.train_dialogs)
         self.labels_panel = LabelsPanel(c, self._actions)
-        pages = {"Sensor": sensor, "Trade": trade, "Train": train, "Labels": self.labels_panel}
-        self.side = SidePanel(pages)
+        agree = AgreementPanel(c.agreement, c.playback, self._actions)
+        pages = {"Sensor": sensor, "Trade": trade, "Train": train}
+        self.side = SidePanel({**pages, "Labels": self.labels_panel, "Agree": agree})
         fill(self._panels["sensor"], self.side)
         self._widths = PageWidths(self._top, self.side, {"Labels": _LABELS_PX}, self._settings)
         self._fill_tracks()
@@ -314,6 +318,7 @@ class MainWindow(QMainWindow):
             c.labels.selection_changed,
             c.labels.marks_changed,
             c.suggestions.changed,
+            c.agreement.changed,
         ):
             signal.connect(self._refresh)
         # Without a person in the frame there is nothing to aim at.

@@ -184,7 +184,7 @@ def agreement(
 def frame_agreement(a: Sequence[Span], b: Sequence[Span], timebase: Timebase) -> FrameAgreement:
     """Compare the labels of every frame."""
     labels = sorted({span.label for span in (*a, *b)})
-    held_a, held_b = (_held(spans, labels, timebase) for spans in (a, b))  # (labels, T)
+    held_a, held_b = (held_labels(spans, labels, timebase) for spans in (a, b))  # (labels, T)
     answers_a, answers_b = _answers(held_a, labels), _answers(held_b, labels)
     answers = tuple(sorted({(), *answers_a, *answers_b}))
     number = {answer: at for at, answer in enumerate(answers)}
@@ -220,23 +220,11 @@ def match_spans(
     """
     if not 0.0 < min_iou <= 1.0:
         raise Sd2Error(f"The least IoU of a match is {min_iou:g}", "above 0 and up to 1")
-    iou = iou_of(a, b)
-    same = np.array([[x.label == y.label for y in b] for x in a]).reshape(iou.shape)
-    # Rounding must not lose the match of a span with itself at a threshold of 1.
-    allowed = iou >= min_iou - 1e-12
-    # A sum of IoU is at most the number of matches, which is below `above`.
-    above = min(iou.shape) + 1.0
-    worth = np.where(allowed, above**2 + above * same + iou, 0.0)
-    rows, columns = linear_sum_assignment(worth, maximize=True)
     pairs = [
-        (int(row), int(column))
-        for row, column in zip(rows, columns, strict=True)
-        if allowed[row, column]
+        pair for rows, columns in _touching(a, b) for pair in _paired(a, b, rows, columns, min_iou)
     ]
-    matches = [
-        _match(a[row], b[column], float(iou[row, column]), timebase) for row, column in pairs
-    ]
-    taken_a, taken_b = {row for row, _ in pairs}, {column for _, column in pairs}
+    matches = [_match(a[row], b[column], iou, timebase) for row, column, iou in pairs]
+    taken_a, taken_b = {row for row, _, _ in pairs}, {column for _, column, _ in pairs}
     return SpanAgreement(
         matches=tuple(sorted(matches, key=lambda match: (match.a.start_s, match.a.id))),
         only_a=tuple(span for at, span in enumerate(a) if at not in taken_a),
@@ -256,7 +244,7 @@ def _spans(labels: Labels, track: str | None, which: str) -> tuple[Span, ...]:
     return labels.of_track(track)
 
 
-def _held(spans: Sequence[Span], labels: list[str], timebase: Timebase) -> NDArray[np.bool_]:
+def held_labels(spans: Sequence[Span], labels: list[str], timebase: Timebase) -> NDArray[np.bool_]:
     """Which labels hold when each frame appears, (labels, T)."""
     held = np.zeros((len(labels), len(timebase)), bool)
     for span in spans:
@@ -275,6 +263,43 @@ def _answers(held: NDArray[np.bool_], labels: list[str]) -> list[Answer]:
 
 def _confusion(a: NDArray[np.int64], b: NDArray[np.int64], answers: int) -> NDArray[np.int64]:
     return np.bincount(a * answers + b, minlength=answers**2).reshape(answers, answers)
+
+
+def _touching(a: Sequence[Span], b: Sequence[Span]) -> list[tuple[list[int], list[int]]]:
+    """Groups of spans of a and b that may be matched: they hang together by overlaps.
+
+    Ten thousand spans of each are matched in groups of a few.
+    """
+    kinds = [(span.start_s, span.end_s, 0, at) for at, span in enumerate(a)]
+    kinds += [(span.start_s, span.end_s, 1, at) for at, span in enumerate(b)]
+    groups: list[tuple[list[int], list[int]]] = []
+    until_s = -np.inf
+    for start_s, end_s, kind, at in sorted(kinds):
+        if start_s >= until_s:
+            groups.append(([], []))
+        groups[-1][kind].append(at)
+        until_s = max(until_s, end_s)
+    return [(sorted(rows), sorted(columns)) for rows, columns in groups if rows and columns]
+
+
+def _paired(
+    a: Sequence[Span], b: Sequence[Span], rows: list[int], columns: list[int], min_iou: float
+) -> list[tuple[int, int, float]]:
+    """The best pairs within a group, with their IoU."""
+    some_a, some_b = [a[row] for row in rows], [b[column] for column in columns]
+    iou = iou_of(some_a, some_b)
+    same = np.array([[x.label == y.label for y in some_b] for x in some_a])
+    # Rounding must not lose the match of a span with itself at a threshold of 1.
+    allowed = iou >= min_iou - 1e-12
+    # A sum of IoU is at most the number of matches, which is below `above`.
+    above = min(iou.shape) + 1.0
+    worth = np.where(allowed, above**2 + above * same + iou, 0.0)
+    found = zip(*linear_sum_assignment(worth, maximize=True), strict=True)
+    return [
+        (rows[row], columns[column], float(iou[row, column]))
+        for row, column in found
+        if allowed[row, column]
+    ]
 
 
 def iou_of(a: Sequence[Span], b: Sequence[Span]) -> NDArray[np.float64]:
