@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QMenu
 from sd2app.actions import ACTIONS, Action
 from sd2app.icons import transport_icon
 from sd2app.label_actions import LabelActions
+from sd2app.models.key_bindings import native
 
 if TYPE_CHECKING:
     from sd2app.views.window import MainWindow
@@ -26,11 +27,11 @@ class ActionSet:
         self._actions: dict[str, QAction] = {}
         for row in ACTIONS:
             action = QAction(row.text, window)
-            action.setShortcuts([QKeySequence(key) for key in row.keys])
-            action.setToolTip(_tip(row))
             action.setCheckable(row.checked is not None)
             action.triggered.connect(lambda _=False, run=row.run: run(window))
             self._actions[row.id] = action
+        self._context.keys.changed.connect(self._follow_keys)
+        self._follow_keys()
 
     def __getitem__(self, name: str) -> QAction:
         return self._actions[name]
@@ -64,9 +65,9 @@ class ActionSet:
             refused = row.edits_labels and refusal
             action.setEnabled(row.enabled(self._context) and not refused)
             if row.edits_labels:
-                action.setToolTip(refusal or _tip(row))
+                action.setToolTip(refusal or self._tip(row))
             elif row.why_not is not None:
-                action.setToolTip(row.why_not(self._context) or _tip(row))
+                action.setToolTip(row.why_not(self._context) or self._tip(row))
             if row.checked is not None:
                 action.setChecked(row.checked(self._context))
         stack = self._context.document.undo_stack
@@ -93,7 +94,16 @@ class ActionSet:
     def _set_icon(self, name: str, icon: str) -> None:
         self._actions[name].setIcon(transport_icon(icon, self._context.display.palette.text))
 
+    def _follow_keys(self) -> None:
+        keys = self._context.keys
+        # Keys that change hands are nobody's in between.
+        for action in self._actions.values():
+            action.setShortcuts([])
+        for name, action in self._actions.items():
+            action.setShortcuts([QKeySequence(key) for key in keys.keys_of(name)])
+        for row in ACTIONS:
+            self._actions[row.id].setToolTip(self._tip(row))
 
-def _tip(row: Action) -> str:
-    keys = ", ".join(row.keys)
-    return f"{row.tip} ({keys})" if keys else row.tip
+    def _tip(self, row: Action) -> str:
+        keys = ", ".join(map(native, self._context.keys.keys_of(row.id)))
+        return f"{row.tip} ({keys})" if keys else row.tip

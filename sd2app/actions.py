@@ -519,7 +519,10 @@ ACTIONS: tuple[Action, ...] = (
         "sample", "Help", "Open the sample recording", (), "A simulated person, four gestures",
         lambda w: w.open_sample(),
     ),
-    Action("keys", "Help", "Keys", ("?", "F1"), "All keys", lambda w: w.dialogs.show_keys()),
+    Action(
+        "keys", "Help", "Keys…", ("?", "F1"), "All keys, to be found and changed",
+        lambda w: w.dialogs.show_keys(),
+    ),
     Action("about", "Help", "About SD² Studio", (), "Version and licence",
            lambda w: w.dialogs.show_about()),
 )  # fmt: skip

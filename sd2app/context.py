@@ -8,6 +8,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject
 
+from sd2app.actions import ACTIONS
 from sd2app.commands import Edits
 from sd2app.label_edits import LabelEdits
 from sd2app.models.agreement import AgreementModel
@@ -23,6 +24,7 @@ from sd2app.models.fit_follower import FitFollower
 from sd2app.models.fit_offer import FitOffer
 from sd2app.models.fit_taker import FitTaker
 from sd2app.models.jobs import JobsModel
+from sd2app.models.key_bindings import KeyBindings
 from sd2app.models.label_session import LabelSession
 from sd2app.models.labels import LabelsModel
 from sd2app.models.ladder import CORE, Ladder
@@ -70,6 +72,7 @@ class Context:
     difference: DifferenceModel
     edits: Edits
     labels: LabelsModel
+    keys: KeyBindings
     label_session: LabelSession
     label_edits: LabelEdits
     suggestions: SuggestionsModel
@@ -176,6 +179,7 @@ def build_context(
         difference=DifferenceModel(denoised, real, display, settings, parent),
         edits=edits,
         labels=labels,
+        keys=KeyBindings(ACTIONS, labels, settings, parent),
         label_session=label_session,
         label_edits=label_edits,
         suggestions=SuggestionsModel(

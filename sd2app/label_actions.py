@@ -8,6 +8,7 @@ from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtWidgets import QMenu
 
 from sd2app.icons import swatch_icon
+from sd2app.models.key_bindings import canonical, native
 
 if TYPE_CHECKING:
     from sd2app.views.window import MainWindow
@@ -46,7 +47,7 @@ class LabelActions:
     def _made(self, label: Label) -> QAction:
         action = QAction(swatch_icon(label.colour), label.name, self._window)
         if label.key:
-            action.setShortcut(QKeySequence(label.key.upper()))
+            action.setShortcut(QKeySequence(canonical(label.key)))
         action.setToolTip(_tip(label))
         action.setAutoRepeat(False)
         action.triggered.connect(lambda _=False: self._use(label.name))
@@ -64,7 +65,7 @@ class LabelActions:
 
 
 def _tip(label: Label) -> str:
-    keys = f" ({label.key.upper()})" if label.key else ""
+    keys = f" ({native(canonical(label.key))})" if label.key else ""
     return (
         "Begin a span with this frame, or end the one that has begun; with a span selected,"
         f" give it this label{keys}"

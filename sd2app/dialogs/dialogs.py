@@ -1,4 +1,4 @@
-"""File choosers, the list of keys, and the question before edits are lost."""
+"""File choosers, dialogs, and the question before edits are lost."""
 
 from __future__ import annotations
 
@@ -6,24 +6,19 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from PySide6.QtCore import Qt
-from PySide6.QtGui import QAction, QKeySequence
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
     QDialog,
-    QDialogButtonBox,
     QFileDialog,
-    QGridLayout,
-    QLabel,
     QMessageBox,
-    QScrollArea,
-    QVBoxLayout,
     QWidget,
 )
 
 import sd2core
-from sd2app.actions import ACTIONS, MOUSE
+from sd2app.actions import MOUSE
 from sd2app.dialogs.comparison import ComparisonWindow
 from sd2app.dialogs.figure_filter import FIGURES
+from sd2app.dialogs.keys import KeysDialog
 from sd2app.dialogs.model_card import ModelCardDialog
 from sd2app.dialogs.new_from_video import VIDEOS, NewFromVideoDialog
 from sd2app.dialogs.recover_labels import choose_recovery
@@ -32,6 +27,7 @@ from sd2app.models.comparison import ComparisonModel
 from sd2app.models.denoise_words import denoised_words
 from sd2app.models.figure import save_figure
 from sd2app.models.fit_setup import FitSetupModel
+from sd2app.models.key_list import KeyListModel
 from sd2app.models.strip import StripModel
 from sd2core.errors import Sd2Error
 
@@ -321,8 +317,12 @@ class Dialogs:
         return answer == buttons.Discard
 
     def show_keys(self) -> None:
-        """All keys, from the table of actions."""
-        KeysDialog(self._parent).exec()
+        """All keys, to be found and changed."""
+        c = self._context
+        model = KeyListModel(c.keys, c.labels, MOUSE, c.label_edits.apply)
+        dialog = KeysDialog(model, c.keys, self._parent)
+        dialog.exec()
+        dialog.deleteLater()
 
     def show_about(self) -> None:
         """Version and licence."""
@@ -349,47 +349,3 @@ class Dialogs:
         except (Sd2Error, OSError) as error:
             self._report(str(error))
             return None
-
-
-class KeysDialog(QDialog):
-    """Every action that has a key."""
-
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.setWindowTitle("Keys")
-        inside = QWidget(self)
-        grid = QGridLayout(inside)
-        grid.setHorizontalSpacing(24)
-        grid.setVerticalSpacing(4)
-        row = 0
-        for title, lines in self._sections():
-            heading = QLabel(title, inside)
-            heading.setObjectName("title")
-            grid.addWidget(heading, row, 0, 1, 2, Qt.AlignmentFlag.AlignBottom)
-            grid.setRowMinimumHeight(row, 28)
-            for keys, meaning in lines:
-                row += 1
-                grid.addWidget(QLabel(keys, inside), row, 0)
-                grid.addWidget(QLabel(meaning, inside), row, 1)
-            row += 1
-        scroll = QScrollArea(self)
-        scroll.setWidget(inside)
-        scroll.setWidgetResizable(True)
-        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, self)
-        buttons.rejected.connect(self.reject)
-        layout = QVBoxLayout(self)
-        layout.addWidget(scroll)
-        layout.addWidget(buttons)
-        self.resize(800, 640)
-
-    @staticmethod
-    def _sections() -> list[tuple[str, list[tuple[str, str]]]]:
-        sections: dict[str, list[tuple[str, str]]] = {}
-        for action in ACTIONS:
-            if action.keys:
-                keys = ", ".join(
-                    QKeySequence(key).toString(QKeySequence.SequenceFormat.NativeText)
-                    for key in action.keys
-                )
-                sections.setdefault(action.menu, []).append((keys, action.tip))
-        return [*sections.items(), ("Mouse", list(MOUSE))]

@@ -57,7 +57,7 @@ class SceneBar(QWidget):
 def _view_menu(actions: ActionSet) -> QToolButton:
     button = QToolButton()
     button.setText("Look from")
-    button.setToolTip("Where to look at the scene from (Ctrl+1 to Ctrl+5)")
+    button.setToolTip("Where to look at the scene from")
     button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
     button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
     menu = QMenu(button)

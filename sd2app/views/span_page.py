@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QSignalBlocker, Qt
-from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent
+from PySide6.QtGui import QHideEvent, QShowEvent
 from PySide6.QtWidgets import (
     QHBoxLayout,
-    QLineEdit,
     QSizePolicy,
     QVBoxLayout,
     QWidget,
@@ -16,29 +15,11 @@ from sd2app.models.labels import LabelsModel
 from sd2app.models.span_columns import COLUMNS
 from sd2app.models.span_table import SpanFilter, SpanTableModel
 from sd2app.views.inputs import Choice
+from sd2app.views.search_line import SearchLine
 from sd2app.views.span_table import SpanTable
 
 _ANY = {"label": "Any label", "track": "Any track"}
 _LISTED = {one.id: one for one in COLUMNS if one.listed is not None}
-
-
-class SearchLine(QLineEdit):
-    """Escape empties it, then gives the keyboard back to the window."""
-
-    def __init__(self, hint: str, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.setPlaceholderText(hint)
-        self.setAccessibleName(hint)
-        self.setClearButtonEnabled(True)
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Escape."""
-        if event.key() != Qt.Key.Key_Escape:
-            super().keyPressEvent(event)
-        elif self.text():
-            self.clear()
-        else:
-            self.clearFocus()
 
 
 class SpanPage(QWidget):

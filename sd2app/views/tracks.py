@@ -99,6 +99,6 @@ class Tracks(QWidget):
             "Add a mesh to see its synthetic Doppler: File → Add to this recording…\n\n"
             "From a video alone: File → New from video… fits a body to the person in it."
             if c.document.content is not None
-            else "Drop a recording, video, mesh or radar capture here, or press Ctrl+O.\n\n"
+            else "Drop a recording, video, mesh or radar capture here, or choose File → Open….\n\n"
             "Help → Open the sample recording shows what it looks like."
         )

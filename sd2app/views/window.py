@@ -317,6 +317,7 @@ class MainWindow(QMainWindow):
             c.labels.changed,
             c.labels.selection_changed,
             c.labels.marks_changed,
+            c.keys.changed,
             c.suggestions.changed,
             c.agreement.changed,
         ):
