@@ -132,6 +132,17 @@ class DopplerMap:
         """The same map ``offset_s`` later."""
         return replace(self, timebase=self.timebase.shifted(offset_s))
 
+    def between(self, start: int, stop: int) -> DopplerMap:
+        """Frames ``start`` to ``stop`` (exclusive), at their times."""
+        known = self.uncertainty
+        return replace(
+            self,
+            values=self.values[:, start:stop],
+            timebase=Timebase(self.times_s[start:stop]),
+            present=None if self.present is None else self.present[start:stop],
+            uncertainty=None if known is None else known.between(start, stop),
+        )
+
     def mean_velocity_mps(self) -> NDArray[np.float64]:
         """Energy-weighted mean velocity per frame; NaN where a frame is empty."""
         return mean_velocity_mps(self.values.T, self.axis)

@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from sd2app.dialogs.figure_filter import FIGURES
+from sd2app.dialogs.figure_file import FIGURES
 from sd2app.models.comparison import ComparisonModel
 from sd2app.views.comparison.curves import JointCurves
 from sd2app.views.comparison.pictures import ComparedPicture

@@ -17,15 +17,15 @@ from PySide6.QtWidgets import (
 import sd2core
 from sd2app.actions import MOUSE
 from sd2app.dialogs.comparison import ComparisonWindow
-from sd2app.dialogs.figure_filter import FIGURES
 from sd2app.dialogs.keys import KeysDialog
+from sd2app.dialogs.map_figure import MapFigureDialog
 from sd2app.dialogs.model_card import ModelCardDialog
 from sd2app.dialogs.new_from_video import VIDEOS, NewFromVideoDialog
 from sd2app.dialogs.recover_labels import choose_recovery
 from sd2app.dialogs.strip import StripDialog
 from sd2app.models.comparison import ComparisonModel
 from sd2app.models.denoise_words import denoised_words
-from sd2app.models.figure import save_figure
+from sd2app.models.figure import FigureModel
 from sd2app.models.fit_setup import FitSetupModel
 from sd2app.models.key_list import KeyListModel
 from sd2app.models.strip import StripModel
@@ -236,14 +236,7 @@ class Dialogs:
             self.attempt(lambda: self._context.denoise.export(Path(name)))
 
     def export_maps(self) -> None:
-        """Ask for a file and draw the maps into it."""
-        name, _ = QFileDialog.getSaveFileName(
-            self._parent, "Export figure of the maps", "doppler-maps.png", FIGURES
-        )
-        if name:
-            self.attempt(lambda: self._save_figure(Path(name)))
-
-    def _save_figure(self, path: Path) -> None:
+        """Choose what the figure shows, ask for a file and draw it."""
         c = self._context
         titles = {c.denoised: denoised_words(c.denoise.card), c.before: c.before.status}
         about = {
@@ -253,10 +246,22 @@ class Dialogs:
             "denoiser": denoised_words(c.denoise.card),
             "synthetic": c.synthetic.status,
         }
-        tracks = [(track, titles.get(track, "")) for track in c.tracks]
-        save_figure(
-            tracks, c.difference, c.display.levels, (c.span.start_s, c.span.end_s), about, path
+        clock = c.playback.timebase
+        model = FigureModel(
+            [(track, titles.get(track, "")) for track in c.tracks],
+            c.difference,
+            c.display.levels,
+            c.labels.labels,
+            (c.span.start_s, c.span.end_s),
+            (clock.start_s, clock.end_s),
+            about,
+            self._parent,
         )
+        dialog = MapFigureDialog(model, c.display.palette, "doppler-maps", self._parent)
+        dialog.exec()
+        model.close()
+        model.deleteLater()
+        dialog.deleteLater()
 
     def open_model(self) -> None:
         """Choose a model file, and use it."""

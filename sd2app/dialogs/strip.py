@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
-import numpy as np
-from PySide6.QtCore import QRectF, QSignalBlocker, QSize, Qt
-from PySide6.QtGui import QColor, QIcon, QImage, QPainter, QPaintEvent
+from PySide6.QtCore import QSignalBlocker
+from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import (
     QCheckBox,
     QDialog,
     QDialogButtonBox,
-    QFileDialog,
     QFormLayout,
     QHBoxLayout,
     QLabel,
@@ -20,51 +16,14 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from sd2app.dialogs.figure_filter import FIGURES
+from sd2app.dialogs.figure_file import ask_figure
+from sd2app.dialogs.figure_preview import FigurePreview
 from sd2app.models.strip import StripModel
 from sd2app.palette import Palette
 from sd2app.views.inputs import Choice, NumberBox
 
 _WAYS = (("spread", "spread evenly"), ("around", "around the cursor"), ("list", "list or ranges"))
 _ROWS = (("video", "video"), ("mesh", "mesh"), ("overlay", "mesh over video"))
-
-
-class StripPreview(QWidget):
-    """The strip as it will be, as large as there is room."""
-
-    def __init__(self, model: StripModel, palette: Palette, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self._model = model
-        self._colours = palette
-        self.setMinimumSize(480, 200)
-        model.drawn.connect(self.update)
-        model.changed.connect(self.update)
-
-    def sizeHint(self) -> QSize:
-        """Wide: a strip is."""
-        return QSize(960, 320)
-
-    def paintEvent(self, event: QPaintEvent) -> None:
-        """The picture on its own paper, or a word."""
-        with QPainter(self) as painter:
-            painter.fillRect(self.rect(), QColor(self._colours.well))
-            picture = self._model.picture
-            if picture is None or self._model.problem:
-                painter.setPen(QColor(self._colours.muted))
-                text = self._model.problem or "Drawing…"
-                flags = Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap
-                painter.drawText(self.rect().adjusted(16, 16, -16, -16), flags, text)
-                return
-            self._draw(painter, picture)
-
-    def _draw(self, painter: QPainter, picture: np.ndarray) -> None:
-        height, width = picture.shape[:2]
-        image = QImage(picture.data, width, height, 4 * width, QImage.Format.Format_RGBA8888)
-        scale = min((self.width() - 16) / width, (self.height() - 16) / height, 1.0)
-        box = QRectF(0, 0, width * scale, height * scale)
-        box.moveCenter(QRectF(self.rect()).center())
-        painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
-        painter.drawImage(box, image)
 
 
 class StripDialog(QDialog):
@@ -89,7 +48,7 @@ class StripDialog(QDialog):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(16, 16, 16, 16)
         layout.setSpacing(16)
-        layout.addWidget(StripPreview(model, palette, self), 1)
+        layout.addWidget(FigurePreview(model, palette, self), 1)
         layout.addLayout(self._lay_out())
         layout.addWidget(buttons)
         model.changed.connect(self._refresh)
@@ -190,13 +149,8 @@ class StripDialog(QDialog):
         self._export.setText("Exporting…" if model.exporting else "Export…")
 
     def _ask(self) -> None:
-        name, chosen = QFileDialog.getSaveFileName(
-            self, "Export strip of frames", f"{self._name}.png", FIGURES
-        )
-        if name:
-            path = Path(name)
-            if not path.suffix:
-                path = path.with_suffix(f".{chosen[:3].lower()}")
+        path = ask_figure(self, "Export strip of frames", self._name)
+        if path is not None:
             self._model.export(path)
 
 

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject
 
-from sd2app.jobs.latest import Emit, LatestRunner
+from sd2app.jobs.latest import Emit
 from sd2app.models.content import UNTITLED, Content
+from sd2app.models.drawn_figure import DrawnFigure
 from sd2core.errors import Sd2Error
 from sd2core.figures.frames import frames_around, parse_frames, spread_frames
 from sd2core.figures.strip_source import MOST_FRAMES, Row, StripOptions, StripSource
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 Way = Literal["spread", "around", "list"]
-_PREVIEW_DPI = 110
 
 
 @dataclass(frozen=True)
@@ -40,25 +41,11 @@ class StripChoice:
     text: str = "0:60:10"
 
 
-class StripModel(QObject):
-    """Draws a preview whenever something is chosen; the newest choice wins.
-
-    Signals
-    -------
-    changed
-        A choice, or whether it is being drawn.
-    drawn
-        Another preview.
-    written : Path
-        The file is there.
-    """
-
-    changed = Signal()
-    drawn = Signal()
-    written = Signal(object)
+class StripModel(DrawnFigure):
+    """Draws a preview whenever something is chosen."""
 
     def __init__(self, content: Content, cursor_s: float, parent: QObject | None = None) -> None:
-        super().__init__(parent)
+        super().__init__("strip", parent)
         recording = content.recording
         named = recording.title if recording.folder == UNTITLED else str(recording.folder)
         self.source = StripSource.of(recording, content.video, content.mesh, named)
@@ -67,13 +54,6 @@ class StripModel(QObject):
         there = {"video": content.video, "mesh": content.mesh}
         rows: Any = tuple(row for row, part in there.items() if part is not None)
         self._options = StripOptions(rows=rows)
-        self._picture: NDArray[np.uint8] | None = None
-        self._problem = ""
-        self._runner = LatestRunner("strip", self)
-        self._runner.finished.connect(self._receive)
-        self._runner.failed.connect(self._refuse)
-        self._runner.idle_changed.connect(lambda _: self.changed.emit())
-        self._exporting = False
         self._draw()
 
     # --- what is there --------------------------------------------------------------------
@@ -94,26 +74,6 @@ class StripModel(QObject):
         video, mesh = self.source.video is not None, self.source.mesh is not None
         rows: dict[Row, bool] = {"video": video, "mesh": mesh, "overlay": video and mesh}
         return tuple(row for row, there in rows.items() if there)
-
-    @property
-    def picture(self) -> NDArray[np.uint8] | None:
-        """The preview, RGBA of shape (H, W, 4)."""
-        return self._picture
-
-    @property
-    def problem(self) -> str:
-        """Why it cannot be drawn."""
-        return self._problem
-
-    @property
-    def busy(self) -> bool:
-        """Whether it is being drawn or written."""
-        return self._runner.busy
-
-    @property
-    def exporting(self) -> bool:
-        """Whether it is being written."""
-        return self._exporting
 
     def frames(self) -> list[int]:
         """The frames of the strip; raises Sd2Error where the list is none."""
@@ -160,57 +120,27 @@ class StripModel(QObject):
             return
         source, options = self.source, self._options
 
-        def write(emit: Emit) -> Path:
+        def write(emit: Emit) -> None:
             from sd2core.figures.strip import plot_strip, save_strip
 
             figure = plot_strip(source, frames, options, lambda *_: emit(None))
             save_strip(figure, path, source, frames, options)
-            return path
 
-        self._exporting = True
-        self._runner.submit(write)
-        self.changed.emit()
-
-    def close(self) -> None:
-        """Stop drawing."""
-        self._runner.close()
+        self._write(path, write)
 
     # --- inside ---------------------------------------------------------------------------
 
     def _draw(self) -> None:
-        self._problem = ""
         try:
             frames = self.frames()
         except Sd2Error as error:
-            self._runner.cancel()
             self._refuse(error)
             return
         source, options = self.source, self._options
 
-        def draw(emit: Emit) -> NDArray[np.uint8]:
-            from matplotlib.backends.backend_agg import FigureCanvasAgg
-
+        def plot(emit: Emit) -> Figure:
             from sd2core.figures.strip import plot_strip
 
-            figure = plot_strip(source, frames, options, lambda *_: emit(None))
-            figure.set_dpi(_PREVIEW_DPI)
-            canvas = FigureCanvasAgg(figure)
-            canvas.draw()
-            return np.array(canvas.buffer_rgba())
+            return plot_strip(source, frames, options, lambda *_: emit(None))
 
-        self._runner.submit(draw)
-        self.changed.emit()
-
-    def _receive(self, result: Any) -> None:
-        if isinstance(result, Path):
-            self._exporting = False
-            self.changed.emit()
-            self.written.emit(result)
-            return
-        self._picture = result
-        self.drawn.emit()
-
-    def _refuse(self, error: Exception) -> None:
-        self._exporting = False
-        self._problem = str(error)
-        self.changed.emit()
+        self._preview(plot)

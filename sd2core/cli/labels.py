@@ -17,6 +17,7 @@ from sd2core.cli.label_reading import (
     write,
 )
 from sd2core.cli.labels_agree import add_agree
+from sd2core.cli.labels_figure import add_figure
 from sd2core.cli.labels_statistics import add_statistics, print_statistics, statistics_of
 from sd2core.cli.labels_suggest import add_suggest
 from sd2core.cli.options import add_command, add_json
@@ -84,6 +85,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
     add_statistics(kinds)
     add_suggest(kinds)
+    add_figure(kinds)
     add_agree(kinds)
 
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 from sd2core.cli.label_reading import add_replace, check_label_output, recording_clock, write
 from sd2core.cli.options import add_command, add_json, not_negative_float
-from sd2core.cli.output import counted, print_json, print_rows, progress_bar
+from sd2core.cli.output import counted, print_json, print_rows
+from sd2core.cli.recording_maps import MapName, maps_of
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
@@ -157,22 +158,7 @@ def _map_and_clock(options: argparse.Namespace) -> tuple[DopplerMap, Timebase]:
     return doppler, doppler.timebase
 
 
-def _map_of(recording: Recording, which: str | None) -> DopplerMap:
+def _map_of(recording: Recording, which: MapName | None) -> DopplerMap:
     """The synthetic map where there is a mesh, else the radar's, or the one asked for."""
-    from sd2core.doppler import Synthesizer
-    from sd2core.fmcw import doppler_map
-
-    if which is None:
-        which = "radar" if recording.mesh is None else "synthetic"
-    if which == "radar":
-        if recording.holds_radar_map:
-            doppler = recording.load_radar_map().doppler
-        else:
-            capture = recording.load_capture()
-            with progress_bar("Processing") as progress:
-                doppler = doppler_map(capture, clutter="mean", progress=progress)
-        return doppler.shifted(recording.radar_offset_s)
-    with progress_bar("Reading the mesh") as progress:
-        mesh = recording.load_mesh(progress)
-    with progress_bar("Synthesizing") as progress:
-        return Synthesizer(mesh, preset="paper").map(recording.sensor, progress=progress)
+    name = which or ("radar" if recording.mesh is None else "synthetic")
+    return maps_of(recording, (name,))[name]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.figure_files import save_figure
+from sd2core.figures.spans import LANE_IN, add_key, draw_edges, draw_lanes, lanes_of
+from sd2core.labels.spans import Labels
 from sd2core.presence import runs
 from sd2core.spectrum import DopplerMap
 
@@ -128,6 +130,8 @@ def draw_maps(
     end_s: float,
     difference: tuple[int, int] | None = None,
     colours: tuple[str, str] = ("#b4520b", "#0b7a5b"),
+    labels: Labels | None = None,
+    heading: str = "",
 ) -> Figure:
     """Draw maps on one time axis.
 
@@ -142,18 +146,32 @@ def draw_maps(
         Numbers of two rows: the level of the first minus that of the second as a last row.
     colours : tuple of str
         Of negative and positive differences.
+    labels : Labels, optional
+        Drawn below the maps, and their edges on them; none where none is in view.
+    heading : str
+        What the maps are of, with the word simulated where it is.
     """
     from matplotlib.figure import Figure
 
     if not rows:
         raise Sd2Error("There is no Doppler map to draw", "at least one")
-    count = len(rows) + (difference is not None)
-    size = (_WIDTH_IN, _ROW_IN * count + 0.45)
+    if not start_s < end_s:
+        raise Sd2Error(
+            f"The figure is to show {start_s:g} to {end_s:g} s", "a start before the end"
+        )
+    lanes = lanes_of(labels, start_s, end_s) if labels is not None else []
+    heights_in = [_ROW_IN] * (len(rows) + (difference is not None))
+    heights_in += [LANE_IN * len(lanes)] if lanes else []
+    size = (_WIDTH_IN, sum(heights_in) + 0.45 + 0.35 * bool(lanes) + 0.2 * bool(heading))
     figure = Figure(figsize=size, dpi=_PIXELS_PER_INCH / 2, layout="constrained")
     figure.set_facecolor("white")
-    all_axes = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
+    all_axes = figure.subplots(
+        len(heights_in), 1, sharex=True, squeeze=False, height_ratios=heights_in
+    )[:, 0]
+    maps_axes = all_axes[:-1] if lanes else all_axes
     shown: Any = None
-    for axes, row in zip(all_axes, rows, strict=False):
+    for axes, row in zip(maps_axes, rows, strict=False):
+        row = _in_view(row, start_s, end_s)
         level = levels.of(row.doppler.values, row.reference)
         low, high = levels.ends
         shown = _draw(axes, row, level, levels.colour_map, low, high)
@@ -164,13 +182,20 @@ def draw_maps(
     bar.set_label(f"level ({levels.unit})", fontsize=8)
     bar.ax.tick_params(labelsize=7)
     if difference is not None:
-        first, second = (rows[number] for number in difference)
-        _draw_difference(figure, all_axes[-1], first, second, levels, colours)
+        first, second = _in_view(rows[difference[0]], start_s, end_s), rows[difference[1]]
+        _draw_difference(figure, maps_axes[-1], first, second, levels, colours)
+    if labels is not None and lanes:
+        draw_lanes(all_axes[-1], lanes, labels, start_s, end_s, 0.8 * _WIDTH_IN)
+        add_key(figure, lanes, labels)
+        for axes in maps_axes:
+            draw_edges(axes, lanes)
     for axes in all_axes:
         axes.set_xlim(start_s, end_s)
         axes.tick_params(labelsize=8)
     all_axes[-1].set_xlabel("time (s)", fontsize=8)
     figure.supylabel("velocity (m/s, approaching +)", fontsize=8)
+    if heading:
+        figure.suptitle(heading, x=0.01, ha="left", fontsize=9, parse_math=False)
     return figure
 
 
@@ -194,6 +219,12 @@ def save_maps(figure: Figure, path: Path, rows: Sequence[MapRow], about: dict[st
         ]
     }
     save_figure(figure, path, provenance, _PIXELS_PER_INCH)
+
+
+def _in_view(row: MapRow, start_s: float, end_s: float) -> MapRow:
+    """Its frames between two times of the figure: hours are not drawn for a second."""
+    start, stop = row.doppler.timebase.frames_between(start_s - row.offset_s, end_s - row.offset_s)
+    return replace(row, doppler=row.doppler.between(start, max(stop, start + 2)))
 
 
 def _draw(

@@ -8,8 +8,9 @@ from answering import once_asked
 from fake_denoisers import fading
 from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QTimer, QUrl
 from PySide6.QtGui import QColor, QDropEvent
-from PySide6.QtWidgets import QApplication, QFileDialog, QLabel
+from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QPushButton
 
+from sd2app.dialogs.map_figure import MapFigureDialog
 from sd2app.dialogs.model_card import ModelCardDialog
 from sd2app.views.model_menu import ModelButton, ModelMenu
 from sd2app.views.spectrum import SpectrumView
@@ -239,6 +240,12 @@ def test_map_and_figure_are_exported(denoised, qtbot, tmp_path, monkeypatch):
     np.testing.assert_allclose(made.values, c.denoised.map.values, rtol=1e-5, atol=1e-9)
     name = tmp_path / "maps.svg"
     qtbot.keyClick(denoised, Qt.Key.Key_X)
+
+    def export(dialog: MapFigureDialog) -> None:
+        button = next(one for one in dialog.findChildren(QPushButton) if one.text() == "Export…")
+        qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
+
+    once_asked(MapFigureDialog, export)
     denoised._actions["export_maps"].trigger()
     text = name.read_text(encoding="utf-8")
     for words in (

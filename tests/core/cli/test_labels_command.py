@@ -252,3 +252,36 @@ def test_every_format_is_named_in_the_help(sd2: Sd2) -> None:
     words = " ".join(sd2("labels", "show", "--help").out.split())
     for one in FORMATS:
         assert one.name in words
+
+
+@pytest.fixture
+def moving_recording(tmp_path: Path, moving: Path) -> Path:
+    """A recording whose mesh, a tetrahedron, swings for two seconds; two labels."""
+    from sd2core.io.mesh import save_mesh
+    from sd2core.mesh import MeshSequence
+
+    corners = np.array([[0, 0, 2], [1, 0, 2], [0, 1, 2], [0, 0, 3]], np.float32)
+    times_s = np.arange(40) / 20.0
+    vertices = np.repeat(corners[None], 40, axis=0)
+    vertices[:, :, 2] += np.sin(2 * np.pi * times_s)[:, None].astype(np.float32) / 5
+    faces = np.array([[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]], np.int32)
+    folder = tmp_path / "swing.sd2"
+    folder.mkdir()
+    save_mesh(MeshSequence(vertices, faces, Timebase(times_s)), folder / "mesh.npz")
+    Recording.create(folder, mesh=folder / "mesh.npz", title="swing", simulated=True)
+    written(folder / "labels.json", (0.5, 1.0, "wave"), (1.25, 1.75, "up-to-down"))
+    return folder
+
+
+def test_a_figure_of_maps_with_labels(sd2: Sd2, moving_recording: Path, tmp_path: Path) -> None:
+    out = tmp_path / "swing.svg"
+    assert "synthetic" in sd2("labels", "figure", moving_recording, "--out", out).out
+    text = out.read_text("utf-8")
+    assert "swing (simulated)" in text
+    assert "wave" in text
+    sd2("labels", "figure", moving_recording, "--out", out, "--from-s", 1.2)
+    assert ">wave<" not in out.read_text("utf-8")
+    for maps, said in (("real", "each once"), ("radar", "no radar")):
+        refused = sd2("labels", "figure", moving_recording, "--out", out, "--maps", maps)
+        assert refused.code == 1
+        assert said in refused.err

@@ -1,0 +1,99 @@
+"""Export a figure of the maps: a preview above, the choices below."""
+
+from __future__ import annotations
+
+from PySide6.QtGui import QIcon
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QDialog,
+    QDialogButtonBox,
+    QFormLayout,
+    QHBoxLayout,
+    QVBoxLayout,
+    QWidget,
+)
+
+from sd2app.dialogs.figure_file import ask_figure
+from sd2app.dialogs.figure_preview import FigurePreview
+from sd2app.models.figure import FigureModel
+from sd2app.palette import Palette
+from sd2app.views.inputs import Choice
+
+
+class MapFigureDialog(QDialog):
+    """A view of :class:`FigureModel`."""
+
+    def __init__(
+        self, model: FigureModel, palette: Palette, name: str, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._model, self._name = model, name
+        self.setWindowTitle("Export figure of the maps")
+        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel, self)
+        self._export = buttons.addButton("Export…", QDialogButtonBox.ButtonRole.ActionRole)
+        self._export.setDefault(True)
+        self._export.clicked.connect(self._ask)
+        for button in buttons.buttons():
+            button.setIcon(QIcon())
+        buttons.rejected.connect(self.reject)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(16, 16, 16, 16)
+        layout.setSpacing(16)
+        layout.addWidget(FigurePreview(model, palette, self), 1)
+        layout.addLayout(self._choices())
+        layout.addWidget(buttons)
+        model.changed.connect(self._refresh)
+        model.written.connect(lambda _: self.accept())
+        self._refresh()
+        self.resize(900, 720)
+
+    def _choices(self) -> QFormLayout:
+        model = self._model
+        maps = [
+            self._box(title, lambda on, title=title: model.set_shown(title, on))
+            for title in model.titles
+        ]
+        stretch = Choice("Which stretch of the recording", self)
+        stretch.addItem("what is in view", False)
+        stretch.addItem("the whole recording", True)
+        stretch.currentIndexChanged.connect(lambda at: model.choose(whole=stretch.itemData(at)))
+        more = []
+        if model.has_labels:
+            more.append(self._box("labels", lambda on: model.choose(with_labels=on)))
+        if model.has_difference:
+            more.append(
+                self._box("difference to the radar", lambda on: model.choose(with_difference=on))
+            )
+        form = QFormLayout()
+        form.setHorizontalSpacing(16)
+        form.setVerticalSpacing(8)
+        form.addRow("Maps", _row(*maps))
+        form.addRow("Stretch", _row(stretch))
+        if more:
+            form.addRow("With", _row(*more))
+        return form
+
+    def _box(self, text: str, chosen: object) -> QCheckBox:
+        box = QCheckBox(text, self)
+        box.setChecked(True)
+        box.toggled.connect(chosen)
+        return box
+
+    def _refresh(self) -> None:
+        model = self._model
+        self._export.setEnabled(not (model.exporting or model.problem))
+        self._export.setText("Exporting…" if model.exporting else "Export…")
+
+    def _ask(self) -> None:
+        path = ask_figure(self, "Export figure of the maps", self._name)
+        if path is not None:
+            self._model.export(path)
+
+
+def _row(*widgets: QWidget) -> QHBoxLayout:
+    row = QHBoxLayout()
+    row.setSpacing(16)
+    for widget in widgets:
+        row.addWidget(widget)
+    row.addStretch(1)
+    return row

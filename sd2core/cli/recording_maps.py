@@ -1,0 +1,109 @@
+"""The Doppler maps of a recording, computed where that is needed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal, get_args
+
+from sd2core.cli.output import progress_bar
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    from sd2core.mesh import MeshSequence
+    from sd2core.recording import Recording
+    from sd2core.sensor import VelocityAxis
+    from sd2core.spectrum import DopplerMap
+
+MapName = Literal["synthetic", "denoised", "radar"]
+MAP_NAMES: tuple[MapName, ...] = get_args(MapName)
+
+
+def usual_maps(recording: Recording) -> tuple[MapName, ...]:
+    """Those that a recording has without a model being asked: of its mesh and of its radar."""
+    there: dict[MapName, object] = {"synthetic": recording.mesh, "radar": recording.radar}
+    return tuple(name for name, part in there.items() if part is not None)
+
+
+def parsed_maps(text: str) -> tuple[MapName, ...]:
+    """Names such as ``synthetic,radar``, in the order given.
+
+    Raises
+    ------
+    Sd2Error
+        For another name, or none.
+    """
+    names = tuple(name for name in MAP_NAMES if name in text.replace(" ", "").split(","))
+    if not names or len(names) < len(text.split(",")):
+        raise Sd2Error(f"The maps are {text!r}", f"some of {', '.join(MAP_NAMES)}, each once")
+    return names
+
+
+def maps_of(
+    recording: Recording,
+    names: tuple[MapName, ...],
+    mesh: MeshSequence | None = None,
+    axis: VelocityAxis | None = None,
+) -> dict[MapName, DopplerMap]:
+    """Maps on the recording's clock, from top to bottom.
+
+    Parameters
+    ----------
+    recording : Recording
+    names : tuple of str
+    mesh : MeshSequence, optional
+        Its mesh, where that has been read already.
+    axis : VelocityAxis, optional
+        Of the radar's map; its own limits where none is given.
+
+    Raises
+    ------
+    Sd2Error
+        When the recording does not have what one is made of.
+    """
+    made: dict[MapName, DopplerMap] = {}
+    if {"synthetic", "denoised"} & {*names}:
+        synthetic = _synthetic(recording, mesh)
+        if "synthetic" in names:
+            made["synthetic"] = synthetic
+        if "denoised" in names:
+            made["denoised"] = _denoised(recording, synthetic)
+    if "radar" in names:
+        made["radar"] = _radar(recording, axis)
+    return made
+
+
+def _synthetic(recording: Recording, mesh: MeshSequence | None) -> DopplerMap:
+    from sd2core.doppler import Synthesizer
+
+    if mesh is None:
+        with progress_bar("Reading the mesh") as progress:
+            mesh = recording.load_mesh(progress)
+    with progress_bar("Synthesizing") as progress:
+        return Synthesizer(mesh, preset="paper").map(recording.sensor, progress=progress)
+
+
+def _denoised(recording: Recording, synthetic: DopplerMap) -> DopplerMap:
+    from sd2core.denoise.files import DEFAULT_NAME, describe_model, find_model, load_model
+    from sd2core.denoise.matching import check_map
+
+    if recording.denoiser is None and recording.bundled_denoiser == "":
+        raise Sd2Error(
+            f"{recording.title} is set to be shown without a denoiser",
+            "a model, for its denoised map",
+            "Choose one in the window, or leave the denoised map out",
+        )
+    path = recording.denoiser or find_model(recording.bundled_denoiser or DEFAULT_NAME)
+    check_map(synthetic, describe_model(path))
+    with progress_bar("Denoising") as progress:
+        return load_model(path).denoise(synthetic, progress)
+
+
+def _radar(recording: Recording, axis: VelocityAxis | None) -> DopplerMap:
+    from sd2core.fmcw import doppler_map
+
+    if recording.holds_radar_map:
+        doppler = recording.load_radar_map().doppler
+    else:
+        capture = recording.load_capture()
+        with progress_bar("Processing") as progress:
+            doppler = doppler_map(capture, axis=axis, clutter="mean", progress=progress)
+    return doppler.shifted(recording.radar_offset_s)
