@@ -10,11 +10,13 @@ from PySide6.QtWidgets import QMenu
 from sd2app.actions import ACTIONS, Action
 from sd2app.icons import transport_icon
 from sd2app.label_actions import LabelActions
+from sd2app.label_menus import ReactionMenu, TrackMenu
 from sd2app.models.key_bindings import native
 
 if TYPE_CHECKING:
     from sd2app.views.window import MainWindow
 
+_SUBMENUS = {"Tracks": "Labels"}
 _MENUS = ("File", "Edit", "View", "Play", "Labels", "Model", "Help")
 
 
@@ -49,12 +51,24 @@ class ActionSet:
         recent = QMenu("Open recent", menus["File"])
         menus["Model"].addMenu(models)
         for row in ACTIONS:
+            if row.menu not in menus:
+                menus[row.menu] = self._submenu(row.menu, menus[_SUBMENUS[row.menu]])
             if row.separator_before:
                 menus[row.menu].addSeparator()
             menus[row.menu].addAction(self._actions[row.id])
             if row.id == "open_folder":
                 menus["File"].addMenu(recent)
+            if row.id == "carve_marks":
+                ask = self._window.track_dialogs.reaction
+                self.reaction = ReactionMenu(self._context.reaction, ask, menus["Labels"])
+                menus["Labels"].addMenu(self.reaction)
         return recent
+
+    def _submenu(self, name: str, above: QMenu) -> QMenu:
+        made = above.addMenu(name)
+        made.setToolTipsVisible(True)
+        self.tracks = TrackMenu(made, self._context.labels)
+        return made
 
     def refresh(self) -> None:
         """Follow the models."""

@@ -2,77 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from sd2app.context import Context
-    from sd2app.views.window import MainWindow
-
-Handler = Callable[["MainWindow"], None]
-Test = Callable[["Context"], bool]
-
-
-def _always(context: Context) -> bool:
-    return True
-
-
-def _has_content(context: Context) -> bool:
-    return context.document.content is not None
-
-
-def _has_mesh(context: Context) -> bool:
-    return context.document.mesh is not None
-
-
-def _has_spans(context: Context) -> bool:
-    return bool(context.labels.labels.spans)
-
-
-def _disagree(context: Context) -> bool:
-    return bool(context.agreement.disagreements)
-
-
-def _has_suggestions(context: Context) -> bool:
-    return bool(context.suggestions.pending)
-
-
-def _one_selected(context: Context) -> bool:
-    return len(context.labels.selected) == 1
-
-
-@dataclass(frozen=True)
-class Action:
-    """One row.
-
-    ``checked`` makes it checkable and says whether it is on; ``why_not`` says in place
-    of the tip why it is not enabled. What ``edits_labels`` is not enabled where labels
-    cannot be edited, and says that.
-    """
-
-    id: str
-    menu: str
-    text: str
-    keys: tuple[str, ...]
-    tip: str
-    run: Handler
-    enabled: Test = _always
-    checked: Test | None = None
-    separator_before: bool = False
-    icon: str = ""
-    why_not: Callable[[Context], str] | None = None
-    edits_labels: bool = False
-
+from sd2app.action import (
+    Action,
+    disagree,
+    has_content,
+    has_mesh,
+    has_spans,
+    has_suggestions,
+    one_selected,
+    some_selected,
+)
+from sd2app.actions_by_hand import MARKING, SPANS, TRACKS
 
 MOUSE = (
     ("Click or drag in a heatmap or the ruler", "Go to that time"),
     ("Wheel over a heatmap", "Zoom in on time, about the pointer"),
     ("Shift+wheel, middle drag", "Pan in time"),
-    ("Double click in a heatmap", "Show the whole recording"),
-    ("Drag an empty place of the labels", "Mark a span"),
+    ("Double click in a heatmap", "Play the span there in a loop; none: the whole recording"),
+    ("Drag an empty place of the labels", "Mark a span; with Shift also over others, cutting them"),
     ("Drag a span or an edge of it", "Move or shorten it; Alt: nothing attracts it"),
-    ("Click a span, Ctrl+click", "Select it and go to its start, select several"),
+    ("Click a span, Ctrl+click, Shift+click", "Select it and go to its start, or several"),
+    ("Double click a span", "Play it in a loop"),
     ("Drag the title of the radar's heatmap", "Align the capture in time"),
     ("Drag the frame or its edges in the overview", "Pan or zoom in time"),
     ("Drag the sensor in the scene", "Move it in the plane of the screen"),
@@ -103,17 +53,17 @@ ACTIONS: tuple[Action, ...] = (
     Action(
         "add", "File", "Add to this recording…", (),
         "Add a video, mesh or radar capture to what is open",
-        lambda w: w.dialogs.add_files(), _has_content,
+        lambda w: w.dialogs.add_files(), has_content,
     ),
     Action(
         "add_folder", "File", "Add folder to this recording…", (),
         "Add a radar capture or a folder of meshes to what is open",
-        lambda w: w.dialogs.add_folder(), _has_content,
+        lambda w: w.dialogs.add_folder(), has_content,
     ),
     Action(
         "compare", "File", "Compare with mesh…", (),
         "Measure another mesh of this video against the one that is open",
-        lambda w: w.compare_with_mesh(), _has_mesh,
+        lambda w: w.compare_with_mesh(), has_mesh,
     ),
     Action(
         "relink", "File", "Find missing files…", (),
@@ -123,12 +73,12 @@ ACTIONS: tuple[Action, ...] = (
     ),
     Action(
         "save", "File", "Save", ("Ctrl+S",), "Save labels, sensor and alignment in the recording",
-        lambda w: w.dialogs.save(), _has_content, separator_before=True,
+        lambda w: w.dialogs.save(), has_content, separator_before=True,
     ),
     Action(
         "save_as", "File", "Save as…", ("Ctrl+Shift+S",),
         "Make a recording folder that refers to these files",
-        lambda w: w.dialogs.save_as(), _has_content,
+        lambda w: w.dialogs.save_as(), has_content,
     ),
     Action(
         "export_map", "File", "Export synthetic map…", ("Ctrl+E",),
@@ -152,7 +102,7 @@ ACTIONS: tuple[Action, ...] = (
         "export_strip", "File", "Export strip of frames…", ("Ctrl+Shift+E",),
         "Write frames side by side, the video above its mesh (.png, .svg, .pdf)",
         lambda w: w.dialogs.export_strip(),
-        lambda c: c.document.video is not None or _has_mesh(c),
+        lambda c: c.document.video is not None or has_mesh(c),
     ),
     Action(
         "recover_labels", "File", "Recover labels…", (),
@@ -166,12 +116,12 @@ ACTIONS: tuple[Action, ...] = (
     Action(
         "undo", "Edit", "Undo", ("Ctrl+Z",), "Take back the last edit of this recording",
         lambda w: w.context.document.undo_stack.undo(),
-        lambda c: c.document.undo_stack.canUndo() and not c.label_edits.dragging,
+        lambda c: c.document.undo_stack.canUndo() and not c.label_dragging.dragging,
     ),
     Action(
         "redo", "Edit", "Redo", ("Ctrl+Shift+Z",), "Do again what was taken back",
         lambda w: w.context.document.undo_stack.redo(),
-        lambda c: c.document.undo_stack.canRedo() and not c.label_edits.dragging,
+        lambda c: c.document.undo_stack.canRedo() and not c.label_dragging.dragging,
     ),
     Action(
         "sensor_to_camera", "Edit", "Sensor at the camera", ("Home",),
@@ -187,79 +137,79 @@ ACTIONS: tuple[Action, ...] = (
     Action(
         "colour_velocity", "View", "Colour by radial velocity", ("Alt+1",),
         "Blue recedes, red approaches, grey is hidden or still",
-        lambda w: w.context.display.set_mesh_colour("velocity"), _has_mesh,
+        lambda w: w.context.display.set_mesh_colour("velocity"), has_mesh,
         lambda c: c.display.mesh_colour == "velocity",
     ),
     Action(
         "colour_range", "View", "Colour by range", ("Alt+2",), "Distance from the sensor in metres",
-        lambda w: w.context.display.set_mesh_colour("range"), _has_mesh,
+        lambda w: w.context.display.set_mesh_colour("range"), has_mesh,
         lambda c: c.display.mesh_colour == "range",
     ),
     Action(
         "colour_visibility", "View", "Colour by visibility", ("Alt+3",),
         "What the sensor sees, and what is hidden from it",
-        lambda w: w.context.display.set_mesh_colour("visibility"), _has_mesh,
+        lambda w: w.context.display.set_mesh_colour("visibility"), has_mesh,
         lambda c: c.display.mesh_colour == "visibility",
     ),
     Action(
         "colour_plain", "View", "Plain mesh", ("Alt+4",), "One colour",
-        lambda w: w.context.display.set_mesh_colour("plain"), _has_mesh,
+        lambda w: w.context.display.set_mesh_colour("plain"), has_mesh,
         lambda c: c.display.mesh_colour == "plain",
     ),
     Action(
         "dots", "View", "Vertices as dots", ("D",), "Draw vertices instead of the surface",
-        lambda w: w.context.display.set_as_dots(not w.context.display.as_dots), _has_mesh,
+        lambda w: w.context.display.set_as_dots(not w.context.display.as_dots), has_mesh,
         lambda c: c.display.as_dots,
     ),
     Action(
         "overlay", "View", "Mesh over the video", ("M",), "Draw the mesh over the video",
-        lambda w: w.context.overlay.set_style(shown=not w.context.overlay.style.shown), _has_mesh,
+        lambda w: w.context.overlay.set_style(shown=not w.context.overlay.style.shown), has_mesh,
         lambda c: c.overlay.style.shown,
     ),
     Action(
         "overlay_dots", "View", "Mesh over the video as dots", ("Shift+M",),
         "Draw vertices over the video instead of the surface",
         lambda w: w.context.overlay.set_style(as_dots=not w.context.overlay.style.as_dots),
-        _has_mesh, lambda c: c.overlay.style.as_dots,
+        has_mesh, lambda c: c.overlay.style.as_dots,
     ),
     Action(
         "view_three_quarter", "View", "Scene: overview", ("Ctrl+1",),
         "See sensor, camera and body",
-        lambda w: w.set_scene_view("overview"), _has_mesh, separator_before=True,
+        lambda w: w.set_scene_view("overview"), has_mesh, separator_before=True,
     ),
     Action(
         "view_camera", "View", "Scene: from the camera", ("Ctrl+2",), "See what the camera sees",
-        lambda w: w.set_scene_view("camera"), _has_mesh,
+        lambda w: w.set_scene_view("camera"), has_mesh,
     ),
     Action(
         "view_sensor", "View", "Scene: from the sensor", ("Ctrl+3",), "See what the sensor sees",
-        lambda w: w.set_scene_view("sensor"), _has_mesh,
+        lambda w: w.set_scene_view("sensor"), has_mesh,
     ),
     Action(
         "view_side", "View", "Scene: from the side", ("Ctrl+4",), "See sensor and body sideways",
-        lambda w: w.set_scene_view("side"), _has_mesh,
+        lambda w: w.set_scene_view("side"), has_mesh,
     ),
     Action(
         "view_top", "View", "Scene: from above", ("Ctrl+5",), "See sensor and body from above",
-        lambda w: w.set_scene_view("top"), _has_mesh,
+        lambda w: w.set_scene_view("top"), has_mesh,
     ),
     Action(
         "zoom_in", "View", "Zoom in on time", ("+", "="), "Show less time, around the cursor",
-        lambda w: w.context.span.zoom(0.7, w.context.playback.time_s), _has_content,
+        lambda w: w.context.span.zoom(0.7, w.context.playback.time_s), has_content,
         separator_before=True,
     ),
     Action(
         "zoom_out", "View", "Zoom out", ("-",), "Show more time",
-        lambda w: w.context.span.zoom(1.0 / 0.7, w.context.playback.time_s), _has_content,
+        lambda w: w.context.span.zoom(1.0 / 0.7, w.context.playback.time_s), has_content,
     ),
     Action(
         "zoom_fit", "View", "Whole recording", ("0",), "Show all of it",
-        lambda w: w.context.span.fit(), _has_content,
+        lambda w: w.context.span.fit(), has_content,
     ),
     Action(
         "reset_reference", "View", "Set 0 dB to what is shown", ("R",),
         "Make the strongest bin of each map 0 dB",
-        lambda w: w.context.reset_references(), _has_content,
+        lambda w: w.context.reset_references(), has_content,
     ),
     Action(
         "uncertain", "View", "Show uncertain cells", ("U",),
@@ -307,33 +257,33 @@ ACTIONS: tuple[Action, ...] = (
     ),
     Action(
         "play", "Play", "Play", ("Space",), "Play or pause",
-        lambda w: w.context.playback.toggle(), _has_content,
+        lambda w: w.context.playback.toggle(), has_content,
         lambda c: c.playback.playing, icon="play",
     ),
     Action(
         "previous_frame", "Play", "Previous frame", ("Left",), "One frame back",
-        lambda w: w.context.playback.step_frames(-1), _has_content, icon="previous",
+        lambda w: w.context.playback.step_frames(-1), has_content, icon="previous",
     ),
     Action(
         "next_frame", "Play", "Next frame", ("Right",), "One frame on",
-        lambda w: w.context.playback.step_frames(1), _has_content, icon="next",
+        lambda w: w.context.playback.step_frames(1), has_content, icon="next",
     ),
     Action(
         "back_second", "Play", "Back one second", ("Shift+Left",), "One second back",
-        lambda w: w.context.playback.step_seconds(-1.0), _has_content,
+        lambda w: w.context.playback.step_seconds(-1.0), has_content,
     ),
     Action(
         "on_second", "Play", "On one second", ("Shift+Right",), "One second on",
-        lambda w: w.context.playback.step_seconds(1.0), _has_content,
+        lambda w: w.context.playback.step_seconds(1.0), has_content,
     ),
     Action(
         "first_frame", "Play", "First frame", ("Ctrl+Left",), "Go to the start",
-        lambda w: w.context.playback.seek_frame(0), _has_content, icon="first",
+        lambda w: w.context.playback.seek_frame(0), has_content, icon="first",
     ),
     Action(
         "last_frame", "Play", "Last frame", ("Ctrl+Right",), "Go to the end",
         lambda w: w.context.playback.seek_frame(len(w.context.playback.timebase) - 1),
-        _has_content, icon="last",
+        has_content, icon="last",
     ),
     Action(
         "slower", "Play", "Slower", (",",), "Play slower",
@@ -348,43 +298,32 @@ ACTIONS: tuple[Action, ...] = (
         lambda w: w.context.playback.set_loop(not w.context.playback.loop),
         checked=lambda c: c.playback.loop, icon="loop",
     ),
-    Action(
-        "end_marks", "Labels", "End what is being marked", ("E",),
-        "End all spans that have begun, before the frame on screen",
-        lambda w: w.context.label_edits.end_marks(),
-        lambda c: bool(c.labels.marks), separator_before=True, edits_labels=True,
-    ),
-    Action(
-        "drop_marks", "Labels", "Forget what is being marked", ("Esc",),
-        "Let what has begun be, without a span",
-        lambda w: w.context.label_edits.drop_marks(),
-        lambda c: bool(c.labels.marks), edits_labels=True,
-    ),
+    *MARKING,
     Action(
         "span_starts_here", "Labels", "Selected span starts here", ("[",),
         "The frame on screen is the first one of the selected span",
-        lambda w: w.context.label_edits.edge_here("start"), _one_selected,
+        lambda w: w.context.label_edits.edge_here("start"), one_selected,
         separator_before=True, edits_labels=True,
     ),
     Action(
         "span_ends_here", "Labels", "Selected span ends here", ("]",),
         "The frame on screen is the last one of the selected span",
-        lambda w: w.context.label_edits.edge_here("end"), _one_selected, edits_labels=True,
+        lambda w: w.context.label_edits.edge_here("end"), one_selected, edits_labels=True,
     ),
     Action(
-        "nudge_back", "Labels", "Move span one frame back", ("Alt+Left",),
-        "It stops at its neighbours",
-        lambda w: w.context.label_edits.nudge(-1), _one_selected, edits_labels=True,
+        "nudge_back", "Labels", "Move selected spans one frame back", ("Alt+Left",),
+        "They stop at their neighbours",
+        lambda w: w.context.label_edits.nudge(-1), some_selected, edits_labels=True,
     ),
     Action(
-        "nudge_on", "Labels", "Move span one frame on", ("Alt+Right",),
-        "It stops at its neighbours",
-        lambda w: w.context.label_edits.nudge(1), _one_selected, edits_labels=True,
+        "nudge_on", "Labels", "Move selected spans one frame on", ("Alt+Right",),
+        "They stop at their neighbours",
+        lambda w: w.context.label_edits.nudge(1), some_selected, edits_labels=True,
     ),
     Action(
         "split_span", "Labels", "Split span here", ("/",),
         "Cut the span under the cursor in two, before the frame on screen",
-        lambda w: w.context.label_edits.split(), _has_spans, edits_labels=True,
+        lambda w: w.context.label_edits.split(), has_spans, edits_labels=True,
     ),
     Action(
         "merge_spans", "Labels", "Merge selected spans", ("G",),
@@ -395,17 +334,19 @@ ACTIONS: tuple[Action, ...] = (
     Action(
         "delete_spans", "Labels", "Delete selected spans", ("Backspace", "Del"),
         "Undo brings them back",
-        lambda w: w.context.label_edits.delete(), lambda c: bool(c.labels.selected),
+        lambda w: w.context.label_edits.delete(), some_selected,
         edits_labels=True,
     ),
+    *SPANS,
     Action(
         "next_span", "Labels", "Next span", ("N",), "Select it and go to its start",
-        lambda w: w.context.label_edits.step(1), _has_spans, separator_before=True,
+        lambda w: w.context.label_edits.step(1), has_spans, separator_before=True,
     ),
     Action(
         "previous_span", "Labels", "Previous span", ("P",), "Select it and go to its start",
-        lambda w: w.context.label_edits.step(-1), _has_spans,
+        lambda w: w.context.label_edits.step(-1), has_spans,
     ),
+    *TRACKS,
     Action(
         "suggest", "Labels", "Suggest spans", ("F",),
         "Find where something moves in a map; each suggestion is then accepted or rejected",
@@ -415,33 +356,33 @@ ACTIONS: tuple[Action, ...] = (
     Action(
         "accept_suggestion", "Labels", "Accept suggestion", ("Y",),
         "Take the one that is selected, or the next; a label's own key takes it as that",
-        lambda w: w.context.suggestions.accept(), _has_suggestions, edits_labels=True,
+        lambda w: w.context.suggestions.accept(), has_suggestions, edits_labels=True,
     ),
     Action(
         "reject_suggestion", "Labels", "Reject suggestion", ("W",),
         "Let the one that is selected go, or the next; it is not suggested again",
-        lambda w: w.context.suggestions.reject(), _has_suggestions, edits_labels=True,
+        lambda w: w.context.suggestions.reject(), has_suggestions, edits_labels=True,
     ),
     Action(
         "accept_suggestions", "Labels", "Accept all suggestions", ("Shift+Y",),
         "Take all that there is room for",
-        lambda w: w.context.suggestions.accept_all(), _has_suggestions, edits_labels=True,
+        lambda w: w.context.suggestions.accept_all(), has_suggestions, edits_labels=True,
     ),
     Action(
         "reject_suggestions", "Labels", "Reject all suggestions", ("Shift+W",),
         "Let all go; they are not suggested again",
-        lambda w: w.context.suggestions.reject_all(), _has_suggestions, edits_labels=True,
+        lambda w: w.context.suggestions.reject_all(), has_suggestions, edits_labels=True,
     ),
     Action(
         "import_labels", "Labels", "Import labels…", ("Ctrl+I",),
         "Take the labels of a file: SD² Studio, table, Audacity, ELAN, Praat, BORIS, MNE",
-        lambda w: w.label_files.import_labels(), _has_content, separator_before=True,
+        lambda w: w.label_files.import_labels(), has_content, separator_before=True,
         edits_labels=True,
     ),
     Action(
         "export_labels", "Labels", "Export labels…", ("Ctrl+Shift+I",),
         "Write the labels for another program, and say what its file cannot hold",
-        lambda w: w.label_files.export_labels(), _has_content,
+        lambda w: w.label_files.export_labels(), has_content,
     ),
     Action(
         "restore_labels", "Labels", "Restore labels that were not saved", (),
@@ -457,22 +398,22 @@ ACTIONS: tuple[Action, ...] = (
     Action(
         "find_spans", "Labels", "Find spans…", ("Ctrl+F",),
         "Search the table of spans for a label, a note or a track",
-        lambda w: w.show_labels(find=True), _has_content,
+        lambda w: w.show_labels(find=True), has_content,
     ),
     Action(
         "compare_labels", "Labels", "Compare with another's labels…", ("Ctrl+K",),
         "Show how far another person's labels agree with these, and where they do not",
-        lambda w: w.label_files.compare_labels(), _has_content, separator_before=True,
+        lambda w: w.label_files.compare_labels(), has_content, separator_before=True,
     ),
     Action(
         "next_disagreement", "Labels", "Next disagreement", ("Shift+N",),
         "Go to where the labels differ next",
-        lambda w: w.context.agreement.step(1), _disagree,
+        lambda w: w.context.agreement.step(1), disagree,
     ),
     Action(
         "previous_disagreement", "Labels", "Previous disagreement", ("Shift+P",),
         "Go to where the labels differ before",
-        lambda w: w.context.agreement.step(-1), _disagree,
+        lambda w: w.context.agreement.step(-1), disagree,
     ),
     Action(
         "end_comparison", "Labels", "End the comparison of labels", (),
@@ -482,7 +423,7 @@ ACTIONS: tuple[Action, ...] = (
     Action(
         "open_model", "Model", "Open model file…", (),
         "Denoise this recording with a model of your own (.safetensors)",
-        lambda w: w.dialogs.open_model(), _has_content, separator_before=True,
+        lambda w: w.dialogs.open_model(), has_content, separator_before=True,
     ),
     Action(
         "model_card", "Model", "About this model…", (),

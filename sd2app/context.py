@@ -10,7 +10,10 @@ from PySide6.QtCore import QObject
 
 from sd2app.actions import ACTIONS
 from sd2app.commands import Edits
+from sd2app.label_dragging import LabelDragging
 from sd2app.label_edits import LabelEdits
+from sd2app.label_marking import LabelMarking
+from sd2app.label_tracks import LabelTracks
 from sd2app.models.agreement import AgreementModel
 from sd2app.models.content import reference_of
 from sd2app.models.denoise import DenoiseModel
@@ -30,7 +33,9 @@ from sd2app.models.labels import LabelsModel
 from sd2app.models.ladder import CORE, Ladder
 from sd2app.models.overlay import OverlayModel
 from sd2app.models.playback import PlaybackModel
+from sd2app.models.reaction import ReactionModel
 from sd2app.models.sensor import SensorModel
+from sd2app.models.span_loop import SpanLoop
 from sd2app.models.suggestions import SuggestionsModel
 from sd2app.models.synthesis import SynthesisModel
 from sd2app.models.tracks import PointerModel, TrackModel
@@ -77,6 +82,11 @@ class Context:
     label_edits: LabelEdits
     suggestions: SuggestionsModel
     agreement: AgreementModel
+    label_dragging: LabelDragging
+    label_marking: LabelMarking
+    label_tracks: LabelTracks
+    reaction: ReactionModel
+    span_loop: SpanLoop
     fit: FitModel
     fit_follower: FitFollower
     fit_offer: FitOffer
@@ -156,6 +166,7 @@ def build_context(
     labels = LabelsModel(parent)
     label_session = LabelSession(document, labels, recovery or recovery_folder(), parent)
     label_edits = LabelEdits(document, labels, playback, label_session, parent)
+    reaction = ReactionModel(settings, parent)
     context = Context(
         settings=settings,
         jobs=jobs,
@@ -191,6 +202,11 @@ def build_context(
             parent,
         ),
         agreement=AgreementModel(labels, playback, span, parent),
+        label_dragging=LabelDragging(labels, playback, label_edits, parent),
+        label_marking=LabelMarking(labels, playback, reaction, label_edits, parent),
+        label_tracks=LabelTracks(labels, label_edits),
+        reaction=reaction,
+        span_loop=SpanLoop(labels, playback, parent),
         fit=fit,
         fit_follower=follower,
         fit_offer=FitOffer(document, fit, parent),

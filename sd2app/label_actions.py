@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class LabelActions:
-    """A key marks while nothing is selected, and gives what is selected another label."""
+    """A key marks; paused and with nothing begun, it gives what is selected another label."""
 
     def __init__(self, window: MainWindow, menu: QMenu) -> None:
         self._window, self._menu = window, menu
@@ -58,10 +58,10 @@ class LabelActions:
         chosen = context.labels.selected
         if any(span.origin == "suggestion" for span in chosen):
             context.suggestions.accept(label)
-        elif chosen and not context.playback.playing:
+        elif chosen and not context.playback.playing and not context.labels.marks:
             context.label_edits.relabel(label)
         else:
-            context.label_edits.mark(label)
+            context.label_marking.mark(label)
 
 
 def _tip(label: Label) -> str:

@@ -91,6 +91,13 @@ class LabelsModel(QObject):
         return self._label
 
     @property
+    def background(self) -> str:
+        """What gaps are filled with: the label of that class, or the one that was used last."""
+        offered = self._labels.label_set.labels
+        named = (one.name for one in offered if one.gesture_class == "background")
+        return next(named, self._label)
+
+    @property
     def marks(self) -> tuple[Mark, ...]:
         """What has begun and not ended, in the order of beginning."""
         return self._marks
@@ -102,6 +109,13 @@ class LabelsModel(QObject):
     def within(self, start_s: float, end_s: float) -> list[Span]:
         """The spans of which something lies between two times, in order."""
         return [self._labels.spans[row] for row in self._arrays.within(start_s, end_s)]
+
+    def at(self, time_s: float) -> Span | None:
+        """The span at a time: one on the track where new ones come, otherwise the shortest."""
+        arrays = self._arrays
+        rows = np.flatnonzero((arrays.starts_s <= time_s) & (time_s < arrays.ends_s))
+        found = [self._labels.spans[row] for row in rows]
+        return min(found, key=lambda one: (one.track != self._track, one.duration_s), default=None)
 
     def columns(
         self,
@@ -158,6 +172,22 @@ class LabelsModel(QObject):
         if wanted:
             self._track = self._labels.spans[self.selected_rows[0]].track
         self.selection_changed.emit()
+
+    def select_all(self) -> None:
+        """Select every span."""
+        self.select(self._arrays.ids.tolist())
+
+    def select_up_to(self, span: Span) -> None:
+        """Select from what is selected to a span: what lies between in time, on tracks between."""
+        names = [track.name for track in self._labels.tracks]
+        corners = [*self.selected, span]
+        rows = [names.index(one.track) for one in corners]
+        first_s, last_s = min(one.start_s for one in corners), max(one.end_s for one in corners)
+        self.select(
+            one.id
+            for one in self.within(first_s, last_s)
+            if min(rows) <= names.index(one.track) <= max(rows)
+        )
 
     def set_track(self, name: str) -> None:
         """Choose where new spans come."""

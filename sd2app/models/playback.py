@@ -11,7 +11,7 @@ _TICK_MS = 5
 
 
 class PlaybackModel(QObject):
-    """Time, play state, speed and loop.
+    """Time, play state, speed, loop, and the stretch that is played again and again.
 
     The frame on screen follows from elapsed time, so a late frame is dropped
     rather than slowing the clock.
@@ -22,6 +22,7 @@ class PlaybackModel(QObject):
     playing_changed = Signal(bool)
     speed_changed = Signal(float)
     loop_changed = Signal(bool)
+    stretch_changed = Signal()
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -30,6 +31,7 @@ class PlaybackModel(QObject):
         self._frame = 0
         self._speed = 1.0
         self._loop = False
+        self._stretch_s: tuple[float, float] | None = None
         self._origin_s = 0.0
         self._elapsed = QElapsedTimer()
         self._timer = QTimer(self)
@@ -67,9 +69,15 @@ class PlaybackModel(QObject):
         """Whether playing starts again at the end."""
         return self._loop
 
+    @property
+    def stretch_s(self) -> tuple[float, float] | None:
+        """Half-open stretch that is played again and again; seeking beyond it ends that."""
+        return self._stretch_s
+
     def set_timebase(self, timebase: Timebase) -> None:
         """Clock another recording, from its first frame."""
         self.pause()
+        self.set_stretch(None)
         self._timebase = timebase
         self._move_to(timebase.start_s, force=True)
 
@@ -78,10 +86,22 @@ class PlaybackModel(QObject):
         if self.playing or len(self._timebase) < 2:
             return
         if self._frame >= len(self._timebase) - 1:
-            self._move_to(self._timebase.start_s)
+            self._move_to(self._stretch_s[0] if self._stretch_s else self._timebase.start_s)
         self._restart_clock()
         self._timer.start()
         self.playing_changed.emit(True)
+
+    def play_stretch(self, start_s: float, end_s: float) -> None:
+        """Play a stretch from its start, again and again."""
+        self.set_stretch((start_s, end_s))
+        self.seek(start_s)
+        self.play()
+
+    def set_stretch(self, stretch_s: tuple[float, float] | None) -> None:
+        """Play this stretch again and again from now on, or none."""
+        if stretch_s != self._stretch_s:
+            self._stretch_s = stretch_s
+            self.stretch_changed.emit()
 
     def pause(self) -> None:
         """Stop on the frame that is on screen."""
@@ -105,7 +125,13 @@ class PlaybackModel(QObject):
     def seek_frame(self, frame: int) -> None:
         """Show ``frame``, held inside the recording."""
         frame = min(max(frame, 0), len(self._timebase) - 1)
-        self._move_to(self._timebase.time_of(frame))
+        time_s = self._timebase.time_of(frame)
+        # Its first frame may have begun before it.
+        if self._stretch_s is not None and not (
+            self._timebase.frame_at(self._stretch_s[0]) <= frame and time_s < self._stretch_s[1]
+        ):
+            self.set_stretch(None)
+        self._move_to(time_s)
         self._restart_clock()
 
     def step_frames(self, count: int) -> None:
@@ -143,11 +169,11 @@ class PlaybackModel(QObject):
 
     def _tick(self) -> None:
         time_s = self._origin_s + self._elapsed.nsecsElapsed() * 1e-9 * self._speed
-        if time_s < self._timebase.end_s:
+        start_s, end_s = self._stretch_s or (self._timebase.start_s, self._timebase.end_s)
+        if time_s < end_s:
             self._move_to(time_s)
-        elif self._loop:
-            overrun = (time_s - self._timebase.start_s) % self._timebase.duration_s
-            self._move_to(self._timebase.start_s + overrun)
+        elif self._loop or self._stretch_s is not None:
+            self._move_to(start_s + (time_s - start_s) % (end_s - start_s))
             self._restart_clock()
         else:
             self.pause()

@@ -25,9 +25,9 @@ from sd2app.models.visible_span import VisibleSpanModel
 from sd2app.views.label_painting import paint_regions
 from sd2app.views.map_widget import MapWidget, paint_cursor
 from sd2app.views.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, signed_text, ticks
+from sd2app.views.time_wheel import turn_wheel
 
 _HEADER_PX = 24
-_ZOOM_PER_NOTCH = 0.8
 
 
 class HeatmapView(MapWidget):
@@ -319,16 +319,7 @@ class HeatmapView(MapWidget):
 
     def wheelEvent(self, event: QWheelEvent) -> None:
         """Zoom about the pointer, or pan with Shift or a sideways wheel."""
-        delta = event.angleDelta()
-        sideways = delta.x() or (
-            delta.y() if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 0
-        )
-        if sideways:
-            self._span.pan(-sideways / 120.0 * self._span.duration_s * 0.1)
-        elif delta.y():
-            anchor_s = self.scale.time_of(event.position().x())
-            self._span.zoom(_ZOOM_PER_NOTCH ** (delta.y() / 120.0), anchor_s)
-        event.accept()
+        turn_wheel(event, self._span, self.scale)
 
     def _read(self, position: QPointF) -> None:
         if self._track.map is None or not self.plot_rect().contains(position):

@@ -1,60 +1,57 @@
-"""Tracks of labels under the maps: drawn, moved and shortened by hand."""
+"""Tracks of labels under the maps: shown, and drawn, moved and shortened by hand."""
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import Literal
 
 from PySide6.QtCore import QRectF, QSize, Qt, QTimer
-from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPaintEvent
+from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QWheelEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from sd2app.label_dragging import LabelDragging
 from sd2app.label_edits import LabelEdits
 from sd2app.models.display import DisplayModel
 from sd2app.models.label_rows import ROW_PX, LabelRows
 from sd2app.models.labels import LabelsModel
 from sd2app.models.playback import PlaybackModel
+from sd2app.models.span_loop import SpanLoop
 from sd2app.models.visible_span import VisibleSpanModel
+from sd2app.views.label_grip import Grip, grip_at, words
 from sd2app.views.label_painting import lane_box, paint_span, paint_spans
 from sd2app.views.map_widget import paint_cursor
 from sd2app.views.time_axis import GUTTER_PX, MARGIN_PX, TimeScale
-from sd2core.labels.spans import Span
+from sd2app.views.time_wheel import turn_wheel
 
-_EDGE_PX = 5.0
 _ATTRACT_PX = 8.0
 _MOVED_PX = 3.0
 _SCROLL_MS, _SCROLL_SHARE = 30, 0.03
 
 
-class _Grip(NamedTuple):
-    """What the hand took hold of, and where."""
-
-    part: Literal["start", "end", "span", "nothing"]
-    x_px: float
-    track: str
-    span: Span | None = None
-
-
 class LabelTimeline(QWidget):
     """A row per track. Drag an empty place, a span or one of its edges; Alt lets nothing attract.
 
-    A click selects a span and goes to its start, with Ctrl it adds to the selection.
+    With Shift a span is drawn over others, which it cuts. A click selects a span and goes to its
+    start, with Ctrl it adds to the selection, with Shift all up to it; a double click plays it in
+    a loop. A click on the name of a track lets new spans come there.
     """
 
     def __init__(
         self,
         labels: LabelsModel,
         edits: LabelEdits,
+        dragging: LabelDragging,
+        loop: SpanLoop,
         span: VisibleSpanModel,
         playback: PlaybackModel,
         display: DisplayModel,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
-        self._labels, self._edits = labels, edits
+        self._labels, self._edits, self._dragging, self._loop = labels, edits, dragging, loop
         self._span, self._playback, self._display = span, playback, display
-        self._grip: _Grip | None = None
+        self._grip: Grip | None = None
         self._pointer_px = 0.0
-        self._attracted = True
+        self._attracted = self._cutting = False
         self._rows = LabelRows.of(labels.labels.tracks, labels.arrays, labels.marks)
         self._scroll = QTimer(self)
         self._scroll.setInterval(_SCROLL_MS)
@@ -65,8 +62,10 @@ class LabelTimeline(QWidget):
         self.setAccessibleName("Labels")
         for signal in (labels.changed, labels.marks_changed):
             signal.connect(self._follow)
+        dragging.changed.connect(self._let_go)
         for signal in (
             labels.selection_changed,
+            loop.changed,
             span.changed,
             playback.frame_changed,
             display.theme_changed,
@@ -147,48 +146,29 @@ class LabelTimeline(QWidget):
 
     # --- the hand -------------------------------------------------------------------------
 
-    def grip_at(self, x_px: float, y_px: float) -> _Grip | None:
-        """What is under the pointer; edges of what is selected go first."""
-        row = self._rows.row_at(y_px)
-        if row is None or x_px < GUTTER_PX:
-            return None
-        track, scale, arrays = row.name, self.scale, self._labels.arrays
-        reach_s = _EDGE_PX * scale.seconds_per_px
-        time_s = scale.time_of(x_px)
-        lane = row.lane_at(y_px)
-        near = [
-            arrays.spans[one]
-            for one in arrays.within(time_s - reach_s, time_s + reach_s)
-            if arrays.spans[one].track == track and arrays.lanes[one] == lane
-        ]
-        near.sort(key=lambda one: not self._labels.is_selected(one.id))
-        for span in near:
-            # The middle third of a short span is for moving it.
-            edge_s = min(reach_s, span.duration_s / 3)
-            for part, at_s in (("start", span.start_s), ("end", span.end_s)):
-                inside = span.start_s <= time_s < span.end_s
-                if abs(time_s - at_s) <= (edge_s if inside else reach_s):
-                    return _Grip(part, x_px, track, span)  # type: ignore[arg-type]
-        held = next((one for one in near if one.start_s <= time_s < one.end_s), None)
-        return _Grip("nothing" if held is None else "span", x_px, track, held)
+    def grip_at(self, x_px: float, y_px: float) -> Grip | None:
+        """What is under the pointer."""
+        return grip_at(self._labels, self._rows, self.scale, x_px, y_px)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """Take hold."""
         if event.button() == Qt.MouseButton.LeftButton:
             self._grip = self.grip_at(event.position().x(), event.position().y())
+            self._cutting = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         """Show what could be held, or drag what is."""
         x = event.position().x()
         if self._grip is None:
-            self._show_grip(self.grip_at(x, event.position().y()))
+            if not event.buttons():
+                self._show_grip(self.grip_at(x, event.position().y()))
             return
-        if not self._edits.dragging:
-            if abs(x - self._grip.x_px) < _MOVED_PX:
-                return
-            if not self._edits.begin_drag():
-                self._grip = None
-                return
+        if not self._dragging.dragging and (
+            self._grip.part == "name"
+            or abs(x - self._grip.x_px) < _MOVED_PX
+            or not self._dragging.begin_drag()
+        ):
+            return
         self._attracted = not event.modifiers() & Qt.KeyboardModifier.AltModifier
         self._pointer_px = x
         outside = not GUTTER_PX <= x <= self.width() - MARGIN_PX
@@ -200,47 +180,57 @@ class LabelTimeline(QWidget):
         """Let go, or click."""
         self._scroll.stop()
         grip, self._grip = self._grip, None
-        if grip is None:
-            return
-        if self._edits.dragging:
-            self._edits.end_drag()
+        if self._dragging.dragging:
+            self._dragging.end_drag()
+        elif grip is not None:
+            self._click(grip, event.modifiers())
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        """Play a span in a loop."""
+        grip = self.grip_at(event.position().x(), event.position().y())
+        if grip is not None and grip.span is not None:
+            self._loop.play(grip.span)
+        else:
+            self.mousePressEvent(event)
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Zoom about the pointer, or pan."""
+        turn_wheel(event, self._span, self.scale)
+
+    def _click(self, grip: Grip, modifiers: Qt.KeyboardModifier) -> None:
+        if grip.part != "name" and modifiers & Qt.KeyboardModifier.ShiftModifier and grip.span:
+            self._labels.select_up_to(grip.span)
             return
         self._labels.set_track(grip.track)
-        if grip.span is None:
-            self._labels.select(())
-            self._playback.seek(self.scale.time_of(grip.x_px))
-        elif event.modifiers() & Qt.KeyboardModifier.ControlModifier:
+        if grip.span is not None and modifiers & Qt.KeyboardModifier.ControlModifier:
             chosen = {span.id for span in self._labels.selected}
             self._labels.select(chosen ^ {grip.span.id})
-        else:
+        elif grip.span is not None:
             self._edits.go_to(grip.span)
+        elif grip.part != "name":
+            self._labels.select(())
+            self._playback.seek(self.scale.time_of(grip.x_px))
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Escape takes back what the hand does."""
-        if event.key() == Qt.Key.Key_Escape and self._edits.dragging:
+    def _let_go(self) -> None:
+        """What is no longer dragged is no longer held."""
+        if not self._dragging.dragging:
             self._scroll.stop()
             self._grip = None
-            self._edits.cancel_drag()
-            return
-        super().keyPressEvent(event)
 
     def _drag(self) -> None:
         grip = self._grip
         assert grip is not None
         scale = self.scale
         within_s = _ATTRACT_PX * scale.seconds_per_px if self._attracted else 0.0
-        time_s = scale.time_of(self._pointer_px)
-        if grip.span is None:
-            self._edits.drag_new(grip.track, self._pressed_s(grip), time_s, within_s)
+        time_s, pressed_s = scale.time_of(self._pointer_px), scale.time_of(grip.x_px)
+        if grip.span is None or self._cutting:
+            self._dragging.drag_new(grip.track, pressed_s, time_s, within_s, cutting=self._cutting)
         elif grip.part == "span":
-            start_s = grip.span.start_s + time_s - self._pressed_s(grip)
-            self._edits.drag_span(grip.span.id, start_s, within_s)
+            start_s = grip.span.start_s + time_s - pressed_s
+            self._dragging.drag_span(grip.span.id, start_s, within_s)
         else:
             side: Literal["start", "end"] = "start" if grip.part == "start" else "end"
-            self._edits.drag_edge(grip.span.id, side, time_s, within_s)
-
-    def _pressed_s(self, grip: _Grip) -> float:
-        return self.scale.time_of(grip.x_px)
+            self._dragging.drag_edge(grip.span.id, side, time_s, within_s)
 
     def _scroll_on(self) -> None:
         """The hand is beyond the end: the axis moves on, and what is held with it."""
@@ -252,7 +242,7 @@ class LabelTimeline(QWidget):
         self._grip = self._grip._replace(x_px=self._grip.x_px - moved_px)
         self._drag()
 
-    def _show_grip(self, grip: _Grip | None) -> None:
+    def _show_grip(self, grip: Grip | None) -> None:
         shapes = {
             "start": Qt.CursorShape.SizeHorCursor,
             "end": Qt.CursorShape.SizeHorCursor,
@@ -260,11 +250,4 @@ class LabelTimeline(QWidget):
         }
         part = "nothing" if grip is None or self._edits.refusal else grip.part
         self.setCursor(shapes.get(part, Qt.CursorShape.ArrowCursor))
-        held = grip.span if grip is not None else None
-        self.setToolTip("" if held is None else _words(held))
-
-
-def _words(span: Span) -> str:
-    lines = [f"{span.label}: {span.start_s:.3f} to {span.end_s:.3f} s ({span.duration_s:.3f} s)"]
-    lines += [span.note] if span.note else []
-    return "\n".join(lines)
+        self.setToolTip("" if grip is None else words(grip))

@@ -34,7 +34,12 @@ class TimeRuler(QWidget):
         self._playback = playback
         self._display = display
         self.setFixedHeight(24)
-        for signal in (span.changed, playback.frame_changed, display.theme_changed):
+        for signal in (
+            span.changed,
+            playback.frame_changed,
+            playback.stretch_changed,
+            display.theme_changed,
+        ):
             signal.connect(self.update)
 
     @property
@@ -50,6 +55,7 @@ class TimeRuler(QWidget):
     def _paint(self, painter: QPainter) -> None:
         colours, scale = self._display.palette, self.scale
         painter.fillRect(self.rect(), QColor(colours.panel))
+        self._paint_stretch(painter, scale)
         most = max(int(scale.plot_width_px / 80), 1)
         step = tick_step(self._span.duration_s, most)
         decimals = 0 if step >= 1 else (1 if step >= 0.1 else 2)
@@ -64,6 +70,28 @@ class TimeRuler(QWidget):
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(colours.accent))
         painter.drawPolygon([QPointF(x - 5, 0), QPointF(x + 5, 0), QPointF(x, 7)])
+
+    def _paint_stretch(self, painter: QPainter, scale: TimeScale) -> None:
+        """A bracket around what is played again and again."""
+        if self._playback.stretch_s is None:
+            return
+        left, right = (
+            min(max(scale.x_of(time_s), GUTTER_PX - 2.0), self.width() - MARGIN_PX + 2.0)
+            for time_s in self._playback.stretch_s
+        )
+        band = QColor(self._display.palette.accent)
+        band.setAlpha(60)
+        painter.fillRect(QRectF(left, 0, right - left, self.height()), band)
+        painter.setPen(QPen(QColor(self._display.palette.accent), 2))
+        for x, inwards in ((left + 1, 4), (right - 1, -4)):
+            painter.drawPolyline(
+                [
+                    QPointF(x + inwards, 1),
+                    QPointF(x, 1),
+                    QPointF(x, self.height() - 1),
+                    QPointF(x + inwards, self.height() - 1),
+                ]
+            )
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """Seek."""

@@ -11,6 +11,7 @@ from sd2app.views.heatmap import HeatmapView
 from sd2app.views.label_timeline import LabelTimeline
 from sd2app.views.model_menu import ModelButton, ModelMenu
 from sd2app.views.other_timeline import OtherTimeline
+from sd2app.views.region_hand import RegionHand
 from sd2app.views.suggestion_bar import SuggestionBar
 from sd2app.views.timeline import Overview, TimeRuler
 
@@ -48,7 +49,18 @@ class Tracks(QWidget):
         self._offer = ModelButton(c.denoise, models)
         self.synthetic.set_button(self._offer)
         self.denoised.set_button(ModelButton(c.denoise, models))
-        self.labels = LabelTimeline(c.labels, c.label_edits, c.span, c.playback, c.display)
+        hand = c.labels, c.label_dragging, c.span_loop
+        for view in (self.synthetic, self.denoised, self.before, self.real, self.difference):
+            RegionHand(view, *hand)
+        self.labels = LabelTimeline(
+            c.labels,
+            c.label_edits,
+            c.label_dragging,
+            c.span_loop,
+            c.span,
+            c.playback,
+            c.display,
+        )
         self.overview = Overview(c.synthetic, c.span, c.playback, c.display, c.labels)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)

@@ -7,6 +7,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QSlider, QToolButton, QWidget
 
 from sd2app.action_set import ActionSet
 from sd2app.models.playback import PlaybackModel
+from sd2app.models.span_loop import SpanLoop
 from sd2app.views.time_axis import clock_text
 
 _BUTTONS = ("first_frame", "previous_frame", "play", "next_frame", "last_frame", "loop")
@@ -18,11 +19,12 @@ class TransportBar(QWidget):
     def __init__(
         self,
         playback: PlaybackModel,
+        looped: SpanLoop,
         actions: ActionSet,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
-        self._playback = playback
+        self._playback, self._looped = playback, looped
         layout = QHBoxLayout(self)
         layout.setContentsMargins(8, 4, 8, 4)
         layout.setSpacing(4)
@@ -31,6 +33,12 @@ class TransportBar(QWidget):
             button.setDefaultAction(actions[name])
             button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
             layout.addWidget(button)
+        self._stretch = QToolButton(self)
+        self._stretch.setObjectName("outlined")
+        self._stretch.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._stretch.setToolTip("Play on beyond the span (Esc)")
+        self._stretch.clicked.connect(looped.end)
+        layout.addWidget(self._stretch)
         self._time = QLabel(self)
         self._time.setMinimumWidth(self._time.fontMetrics().horizontalAdvance("00:00.000 ") + 8)
         self._frame = QLabel(self)
@@ -57,6 +65,8 @@ class TransportBar(QWidget):
             layout.addWidget(widget)
         playback.frame_changed.connect(self._refresh)
         playback.speed_changed.connect(self._refresh)
+        looped.changed.connect(self._show_stretch)
+        self._show_stretch()
         self._refresh()
 
     def _refresh(self) -> None:
@@ -68,3 +78,12 @@ class TransportBar(QWidget):
         self._time.setText(clock_text(playback.time_s))
         self._frame.setText(f"frame {playback.frame} / {last}")
         self._speed.setText(f"{playback.speed:g}×")
+
+    def _show_stretch(self) -> None:
+        span = self._looped.span
+        self._stretch.setVisible(span is not None)
+        if span is not None:
+            stretch = f"{clock_text(span.start_s)} – {clock_text(span.end_s)}"
+            label = self.fontMetrics().elidedText(span.label, Qt.TextElideMode.ElideRight, 120)
+            self._stretch.setText(f"Looping {label}  {stretch}  ✕")
+            self._stretch.setAccessibleName(f"End the loop of {span.label}, {stretch}")

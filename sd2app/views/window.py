@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from sd2app.context import Context
     from sd2app.dialogs.dialogs import Dialogs
     from sd2app.dialogs.label_files import LabelFileDialogs
+    from sd2app.dialogs.label_tracks import TrackDialogs
     from sd2app.dialogs.training import TrainingDialogs
     from sd2app.models.denoise_library import DenoiserLibrary
     from sd2app.models.ladder import Ladder
@@ -52,6 +53,7 @@ class MainWindow(QMainWindow):
     context: Context
     dialogs: Dialogs
     label_files: LabelFileDialogs
+    track_dialogs: TrackDialogs
     train_dialogs: TrainingDialogs
     side: SidePanel
     labels_panel: LabelsPanel
@@ -130,6 +132,7 @@ class MainWindow(QMainWindow):
         from sd2app.context import build_context
         from sd2app.dialogs.dialogs import Dialogs
         from sd2app.dialogs.label_files import LabelFileDialogs
+        from sd2app.dialogs.label_tracks import TrackDialogs
         from sd2app.views.message_bar import MessageBar
         from sd2app.views.model_menu import ModelMenu
         from sd2app.views.status import StatusLine
@@ -151,6 +154,7 @@ class MainWindow(QMainWindow):
         self.label_files = LabelFileDialogs(
             self, context, self.messages, lambda: self.side.bring_up("Agree")
         )
+        self.track_dialogs = TrackDialogs(self, context, self.messages)
         self._actions = ActionSet(self)
         below = [self._actions[name] for name in ("open_model", "model_card")]
         self._models = ModelMenu(context.denoise, self.dialogs.use_model, below, self)
@@ -160,7 +164,9 @@ class MainWindow(QMainWindow):
         self._column.insertWidget(0, self.messages)
         self._column.insertWidget(1, self._label_bar())
         self._column.insertWidget(2, self._fit_bar())
-        self._column.addWidget(TransportBar(context.playback, self._actions, self))
+        self._column.addWidget(
+            TransportBar(context.playback, context.span_loop, self._actions, self)
+        )
         self._column.addWidget(
             StatusLine(context.pointer, context.jobs, context.trade, context.synthesis, self)
         )
@@ -318,6 +324,8 @@ class MainWindow(QMainWindow):
             c.labels.selection_changed,
             c.labels.marks_changed,
             c.keys.changed,
+            c.label_dragging.changed,
+            c.span_loop.changed,
             c.suggestions.changed,
             c.agreement.changed,
         ):

@@ -48,12 +48,10 @@ def nudge_together(labels: Labels, timebase: Timebase, ids: Collection[int], cou
     count = min(free, key=abs)
     moved = chosen
     if count:
-        moved = [
-            _put(
-                span, *(frames.stepped(at_s, count) for at_s in (span.start_s, span.end_s)), frames
-            )
-            for span in chosen
-        ]
+        moved = []
+        for span in chosen:
+            start_s, end_s = frames.stepped(span.start_s, count), frames.stepped(span.end_s, count)
+            moved.append(_put(span, start_s, end_s, frames))
     return Edit(_name("Nudge", moved), labels.with_spans(moved), tuple(one.id for one in moved))
 
 
@@ -62,7 +60,8 @@ def duplicate_together(
 ) -> Edit:
     """Copy spans, so that the first copy begins at a time; each where there is room for it."""
     chosen = _chosen(labels, ids)
-    after, made = labels, []
+    after = labels
+    made: list[int] = []
     for span in chosen:
         place_s = start_s + span.start_s - chosen[0].start_s
         edit = duplicate(after, timebase, span.id, place_s)
