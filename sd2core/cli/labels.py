@@ -18,6 +18,7 @@ from sd2core.cli.label_reading import (
 )
 from sd2core.cli.labels_agree import add_agree
 from sd2core.cli.labels_figure import add_figure
+from sd2core.cli.labels_recover import add_recover
 from sd2core.cli.labels_statistics import add_statistics, print_statistics, statistics_of
 from sd2core.cli.labels_suggest import add_suggest
 from sd2core.cli.options import add_command, add_json
@@ -87,6 +88,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     add_suggest(kinds)
     add_figure(kinds)
     add_agree(kinds)
+    add_recover(kinds)
 
 
 def _show(options: argparse.Namespace) -> None:
