@@ -64,17 +64,17 @@ def test_another_key_does_it_at_once_and_the_usual_one_nothing(window, dialog, q
     c = window.context
     search(dialog, "next span")
     capture(dialog)
-    press(Qt.Key.Key_J)
-    assert c.keys.keys_of("next_span") == ("J",)
+    press(Qt.Key.Key_H)
+    assert c.keys.keys_of("next_span") == ("H",)
     action = window._actions["next_span"]
-    assert [one.toString() for one in action.shortcuts()] == ["J"]
-    assert action.toolTip().endswith("(J)")
+    assert [one.toString() for one in action.shortcuts()] == ["H"]
+    assert action.toolTip().endswith("(H)")
     dialog.close()
     window.activateWindow()
     qtbot.waitUntil(window.isActiveWindow, timeout=5000)
     qtbot.keyClick(window, Qt.Key.Key_N)
     assert not c.labels.selected
-    qtbot.keyClick(window, Qt.Key.Key_J)
+    qtbot.keyClick(window, Qt.Key.Key_H)
     assert [span.label for span in c.labels.selected] == ["there"]
 
 
@@ -110,8 +110,8 @@ def test_a_shifted_sign_is_the_sign(window, dialog) -> None:
     QTest.keyClick(QApplication.focusWidget(), Qt.Key.Key_Exclam, SHIFT)
     assert window.context.keys.keys_of("next_span") == ("!",)
     capture(dialog)
-    press(Qt.Key.Key_J, SHIFT)
-    assert window.context.keys.keys_of("next_span") == ("Shift+J",)
+    press(Qt.Key.Key_H, SHIFT)
+    assert window.context.keys.keys_of("next_span") == ("Shift+H",)
 
 
 def test_keys_are_added_taken_away_and_given_back(window, dialog) -> None:
@@ -119,8 +119,8 @@ def test_keys_are_added_taken_away_and_given_back(window, dialog) -> None:
     search(dialog, "split span")
     assert not button(dialog, "Reset").isEnabled()
     click(dialog, "Add")
-    press(Qt.Key.Key_J)
-    assert keys.keys_of("split_span") == ("/", "J")
+    press(Qt.Key.Key_H)
+    assert keys.keys_of("split_span") == ("/", "H")
     click(dialog, "Remove")
     assert keys.keys_of("split_span") == ()
     click(dialog, "Reset")
@@ -133,13 +133,13 @@ def test_keys_are_added_taken_away_and_given_back(window, dialog) -> None:
 def test_a_labels_key_is_changed_as_one_step(window, dialog) -> None:
     search(dialog, "left-to-right")
     capture(dialog)
-    press(Qt.Key.Key_J)
+    press(Qt.Key.Key_H)
     labels = window.context.labels
-    assert labels.labels.label_set.find("left-to-right").key == "j"
+    assert labels.labels.label_set.find("left-to-right").key == "h"
     assert window.context.document.undo_stack.undoText() == "Change key of label"
     window.context.document.undo_stack.undo()
     assert labels.labels.label_set.find("left-to-right").key == "1"
-    assert window.context.keys.owner("J") == ""
+    assert window.context.keys.owner("H") == ""
 
 
 def test_what_the_mouse_does_is_listed_and_not_changed(dialog) -> None:
