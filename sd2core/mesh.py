@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -149,6 +149,17 @@ class MeshSequence:
         if not 0 <= start < stop <= self.frame_count:
             raise IndexError(f"frames {start} to {stop} of {self.frame_count}")
         return np.asarray(self.vertices[start:stop])
+
+    def between(self, start: int, stop: int) -> MeshSequence:
+        """Frames ``start`` to ``stop`` (exclusive) in memory, at their times."""
+        known = self.uncertainty
+        return replace(
+            self,
+            vertices=self.read(start, stop),
+            timebase=Timebase(self.times_s[start:stop]),
+            present=None if self.present is None else self.present[start:stop],
+            uncertainty=None if known is None else known.of_frames(slice(start, stop)),
+        )
 
     def frame(self, index: int) -> NDArray[Any]:
         """Vertices of one frame, (V, 3)."""

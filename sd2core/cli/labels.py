@@ -17,6 +17,7 @@ from sd2core.cli.label_reading import (
     write,
 )
 from sd2core.cli.labels_agree import add_agree
+from sd2core.cli.labels_cut import add_cut
 from sd2core.cli.labels_figure import add_figure
 from sd2core.cli.labels_recover import add_recover
 from sd2core.cli.labels_statistics import add_statistics, print_statistics, statistics_of
@@ -87,6 +88,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     add_statistics(kinds)
     add_suggest(kinds)
     add_figure(kinds)
+    add_cut(kinds)
     add_agree(kinds)
     add_recover(kinds)
 

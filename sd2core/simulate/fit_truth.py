@@ -28,11 +28,12 @@ from sd2core.body.track import LANDMARKS
 from sd2core.compare.truth import FORMAT, VERSION, read_truth
 from sd2core.compiled import worker_count, workers
 from sd2core.errors import Sd2Error
+from sd2core.io.video_writing import write_video
 from sd2core.mesh import MeshSequence
 from sd2core.progress import Progress, silent
 from sd2core.simulate.cast import PEOPLE, ROOMS
 from sd2core.simulate.clothing import Clothes
-from sd2core.simulate.encode import write_compact_mesh, write_video
+from sd2core.simulate.encode import write_compact_mesh
 from sd2core.simulate.gestures import GestureSpan, arm_length_m
 from sd2core.simulate.motions import Action, duration_s, perform
 from sd2core.simulate.render import Camera, Renderer

@@ -21,12 +21,13 @@ from sd2core.errors import Sd2Error
 from sd2core.fmcw.options import Reflector, SignalOptions
 from sd2core.fmcw.signal import simulate_capture
 from sd2core.io.radar.infineon import write_capture
+from sd2core.io.video_writing import write_video
 from sd2core.mesh import MeshSequence
 from sd2core.progress import Progress, silent
 from sd2core.recording import SUFFIX, Recording, Span
 from sd2core.scattering.facets import facet_visibility
 from sd2core.sensor import PAPER_RADAR, VirtualSensor
-from sd2core.simulate.encode import write_compact_mesh, write_video
+from sd2core.simulate.encode import write_compact_mesh
 from sd2core.simulate.gestures import DURATION_S, SPANS, swipes
 from sd2core.simulate.render import Camera, Renderer
 from sd2core.timebase import Timebase

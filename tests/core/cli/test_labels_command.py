@@ -285,3 +285,26 @@ def test_a_figure_of_maps_with_labels(sd2: Sd2, moving_recording: Path, tmp_path
         refused = sd2("labels", "figure", moving_recording, "--out", out, "--maps", maps)
         assert refused.code == 1
         assert said in refused.err
+
+
+def test_spans_are_cut_out(sd2: Sd2, moving_recording: Path, tmp_path: Path) -> None:
+    out = tmp_path / "cuts"
+    said = sd2("labels", "cut", moving_recording, "--out", out, "--label", "wave").out
+    assert "1 span cut out" in said
+    (made,) = out.glob("*s_wave_1")
+    assert sorted(path.name for path in made.iterdir()) == [
+        "mesh.zarr",
+        "span.json",
+        "synthetic.npz",
+    ]
+    assert DopplerMap.load(made / "synthetic.npz").values.shape == (32, 10)
+    said = json.loads(sd2("labels", "cut", moving_recording, "--out", out, "--json").out)
+    assert (len(said["written"]), len(said["same"])) == (1, 1)
+    other = ("labels", "cut", moving_recording, "--out", out, "--parts", "mesh")
+    refused = sd2(*other)
+    assert refused.code == 1
+    assert "--replace" in refused.err
+    assert "2 spans cut out" in sd2(*other, "--replace").out
+    assert not (made / "synthetic.npz").exists()
+    refused = sd2("labels", "cut", moving_recording, "--out", out, "--label", "push")
+    assert "up-to-down, wave" in refused.err

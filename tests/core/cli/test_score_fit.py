@@ -98,7 +98,7 @@ def test_real_videos_are_looked_at_too(
     from sd2core.body.camera import PinholeCamera
     from sd2core.body.silhouette import silhouette
     from sd2core.body.track import LandmarkTrack
-    from sd2core.simulate.encode import write_video
+    from sd2core.io.video_writing import write_video
 
     meshes = tmp_path / "meshes"
     meshes.mkdir()

@@ -1,0 +1,253 @@
+"""Spans cut out into folders, each whole or not there at all."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import shutil
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from sd2core.atomic import atomic_write_text
+from sd2core.cutouts.source import FORMAT, CutSource, folder_name
+from sd2core.errors import Sd2Error
+from sd2core.file_lock import FileLock
+from sd2core.io.mesh import save_mesh
+from sd2core.io.video import VideoReader, open_video
+from sd2core.io.video_writing import write_video
+from sd2core.labels.spans import Span
+from sd2core.progress import Progress, silent
+
+State = Literal["new", "same", "other"]
+_DETAILS = "span.json"
+_UNFINISHED = ".sd2-cut-"
+_LOCK = ".sd2-lock"
+_CRF, _PRESET = 16, "fast"
+_COLUMNS = (
+    "folder", "label", "track", "start_s", "end_s", "start_frame", "end_frame", "note", "author",
+    "confidence", "recording", "simulated",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Cut:
+    """A span, and the folder that it becomes.
+
+    Parameters
+    ----------
+    span : Span
+    path : Path
+    state : {"new", "same", "other"}
+        Whether nothing is there, the very same, or something else.
+    """
+
+    span: Span
+    path: Path
+    state: State
+
+
+def plan_cuts(source: CutSource, spans: Iterable[Span], folder: Path) -> list[Cut]:
+    """What cutting out would find in a folder, in the order of time.
+
+    Raises
+    ------
+    Sd2Error
+        When there are no spans, or one has no frame of the recording.
+    """
+    cuts = []
+    for span in sorted(spans, key=lambda one: (one.start_s, one.end_s, one.id)):
+        first, stop = source.frames_of(span)
+        if stop <= first:
+            raise Sd2Error(f"{span.words()} has no frame of {source.title}", "one at least")
+        path = folder / folder_name(span)
+        cuts.append(Cut(span, path, _state(path, source.described(span))))
+    if not cuts:
+        raise Sd2Error("There are no spans to cut out", "one at least")
+    return cuts
+
+
+def cut_out(
+    source: CutSource,
+    cuts: Sequence[Cut],
+    folder: Path,
+    *,
+    replace_others: bool = False,
+    progress: Progress = silent,
+) -> list[Path]:
+    """Write the folders that are not there yet, and an index of all.
+
+    A folder has its name only once it is complete. What is the same is left alone, so that
+    what was stopped goes on where it was.
+
+    Parameters
+    ----------
+    source : CutSource
+    cuts : sequence of Cut
+        Of :func:`plan_cuts`.
+    folder : Path
+        Made where it is not there.
+    replace_others : bool
+        Replace folders of the same name that hold something else; otherwise they stay.
+    progress : Progress
+        In frames; it may raise ``Cancelled``.
+
+    Returns
+    -------
+    list of Path
+        The folders that were written.
+
+    Raises
+    ------
+    Sd2Error
+        When somebody else is writing there.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    lock = FileLock(folder / _LOCK)
+    if not lock.take():
+        raise Sd2Error(f"Somebody is writing to {folder}", "a folder of its own", "Wait for that")
+    try:
+        for left in folder.glob(f"{_UNFINISHED}*"):
+            shutil.rmtree(left, ignore_errors=True)
+        wanted = [
+            one for one in cuts if one.state == "new" or (one.state == "other" and replace_others)
+        ]
+        try:
+            return _write_all(source, wanted, folder, progress)
+        finally:
+            write_index(folder)
+    finally:
+        lock.release()
+
+
+def write_index(folder: Path) -> None:
+    """Write ``index.csv`` and ``index.json`` of all that was cut out into a folder."""
+    entries = []
+    for path in sorted(folder.glob(f"*/{_DETAILS}")):
+        found = _read(path)
+        if found is not None:
+            entries.append({"folder": path.parent.name, **found})
+    if not entries:
+        return
+    table = io.StringIO()
+    writer = csv.writer(table, lineterminator="\n")
+    writer.writerow(_COLUMNS)
+    for one in entries:
+        flat = (
+            one | one["span"] | dict(zip(("start_frame", "end_frame"), one["frames"], strict=True))
+        )
+        writer.writerow(["" if flat[name] is None else flat[name] for name in _COLUMNS])
+    atomic_write_text(folder / "index.csv", table.getvalue())
+    kept = [{key: value for key, value in one.items() if key != "frame_times_s"} for one in entries]
+    content = {"format": f"{FORMAT}-index", "version": 1, "spans": kept}
+    atomic_write_text(
+        folder / "index.json", json.dumps(content, indent=2, ensure_ascii=False) + "\n"
+    )
+
+
+def _write_all(
+    source: CutSource, wanted: Sequence[Cut], folder: Path, progress: Progress
+) -> list[Path]:
+    sizes = [stop - first for first, stop in (source.frames_of(one.span) for one in wanted)]
+    done, total = 0, sum(sizes)
+    progress(0, total)
+    video = open_video(source.video) if source.video is not None and wanted else None
+    try:
+        for one, size in zip(wanted, sizes, strict=True):
+            start = done
+
+            def within(frames: int, _: int, start: int = start) -> None:
+                progress(start + frames, total)
+
+            made = folder / f"{_UNFINISHED}{one.span.id}"
+            made.mkdir()
+            try:
+                _write_one(source, one.span, video, made, within)
+                _put(made, one.path)
+            except BaseException:
+                shutil.rmtree(made, ignore_errors=True)
+                raise
+            done += size
+            progress(done, total)
+    finally:
+        if video is not None:
+            video.close()
+    return [one.path for one in wanted]
+
+
+def _write_one(
+    source: CutSource, span: Span, video: VideoReader | None, made: Path, progress: Progress
+) -> None:
+    zero_s = source.zero_s(span)
+    if video is not None:
+        _write_clip(video, span, zero_s, made / "video.mp4", progress)
+    if source.mesh is not None:
+        start, end = source.mesh.timebase.frames_between(span.start_s, span.end_s)
+        if end > start:
+            mesh = source.mesh.between(start, end)
+            save_mesh(replace(mesh, timebase=mesh.timebase.shifted(-zero_s)), made / "mesh.zarr")
+    label = {"label": span.label, "track": span.track, "start_s": span.start_s, "end_s": span.end_s}
+    for name, doppler in source.maps.items():
+        start, end = doppler.timebase.frames_between(span.start_s, span.end_s)
+        if end > start:
+            part = doppler.between(start, end).shifted(-zero_s)
+            replace(part, meta=part.meta | {"cut_out": label}).save(made / f"{name}.npz")
+    described = source.described(span)
+    described["files"] = [name for name in described["files"] if (made / name).exists()]
+    atomic_write_text(made / _DETAILS, _text(described))
+
+
+def _write_clip(
+    video: VideoReader, span: Span, zero_s: float, path: Path, progress: Progress
+) -> None:
+    first, stop = video.timebase.frames_between(span.start_s, span.end_s)
+    times_s = video.timebase.times_s[first:stop] - zero_s
+    # H.264 halves the colour's resolution: an odd edge is repeated.
+    odd_y, odd_x = video.height % 2, video.width % 2
+
+    def pictures() -> Iterable[np.ndarray]:
+        for number, picture in enumerate(video.frames(first, stop)):
+            progress(number, stop - first)
+            yield np.pad(picture, ((0, odd_y), (0, odd_x), (0, 0)), mode="edge")
+
+    size = video.width + odd_x, video.height + odd_y
+    rate = max(round(video.timebase.frames_per_s), 1)
+    write_video(path, pictures(), rate, size, times_s=times_s, crf=_CRF, preset=_PRESET)
+
+
+def _put(made: Path, path: Path) -> None:
+    """Give a complete folder its name; one that is in the way goes aside first."""
+    if path.exists():
+        aside = made.with_name(f"{made.name}-before")
+        path.rename(aside)
+        made.rename(path)
+        shutil.rmtree(aside, ignore_errors=True)
+    else:
+        made.rename(path)
+
+
+def _state(path: Path, described: dict[str, Any]) -> State:
+    if not path.exists():
+        return "new"
+    found = _read(path / _DETAILS)
+    if found is None or not all((path / name).exists() for name in found["files"]):
+        return "other"
+    known = json.loads(_text(described)) | {"files": found["files"]}
+    return "same" if found == known else "other"
+
+
+def _read(path: Path) -> dict[str, Any] | None:
+    try:
+        found = json.loads(path.read_text("utf-8"))
+    except (OSError, ValueError):
+        return None
+    ours = isinstance(found, dict) and found.get("format") == FORMAT
+    return found if ours and isinstance(found.get("files"), list) else None
+
+
+def _text(described: dict[str, Any]) -> str:
+    return json.dumps(described, indent=2, ensure_ascii=False) + "\n"

@@ -1,0 +1,116 @@
+"""What spans are cut out of, and what each of them is to become."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import sd2core
+from sd2core.errors import Sd2Error
+from sd2core.labels.spans import Span
+from sd2core.mesh import MeshSequence
+from sd2core.spectrum import DopplerMap
+from sd2core.timebase import Timebase
+
+Part = Literal["video", "mesh", "maps"]
+PARTS: tuple[Part, ...] = ("video", "mesh", "maps")
+FORMAT, VERSION = "sd2-cut-out", 1
+
+_LONGEST_SLUG = 40
+
+
+@dataclass(frozen=True, eq=False)
+class CutSource:
+    """A recording with its parts at hand.
+
+    Parameters
+    ----------
+    title : str
+    simulated : bool
+    timebase : Timebase
+        The recording's clock.
+    video : Path, optional
+    mesh : MeshSequence, optional
+    maps : dict of str to DopplerMap
+        On the recording's clock, by the name of their file.
+    sensor_position_m : tuple of float
+    """
+
+    title: str
+    simulated: bool
+    timebase: Timebase
+    video: Path | None = None
+    mesh: MeshSequence | None = None
+    maps: Mapping[str, DopplerMap] = field(default_factory=dict)
+    sensor_position_m: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.video is None and self.mesh is None and not self.maps:
+            raise Sd2Error(f"{self.title} has nothing to cut out", "a video, a mesh or a map")
+
+    def only(self, parts: Iterable[Part]) -> CutSource:
+        """The same with some of its parts."""
+        kept = {*parts}
+        return CutSource(
+            self.title,
+            self.simulated,
+            self.timebase,
+            self.video if "video" in kept else None,
+            self.mesh if "mesh" in kept else None,
+            self.maps if "maps" in kept else {},
+            self.sensor_position_m,
+        )
+
+    def frames_of(self, span: Span) -> tuple[int, int]:
+        """Frames of the recording that are on screen during a span, half-open."""
+        return self.timebase.frames_between(span.start_s, span.end_s)
+
+    def zero_s(self, span: Span) -> float:
+        """When the first frame of a span appears: 0 s in what is cut out."""
+        return self.timebase.time_of(self.frames_of(span)[0])
+
+    def files(self) -> list[str]:
+        """What a folder of a span holds besides ``span.json``."""
+        files = ["video.mp4"] if self.video is not None else []
+        files += ["mesh.zarr"] if self.mesh is not None else []
+        return files + [f"{name}.npz" for name in self.maps]
+
+    def described(self, span: Span) -> dict[str, Any]:
+        """What ``span.json`` says; the same source and span give the same."""
+        first, stop = self.frames_of(span)
+        return {
+            "format": FORMAT,
+            "version": VERSION,
+            "program": f"SD² Studio {sd2core.__version__}",
+            "span": asdict(span),
+            "frames": [first, stop],
+            "zero_s": self.zero_s(span),
+            "frame_times_s": (self.timebase.times_s[first:stop] - self.zero_s(span)).tolist(),
+            "recording": self.title,
+            "simulated": self.simulated,
+            "sensor_position_m": list(self.sensor_position_m),
+            "files": self.files(),
+            "sources": {
+                "video": _file_words(self.video),
+                "mesh": None if self.mesh is None else self.mesh.source,
+                "maps": {
+                    name: {"kind": one.kind, "unit": one.unit, "provenance": one.meta}
+                    for name, one in self.maps.items()
+                },
+            },
+        }
+
+
+def folder_name(span: Span) -> str:
+    """Sorts by time, can be read, and is the span's own: ``00001.600s left-to-right 7``."""
+    slug = re.sub(r"[^\w.-]+", "-", span.label)[:_LONGEST_SLUG].strip("-.") or "label"
+    return f"{span.start_s:09.3f}s_{slug}_{span.id}"
+
+
+def _file_words(path: Path | None) -> dict[str, Any] | None:
+    if path is None:
+        return None
+    return {"name": path.name, "bytes": path.stat().st_size}

@@ -1,0 +1,80 @@
+"""Pictures to a video file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+
+_TICKS_PER_S = 90_000
+"""Of videos with times of their own: 11 microseconds, which every player knows."""
+
+
+def write_video(
+    path: Path,
+    frames: Iterable[NDArray[np.uint8]],
+    frames_per_s: int,
+    size: tuple[int, int],
+    *,
+    times_s: NDArray[np.float64] | None = None,
+    crf: int = 21,
+    preset: str = "slow",
+) -> None:
+    """Encode sRGB pictures as H.264 in MP4.
+
+    Parameters
+    ----------
+    path : Path
+    frames : iterable of uint8 arrays, shape (height, width, 3)
+    frames_per_s : int
+        Frame k is shown at ``k / frames_per_s`` unless times are given.
+    size : (int, int)
+        Width and height, both even.
+    times_s : float64 array, shape (frames,), optional
+        When each frame is shown; the first at 0 s.
+    crf : int
+        What x264 calls constant rate factor: less is better, 18 is hard to tell from the source.
+    preset : str
+        How long x264 may look for a shorter file.
+
+    Raises
+    ------
+    Sd2Error
+        When this build of PyAV has no H.264 encoder.
+    """
+    import av
+
+    try:
+        av.Codec("libx264", "w")
+    except ValueError as error:
+        raise Sd2Error(
+            "This build of PyAV cannot encode H.264 (libx264)",
+            "the wheels of PyAV from the package index",
+            "Install it again with: pip install --force-reinstall av",
+        ) from error
+    ticks = frames_per_s if times_s is None else _TICKS_PER_S
+    with av.open(str(path), "w", options={"movflags": "+faststart"}) as container:
+        stream = container.add_stream("libx264", rate=frames_per_s)
+        stream.width, stream.height = size
+        stream.pix_fmt = "yuv420p"
+        # A key frame every half second: scrubbing decodes few frames.
+        stream.options = {
+            "preset": preset,
+            "crf": str(crf),
+            "g": str(max(frames_per_s // 2, 1)),
+            "threads": "1",
+        }
+        stream.codec_context.time_base = Fraction(1, ticks)
+        for number, picture in enumerate(frames):
+            frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
+            # Without this, players guess the matrix from the picture's size.
+            frame = frame.reformat(format="yuv420p", dst_colorspace="ITU601")
+            frame.pts = number if times_s is None else round(float(times_s[number]) * ticks)
+            frame.time_base = Fraction(1, ticks)
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))
