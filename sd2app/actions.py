@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from sd2app.action import (
     Action,
-    disagree,
     has_content,
     has_mesh,
     has_spans,
-    has_suggestions,
     one_selected,
     some_selected,
 )
 from sd2app.actions_by_hand import MARKING, SPANS, TRACKS
+from sd2app.actions_of_labels import COMPARING, LABEL_FILES, SUGGESTIONS
 
 MOUSE = (
     ("Click or drag in a heatmap or the ruler", "Go to that time"),
@@ -347,43 +346,8 @@ ACTIONS: tuple[Action, ...] = (
         lambda w: w.context.label_edits.step(-1), has_spans,
     ),
     *TRACKS,
-    Action(
-        "suggest", "Labels", "Suggest spans", ("F",),
-        "Find where something moves in a map; each suggestion is then accepted or rejected",
-        lambda w: w.context.suggestions.start(),
-        lambda c: c.suggestions.source is not None, separator_before=True, edits_labels=True,
-    ),
-    Action(
-        "accept_suggestion", "Labels", "Accept suggestion", ("Y",),
-        "Take the one that is selected, or the next; a label's own key takes it as that",
-        lambda w: w.context.suggestions.accept(), has_suggestions, edits_labels=True,
-    ),
-    Action(
-        "reject_suggestion", "Labels", "Reject suggestion", ("W",),
-        "Let the one that is selected go, or the next; it is not suggested again",
-        lambda w: w.context.suggestions.reject(), has_suggestions, edits_labels=True,
-    ),
-    Action(
-        "accept_suggestions", "Labels", "Accept all suggestions", ("Shift+Y",),
-        "Take all that there is room for",
-        lambda w: w.context.suggestions.accept_all(), has_suggestions, edits_labels=True,
-    ),
-    Action(
-        "reject_suggestions", "Labels", "Reject all suggestions", ("Shift+W",),
-        "Let all go; they are not suggested again",
-        lambda w: w.context.suggestions.reject_all(), has_suggestions, edits_labels=True,
-    ),
-    Action(
-        "import_labels", "Labels", "Import labels…", ("Ctrl+I",),
-        "Take the labels of a file: SD² Studio, table, Audacity, ELAN, Praat, BORIS, MNE",
-        lambda w: w.label_files.import_labels(), has_content, separator_before=True,
-        edits_labels=True,
-    ),
-    Action(
-        "export_labels", "Labels", "Export labels…", ("Ctrl+Shift+I",),
-        "Write the labels for another program, and say what its file cannot hold",
-        lambda w: w.label_files.export_labels(), has_content,
-    ),
+    *SUGGESTIONS,
+    *LABEL_FILES,
     Action(
         "restore_labels", "Labels", "Restore labels that were not saved", (),
         "Take over what an earlier session left behind; one undo takes that back",
@@ -400,26 +364,7 @@ ACTIONS: tuple[Action, ...] = (
         "Search the table of spans for a label, a note or a track",
         lambda w: w.show_labels(find=True), has_content,
     ),
-    Action(
-        "compare_labels", "Labels", "Compare with another's labels…", ("Ctrl+K",),
-        "Show how far another person's labels agree with these, and where they do not",
-        lambda w: w.label_files.compare_labels(), has_content, separator_before=True,
-    ),
-    Action(
-        "next_disagreement", "Labels", "Next disagreement", ("Shift+N",),
-        "Go to where the labels differ next",
-        lambda w: w.context.agreement.step(1), disagree,
-    ),
-    Action(
-        "previous_disagreement", "Labels", "Previous disagreement", ("Shift+P",),
-        "Go to where the labels differ before",
-        lambda w: w.context.agreement.step(-1), disagree,
-    ),
-    Action(
-        "end_comparison", "Labels", "End the comparison of labels", (),
-        "Take the other's labels away",
-        lambda w: w.context.agreement.clear(), lambda c: c.agreement.active,
-    ),
+    *COMPARING,
     Action(
         "open_model", "Model", "Open model file…", (),
         "Denoise this recording with a model of your own (.safetensors)",

@@ -16,6 +16,7 @@ from sd2app.label_marking import LabelMarking
 from sd2app.label_tracks import LabelTracks
 from sd2app.models.agreement import AgreementModel
 from sd2app.models.content import reference_of
+from sd2app.models.cut_out import CutOutModel
 from sd2app.models.denoise import DenoiseModel
 from sd2app.models.denoise_library import DenoiserLibrary, core_library
 from sd2app.models.denoise_live import LiveDenoiseModel
@@ -82,6 +83,7 @@ class Context:
     label_edits: LabelEdits
     suggestions: SuggestionsModel
     agreement: AgreementModel
+    cut_out: CutOutModel
     label_dragging: LabelDragging
     label_marking: LabelMarking
     label_tracks: LabelTracks
@@ -110,6 +112,7 @@ class Context:
         self.playback.pause()
         self.suggestions.close()
         self.agreement.close()
+        self.cut_out.close()
         self.fit.close()
         self.training_use.close()
         self.training.close()
@@ -202,6 +205,9 @@ def build_context(
             parent,
         ),
         agreement=AgreementModel(labels, playback, span, parent),
+        cut_out=CutOutModel(
+            document, {"synthetic": synthetic, "denoised": denoised, "radar": real}, jobs, parent
+        ),
         label_dragging=LabelDragging(labels, playback, label_edits, parent),
         label_marking=LabelMarking(labels, playback, reaction, label_edits, parent),
         label_tracks=LabelTracks(labels, label_edits),

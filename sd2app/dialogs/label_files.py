@@ -7,10 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QTimer
-from PySide6.QtWidgets import QDialog, QFileDialog, QWidget
+from PySide6.QtWidgets import QDialog, QFileDialog, QMessageBox, QWidget
 
+from sd2app.dialogs.cut_out import CutOutDialog
 from sd2app.dialogs.label_export import LabelExportDialog
 from sd2app.dialogs.label_import import LabelImportDialog
+from sd2app.models.cut_out import groups
 from sd2app.models.label_export import LabelExportModel
 from sd2app.models.label_import import LABEL_SUFFIXES, LabelImportModel, is_label_file
 from sd2core.labels.taking_in import take_in
@@ -35,6 +37,9 @@ class LabelFileDialogs:
     ) -> None:
         self._parent, self._context, self._messages = parent, context, messages
         self._show_agreement = show_agreement
+        context.cut_out.asked.connect(self.decide_on_others)
+        context.cut_out.noted.connect(messages.note)
+        context.cut_out.failed.connect(messages.warn)
 
     def take_dropped(self, path: Path) -> bool:
         """Import a file of labels once the drop is over; False where it is none."""
@@ -89,3 +94,40 @@ class LabelFileDialogs:
         if name:
             self._context.agreement.open(Path(name))
             self._show_agreement()
+
+    def cut_out(self) -> None:
+        """Ask which spans, what of them and where to, and cut them out in the background."""
+        c = self._context
+        source = c.cut_out.source()
+        offered = groups(c.labels.labels, c.labels.selected)
+        if source is None or not offered[-1][1]:
+            return
+        dialog = CutOutDialog(offered, source, self._parent)
+        accepted = dialog.exec() == QDialog.DialogCode.Accepted
+        spans, parts = dialog.spans, dialog.parts
+        dialog.deleteLater()
+        if not accepted:
+            return
+        folder = QFileDialog.getExistingDirectory(self._parent, "Folder for the cut-outs")
+        if folder:
+            c.cut_out.start(spans, parts, Path(folder))
+
+    def decide_on_others(self, count: int, example: str) -> None:
+        """Folders hold something else: ask what becomes of them."""
+        buttons = QMessageBox.StandardButton
+        box = QMessageBox(self._parent)
+        box.setWindowTitle("Replace cut-outs?")
+        box.setText(
+            f"{count} folder{'s' * (count != 1)} of the same name hold something else, such as"
+            f" {example}."
+        )
+        replace = box.addButton("Replace", QMessageBox.ButtonRole.DestructiveRole)
+        keep = box.addButton("Keep them", QMessageBox.ButtonRole.AcceptRole)
+        box.addButton(buttons.Cancel)
+        box.setDefaultButton(keep)
+        box.exec()
+        if box.clickedButton() in (replace, keep):
+            self._context.cut_out.go_on(replace_others=box.clickedButton() is replace)
+        else:
+            self._context.cut_out.give_up()
+        box.deleteLater()
