@@ -12,6 +12,7 @@ from PySide6.QtGui import (
     QPainter,
     QPaintEvent,
     QPen,
+    QPixmap,
     QWheelEvent,
 )
 from PySide6.QtWidgets import QSizePolicy, QWidget
@@ -64,30 +65,38 @@ class HeatmapView(MapWidget):
         self._button: QWidget | None = None
         self.setMinimumHeight(96)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self._still: QPixmap | None = None
+        self._room_px = 0
         span.changed.connect(self.invalidate)
-        for signal in (
-            track.status_changed,
-            playback.frame_changed,
-            pointer.changed,
-            labels.changed,
-            labels.selection_changed,
-        ):
+        for signal in (track.status_changed, labels.changed, labels.selection_changed):
+            signal.connect(self.redraw)
+        for signal in (playback.frame_changed, pointer.changed):
             signal.connect(self.update)
 
     def sizeHint(self) -> QSize:
         """Room for 32 bins of 5 pixels."""
         return QSize(640, _HEADER_PX + 160)
 
+    def invalidate(self) -> None:
+        """Draw the map anew, and all that is around it."""
+        self._still = None
+        super().invalidate()
+
+    def redraw(self) -> None:
+        """Draw what is on the map and around it anew."""
+        self._still = None
+        self.update()
+
     def set_hint(self, hint: str) -> None:
         """What to say while there is no map."""
         self._hint = hint
-        self.update()
+        self.redraw()
 
     def set_button(self, button: QWidget) -> None:
         """Put a button beside the title."""
         self._button = button
         button.setParent(self)
-        self.update()
+        self.redraw()
 
     def title(self) -> str:
         """What is shown."""
@@ -139,9 +148,18 @@ class HeatmapView(MapWidget):
     # --- painting -------------------------------------------------------------------------
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Header, map, marked bins, axis, cursor."""
+        """Header, map, marked bins, axis, labels; over what is kept of them, the cursors."""
+        if self._still is None or self._button_px != self._room_px:
+            ratio = self.devicePixelRatioF()
+            self._still = QPixmap(self.size() * ratio)
+            self._still.setDevicePixelRatio(ratio)
+            with QPainter(self._still) as painter:
+                painter.setFont(self.font())
+                self._paint(painter)
         with QPainter(self) as painter:
-            self._paint(painter)
+            painter.drawPixmap(0, 0, self._still)
+            if self._track.map is not None:
+                self._paint_cursors(painter, self.plot_rect())
 
     def _paint(self, painter: QPainter) -> None:
         colours = self._display.palette
@@ -157,7 +175,6 @@ class HeatmapView(MapWidget):
         self.paint_gaps(painter, plot, self.scale)
         paint_regions(painter, plot, self.scale, self._labels)
         self._paint_axis(painter, plot)
-        self._paint_cursors(painter, plot)
 
     def _paint_header(self, painter: QPainter) -> None:
         colours = self._display.palette
@@ -181,14 +198,22 @@ class HeatmapView(MapWidget):
             QRectF(left, 0, self.width(), _HEADER_PX), centred | Qt.AlignmentFlag.AlignLeft, status
         )
 
-    def _place_button(self, left: int) -> int:
-        """Room that the button takes."""
+    @property
+    def _button_px(self) -> int:
+        """Room that the button wants."""
         if self._button is None or self._button.isHidden():
             return 0
-        size = self._button.sizeHint()
-        height = min(size.height(), _HEADER_PX - 2)
-        self._button.setGeometry(left - 4, (_HEADER_PX - height) // 2, size.width(), height)
-        return size.width() + 4
+        return self._button.sizeHint().width() + 4
+
+    def _place_button(self, left: int) -> int:
+        """Room that the button takes."""
+        self._room_px = self._button_px
+        if self._room_px:
+            assert self._button is not None
+            size = self._button.sizeHint()
+            height = min(size.height(), _HEADER_PX - 2)
+            self._button.setGeometry(left - 4, (_HEADER_PX - height) // 2, size.width(), height)
+        return self._room_px
 
     def _paint_corner(self, painter: QPainter, box: QRectF, left: float) -> float:
         """What stands on the right of the header; returns its width."""

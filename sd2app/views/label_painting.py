@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtCore import QLineF, QRectF, Qt
 from PySide6.QtGui import QBrush, QColor, QImage, QPainter, QPen
 
@@ -16,9 +19,8 @@ from sd2core.labels.spans import Span
 _TINT, _SELECTED_TINT = 64, 136
 _NARROW_TINTS = 90, 255
 """Of columns that narrow spans hold hardly and wholly."""
-_REGION_TINT, _SELECTED_REGION_TINT = 16, 52
+_REGION_TINT, _SELECTED_REGION_TINT = 18, 54
 """Faint: a map's colours are read as levels."""
-_NARROW_REGION_TINTS = 8, 40
 _OVERVIEW_TINTS = 130, 255
 _TEXT_FROM_PX = 26.0
 _INSET_PX = 1.0
@@ -115,22 +117,19 @@ def _text(span: Span) -> str:
 
 
 def paint_regions(painter: QPainter, plot: QRectF, scale: TimeScale, model: LabelsModel) -> None:
-    """The spans as stretches of a map: the edges of all, and the selected ones tinted."""
-    columns = columns_in(painter, plot, scale, model, together=True)
+    """The spans as stretches of a map: tinted, the selected ones more, with edges where wide."""
+    columns = columns_in(painter, plot, scale, model, together=True, wide_px=math.inf)
     arrays = model.arrays
+    tints = np.where(columns.selected, _SELECTED_REGION_TINT, _REGION_TINT) * columns.share
     painter.save()
     painter.setClipRect(plot)
-    if columns.share.any():
-        painter.drawImage(plot, _tinted(columns, arrays.colours, _NARROW_REGION_TINTS))
+    painter.drawImage(plot, _coloured(columns, arrays.colours, tints))
     edges: dict[tuple[int, bool], list[QLineF]] = {}
-    for number in columns.wide.tolist():
+    for number in columns_in(painter, plot, scale, model).wide.tolist():
         span, tone = arrays.spans[number], int(arrays.tones[number])
-        left, right = scale.x_of(span.start_s), scale.x_of(span.end_s)
-        tint = QColor(arrays.colours[tone])
-        tint.setAlpha(_SELECTED_REGION_TINT if model.is_selected(span.id) else _REGION_TINT)
-        painter.fillRect(QRectF(left, plot.top(), right - left, plot.height()), tint)
         lines = edges.setdefault((tone, span.origin == "suggestion"), [])
-        lines += [QLineF(x, plot.top(), x, plot.bottom()) for x in (left, right)]
+        for x in (scale.x_of(span.start_s), scale.x_of(span.end_s)):
+            lines.append(QLineF(x, plot.top(), x, plot.bottom()))
     for (tone, suggested), lines in edges.items():
         style = Qt.PenStyle.DashLine if suggested else Qt.PenStyle.SolidLine
         painter.setPen(QPen(QColor(arrays.colours[tone]), 1.0, style))
@@ -140,7 +139,7 @@ def paint_regions(painter: QPainter, plot: QRectF, scale: TimeScale, model: Labe
 
 def paint_strip(painter: QPainter, strip: QRectF, scale: TimeScale, model: LabelsModel) -> None:
     """All spans of all tracks in one line."""
-    columns = columns_in(painter, strip, scale, model, together=True, wide_px=np.inf)
+    columns = columns_in(painter, strip, scale, model, together=True, wide_px=math.inf)
     painter.drawImage(strip, _tinted(columns, model.arrays.colours, _OVERVIEW_TINTS))
 
 
@@ -161,10 +160,16 @@ def columns_in(
 
 def _tinted(columns: SpanColumns, colours: tuple[str, ...], tints: tuple[int, int]) -> QImage:
     """A line per lane: the colour that holds most, the stronger the more is held."""
-    table = np.array([QColor(colour).rgb() & 0xFFFFFF for colour in colours], np.uint32)
     low, high = tints
-    alphas = np.where(columns.share > 0, low + (high - low) * columns.share, 0).astype(np.uint32)
-    return _image(table[columns.tone] | (alphas << np.uint32(24)))
+    alphas = np.where(columns.share > 0, low + (high - low) * columns.share, 0)
+    return _coloured(columns, colours, alphas)
+
+
+def _coloured(
+    columns: SpanColumns, colours: tuple[str, ...], alphas: NDArray[np.floating]
+) -> QImage:
+    table = np.array([QColor(colour).rgb() & 0xFFFFFF for colour in colours], np.uint32)
+    return _image(table[columns.tone] | (alphas.astype(np.uint32) << np.uint32(24)))
 
 
 def _marked(columns: SpanColumns, palette: Palette) -> QImage:
@@ -172,7 +177,7 @@ def _marked(columns: SpanColumns, palette: Palette) -> QImage:
     return _image(np.where(columns.selected, QColor(palette.text).rgb(), 0).astype(np.uint32))
 
 
-def _image(pixels: np.ndarray) -> QImage:
+def _image(pixels: NDArray[np.uint32]) -> QImage:
     height, width = pixels.shape
     pixels = np.ascontiguousarray(pixels)
     made = QImage(pixels.data, width, height, 4 * width, QImage.Format.Format_ARGB32)
