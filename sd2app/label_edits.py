@@ -143,6 +143,7 @@ class LabelEdits(QObject):
         recording = self._document.recording
         if recording is None or self._session.offer is None or self.refused():
             return
+        self.applying.emit()
         before = self._labels.labels
         recording.labels = self._session.take_offer()  # on disk already, as a session of its own
         self._labels.set_labels(recording.labels)

@@ -8,6 +8,8 @@ import os
 import subprocess
 import sys
 
+import h5py
+import numpy as np
 import pytest
 from answering import answer, once_asked
 from PySide6.QtCore import QPoint, Qt
@@ -316,3 +318,29 @@ class TestReadOnly:
         assert bar(window).text.endswith("1 span removed.")
         press(window, qtbot, "Restore")
         assert spans(window) == [BACK]
+
+
+class TestLabelsOfARadarFile:
+    def test_go_with_its_offset_until_they_are_edited(
+        self, on, qtbot, small_recording, tmp_path
+    ) -> None:
+        values = np.zeros((2, 32, 32, 10), np.float16)
+        values[0, 3, 20] = 2.0
+        with h5py.File(tmp_path / "swing.h5", "w") as file:
+            file["DS1"] = values
+            file["LABEL"] = np.isin(np.arange(10), (2, 3)).astype(np.uint16)[:, None]
+        window = on(small_recording / "video.mp4")
+        with qtbot.waitSignal(window.context.document.opened, timeout=20_000):
+            window.context.document.add([tmp_path / "swing.h5"])
+        labels, edits = window.context.labels, window.context.edits
+        (before,) = labels.labels.spans
+        edits.set_radar_offset(0.5)
+        (after,) = labels.labels.spans
+        assert after.start_s == pytest.approx(before.start_s + 0.5)
+        window.context.document.undo_stack.undo()
+        assert labels.labels.spans == (before,)
+        window.context.label_edits.step(1)
+        qtbot.keyClick(window, Qt.Key.Key_Backspace)
+        assert labels.labels.spans == ()
+        edits.set_radar_offset(0.5)
+        assert labels.labels.spans == ()
