@@ -11,12 +11,16 @@ import numpy as np
 import pytest
 from labelled import even, imported, random_edit
 
+from sd2app.label_dragging import LabelDragging
 from sd2app.label_edits import LabelEdits
+from sd2app.label_marking import LabelMarking
 from sd2app.models.document import DocumentModel
 from sd2app.models.jobs import JobsModel
 from sd2app.models.label_session import LabelSession
 from sd2app.models.labels import LabelsModel
 from sd2app.models.playback import PlaybackModel
+from sd2app.models.reaction import ReactionModel
+from sd2app.settings import Settings
 from sd2core.labels import edits as core_edits
 from sd2core.labels.files import read_labels, write_labels
 from sd2core.labels.recovery import RecoveryPlace, offers_in
@@ -33,6 +37,10 @@ class Desk:
         self.labels, self.playback = LabelsModel(), PlaybackModel()
         self.session = LabelSession(self.document, self.labels, root)
         self.edits = LabelEdits(self.document, self.labels, self.playback, self.session)
+        self.marking = LabelMarking(
+            self.labels, self.playback, ReactionModel(Settings.forgetful()), self.edits
+        )
+        self.hand = LabelDragging(self.labels, self.playback, self.edits)
         self.said: list[str] = []
         for signal in (self.session.failed, self.session.noted, self.edits.failed):
             signal.connect(self.said.append)
@@ -51,7 +59,7 @@ class Desk:
         """Mark frames from the first to the one before ``stop`` by key."""
         for frame in (first, stop):
             self.playback.seek_frame(frame)
-            self.edits.mark(label)
+            self.marking.mark(label)
 
     def edit(self, rng: random.Random) -> bool:
         return self.edits.apply(lambda labels, base: random_edit(labels, base, rng))
@@ -138,12 +146,12 @@ class TestEveryEdit:
         at = desk().open(recording)
         at.mark(10, 20)
         size = [path.stat().st_size for path in root.rglob("*.journal")]
-        assert at.edits.begin_drag()
+        assert at.hand.begin_drag()
         span = at.labels.labels.spans[0]
         for to_s in (0.8, 0.9, 1.0):
-            at.edits.drag_edge(span.id, "end", to_s, 0.0)
+            at.hand.drag_edge(span.id, "end", to_s, 0.0)
             assert [path.stat().st_size for path in root.rglob("*.journal")] == size
-        at.edits.end_drag()
+        at.hand.end_drag()
         (offer,) = left(root)
         assert (offer.edits, offer.last) == (2, "Move end of span")
         assert offer.labels == at.labels.labels
@@ -388,16 +396,16 @@ class TestTwoWindows:
         assert f"(process {os.getpid()})" in second.session.refusal
         second.playback.seek_frame(5)
         for refused in (
-            lambda: second.edits.mark("left-to-right"),
+            lambda: second.marking.mark("left-to-right"),
             lambda: second.edits.apply(lambda labels, base: random_edit(labels, base, None)),
-            second.edits.begin_drag,
+            second.hand.begin_drag,
         ):
             second.said.clear()
             assert not refused()
             assert second.said == [second.session.refusal]
         assert second.spans == []
         assert not second.labels.marks
-        assert not second.edits.dragging
+        assert not second.hand.dragging
         first.document.save()
         # The sensor, say, can be saved; the labels of the first stay.
         second.document.save()
@@ -429,14 +437,14 @@ class TestTwoWindows:
         first.session.close()
         second.session.try_again()
         assert "labels.json" in second.session.refusal
-        assert not second.edits.begin_drag()
+        assert not second.hand.begin_drag()
         second.document.save()
         assert (recording / "labels.json").read_text() == "{"
 
     def test_nothing_is_edited_where_nothing_is_open(self, desk) -> None:
         at = desk()
-        at.edits.mark("left-to-right")
-        assert not at.edits.begin_drag()
+        at.marking.mark("left-to-right")
+        assert not at.hand.begin_drag()
         assert not at.session.read_only
         assert set(at.said) == {at.session.refusal}
 
