@@ -362,7 +362,12 @@ ACTIONS: tuple[Action, ...] = (
     Action(
         "find_spans", "Labels", "Find spans…", ("Ctrl+F",),
         "Search the table of spans for a label, a note or a track",
-        lambda w: w.show_labels(find=True), has_content,
+        lambda w: w.show_labels("search"), has_content,
+    ),
+    Action(
+        "label_set", "Labels", "Label set…", ("Ctrl+L",),
+        "Names, keys, colours and classes of the labels, to be edited and shared",
+        lambda w: w.show_labels("label set"),
     ),
     *COMPARING,
     Action(

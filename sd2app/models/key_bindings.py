@@ -140,6 +140,16 @@ class KeyBindings(QObject):
         if owner := self.owner(key, besides):
             raise Sd2Error(f"{shown} belongs to {owner}", f"a key for {what} that nobody has")
 
+    def for_label(self, name: str, key: str) -> str:
+        """The key that a label is to get, as labels have it; errors are those of :meth:`bind`."""
+        label, key = self._labels.labels.label_set.find(name), canonical(key)
+        if label is not None and label.key and canonical(label.key) == key:
+            return label.key
+        if len(key) > 1:
+            raise Sd2Error(f"{native(key)} was to mark “{name}”", "one character, without Ctrl")
+        self.check(key, f"the label “{name}”")
+        return key.lower()
+
     def reset(self, action_id: str) -> None:
         """Give an action its usual keys back; errors are those of :meth:`bind`."""
         self.bind(action_id, self._usual(action_id))

@@ -12,7 +12,6 @@ from PySide6.QtGui import QFont
 from sd2app.models.key_bindings import KeyBindings, canonical, native
 from sd2app.models.labels import LabelsModel
 from sd2app.models.span_columns import Change
-from sd2core.errors import Sd2Error
 from sd2core.labels.label_set_edits import set_key
 
 Index = QModelIndex | QPersistentModelIndex
@@ -91,12 +90,13 @@ class KeyListModel(QAbstractTableModel):
         Sd2Error
             When the key is somebody else's, or cannot be one.
         """
-        at, key = self._rows[row], canonical(key)
+        at = self._rows[row]
         if at.action:
             kept = self._bindings.keys_of(at.action) if besides else ()
             self._bindings.bind(at.action, (*kept, key))
         elif at.label:
-            self._change_label(at.label, key)
+            wanted = self._bindings.for_label(at.label, key)
+            self._apply(lambda labels, _: set_key(labels, at.label, wanted))
 
     def clear(self, row: int) -> None:
         """Take all keys of a row away."""
@@ -110,15 +110,6 @@ class KeyListModel(QAbstractTableModel):
         """Give a row its usual keys back; errors are those of :meth:`change`."""
         if action := self._rows[row].action:
             self._bindings.reset(action)
-
-    def _change_label(self, name: str, key: str) -> None:
-        label = self._labels.labels.label_set.find(name)
-        if label is None or canonical(label.key) == key:
-            return
-        if len(key) > 1:
-            raise Sd2Error(f"{native(key)} was to mark “{name}”", "one character, without Ctrl")
-        self._bindings.check(key, f"the label “{name}”")
-        self._apply(lambda labels, _: set_key(labels, name, key.lower()))
 
     # --- the list -------------------------------------------------------------------------
 

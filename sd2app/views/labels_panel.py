@@ -8,16 +8,17 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QButtonGroup,
     QHBoxLayout,
-    QLabel,
     QStackedWidget,
     QToolButton,
     QVBoxLayout,
     QWidget,
 )
 
+from sd2app.models.label_set_table import LabelSetModel
 from sd2app.models.span_table import SpanTableModel
 from sd2app.models.statistics_table import StatisticsTableModel
-from sd2app.views.panel_parts import outlined
+from sd2app.views.elided import ElidedLabel
+from sd2app.views.label_set_page import Asks, LabelSetPage
 from sd2app.views.span_page import SpanPage
 from sd2app.views.span_table import SpanTable
 from sd2app.views.statistics_page import StatisticsPage
@@ -26,10 +27,11 @@ if TYPE_CHECKING:
     from sd2app.action_set import ActionSet
     from sd2app.context import Context
 
-_TIPS = {
-    "Spans": "All spans, to be found, sorted and edited",
-    "Statistics": "How many spans each label has, and how long they are",
-}
+_PAGES = (
+    ("Spans", "All spans, to be found, sorted and edited"),
+    ("Statistics", "How many spans each label has, and how long they are"),
+    ("Label set", "Names, keys, colours and classes of the labels"),
+)
 _MENU = ("span_starts_here", "span_ends_here", "split_span", "merge_spans", "delete_spans")
 """Actions that the table's own menu has too."""
 
@@ -37,7 +39,13 @@ _MENU = ("span_starts_here", "span_ends_here", "split_span", "merge_spans", "del
 class LabelsPanel(QWidget):
     """One page at a time; a button for each."""
 
-    def __init__(self, context: Context, actions: ActionSet, parent: QWidget | None = None) -> None:
+    def __init__(
+        self,
+        context: Context,
+        actions: ActionSet,
+        asks: Asks,
+        parent: QWidget | None = None,
+    ) -> None:
         super().__init__(parent)
         self.setObjectName("page")
         c = context
@@ -46,25 +54,22 @@ class LabelsPanel(QWidget):
         table.set_menu([actions[name] for name in _MENU])
         self.spans = SpanPage(model, c.labels, table, self)
         statistics = StatisticsPage(StatisticsTableModel(c.labels, c.playback, self), self)
+        set_model = LabelSetModel(c.labels, c.keys, c.label_edits.apply, self)
+        self._label_set = LabelSetPage(set_model, asks, self)
         self._pages = QStackedWidget(self)
-        self._count = QLabel(self)
+        self._count = ElidedLabel(self)
         self._count.setObjectName("muted")
+        self._count.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         row = QHBoxLayout()
         row.setSpacing(6)
         self._buttons = QButtonGroup(self)
-        for place, (name, page) in enumerate((("Spans", self.spans), ("Statistics", statistics))):
+        for place, page in enumerate((self.spans, statistics, self._label_set)):
             self._pages.addWidget(page)
-            button = self._button(name)
+            button = self._button(place)
             self._buttons.addButton(button, place)
             row.addWidget(button)
         self._buttons.idClicked.connect(self._pages.setCurrentIndex)
-        row.addStretch(1)
-        row.addWidget(self._count)
-        columns = outlined("Columns", "Which columns of the spans are shown", None, self)
-        columns.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
-        columns.setMenu(table.columns_menu())
-        self._pages.currentChanged.connect(lambda place: columns.setVisible(place == 0))
-        row.addWidget(columns)
+        row.addWidget(self._count, 1)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(8, 6, 8, 6)
         layout.setSpacing(6)
@@ -84,18 +89,24 @@ class LabelsPanel(QWidget):
         self._turn_to(0)
         self.spans.find()
 
+    def show_label_set(self) -> None:
+        """Show the label set, with the keyboard in its table."""
+        self._turn_to(2)
+        self._label_set.table.setFocus(Qt.FocusReason.ShortcutFocusReason)
+
     def _turn_to(self, place: int) -> None:
         self._buttons.button(place).setChecked(True)
         self._pages.setCurrentIndex(place)
 
-    def _button(self, name: str) -> QToolButton:
+    def _button(self, place: int) -> QToolButton:
+        name, tip = _PAGES[place]
         button = QToolButton(self)
         button.setText(name)
-        button.setToolTip(_TIPS[name])
+        button.setToolTip(tip)
         button.setAccessibleName(name)
-        button.setAccessibleDescription(_TIPS[name])
+        button.setAccessibleDescription(tip)
         button.setCheckable(True)
-        button.setChecked(name == "Spans")
+        button.setChecked(place == 0)
         button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         return button
 

@@ -7,6 +7,7 @@ from PySide6.QtGui import QHideEvent, QShowEvent
 from PySide6.QtWidgets import (
     QHBoxLayout,
     QSizePolicy,
+    QToolButton,
     QVBoxLayout,
     QWidget,
 )
@@ -15,6 +16,7 @@ from sd2app.models.labels import LabelsModel
 from sd2app.models.span_columns import COLUMNS
 from sd2app.models.span_table import SpanFilter, SpanTableModel
 from sd2app.views.inputs import Choice
+from sd2app.views.panel_parts import outlined
 from sd2app.views.search_line import SearchLine
 from sd2app.views.span_table import SpanTable
 
@@ -44,6 +46,12 @@ class SpanPage(QWidget):
             choice.setMinimumWidth(48)
             choice.activated.connect(self._filter)
             row.addWidget(choice, 2)
+        columns = outlined("…", "Which columns are shown", None, self)
+        columns.setAccessibleName("Columns")
+        columns.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        columns.setStyleSheet("QToolButton::menu-indicator { image: none; }")
+        columns.setMenu(table.columns_menu())
+        row.addWidget(columns)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(6)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 
-from PySide6.QtCore import QEvent, QItemSelection, QItemSelectionModel, QModelIndex, Qt
-from PySide6.QtGui import QAction, QContextMenuEvent, QFocusEvent, QKeyEvent, QPainter, QPaintEvent
-from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QMenu, QTableView, QWidget
+from PySide6.QtCore import QItemSelection, QItemSelectionModel, QModelIndex, Qt
+from PySide6.QtGui import QAction, QContextMenuEvent, QFocusEvent, QPainter, QPaintEvent
+from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QMenu, QWidget
 
 from sd2app.label_edits import LabelEdits
 from sd2app.models.labels import LabelsModel
@@ -16,33 +16,18 @@ from sd2app.models.span_columns import COLUMNS
 from sd2app.models.span_table import SpanTableModel
 from sd2app.models.visible_span import VisibleSpanModel
 from sd2app.settings import Settings
+from sd2app.views.cell_table import CellTable
 from sd2app.views.span_cells import SpanCells
 from sd2core.labels import span_fields
 
-ROW_PX = 22
 _PADDING_PX = 12
 _HIDDEN = "span_table/hidden"
-_OWN_KEYS = (
-    Qt.Key.Key_Home,
-    Qt.Key.Key_End,
-    Qt.Key.Key_PageUp,
-    Qt.Key.Key_PageDown,
-    Qt.Key.Key_Up,
-    Qt.Key.Key_Down,
-    Qt.Key.Key_Return,
-    Qt.Key.Key_Enter,
-    Qt.Key.Key_F2,
-)
-"""Those that move in a table, whatever they mean elsewhere. Left and Right stay with the frames."""
-
-_Move = QAbstractItemView.CursorAction
 
 
-class SpanTable(QTableView):
-    """Return or a double click edits a cell, Tab goes to the next one that can be edited.
+class SpanTable(CellTable):
+    """The window follows the current cell.
 
-    The window follows: it shows the first frame of the span in the current row, in a column
-    of ends the last one. Escape gives the keyboard back.
+    It shows the first frame of the span in that row, in a column of ends the last one.
     """
 
     def __init__(
@@ -55,25 +40,14 @@ class SpanTable(QTableView):
         settings: Settings,
         parent: QWidget | None = None,
     ) -> None:
-        super().__init__(parent)
+        super().__init__("Spans", parent=parent)
         self._model, self._labels, self._edits = model, labels, edits
         self._playback, self._visible, self._settings = playback, visible, settings
         self._mirroring = False
         self._menu_actions: Sequence[QAction] = ()
         self.setModel(model)
         self.setItemDelegate(SpanCells(model, labels, self))
-        self.setAccessibleName("Spans")
-        self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
-        self.setEditTriggers(
-            QAbstractItemView.EditTrigger.DoubleClicked
-            | QAbstractItemView.EditTrigger.EditKeyPressed
-        )
-        self.setShowGrid(False)
-        self.setWordWrap(False)
-        self.setHorizontalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
-        self.verticalHeader().hide()
-        self.verticalHeader().setDefaultSectionSize(ROW_PX)
         self._arrange_columns()
         self.clicked.connect(self._go)
         labels.selection_changed.connect(self.mirror)
@@ -87,8 +61,6 @@ class SpanTable(QTableView):
 
     def _arrange_columns(self) -> None:
         header = self.horizontalHeader()
-        header.setHighlightSections(False)
-        header.setStretchLastSection(True)
         header.setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
         header.setMinimumSectionSize(40)
         header.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
@@ -178,58 +150,6 @@ class SpanTable(QTableView):
                 self.scrollTo(current)
         finally:
             self._mirroring = False
-
-    # --- keys -----------------------------------------------------------------------------
-
-    def event(self, event: QEvent) -> bool:
-        """Claim the keys that move in a table before they are taken for those of actions."""
-        if (
-            event.type() == QEvent.Type.ShortcutOverride
-            and isinstance(event, QKeyEvent)
-            and event.key() in _OWN_KEYS
-            and event.modifiers()
-            in (Qt.KeyboardModifier.NoModifier, Qt.KeyboardModifier.ShiftModifier)
-        ):
-            event.accept()
-            return True
-        return super().event(event)
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Return edits, Escape gives the keyboard back to the window."""
-        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
-            # The one that ended editing comes by here too.
-            if self.state() != QAbstractItemView.State.EditingState:
-                self.edit(self.currentIndex())
-        elif event.key() == Qt.Key.Key_Escape:
-            self.clearFocus()
-        else:
-            super().keyPressEvent(event)
-
-    def keyboardSearch(self, search: str) -> None:
-        """Letters are keys of labels and actions, and go nowhere where they are none."""
-
-    def moveCursor(self, action: _Move, modifiers: Qt.KeyboardModifier) -> QModelIndex:
-        """Tab goes from one cell that can be edited to the next, row after row."""
-        steps = {_Move.MoveNext: 1, _Move.MovePrevious: -1}
-        current = self.currentIndex()
-        if action not in steps or not current.isValid():
-            return super().moveCursor(action, modifiers)
-        places = [
-            place
-            for place, column in enumerate(COLUMNS)
-            if column.typed is not None and not self.isColumnHidden(place)
-        ]
-        cells = len(places) * self._model.rowCount()
-        towards = steps[action]
-        # From a column that cannot be edited it goes to the nearest that can.
-        before = sum(place < current.column() for place in places)
-        here = current.row() * len(places) + before
-        inside = current.column() in places
-        there = here + towards if inside or towards < 0 else here
-        if not 0 <= there < cells:
-            return current
-        row, place = divmod(there, len(places))
-        return self._model.index(row, places[place])
 
     def focusInEvent(self, event: QFocusEvent) -> None:
         """With a row to begin from: the selected one, else that of the frame on screen."""

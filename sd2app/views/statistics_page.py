@@ -13,8 +13,8 @@ from PySide6.QtWidgets import (
 )
 
 from sd2app.models.statistics_table import StatisticsTableModel
+from sd2app.views.cell_table import ROW_PX
 from sd2app.views.panel_parts import outlined, sentence
-from sd2app.views.span_table import ROW_PX
 
 _WIDE = "■ left-to-right  "
 _PADDING_PX = 10

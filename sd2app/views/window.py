@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import (
@@ -185,6 +185,7 @@ class MainWindow(QMainWindow):
         self._importer.submit(lambda emit: import_module("sd2app.views.scene3d"))
 
     def _fill_panels(self) -> None:
+        from sd2app.dialogs.label_set import LabelSetDialogs
         from sd2app.dialogs.training import TrainingDialogs
         from sd2app.views.agreement_panel import AgreementPanel
         from sd2app.views.labels_panel import LabelsPanel
@@ -205,7 +206,8 @@ class MainWindow(QMainWindow):
         trade = TradePanel(c.trade, c.display, self._actions["measure"])
         self.train_dialogs = TrainingDialogs(self, c.training, c.training_use, self.messages.warn)
         train = TrainingPanel(c.training, c.training_use, c.display, self.train_dialogs)
-        self.labels_panel = LabelsPanel(c, self._actions)
+        asks = LabelSetDialogs(self, c.labels, c.label_edits.apply, self.messages.warn)
+        self.labels_panel = LabelsPanel(c, self._actions, asks)
         agree = AgreementPanel(c.agreement, c.playback, self._actions)
         pages = {"Sensor": sensor, "Trade": trade, "Train": train}
         self.side = SidePanel({**pages, "Labels": self.labels_panel, "Agree": agree})
@@ -396,10 +398,12 @@ class MainWindow(QMainWindow):
         self.side.bring_up("Trade")
         self.context.trade.measured.measure()
 
-    def show_labels(self, find: bool = False) -> None:
-        """Bring up the table of spans, or the search in it, with the keyboard."""
+    def show_labels(self, page: Literal["spans", "search", "label set"] = "spans") -> None:
+        """Bring up the table of spans, the search in it, or the label set, with the keyboard."""
         self.side.bring_up("Labels")
-        self.labels_panel.find() if find else self.labels_panel.show_spans()
+        panel = self.labels_panel
+        pages = {"spans": panel.show_spans, "search": panel.find, "label set": panel.show_label_set}
+        pages[page]()
 
     def close_window(self) -> None:
         """Close, after asking when edits would be lost."""

@@ -9,8 +9,8 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit, QToolButton
 
 from sd2app.models.span_columns import COLUMNS
+from sd2app.views.cells import ListedEditor
 from sd2app.views.label_timeline import ROW_PX, LabelTimeline
-from sd2app.views.listed_editor import ListedEditor
 from sd2app.views.span_table import SpanTable
 
 NONE, LEFT = Qt.KeyboardModifier.NoModifier, Qt.MouseButton.LeftButton
