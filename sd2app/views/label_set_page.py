@@ -17,7 +17,6 @@ from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHBoxLayout,
-    QLabel,
     QLineEdit,
     QMenu,
     QStyleOptionViewItem,
@@ -30,6 +29,7 @@ from sd2app.icons import swatch_icon
 from sd2app.models.label_set_table import CLASS, COLOUR, KEY, NAME, NO_CLASS, LabelSetModel
 from sd2app.views.cell_table import CellTable
 from sd2app.views.cells import Choosable, FramedCells, ListedEditor
+from sd2app.views.elided import ElidedLabel
 from sd2app.views.panel_parts import outlined
 
 _WIDE = ("■ a longer name", "Key", "■ vermilion (alike)", "background", "Spans")
@@ -65,9 +65,8 @@ class LabelSetPage(QWidget):
         self._name.editingFinished.connect(lambda: model.rename_set(self._name.text()))
         self.table = table = LabelSetTable(model, asks, self)
         table.removed.connect(self._remove)
-        self._warning = QLabel(self)
+        self._warning = ElidedLabel(self)
         self._warning.setObjectName("warning")
-        self._warning.setWordWrap(True)
         self._add = outlined("Add", "Add a label", self._added, self)
         self._less = outlined("Remove", "Remove the label of the current row", self._remove, self)
         self._up = outlined("Up", "Offer it earlier", lambda: self._move(-1), self)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QFileDialog, QLineEdit, QToolButton
+from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QLineEdit, QToolButton
 
 from sd2app.models.label_set_table import COLOUR, KEY, NAME
 from sd2app.views.cells import ListedEditor
@@ -104,10 +104,9 @@ def test_a_colour_is_chosen_from_a_list_and_likeness_is_said(window, page) -> No
     press(Qt.Key.Key_Return)
     label = window.context.labels.labels.label_set.labels[0]
     assert label.colour == "#56b4e9"
-    assert (
-        "left-to-right and right-to-left look alike"
-        in page.findChild(type(page._warning), "warning").text()
-    )
+    warning = page.findChild(QLabel, "warning")
+    assert warning.text() == "left-to-right and right-to-left look alike."
+    assert warning.isVisible()
 
 
 def test_any_other_colour_is_asked_for(window, page, qtbot, monkeypatch) -> None:
