@@ -81,7 +81,7 @@ class CutOutDialog(QDialog):
         layout.addStretch(1)
         layout.addWidget(buttons)
         self._refresh()
-        self.resize(520, 0)
+        self.setMinimumWidth(520)
 
     @property
     def spans(self) -> tuple[Span, ...]:

@@ -41,7 +41,7 @@ class LabelImportDialog(QDialog):
         self._lay_out(buttons)
         model.changed.connect(self._refresh)
         self._refresh()
-        self.resize(560, 0)
+        self.setMinimumWidth(560)
 
     # --- building -------------------------------------------------------------------------
 

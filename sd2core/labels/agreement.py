@@ -6,21 +6,19 @@ kappa = (p_o - p_e) / (1 - p_e), where p_o is the share of frames in which both 
 same, and p_e the share in which they would if each used each answer as often as they did,
 independently of the other.
 
-Span by span: one-to-one matches by intersection over union (IoU) of time, as detections
-of actions are matched to the truth.
+Span by span: :mod:`sd2core.labels.matching`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from statistics import fmean
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from sd2core.errors import Sd2Error
+from sd2core.labels.matching import SpanAgreement, match_spans
 from sd2core.labels.spans import Labels, Span
 from sd2core.timebase import Timebase
 
@@ -87,65 +85,6 @@ class FrameAgreement:
 
 
 @dataclass(frozen=True)
-class Match:
-    """A span of a and the span of b that is taken for the same.
-
-    Parameters
-    ----------
-    a, b : Span
-    iou : float
-        Intersection over union of their times.
-    start_difference_s, end_difference_s : float
-        b's edge less a's: positive when b is later.
-    start_difference_frames, end_difference_frames : int or None
-        The same in frames; None where a span lies outside the recording.
-    """
-
-    a: Span
-    b: Span
-    iou: float
-    start_difference_s: float
-    end_difference_s: float
-    start_difference_frames: int | None
-    end_difference_frames: int | None
-
-    @property
-    def same_label(self) -> bool:
-        """Whether both call it the same."""
-        return self.a.label == self.b.label
-
-
-@dataclass(frozen=True)
-class SpanAgreement:
-    """Agreement span by span.
-
-    Parameters
-    ----------
-    matches : tuple of Match
-        In the order of a.
-    only_a, only_b : tuple of Span
-        What has no match.
-    min_iou : float
-    """
-
-    matches: tuple[Match, ...]
-    only_a: tuple[Span, ...]
-    only_b: tuple[Span, ...]
-    min_iou: float
-
-    @property
-    def f1(self) -> float | None:
-        """2 matches / (spans of a + spans of b), whatever their labels; None without spans."""
-        spans = 2 * len(self.matches) + len(self.only_a) + len(self.only_b)
-        return 2 * len(self.matches) / spans if spans else None
-
-    @property
-    def mean_iou(self) -> float | None:
-        """Over the matches; None without any."""
-        return fmean(match.iou for match in self.matches) if self.matches else None
-
-
-@dataclass(frozen=True)
 class Agreement:
     """Both ways to see it."""
 
@@ -205,34 +144,6 @@ def frame_agreement(a: Sequence[Span], b: Sequence[Span], timebase: Timebase) ->
     )
 
 
-def match_spans(
-    a: Sequence[Span], b: Sequence[Span], timebase: Timebase, *, min_iou: float = 0.5
-) -> SpanAgreement:
-    """Match spans one to one.
-
-    Of all ways to match, one with the most matches is taken; of these, one with the most
-    pairs of the same label; of these, one with the largest sum of IoU.
-
-    Raises
-    ------
-    Sd2Error
-        When `min_iou` is not above 0 and up to 1.
-    """
-    if not 0.0 < min_iou <= 1.0:
-        raise Sd2Error(f"The least IoU of a match is {min_iou:g}", "above 0 and up to 1")
-    pairs = [
-        pair for rows, columns in _touching(a, b) for pair in _paired(a, b, rows, columns, min_iou)
-    ]
-    matches = [_match(a[row], b[column], iou, timebase) for row, column, iou in pairs]
-    taken_a, taken_b = {row for row, _, _ in pairs}, {column for _, column, _ in pairs}
-    return SpanAgreement(
-        matches=tuple(sorted(matches, key=lambda match: (match.a.start_s, match.a.id))),
-        only_a=tuple(span for at, span in enumerate(a) if at not in taken_a),
-        only_b=tuple(span for at, span in enumerate(b) if at not in taken_b),
-        min_iou=min_iou,
-    )
-
-
 def _spans(labels: Labels, track: str | None, which: str) -> tuple[Span, ...]:
     if track is None:
         return labels.spans
@@ -263,63 +174,3 @@ def _answers(held: NDArray[np.bool_], labels: list[str]) -> list[Answer]:
 
 def _confusion(a: NDArray[np.int64], b: NDArray[np.int64], answers: int) -> NDArray[np.int64]:
     return np.bincount(a * answers + b, minlength=answers**2).reshape(answers, answers)
-
-
-def _touching(a: Sequence[Span], b: Sequence[Span]) -> list[tuple[list[int], list[int]]]:
-    """Groups of spans of a and b that may be matched: they hang together by overlaps.
-
-    Ten thousand spans of each are matched in groups of a few.
-    """
-    kinds = [(span.start_s, span.end_s, 0, at) for at, span in enumerate(a)]
-    kinds += [(span.start_s, span.end_s, 1, at) for at, span in enumerate(b)]
-    groups: list[tuple[list[int], list[int]]] = []
-    until_s = -np.inf
-    for start_s, end_s, kind, at in sorted(kinds):
-        if start_s >= until_s:
-            groups.append(([], []))
-        groups[-1][kind].append(at)
-        until_s = max(until_s, end_s)
-    return [(sorted(rows), sorted(columns)) for rows, columns in groups if rows and columns]
-
-
-def _paired(
-    a: Sequence[Span], b: Sequence[Span], rows: list[int], columns: list[int], min_iou: float
-) -> list[tuple[int, int, float]]:
-    """The best pairs within a group, with their IoU."""
-    some_a, some_b = [a[row] for row in rows], [b[column] for column in columns]
-    iou = iou_of(some_a, some_b)
-    same = np.array([[x.label == y.label for y in some_b] for x in some_a])
-    # Rounding must not lose the match of a span with itself at a threshold of 1.
-    allowed = iou >= min_iou - 1e-12
-    # A sum of IoU is at most the number of matches, which is below `above`.
-    above = min(iou.shape) + 1.0
-    worth = np.where(allowed, above**2 + above * same + iou, 0.0)
-    found = zip(*linear_sum_assignment(worth, maximize=True), strict=True)
-    return [
-        (rows[row], columns[column], float(iou[row, column]))
-        for row, column in found
-        if allowed[row, column]
-    ]
-
-
-def iou_of(a: Sequence[Span], b: Sequence[Span]) -> NDArray[np.float64]:
-    """Intersection over union of the times of spans, (len(a), len(b))."""
-    start_a, end_a = np.array([(s.start_s, s.end_s) for s in a]).reshape(-1, 2).T[:, :, None]
-    start_b, end_b = np.array([(s.start_s, s.end_s) for s in b]).reshape(-1, 2).T[:, None, :]
-    both = np.maximum(np.minimum(end_a, end_b) - np.maximum(start_a, start_b), 0.0)
-    return np.asarray(both / ((end_a - start_a) + (end_b - start_b) - both))
-
-
-def _match(a: Span, b: Span, iou: float, timebase: Timebase) -> Match:
-    frames_a = timebase.frames_between(a.start_s, a.end_s)
-    frames_b = timebase.frames_between(b.start_s, b.end_s)
-    inside = frames_a[1] > frames_a[0] and frames_b[1] > frames_b[0]
-    return Match(
-        a=a,
-        b=b,
-        iou=iou,
-        start_difference_s=b.start_s - a.start_s,
-        end_difference_s=b.end_s - a.end_s,
-        start_difference_frames=frames_b[0] - frames_a[0] if inside else None,
-        end_difference_frames=frames_b[1] - frames_a[1] if inside else None,
-    )

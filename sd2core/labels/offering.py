@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from sd2core.errors import Sd2Error
-from sd2core.labels.agreement import iou_of
 from sd2core.labels.edits import Edit
+from sd2core.labels.matching import iou_of
 from sd2core.labels.rooms import Frames
 from sd2core.labels.span_fields import accept, reject, relabel
 from sd2core.labels.spans import Labels, Span, Track

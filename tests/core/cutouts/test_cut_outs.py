@@ -177,3 +177,26 @@ def test_pictures_of_odd_size_are_cut_out_too(source, tmp_path) -> None:
     (made,) = cut(odd, tmp_path / "out", Span(1, "Gestures", 0.5, 0.7, "wave"))
     with open_video(made / "video.mp4") as clip:
         assert (clip.width, clip.height, len(clip)) == (64, 48, 6)
+
+
+def test_killed_midway_there_are_whole_folders_only_and_it_goes_on(source, tmp_path) -> None:
+    import subprocess
+    import sys
+
+    # Ends at a frame as a kill does: nothing is tidied up.
+    script = f"""
+import os, sys
+from pathlib import Path
+from test_cut_outs import CLOCK, CutSource, PUSH, WAVE, cut
+source = CutSource("walk", True, CLOCK, Path({str(source.video)!r}))
+end = lambda done, total: done >= 14 and os._exit(9)
+cut(source, Path({str(tmp_path)!r}), WAVE, PUSH, progress=end)
+"""
+    here = str(Path(__file__).parent)
+    code = f"import sys; sys.path.insert(0, {here!r})\n{script}"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 9
+    assert [path.name for path in tmp_path.glob("*s_*")] == [folder_name(WAVE)]
+    assert list(tmp_path.glob(".sd2-cut-*"))
+    only = source.only(["video"])
+    assert [path.name for path in cut(only, tmp_path, WAVE, PUSH)] == [folder_name(PUSH)]
+    assert not list(tmp_path.glob(".sd2-cut-*"))

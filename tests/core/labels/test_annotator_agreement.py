@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
-from sd2core.labels.agreement import Kappa, agreement, frame_agreement, match_spans
+from sd2core.labels.agreement import Kappa, agreement, frame_agreement
+from sd2core.labels.matching import match_spans
 from sd2core.labels.spans import Labels, Span, Track
 from sd2core.timebase import Timebase
 
