@@ -40,12 +40,12 @@ class SpanPage(QWidget):
         self._chosen = {name: Choice(f"Spans of this {name} only", self) for name in _ANY}
         row = QHBoxLayout()
         row.setSpacing(6)
-        row.addWidget(self.search, 3)
+        row.addWidget(self.search, 5)
         for choice in self._chosen.values():
             choice.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
             choice.setMinimumWidth(48)
             choice.activated.connect(self._filter)
-            row.addWidget(choice, 2)
+            row.addWidget(choice, 4)
         columns = outlined("…", "Which columns are shown", None, self)
         columns.setAccessibleName("Columns")
         columns.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)

@@ -20,6 +20,7 @@ from sd2core.cli.labels_agree import add_agree
 from sd2core.cli.labels_cut import add_cut
 from sd2core.cli.labels_figure import add_figure
 from sd2core.cli.labels_recover import add_recover
+from sd2core.cli.labels_set import add_set
 from sd2core.cli.labels_statistics import add_statistics, print_statistics, statistics_of
 from sd2core.cli.labels_suggest import add_suggest
 from sd2core.cli.options import add_command, add_json
@@ -86,6 +87,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     add_json(convert)
 
     add_statistics(kinds)
+    add_set(kinds)
     add_suggest(kinds)
     add_figure(kinds)
     add_cut(kinds)

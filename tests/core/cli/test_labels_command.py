@@ -11,6 +11,7 @@ from cli_outcome import Sd2
 
 from sd2core.labels import files
 from sd2core.labels.formats import FORMATS, read_labels
+from sd2core.labels.label_set import Label, LabelSet
 from sd2core.labels.spans import Labels, Span, Track
 from sd2core.recording import Recording
 from sd2core.sensor import VelocityAxis
@@ -83,6 +84,38 @@ def test_statistics_are_printed_three_ways(sd2: Sd2, anna: Path) -> None:
     assert data["swipe"]["sd_s"] is None
     assert data["swipe"]["share"] is None  # nobody said how long the recording is
     assert sd2("labels", "statistics", anna, "--json", "--csv").code == 2
+
+
+def test_a_label_set_is_shown_shared_and_exchanged(sd2: Sd2, anna: Path, tmp_path: Path) -> None:
+    lines = sd2("labels", "set", anna).out.splitlines()
+    assert lines[0] == "Gestures of the paper"
+    assert cells(lines[2]) == ["left-to-right", "1", "#0072b2", "horizontal", "0"]
+    mine, shared = tmp_path / "mine.json", tmp_path / "shared.json"
+    two = (Label("wave", "#0072b2", "w"), Label("push", "#0080c0"))
+    files.write_label_set(mine, LabelSet("Mine", two))
+    out = tmp_path / "out.json"
+    done = sd2("labels", "set", anna, "--use", mine, "--out", out, "--export", shared)
+    assert done.out.splitlines()[0] == f"Wrote {out} with 2 labels"
+    assert files.read_label_set(shared) == files.read_label_set(mine)
+    assert files.read_labels(out).labels.spans == files.read_labels(anna).labels.spans
+    data = json.loads(sd2("labels", "set", out, "--json").out)
+    assert [one["spans"] for one in data["labels"]] == [2, 0]
+    assert data["alike"] == ["wave and push look alike"]
+    assert "wave and push look alike." in sd2("labels", "set", out).out
+    back = sd2("labels", "set", out, "--use", "usual", "--out", out, "--replace", "--json")
+    assert json.loads(back.out)["written"] == [str(out)]
+    assert files.read_labels(out).labels == files.read_labels(anna).labels
+
+
+def test_a_label_set_is_not_exchanged_by_halves(sd2: Sd2, anna: Path, tmp_path: Path) -> None:
+    half = sd2("labels", "set", anna, "--use", "usual")
+    assert (half.code, "both of them, or none" in half.err) == (1, True)
+    there = sd2("labels", "set", anna, "--export", anna)
+    assert (there.code, "exists" in there.err) == (1, True)
+    assert (
+        "has the format 'sd2-labels'"
+        in sd2("labels", "set", anna, "--use", anna, "--out", tmp_path / "out.json").err
+    )
 
 
 def test_show_says_when_there_is_nothing(sd2: Sd2, tmp_path: Path) -> None:
