@@ -76,12 +76,11 @@ class ActionSet:
         self.labels.refresh(refusal)
         for row in ACTIONS:
             action = self._actions[row.id]
-            refused = row.edits_labels and refusal
+            refused = refusal if row.edits_labels else ""
             action.setEnabled(row.enabled(self._context) and not refused)
-            if row.edits_labels:
-                action.setToolTip(refusal or self._tip(row))
-            elif row.why_not is not None:
-                action.setToolTip(row.why_not(self._context) or self._tip(row))
+            if row.edits_labels or row.why_not is not None:
+                why_not = row.why_not(self._context) if row.why_not is not None else ""
+                action.setToolTip(refused or why_not or self._tip(row))
             if row.checked is not None:
                 action.setChecked(row.checked(self._context))
         stack = self._context.document.undo_stack

@@ -114,12 +114,10 @@ class LabelSession(QObject):
 
     def close(self) -> None:
         """End the session: all is saved, or the user wants none of it."""
-        if self._journal is not None:
-            with suppress(OSError):
-                self._journal.close()
+        self._go_on_in(None)
         if self._place is not None:
             self._place.release()
-        self._place = self._journal = None
+        self._place = None
         self._refusal, self._offers, self._notes, self._keeping = "", (), (), True
 
     def _begin_at(self, path: Path, *, reread: bool) -> None:
@@ -186,6 +184,12 @@ class LabelSession(QObject):
             )
         self._keeping = False
 
+    def _go_on_in(self, journal: Journal | None) -> None:
+        before, self._journal = self._journal, journal
+        if before is not None:
+            with suppress(OSError):
+                before.close()
+
     # --- what was left behind -------------------------------------------------------------
 
     def look_around(self) -> None:
@@ -238,9 +242,7 @@ class LabelSession(QObject):
         except OSError as error:
             self._tell_unkept(error)
         else:
-            if self._journal is not None:
-                self._journal.close()
-            self._journal = journal
+            self._go_on_in(journal)
         self.postpone()
         return offer.labels
 
