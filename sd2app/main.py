@@ -56,8 +56,9 @@ def run(paths: Sequence[Path] = (), *, screenshot: Path | None = None) -> int:
     # Queued, so that the skeleton reaches the screen before the imports begin.
     window.first_painted.connect(lambda: QTimer.singleShot(0, fill))
     window.show()
-    if screenshot is None:
+    if screenshot is None or aside is None:
         return application.exec()
     from sd2app.screenshot import take_screenshot
 
-    return take_screenshot(application, window, screenshot, limit_s=_SCREENSHOT_LIMIT_S)
+    with aside:
+        return take_screenshot(application, window, screenshot, limit_s=_SCREENSHOT_LIMIT_S)
