@@ -29,7 +29,7 @@ _SAID = (
     " they change."
 )
 _NOTHING = "There is nothing to recover: whatever was edited was saved, or was not wanted."
-_ROW_PX = 24
+_ROW_PX, _MARGIN_PX = 24, 16
 _HEADINGS = ("Recording", "Edits that were not saved", "Holds", "")
 
 
@@ -53,11 +53,13 @@ class RecoverLabelsDialog(QDialog):
         self.chosen: Offer | None = None
         self.setWindowTitle("Recover labels")
         self._said, self._notes = sentence(""), sentence("", "warning")
+        self._said.setAlignment(Qt.AlignmentFlag.AlignTop)
         self._list = QTreeWidget(self)
         self._list.setHeaderLabels(_HEADINGS)
         self._list.setAccessibleName("Labels that can be recovered")
         self._list.setRootIsDecorated(False)
         self._list.setUniformRowHeights(True)
+        self._list.setAllColumnsShowFocus(True)
         self._list.header().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         self._list.currentItemChanged.connect(self._follow)
         self._list.itemActivated.connect(lambda *_: self._open.isEnabled() and self._accept())
@@ -90,7 +92,8 @@ class RecoverLabelsDialog(QDialog):
             )
             item.setData(0, Qt.ItemDataRole.UserRole, offer)
             item.setToolTip(0, str(offer.recording))
-            item.setSizeHint(0, QSize(0, _ROW_PX))
+            width = self._list.fontMetrics().horizontalAdvance(offer.recording.name)
+            item.setSizeHint(0, QSize(width + _MARGIN_PX, _ROW_PX))
             self._list.addTopLevelItem(item)
         self._said.setText(_SAID if found.offers else _NOTHING)
         self._list.setVisible(bool(found.offers))
