@@ -60,7 +60,7 @@ class SuggestionBar(QWidget):
         close.setText("✕")
         close.setToolTip("Close; the suggestions stay")
         close.setAccessibleName("Close the suggestions")
-        close.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        close.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         close.clicked.connect(self._model.stop)
         return close
 

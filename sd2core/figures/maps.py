@@ -185,10 +185,11 @@ def draw_maps(
         first, second = _in_view(rows[difference[0]], start_s, end_s), rows[difference[1]]
         _draw_difference(figure, maps_axes[-1], first, second, levels, colours)
     if labels is not None and lanes:
-        draw_lanes(all_axes[-1], lanes, labels, start_s, end_s, 0.8 * _WIDTH_IN)
+        in_per_s = 0.8 * _WIDTH_IN / (end_s - start_s)
+        draw_lanes(all_axes[-1], lanes, labels, start_s, end_s, in_per_s)
         add_key(figure, lanes, labels)
         for axes in maps_axes:
-            draw_edges(axes, lanes)
+            draw_edges(axes, lanes, in_per_s)
     for axes in all_axes:
         axes.set_xlim(start_s, end_s)
         axes.tick_params(labelsize=8)

@@ -16,6 +16,8 @@ LANE_IN = 0.2
 """Height of one lane of spans."""
 _FREE_COLOUR = "#8a8f98"
 _HATCHES = ("", "////", "\\\\\\\\", "....", "xxxx", "----", "||||", "oo", "++")
+_NARROW_IN = 0.03
+"""Below this width neither a hatch nor an edge could be told from the next."""
 _LETTER_IN = 0.062
 """Width of a letter at the size of names, a little on the wide side."""
 
@@ -44,21 +46,24 @@ def draw_lanes(
     labels: Labels,
     start_s: float,
     end_s: float,
-    width_in: float,
+    in_per_s: float,
 ) -> None:
     """Draw spans as boxes with a colour and a hatch per label, and names where they fit."""
-    per_s, looks = width_in / (end_s - start_s), _looks(labels, lanes)
+    looks = _looks(labels, lanes)
     for at, (_, spans) in enumerate(lanes):
         top = len(lanes) - 1 - at
         for name in dict.fromkeys(span.label for span in spans):
             here = [span for span in spans if span.label == name]
-            axes.broken_barh(
-                [(span.start_s, span.duration_s) for span in here], (top + 0.08, 0.84),
-                linewidth=0.8, **looks[name],
-            )  # fmt: skip
+            wide = [span for span in here if span.duration_s * in_per_s >= _NARROW_IN]
+            narrow = [span for span in here if span.duration_s * in_per_s < _NARROW_IN]
+            look, plain = looks[name], {"facecolor": looks[name]["edgecolor"], "linewidth": 0}
+            for some, how in ((wide, {"linewidth": 0.8, **look}), (narrow, plain)):
+                if some:
+                    stretches = [(span.start_s, span.duration_s) for span in some]
+                    axes.broken_barh(stretches, (top + 0.08, 0.84), **how)
         for span in spans:
             left_s, right_s = max(span.start_s, start_s), min(span.end_s, end_s)
-            if (right_s - left_s) * per_s >= _LETTER_IN * len(span.label):
+            if (right_s - left_s) * in_per_s >= _LETTER_IN * len(span.label):
                 words = axes.text(
                     (left_s + right_s) / 2, top + 0.48, span.label, ha="center", va="center",
                     fontsize=6.5, clip_on=True, parse_math=False,
@@ -75,9 +80,9 @@ def draw_lanes(
     axes.tick_params(axis="y", length=0)
 
 
-def draw_edges(axes: Axes, lanes: Sequence[tuple[str, Sequence[Span]]]) -> None:
+def draw_edges(axes: Axes, lanes: Sequence[tuple[str, Sequence[Span]]], in_per_s: float) -> None:
     """Draw where spans begin (whole lines) and end (broken ones) over a map."""
-    spans = [span for _, row in lanes for span in row]
+    spans = [span for _, row in lanes for span in row if span.duration_s * in_per_s >= _NARROW_IN]
     look: Any = {"transform": axes.get_xaxis_transform(), "colors": "white", "linewidth": 0.7}
     axes.vlines([span.start_s for span in spans], 0, 1, alpha=0.75, **look)
     axes.vlines([span.end_s for span in spans], 0, 1, alpha=0.75, linestyles="dashed", **look)

@@ -124,17 +124,16 @@ def frame_agreement(a: Sequence[Span], b: Sequence[Span], timebase: Timebase) ->
     """Compare the labels of every frame."""
     labels = sorted({span.label for span in (*a, *b)})
     held_a, held_b = (held_labels(spans, labels, timebase) for spans in (a, b))  # (labels, T)
-    answers_a, answers_b = _answers(held_a, labels), _answers(held_b, labels)
-    answers = tuple(sorted({(), *answers_a, *answers_b}))
-    number = {answer: at for at, answer in enumerate(answers)}
+    kinds, kind = np.unique(np.hstack([held_a, held_b]), axis=1, return_inverse=True)
+    said = [
+        tuple(label for label, holds in zip(labels, one, strict=True) if holds)
+        for one in kinds.T.tolist()
+    ]
+    answers = tuple(sorted({(), *said}))
+    numbers = np.array([answers.index(answer) for answer in said])[kind.ravel()]
+    frames = len(timebase)
     return FrameAgreement(
-        overall=Kappa.of(
-            confusion := _confusion(
-                np.array([number[answer] for answer in answers_a]),
-                np.array([number[answer] for answer in answers_b]),
-                len(answers),
-            )
-        ),
+        overall=Kappa.of(confusion := _confusion(numbers[:frames], numbers[frames:], len(answers))),
         of_label={
             label: Kappa.of(_confusion(row_a.astype(int), row_b.astype(int), 2))
             for label, row_a, row_b in zip(labels, held_a, held_b, strict=True)
@@ -158,18 +157,12 @@ def _spans(labels: Labels, track: str | None, which: str) -> tuple[Span, ...]:
 def held_labels(spans: Sequence[Span], labels: list[str], timebase: Timebase) -> NDArray[np.bool_]:
     """Which labels hold when each frame appears, (labels, T)."""
     held = np.zeros((len(labels), len(timebase)), bool)
-    for span in spans:
-        edges_s = np.array([span.start_s, span.end_s]) - _ROUNDING_S
-        first, stop = np.searchsorted(timebase.times_s, edges_s)
-        held[labels.index(span.label), first:stop] = True
+    rows = {label: row for row, label in enumerate(labels)}
+    edges_s = np.array([(span.start_s, span.end_s) for span in spans]).reshape(-1, 2) - _ROUNDING_S
+    edges = np.searchsorted(timebase.times_s, edges_s).tolist()
+    for span, (first, stop) in zip(spans, edges, strict=True):
+        held[rows[span.label], first:stop] = True
     return held
-
-
-def _answers(held: NDArray[np.bool_], labels: list[str]) -> list[Answer]:
-    return [
-        tuple(label for label, holds in zip(labels, frame, strict=True) if holds)
-        for frame in held.T.tolist()
-    ]
 
 
 def _confusion(a: NDArray[np.int64], b: NDArray[np.int64], answers: int) -> NDArray[np.int64]:

@@ -89,3 +89,14 @@ def test_only_what_is_in_view_is_drawn(row) -> None:
     assert not figure.legends
     with pytest.raises(Sd2Error, match="start before the end"):
         draw_maps([row], Levels(), start_s=3.0, end_s=3.0)
+
+
+def test_spans_too_narrow_to_tell_apart_are_plain_and_leave_the_maps_alone(row) -> None:
+    crowd = tuple(
+        Span(k + 1, "Hands", k * 0.01, k * 0.01 + 0.005, "up-to-down") for k in range(900)
+    )
+    labels = Labels((Track("Hands"),), (*crowd, Span(999, "Hands", 9.2, 9.8, "down-to-up")))
+    figure = draw_maps([row], Levels(), start_s=0.0, end_s=10.0, labels=labels)
+    maps, lanes = figure.axes[:2]
+    assert [len(one.get_segments()) for one in maps.collections[-2:]] == [1, 1]
+    assert [one.get_hatch() for one in lanes.collections] == [None, "...."]
