@@ -79,7 +79,7 @@ def _style_sheet(c: Palette) -> str:
     QTabBar {{ background: transparent; }}
     QTabBar::tab {{
         color: {c.muted}; background: transparent; border: none;
-        border-bottom: 2px solid transparent; padding: 3px 12px; font-weight: 600;
+        border-bottom: 2px solid transparent; padding: 3px 9px; font-weight: 600;
     }}
     QTabBar::tab:selected {{ color: {c.text}; border-bottom-color: {c.accent}; }}
     QTabBar::tab:hover, QTabBar::tab:focus {{ color: {c.text}; background: {c.well}; }}

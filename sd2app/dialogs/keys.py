@@ -16,18 +16,18 @@ from PySide6.QtWidgets import (
     QPushButton,
     QStyledItemDelegate,
     QStyleOptionViewItem,
-    QTableView,
     QVBoxLayout,
     QWidget,
 )
 
 from sd2app.models.key_bindings import KeyBindings
 from sd2app.models.key_list import KEYS, KeyListModel
+from sd2app.views.cell_table import CellTable
 from sd2app.views.key_capture import KeyCapture
 from sd2app.views.search_line import SearchLine
 from sd2core.errors import Sd2Error
 
-_ROW_PX = 22
+_KEYS_PX = 250
 
 
 class KeysDialog(QDialog):
@@ -125,40 +125,28 @@ class KeysDialog(QDialog):
         self._reset.setEnabled(can and not self._model.is_usual(self._row))
 
 
-class KeyTable(QTableView):
-    """The list; Tab leaves it."""
+class KeyTable(CellTable):
+    """The list; Tab leaves it, Escape closes the dialog."""
 
     def __init__(self, model: KeyListModel, parent: QWidget) -> None:
-        super().__init__(parent)
+        super().__init__("Keys", parent=parent)
         self.setModel(model)
-        self.setAccessibleName("Keys")
-        self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
-        self.setEditTriggers(
-            QAbstractItemView.EditTrigger.DoubleClicked
-            | QAbstractItemView.EditTrigger.EditKeyPressed
-        )
-        self.setShowGrid(False)
-        self.setWordWrap(False)
         self.setTabKeyNavigation(False)
-        self.verticalHeader().hide()
-        self.verticalHeader().setDefaultSectionSize(_ROW_PX)
         header = self.horizontalHeader()
-        header.setHighlightSections(False)
+        header.setStretchLastSection(False)
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)
-        self.setColumnWidth(KEYS, 250)
+        self.setColumnWidth(KEYS, _KEYS_PX)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Return waits for another key."""
-        waits = self.state() == QAbstractItemView.State.EditingState
-        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter) and not waits:
-            self.edit(self.currentIndex().siblingAtColumn(KEYS))
-        else:
-            super().keyPressEvent(event)
-
-    def keyboardSearch(self, search: str) -> None:
-        """The field above the list is for that."""
+        if event.key() == Qt.Key.Key_Escape:
+            event.ignore()
+            return
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            self.setCurrentIndex(self.currentIndex().siblingAtColumn(KEYS))
+        super().keyPressEvent(event)
 
 
 class KeyCells(QStyledItemDelegate):

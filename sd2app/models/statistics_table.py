@@ -18,6 +18,17 @@ from sd2core.labels.statistics import (
 
 Index = QModelIndex | QPersistentModelIndex
 
+_TIPS = (
+    "Labels of the set, then any others that spans have",
+    "How many spans",
+    "Sum of their lengths; where spans overlap an instant counts in each",
+    "Mean length",
+    "Standard deviation of the lengths (n − 1)",
+    "Half of the spans are shorter",
+    "The shortest",
+    "The longest",
+    "Share of the recording that they hold, an instant counting once",
+)
 _RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 _LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 _NOWHERE = QModelIndex()

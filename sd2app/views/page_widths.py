@@ -31,16 +31,20 @@ class PageWidths(QObject):
         side.bring_up(settings.stored(_SHOWN, side.shown))
         self._shown = side.shown
         side.currentChanged.connect(self._turn)
+        splitter.splitterMoved.connect(self._remember)
 
     def remember(self) -> None:
-        """Keep the width of the panel in front."""
+        """Keep which panel is in front."""
         self._settings.set_value(_SHOWN, self._shown)
+
+    def _remember(self) -> None:
         self._settings.set_value(self._name(self._shown), self._splitter.sizes()[-1])
 
     def _turn(self) -> None:
-        self.remember()
+        if self._shown not in self._usual:
+            # A wide panel's width counts where a hand chose it: a small window may have cut it.
+            self._remember()
         before, self._shown = self._shown, self._side.shown
-        self._settings.set_value(_SHOWN, self._shown)
         if self._name(before) == self._name(self._shown):
             return
         *others, beside, now_px = self._splitter.sizes()

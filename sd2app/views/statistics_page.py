@@ -14,7 +14,7 @@ from PySide6.QtWidgets import (
 
 from sd2app.models.statistics_table import StatisticsTableModel
 from sd2app.views.cell_table import ROW_PX
-from sd2app.views.panel_parts import outlined, sentence
+from sd2app.views.panel_parts import outlined
 
 _WIDE = "■ left-to-right  "
 _PADDING_PX = 10
@@ -42,7 +42,7 @@ class StatisticsPage(QWidget):
         copy_csv = outlined("Copy CSV", "Comma-separated values", lambda: self._copy(","), self)
         row = QHBoxLayout()
         row.setSpacing(6)
-        row.addWidget(sentence("Share: of the recording, an instant counting once."), 1)
+        row.addStretch(1)
         row.addWidget(copy_table)
         row.addWidget(copy_csv)
         layout = QVBoxLayout(self)
