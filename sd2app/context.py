@@ -253,8 +253,10 @@ def _follow_capture(context: Context, new: bool = False) -> None:
     radar_map, recording = document.radar_map, document.recording
     if recording is not None:
         real.set_offset(recording.radar_offset_s)
-        if recording.unlabelled and document.labels != context.labels.labels:
-            context.labels.set_labels(document.labels)  # they are on the radar's clock
+    content = document.content
+    brought = content is not None and content.radar_labels is not None
+    if brought and recording is not None and recording.unlabelled:
+        context.labels.set_labels(document.labels)  # they are on the radar's clock
     if radar_map is real.map and not new:
         return
     real.title = "Radar (simulated)" if radar_map and radar_map.kind == "simulated" else "Real"
