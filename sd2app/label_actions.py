@@ -56,12 +56,12 @@ class LabelActions:
     def _use(self, label: str) -> None:
         context = self._window.context
         chosen = context.labels.selected
-        if any(span.origin == "suggestion" for span in chosen):
-            context.suggestions.accept(label)
-        elif chosen and not context.playback.playing and not context.labels.marks:
-            context.label_edits.relabel(label)
-        else:
+        if not chosen or context.playback.playing or context.labels.marks:
             context.label_marking.mark(label)
+        elif any(span.origin == "suggestion" for span in chosen):
+            context.suggestions.accept(label)
+        else:
+            context.label_edits.relabel(label)
 
 
 def _tip(label: Label) -> str:

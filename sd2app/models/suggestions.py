@@ -164,8 +164,9 @@ class SuggestionsModel(QObject):
         """Another recording is there: of the one before nothing is remembered."""
         self._declined, self._made, self._loudest_db, self._problem = (), None, None, ""
         self._source = None
-        self.stop()
-        self._active = bool(self._pending)
+        self._runner.cancel()
+        self._wanted, self._active = False, bool(self._pending)
+        self.changed.emit()
 
     def close(self) -> None:
         """Stop looking."""

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from sd2app.label_dragging import LabelDragging
 from sd2app.label_edits import LabelEdits
 from sd2app.models.labels import LabelsModel
 from sd2app.models.playback import PlaybackModel
@@ -155,8 +156,9 @@ def test_a_map_that_is_being_computed_is_waited_for(set_up, qtbot) -> None:
 
 
 def test_what_a_hand_holds_is_a_step_before(set_up) -> None:
-    set_up.edits.begin_drag()
-    set_up.edits.drag_new("Gestures", 1.0, 2.0, 0.0)
+    hand = LabelDragging(set_up.labels, set_up.playback, set_up.edits)
+    hand.begin_drag()
+    hand.drag_new("Gestures", 1.0, 2.0, 0.0)
     set_up.look()
     texts = [set_up.stack.text(k) for k in range(set_up.stack.count())]
     assert texts == ["Create span", "Suggest 3 spans"]
@@ -167,3 +169,16 @@ def test_without_a_map_there_is_nothing_to_look_in(set_up) -> None:
     set_up.model.start()
     assert not set_up.model.active
     assert set_up.model.text == "There is no map to look in"
+
+
+def test_suggestions_of_a_file_are_to_be_decided_on_without_looking(set_up) -> None:
+    offered = Span(5, "Gestures", 3.0, 4.0, "background", confidence=0.5, origin="suggestion")
+    set_up.labels.open(Labels((Track("Gestures"),), (offered,)))
+    seen = []
+    set_up.model.changed.connect(lambda: seen.append(set_up.model.active))
+    set_up.model.open()
+    assert seen[-1] is True
+    assert set_up.model.text == "1 suggestion to decide on"
+    set_up.model.accept()
+    (taken,) = set_up.labels.labels.spans
+    assert (taken.origin, taken.label) == ("person", "background")

@@ -81,3 +81,14 @@ def test_suggestions_are_saved_with_the_labels(moving, qtbot, tmp_path) -> None:
     assert [span.origin for span in open_recording(tmp_path / "saved.sd2").labelled.spans] == [
         "suggestion"
     ] * 2
+
+
+def test_while_it_plays_a_label_key_marks_also_with_a_suggestion_selected(moving, qtbot) -> None:
+    asked(moving, qtbot)
+    c = moving.context
+    assert [span.origin for span in c.labels.selected] == ["suggestion"]
+    c.playback.toggle()
+    key(moving, qtbot, "3")
+    c.playback.toggle()
+    assert [mark.label for mark in c.labels.marks] == ["up-to-down"]
+    assert len(c.suggestions.pending) == 2
