@@ -8,6 +8,8 @@ from PySide6.QtCore import QEvent, QModelIndex, Qt
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QAbstractItemView, QTableView, QWidget
 
+from sd2app.views.own_keys import claims
+
 ROW_PX = 22
 _OWN_KEYS = (
     Qt.Key.Key_Home,
@@ -21,7 +23,6 @@ _OWN_KEYS = (
     Qt.Key.Key_F2,
 )
 """Those that move in a table, whatever they mean elsewhere. Left and Right stay with the frames."""
-_UNSHIFTED = (Qt.KeyboardModifier.NoModifier, Qt.KeyboardModifier.ShiftModifier)
 
 _Move = QAbstractItemView.CursorAction
 
@@ -52,16 +53,8 @@ class CellTable(QTableView):
         self.horizontalHeader().setStretchLastSection(True)
 
     def event(self, event: QEvent) -> bool:
-        """Claim the keys that move in a table before they are taken for those of actions."""
-        if (
-            event.type() == QEvent.Type.ShortcutOverride
-            and isinstance(event, QKeyEvent)
-            and event.key() in self._own_keys
-            and event.modifiers() in _UNSHIFTED
-        ):
-            event.accept()
-            return True
-        return super().event(event)
+        """Keys that move in a table do that here."""
+        return claims(event, self._own_keys) or super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Return edits, Escape leaves."""

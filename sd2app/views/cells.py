@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from PySide6.QtCore import QAbstractItemModel, QEvent, QModelIndex, QRect, Qt
-from PySide6.QtGui import QIcon, QKeyEvent, QPainter, QPalette
+from PySide6.QtGui import QIcon, QPainter, QPalette
 from PySide6.QtWidgets import (
     QComboBox,
     QStyle,
@@ -15,11 +15,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-_ELSEWHERE = (
-    Qt.KeyboardModifier.ControlModifier
-    | Qt.KeyboardModifier.AltModifier
-    | Qt.KeyboardModifier.MetaModifier
-)
+from sd2app.views.own_keys import claims
 
 
 class Choosable(NamedTuple):
@@ -50,15 +46,8 @@ class ListedEditor(QComboBox):
             self.addItem(one.icon or QIcon(), one.text, one.value)
 
     def event(self, event: QEvent) -> bool:
-        """Claim plain keys before they are taken for those of actions."""
-        if (
-            event.type() == QEvent.Type.ShortcutOverride
-            and isinstance(event, QKeyEvent)
-            and not event.modifiers() & _ELSEWHERE
-        ):
-            event.accept()
-            return True
-        return super().event(event)
+        """Letters choose here."""
+        return claims(event) or super().event(event)
 
 
 class FramedCells(QStyledItemDelegate):

@@ -2,9 +2,21 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QSignalBlocker, Qt
+from PySide6.QtCore import QEvent, QSignalBlocker, Qt
 from PySide6.QtGui import QAction, QKeyEvent, QWheelEvent
 from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QToolButton, QWidget
+
+from sd2app.views.own_keys import claims
+
+_OWN_KEYS = (
+    Qt.Key.Key_Up,
+    Qt.Key.Key_Down,
+    Qt.Key.Key_PageUp,
+    Qt.Key.Key_PageDown,
+    Qt.Key.Key_Return,
+    Qt.Key.Key_Enter,
+    Qt.Key.Key_Escape,
+)
 
 
 class NumberBox(QDoubleSpinBox):
@@ -47,6 +59,10 @@ class NumberBox(QDoubleSpinBox):
         if abs(value - self.value()) >= 0.5 * 10.0 ** -self.decimals():
             with QSignalBlocker(self):
                 self.setValue(value)
+
+    def event(self, event: QEvent) -> bool:
+        """Keys that step or end the editing do that here."""
+        return claims(event, _OWN_KEYS) or super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Return and Escape end the editing."""

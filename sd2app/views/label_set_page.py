@@ -6,6 +6,7 @@ from typing import Protocol
 
 from PySide6.QtCore import (
     QAbstractItemModel,
+    QEvent,
     QModelIndex,
     QPersistentModelIndex,
     QPoint,
@@ -30,11 +31,13 @@ from sd2app.models.label_set_table import CLASS, COLOUR, KEY, NAME, NO_CLASS, La
 from sd2app.views.cell_table import CellTable
 from sd2app.views.cells import Choosable, FramedCells, ListedEditor
 from sd2app.views.elided import ElidedLabel
+from sd2app.views.own_keys import claims
 from sd2app.views.panel_parts import outlined
 
 _WIDE = ("■ a longer name", "Key", "■ vermilion (alike)", "background", "Spans")
 _PADDING_PX = 14
 _OTHER = "other"
+_OWN_KEYS = (Qt.Key.Key_Escape, Qt.Key.Key_Return, Qt.Key.Key_Enter)
 
 
 class Asks(Protocol):
@@ -59,10 +62,9 @@ class LabelSetPage(QWidget):
     def __init__(self, model: LabelSetModel, asks: Asks, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._model = model
-        self._name = QLineEdit(self)
-        self._name.setAccessibleName("Name of the label set")
-        self._name.setToolTip("Name of the label set")
+        self._name = NameLine("Name of the label set", self)
         self._name.editingFinished.connect(lambda: model.rename_set(self._name.text()))
+        self._name.given_up.connect(lambda: self._name.setText(model.label_set.name))
         self.table = table = LabelSetTable(model, asks, self)
         table.removed.connect(self._remove)
         self._warning = ElidedLabel(self)
@@ -168,6 +170,30 @@ class LabelSetPage(QWidget):
         self._warning.setVisible(bool(self._model.warnings))
         if not self._name.hasFocus():
             self._name.setText(self._model.label_set.name)
+
+
+class NameLine(QLineEdit):
+    """Return takes what was typed, Escape takes it back; either gives the keyboard back."""
+
+    given_up = Signal()
+
+    def __init__(self, name: str, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.setAccessibleName(name)
+        self.setToolTip(name)
+
+    def event(self, event: QEvent) -> bool:
+        """Escape and Return are its own."""
+        return claims(event, _OWN_KEYS) or super().event(event)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Leave."""
+        if event.key() == Qt.Key.Key_Escape:
+            self.given_up.emit()
+        else:
+            super().keyPressEvent(event)
+        if event.key() in _OWN_KEYS:
+            self.clearFocus()
 
 
 class LabelSetTable(CellTable):

@@ -151,6 +151,8 @@ def test_what_the_mouse_does_is_listed_and_not_changed(dialog) -> None:
 def test_typing_in_a_number_box_fires_no_action(window, qtbot) -> None:
     """Whatever keys are chosen: letters, signs and arrows belong to the field."""
     c = window.context
+    c.keys.bind("dots", ["Up"])
+    c.keys.bind("show_trade", ["End"])
     window.activateWindow()
     qtbot.waitUntil(window.isActiveWindow, timeout=5000)
     window.side.bring_up("Sensor")
@@ -159,4 +161,14 @@ def test_typing_in_a_number_box_fires_no_action(window, qtbot) -> None:
     before = c.playback.frame, c.labels.labels, c.playback.playing, c.display.as_dots
     for key in (Qt.Key.Key_1, Qt.Key.Key_D, Qt.Key.Key_Slash, Qt.Key.Key_Right, Qt.Key.Key_Space):
         QTest.keyClick(box, key)
+    QTest.keyClick(box, Qt.Key.Key_Up)
+    QTest.keyClick(box, Qt.Key.Key_End)
     assert (c.playback.frame, c.labels.labels, c.playback.playing, c.display.as_dots) == before
+    assert window.side.shown == "Sensor"
+    # Escape takes back what was typed, and what is being marked goes on.
+    QTest.keyClick(window, Qt.Key.Key_1)
+    assert c.labels.marks
+    QTest.keyClick(box, Qt.Key.Key_Escape)
+    assert c.labels.marks
+    QTest.keyClick(window, Qt.Key.Key_Escape)
+    assert not c.labels.marks

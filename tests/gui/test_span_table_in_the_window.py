@@ -182,6 +182,17 @@ def test_a_label_is_chosen_from_a_list_for_all_selected_rows(labelled) -> None:
     assert labelled.context.document.undo_stack.count() == 1
 
 
+def test_letters_choose_in_an_open_list_too(labelled) -> None:
+    editor = edit(labelled, 0, "label")
+    press(labelled, "Down", Qt.KeyboardModifier.AltModifier)
+    assert editor.view().isVisible()
+    QTest.keyClick(editor.view(), Qt.Key.Key_D)
+    assert not labelled.context.display.as_dots
+    QTest.keyClick(editor.view(), Qt.Key.Key_Return)
+    QApplication.processEvents()
+    assert spans(labelled)[0][0] == "down-to-up"
+
+
 def test_search_filters_and_escape_leaves(labelled) -> None:
     press(labelled, "F", CONTROL)
     search = QApplication.focusWidget()
