@@ -24,6 +24,8 @@ from sd2app.views.time_wheel import turn_wheel
 
 _ATTRACT_PX = 8.0
 _MOVED_PX = 3.0
+_SMALL = 0.82
+"""Of names that would not be whole otherwise."""
 _SCROLL_MS, _SCROLL_SHARE = 30, 0.03
 
 
@@ -122,11 +124,20 @@ class LabelTimeline(QWidget):
         palette = self._display.palette
         chosen = name == self._labels.track and len(self._labels.labels.tracks) > 1
         painter.setPen(QColor(palette.accent if chosen else palette.muted))
-        room = row.adjusted(0, 0, GUTTER_PX - 6 - row.width(), 0)
-        metrics = painter.fontMetrics()
-        shown = metrics.elidedText(name, Qt.TextElideMode.ElideRight, int(room.width()))
+        room = row.adjusted(2, 0, GUTTER_PX - 6 - row.width(), 0)
         place = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-        painter.drawText(room, place, shown)
+        painter.save()
+        if painter.fontMetrics().horizontalAdvance(name) > room.width():
+            font = painter.font()
+            font.setPixelSize(round(_SMALL * painter.fontInfo().pixelSize()))
+            painter.setFont(font)
+        metrics = painter.fontMetrics()
+        if metrics.horizontalAdvance(name) > room.width() and row.height() > 2 * metrics.height():
+            painter.drawText(room, place | Qt.TextFlag.TextWordWrap, name)
+        else:
+            shown = metrics.elidedText(name, Qt.TextElideMode.ElideRight, int(room.width()))
+            painter.drawText(room, place, shown)
+        painter.restore()
 
     def _paint_hint(self, painter: QPainter, row: QRectF) -> None:
         keys = [one.key for one in self._labels.labels.label_set.labels if one.key]

@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from sd2app.views.difference import DifferenceView
 from sd2app.views.heatmap import HeatmapView
+from sd2app.views.label_area import LabelArea
 from sd2app.views.label_timeline import LabelTimeline
 from sd2app.views.model_menu import ModelButton, ModelMenu
 from sd2app.views.other_timeline import OtherTimeline
@@ -71,7 +72,7 @@ class Tracks(QWidget):
         other = OtherTimeline(c.agreement, c.span, c.playback, c.display)
         for below in (
             bar,
-            self.labels,
+            LabelArea(self.labels, c.labels),
             other,
             TimeRuler(c.span, c.playback, c.display),
             self.overview,

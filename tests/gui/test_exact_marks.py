@@ -138,12 +138,14 @@ def presses() -> list[tuple[float, str]]:
     ]
 
 
-def check_marked(labels: Labels, script: list[tuple[float, str]]) -> None:
+def check_marked(
+    labels: Labels, script: list[tuple[float, str]], within_s: float = TWO_FRAMES_S
+) -> None:
     """Eight gestures with the right labels, every edge within two frames of its press."""
     expected = open_recording(SAMPLE).labelled.spans
     assert [span.label for span in labels.spans] == [span.label for span in expected]
     edges_s = [edge for span in labels.spans for edge in (span.start_s, span.end_s)]
-    assert np.abs(np.array(edges_s) - [at_s for at_s, _ in script]).max() <= TWO_FRAMES_S
+    assert np.abs(np.array(edges_s) - [at_s for at_s, _ in script]).max() <= within_s
 
 
 def check_formats(labels: Labels, window, folder: Path) -> None:
@@ -191,11 +193,13 @@ def test_the_eight_gestures_of_the_sample(unlabelled_sample, qtbot, tmp_path) ->
 @pytest.mark.slow
 def test_the_same_at_1x_by_the_clock_on_the_wall(unlabelled_sample, qtbot, tmp_path) -> None:
     c, script = unlabelled_sample.context, presses()
-    # When the hand has pressed by a clock of its own: a busy machine may hold it back.
+    # When the hand has pressed by a clock of its own, and what it saw then.
     pressed: list[tuple[float, str]] = []
+    on_screen_s: list[float] = []
 
     def press(name: str) -> None:
         pressed.append((time.perf_counter() - began_s, name))
+        on_screen_s.append(c.playback.timebase.time_of(c.playback.frame))
         key(unlabelled_sample, name)
 
     for at_s, name in script:
@@ -204,10 +208,19 @@ def test_the_same_at_1x_by_the_clock_on_the_wall(unlabelled_sample, qtbot, tmp_p
         timer.setTimerType(Qt.TimerType.PreciseTimer)
         timer.timeout.connect(lambda name=name: press(name))
         timer.start(round(1000 * at_s))
+    # Where others hold the machine up, the screen stands; the hand marks what it sees.
+    ticks_s: list[float] = []
+    ticker = QTimer(unlabelled_sample)
+    ticker.timeout.connect(lambda: ticks_s.append(time.perf_counter()))
+    ticker.start(5)
     began_s = time.perf_counter()
     c.playback.play()
     qtbot.waitUntil(lambda: not c.playback.playing, timeout=60_000)
+    ticker.stop()
+    held_up_s = float(np.diff(ticks_s).max())
+    labels = c.labels.labels
     assert [name for _, name in pressed] == [name for _, name in script]
-    check_marked(c.labels.labels, pressed)
-    check_formats(c.labels.labels, unlabelled_sample, tmp_path)
+    assert [edge for one in labels.spans for edge in (one.start_s, one.end_s)] == on_screen_s
+    check_marked(labels, pressed, TWO_FRAMES_S + held_up_s)
+    check_formats(labels, unlabelled_sample, tmp_path)
     c.document.undo_stack.setClean()

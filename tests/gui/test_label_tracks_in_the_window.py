@@ -23,6 +23,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QCheckBox, QInputDialog, QLineEdit
 
 from sd2app.dialogs.label_tracks import TrackDialog
+from sd2app.views.label_area import LabelArea
 
 THERE, BACK = ("there", 6, 24), ("back", 30, 60)
 
@@ -172,6 +173,25 @@ def test_a_name_chooses_the_track_and_spans_change_theirs(two_tracks) -> None:
     key(two_tracks, "Down", ALT)
     key(two_tracks, "Up", ALT)
     assert spans(two_tracks, "Gestures") == [THERE, BACK]
+
+
+def test_many_tracks_are_scrolled_and_the_chosen_one_is_in_view(labelled, qtbot) -> None:
+    c, view = labelled.context, timeline(labelled)
+    width_px = view.width()
+    for number in range(20):
+        c.label_tracks.add(f"Track {number}", "exclusive")
+    area = labelled.findChild(LabelArea)
+    assert view.height() > 2 * area.height()
+    assert view.width() == width_px
+    for track in ("Gestures", "Track 19", "Track 9"):
+        c.labels.set_track(track)
+        row = view.rows.row_of(track)
+
+        def in_view(row=row) -> bool:
+            seen = view.visibleRegion().boundingRect()
+            return seen.top() <= row.top_px and row.top_px + row.height_px <= seen.bottom() + 1
+
+        qtbot.waitUntil(in_view, timeout=5000)
 
 
 def test_the_menu_shows_the_tracks_and_the_one_that_is_chosen(two_tracks) -> None:
