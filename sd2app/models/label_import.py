@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 from PySide6.QtCore import QObject, Signal
 
@@ -11,7 +10,7 @@ from sd2app.jobs.latest import Emit, LatestRunner
 from sd2core.labels.formats import FORMATS, format_for, read_labels
 from sd2core.labels.formats.boris_reading import observations
 from sd2core.labels.spans import Labels, Span
-from sd2core.labels.taking_in import Incoming, Way
+from sd2core.labels.taking_in import Incoming, Way, set_after
 from sd2core.timebase import Timebase
 
 _MOST_NAMED = 6
@@ -112,7 +111,7 @@ class LabelImportModel(QObject):
             ("Tracks", f"{len(tracks)}: {_names([track.name for track in tracks])}"),
             ("Labels", _label_words(found.labels.spans)),
         ]
-        if unknown := found.unknown(self._set_afterwards(found)):
+        if unknown := found.unknown(set_after(self._labels.label_set, found, self._way)):
             one = len(unknown) == 1
             facts.append(
                 (
@@ -149,11 +148,6 @@ class LabelImportModel(QObject):
         self._runner.close()
 
     # --- inside ---------------------------------------------------------------------------
-
-    def _set_afterwards(self, found: Incoming) -> Any:
-        from sd2core.labels.taking_in import take_in
-
-        return take_in(self._labels, found, self._way, self.path.name).labels.label_set
 
     def _read(self) -> None:
         self._incoming, self._problem = None, ""

@@ -1,4 +1,4 @@
-"""``sd2 labels``: show, count, convert, suggest and compare labelled spans."""
+"""``sd2 labels``: show, count, convert, suggest, compare, draw and cut out labelled spans."""
 
 from __future__ import annotations
 
@@ -36,13 +36,15 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser = add_command(
         commands,
         "labels",
-        "show, count, convert, suggest and compare labelled spans",
+        "show, count, convert, suggest, compare, draw and cut out labelled spans",
         examples=(
             "  sd2 labels show walk.sd2\n"
             "  sd2 labels statistics walk.sd2 --csv\n"
             "  sd2 labels convert walk.sd2 walk.eaf\n"
             "  sd2 labels suggest walk.sd2 --out suggested.json\n"
-            "  sd2 labels agree anna.json ben.json --video walk.mp4"
+            "  sd2 labels agree anna.json ben.json --video walk.mp4\n"
+            "  sd2 labels figure walk.sd2 --out walk.pdf\n"
+            "  sd2 labels cut walk.sd2 --out cuts"
         ),
     )
     kinds = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)

@@ -246,7 +246,7 @@ def _read(path: Path) -> dict[str, Any] | None:
     except (OSError, ValueError):
         return None
     ours = isinstance(found, dict) and found.get("format") == FORMAT
-    return found if ours and isinstance(found.get("files"), list) else None
+    return found if ours and {"span", "frames", "files"} <= found.keys() else None
 
 
 def _text(described: dict[str, Any]) -> str:

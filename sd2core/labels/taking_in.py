@@ -89,10 +89,9 @@ def take_in(labels: Labels, incoming: Incoming, way: Way, source: str) -> Edit:
     if not brought.spans and not incoming.outside and way == "add":
         raise Sd2Error(f"{source} holds no spans", "at least one, to add them")
     name = f"Import {len(brought.spans)} span{'s' * (len(brought.spans) != 1)}"
+    label_set = set_after(labels.label_set, incoming, way)
     if way == "replace":
-        # A file that says nothing of labels is read with the default set.
-        own = brought.label_set != GESTURES
-        after = replace(brought, label_set=brought.label_set if own else labels.label_set)
+        after = replace(brought, label_set=label_set)
         return Edit(name, labels if after == labels else after)
     names = {track.name for track in labels.tracks}
     called: dict[str, str] = {}
@@ -107,11 +106,7 @@ def take_in(labels: Labels, incoming: Incoming, way: Way, source: str) -> Edit:
         replace(span, id=first + number, track=called[span.track])
         for number, span in enumerate(brought.spans)
     ]
-    after = Labels(
-        (*labels.tracks, *tracks),
-        (*labels.spans, *spans),
-        _with_labels_of(labels.label_set, incoming),
-    )
+    after = Labels((*labels.tracks, *tracks), (*labels.spans, *spans), label_set)
     return Edit(name, after, tuple(span.id for span in spans))
 
 
@@ -129,12 +124,19 @@ def free_name(name: str, source: str, taken: Collection[str]) -> str:
         number += 1
 
 
-def _with_labels_of(label_set: LabelSet, incoming: Incoming) -> LabelSet:
-    """The set with those labels in use besides that only the file has a colour for."""
+def set_after(label_set: LabelSet, incoming: Incoming, way: Way) -> LabelSet:
+    """The label set of a recording after :func:`take_in`.
+
+    Added labels bring those of their labels that only the file has a colour for.
+    """
+    theirs = incoming.labels.label_set
+    if way == "replace":
+        # A file that says nothing of labels is read with the default set.
+        return theirs if theirs != GESTURES else label_set
     keys = {one.key.casefold() for one in label_set.labels if one.key}
     added = []
     for name in incoming.unknown(label_set):
-        brought = incoming.labels.label_set.find(name)
+        brought = theirs.find(name)
         if brought is not None:
             key = "" if brought.key.casefold() in keys else brought.key
             keys.add(key.casefold())

@@ -69,6 +69,13 @@ def test_a_bad_file_is_refused_in_the_cores_words(importing, tmp_path) -> None:
     assert model.problem == ""
 
 
+def test_a_file_without_spans_is_shown_as_that(importing, tmp_path) -> None:
+    path = tmp_path / "empty.json"
+    write_labels(path, Labels(), FRAMES)
+    model = importing(path)
+    assert dict(model.facts()) == {"Spans": "none", "Tracks": "1: Gestures", "Labels": "none"}
+
+
 def test_of_several_videos_in_a_file_one_is_chosen(importing, tmp_path, qtbot) -> None:
     path = tmp_path / "project.boris"
     write_labels(path, of((1.0, 2.0, "wave")), FRAMES)
