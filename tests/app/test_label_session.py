@@ -429,6 +429,31 @@ class TestTwoWindows:
         second.document.save()
         assert len(read_labels(recording / "labels.json").labels.spans) == 2
 
+    def test_a_recording_of_ones_own_is_edited(self, desk, root, recording, tmp_path) -> None:
+        first, second = desk().open(recording), desk().open(recording)
+        second.document.save_as(tmp_path / "mine.sd2")
+        assert not second.session.refusal
+        second.mark(10, 20)
+        second.document.save()
+        first.mark(30, 40)
+        first.document.save()
+        for folder, spans in ((tmp_path / "mine.sd2", second.spans), (recording, first.spans)):
+            (span,) = read_labels(folder / "labels.json").labels.spans
+            assert (span.label, *even(90).frames_between(span.start_s, span.end_s)) == spans[0]
+
+    def test_it_looks_on_with_files_that_were_added(
+        self, qtbot, desk, root, recording, tmp_path
+    ) -> None:
+        first, second = desk().open(recording), desk().open(recording)
+        write_capture_of_nothing(tmp_path / "radar")
+        with qtbot.waitSignal(second.document.opened, timeout=10_000):
+            second.document.add([tmp_path / "radar"])
+        assert not second.hand.begin_drag()
+        first.mark(10, 20)
+        first.document.save()
+        second.document.save()
+        assert len(read_labels(recording / "labels.json").labels.spans) == 1
+
     def test_labels_that_were_damaged_meanwhile_are_not_overwritten(
         self, desk, root, recording
     ) -> None:
