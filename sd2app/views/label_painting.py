@@ -21,6 +21,8 @@ _NARROW_TINTS = 90, 255
 """Of columns that narrow spans hold hardly and wholly."""
 _REGION_TINT, _SELECTED_REGION_TINT = 18, 54
 """Faint: a map's colours are read as levels."""
+_EDGES_FROM_PX = 12.0
+"""On a map, which lines closer than that would hide."""
 _OVERVIEW_TINTS = 130, 255
 _TEXT_FROM_PX = 26.0
 _INSET_PX = 1.0
@@ -60,8 +62,9 @@ def paint_span(
         # Half a line is no text.
         if room.height() >= metrics.ascent():
             shown = metrics.elidedText(text, Qt.TextElideMode.ElideRight, int(room.width()))
-            painter.setPen(QColor(palette.text))
-            painter.drawText(room, Qt.AlignmentFlag.AlignVCenter, shown)
+            if shown != "…":
+                painter.setPen(QColor(palette.text))
+                painter.drawText(room, Qt.AlignmentFlag.AlignVCenter, shown)
 
 
 def lane_box(row: TrackRow, lane: int, left: float, right: float) -> QRectF:
@@ -127,9 +130,10 @@ def paint_regions(painter: QPainter, plot: QRectF, scale: TimeScale, model: Labe
     edges: dict[tuple[int, bool], list[QLineF]] = {}
     for number in columns_in(painter, plot, scale, model).wide.tolist():
         span, tone = arrays.spans[number], int(arrays.tones[number])
-        lines = edges.setdefault((tone, span.origin == "suggestion"), [])
-        for x in (scale.x_of(span.start_s), scale.x_of(span.end_s)):
-            lines.append(QLineF(x, plot.top(), x, plot.bottom()))
+        left, right = scale.x_of(span.start_s), scale.x_of(span.end_s)
+        if right - left >= _EDGES_FROM_PX:
+            lines = edges.setdefault((tone, span.origin == "suggestion"), [])
+            lines += [QLineF(x, plot.top(), x, plot.bottom()) for x in (left, right)]
     for (tone, suggested), lines in edges.items():
         style = Qt.PenStyle.DashLine if suggested else Qt.PenStyle.SolidLine
         painter.setPen(QPen(QColor(arrays.colours[tone]), 1.0, style))

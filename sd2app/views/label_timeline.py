@@ -24,6 +24,7 @@ from sd2app.views.time_wheel import turn_wheel
 
 _ATTRACT_PX = 8.0
 _MOVED_PX = 3.0
+_CHOSEN_PX = 3.0
 _SMALL = 0.82
 """Of names that would not be whole otherwise."""
 _SCROLL_MS, _SCROLL_SHARE = 30, 0.03
@@ -101,11 +102,10 @@ class LabelTimeline(QWidget):
         painter.fillRect(self.rect(), QColor(palette.panel))
         plot = QRectF(GUTTER_PX, 0, self.width() - GUTTER_PX - MARGIN_PX, self.height())
         rows = self._rows
+        self._paint_names(painter)
         for row in rows.tracks:
             whole = QRectF(0, row.top_px, self.width(), row.height_px)
-            self._paint_name(painter, row.name, whole)
-            well = whole.adjusted(GUTTER_PX, 1, -MARGIN_PX, -1)
-            painter.fillRect(well, QColor(palette.well))
+            painter.fillRect(whole.adjusted(GUTTER_PX, 1, -MARGIN_PX, -1), QColor(palette.well))
         painter.save()
         painter.setClipRect(plot)
         if not model.labels.spans and not model.marks and rows.tracks and not self._edits.refusal:
@@ -120,23 +120,29 @@ class LabelTimeline(QWidget):
         painter.restore()
         paint_cursor(painter, plot, scale.x_of(self._playback.time_s))
 
-    def _paint_name(self, painter: QPainter, name: str, row: QRectF) -> None:
-        palette = self._display.palette
-        chosen = name == self._labels.track and len(self._labels.labels.tracks) > 1
-        painter.setPen(QColor(palette.accent if chosen else palette.muted))
-        room = row.adjusted(2, 0, GUTTER_PX - 6 - row.width(), 0)
-        place = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+    def _paint_names(self, painter: QPainter) -> None:
+        palette, rows = self._display.palette, self._rows.tracks
+        room_px = GUTTER_PX - 8
         painter.save()
-        if painter.fontMetrics().horizontalAdvance(name) > room.width():
+        if any(painter.fontMetrics().horizontalAdvance(row.name) > room_px for row in rows):
             font = painter.font()
             font.setPixelSize(round(_SMALL * painter.fontInfo().pixelSize()))
             painter.setFont(font)
         metrics = painter.fontMetrics()
-        if metrics.horizontalAdvance(name) > room.width() and row.height() > 2 * metrics.height():
-            painter.drawText(room, place | Qt.TextFlag.TextWordWrap, name)
-        else:
-            shown = metrics.elidedText(name, Qt.TextElideMode.ElideRight, int(room.width()))
-            painter.drawText(room, place, shown)
+        place = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+        for row in rows:
+            chosen = row.name == self._labels.track and len(rows) > 1
+            painter.setPen(QColor(palette.accent if chosen else palette.muted))
+            if chosen:
+                bar = QRectF(0, row.top_px + 3, _CHOSEN_PX, row.height_px - 6)
+                painter.fillRect(bar, QColor(palette.accent))
+            room = QRectF(2, row.top_px, room_px, row.height_px)
+            whole = metrics.horizontalAdvance(row.name) <= room_px
+            if not whole and row.height_px > 2 * metrics.height():
+                painter.drawText(room, place | Qt.TextFlag.TextWordWrap, row.name)
+            else:
+                shown = metrics.elidedText(row.name, Qt.TextElideMode.ElideRight, room_px)
+                painter.drawText(room, place, shown)
         painter.restore()
 
     def _paint_hint(self, painter: QPainter, row: QRectF) -> None:

@@ -86,13 +86,16 @@ def long_window(qtbot: Any, long_recording: Path) -> Iterator[Any]:
     window.show()
     window.populate()
     qtbot.waitUntil(lambda: window.settled, timeout=60_000)
-    began_s, worked_s = time.perf_counter(), time.thread_time()
+    began_s, worked_s, all_s = time.perf_counter(), time.thread_time(), time.process_time()
     window.open_paths([long_recording])
     c = window.context
     qtbot.waitUntil(lambda: c.synthetic.map is not None, timeout=60_000)
     QApplication.processEvents()
-    print(f"\nopened in {time.perf_counter() - began_s:.2f} s, "
-          f"{time.thread_time() - worked_s:.2f} s of them in the thread of the window")  # fmt: skip
+    clock_s, window_s = time.perf_counter() - began_s, time.thread_time() - worked_s
+    process_s = time.process_time() - all_s
+    print(
+        f"\nopened in {clock_s:.2f} s; worked {process_s:.2f} s, the window {window_s:.2f} s of it"
+    )
     c.synthesis.close()
     yield window
     c.document.undo_stack.clear()
