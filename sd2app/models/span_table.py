@@ -26,6 +26,7 @@ Index = QModelIndex | QPersistentModelIndex
 _RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 _LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 _READ = Qt.ItemFlag.ItemIsSelectable | Qt.ItemFlag.ItemIsEnabled
+_TYPED = _READ | Qt.ItemFlag.ItemIsEditable
 _NOWHERE = QModelIndex()
 
 
@@ -242,8 +243,7 @@ class SpanTableModel(QAbstractTableModel):
         """What can be typed into."""
         if not index.isValid():
             return Qt.ItemFlag.NoItemFlags
-        editable = COLUMNS[index.column()].typed is not None
-        return _READ | Qt.ItemFlag.ItemIsEditable if editable else _READ
+        return _READ if COLUMNS[index.column()].typed is None else _TYPED
 
     def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
         """A cell, as it is looked at."""

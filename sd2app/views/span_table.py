@@ -61,6 +61,8 @@ class SpanTable(CellTable):
 
     def _arrange_columns(self) -> None:
         header = self.horizontalHeader()
+        # Asked which headings are selected, it would look at every cell of all selected rows.
+        header.setSelectionModel(QItemSelectionModel(self._model, self))
         header.setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
         header.setMinimumSectionSize(40)
         header.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
@@ -104,9 +106,12 @@ class SpanTable(CellTable):
         """The user has chosen rows: these spans are selected everywhere."""
         super().selectionChanged(selected, deselected)
         if not (self._mirroring or self._model.following):
+            # By ranges: rows one by one are asked for every cell, which takes seconds.
             spans = self._model.spans
-            rows = self.selectionModel().selectedRows()
-            self._labels.select(spans[index.row()].id for index in rows)
+            ranges = self.selectionModel().selection()
+            self._labels.select(
+                span.id for part in ranges for span in spans[part.top() : part.bottom() + 1]
+            )
 
     def currentChanged(self, current: QModelIndex, previous: QModelIndex) -> None:
         """The user has gone to another cell: the window goes there too."""

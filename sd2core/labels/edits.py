@@ -88,7 +88,7 @@ def duplicate(
 
 def delete(labels: Labels, ids: Iterable[int]) -> Edit:
     """Delete spans."""
-    gone = {labels.span(one).id for one in ids}
+    gone = {span.id for span in labels.these(ids)}
     name = "Delete span" if len(gone) == 1 else f"Delete {len(gone)} spans"
     return Edit(name, labels.with_spans(without=gone))
 
@@ -173,7 +173,7 @@ def merge(labels: Labels, ids: Sequence[int]) -> Edit:
     Sd2Error
         When they are on several tracks, or another span of an exclusive track is between.
     """
-    parts = [span for span in labels.spans if span.id in {labels.span(one).id for one in ids}]
+    parts = labels.these(ids)
     tracks = sorted({span.track for span in parts})
     if len(parts) < 2 or len(tracks) != 1:
         raise Sd2Error(

@@ -83,13 +83,12 @@ def reject(labels: Labels, ids: Iterable[int]) -> Edit:
 
 
 def _with(labels: Labels, ids: Iterable[int], name: str, **fields: Any) -> Edit:
-    changed = [replace(labels.span(one), **fields) for one in ids]
+    changed = [replace(span, **fields) for span in labels.these(ids)]
     return Edit(name, labels.with_spans(changed), tuple(span.id for span in changed))
 
 
 def _suggestions(labels: Labels, ids: Iterable[int]) -> list[Span]:
-    wanted = {labels.span(one).id for one in ids}
-    chosen = [span for span in labels.spans if span.id in wanted]
+    chosen = labels.these(ids)
     for span in chosen:
         if span.origin != "suggestion":
             raise Sd2Error(f"{span.words()} is of origin {span.origin!r}", "a suggestion")

@@ -173,6 +173,14 @@ class Labels:
                 return span
         raise Sd2Error(f"No span has the id {span_id}", f"one of the {len(self.spans)} spans")
 
+    def these(self, ids: Iterable[int]) -> list[Span]:
+        """The spans of those ids, in order; they must exist."""
+        wanted = set(ids)
+        found = [span for span in self.spans if span.id in wanted]
+        for missing in wanted.difference(span.id for span in found):
+            self.span(missing)
+        return found
+
     def track(self, name: str) -> Track:
         """The track of that name; it must exist."""
         for track in self.tracks:

@@ -121,3 +121,10 @@ class TestTracks:
             set_overlap(LABELS, "Suggested", "exclusive")
         after = set_overlap(reject(LABELS, [3]).labels, "Suggested", "exclusive").labels
         assert after.track("Suggested").overlap == "exclusive"
+
+
+def test_spans_are_found_by_their_ids_in_the_order_of_time() -> None:
+    assert [span.id for span in LABELS.these([3, 1, 3])] == [1, 3]
+    assert LABELS.these([]) == []
+    with pytest.raises(Sd2Error, match="No span has the id 9"):
+        LABELS.these([1, 9])
