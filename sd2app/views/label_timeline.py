@@ -138,7 +138,8 @@ class LabelTimeline(QWidget):
                 painter.fillRect(bar, QColor(palette.accent))
             room = QRectF(2, row.top_px, room_px, row.height_px)
             whole = metrics.horizontalAdvance(row.name) <= room_px
-            if not whole and row.height_px > 2 * metrics.height():
+            words = max(map(metrics.horizontalAdvance, row.name.split()))
+            if not whole and words <= room_px and row.height_px > 2 * metrics.height():
                 painter.drawText(room, place | Qt.TextFlag.TextWordWrap, row.name)
             else:
                 shown = metrics.elidedText(row.name, Qt.TextElideMode.ElideRight, room_px)

@@ -68,8 +68,10 @@ class SuggestionBar(QWidget):
         model = self._model
         self.setVisible(model.active)
         self._text.setText(model.text)
-        self._as.setText(f"Y: {model.accepted_as}" if model.pending else "")
-        self._as.setToolTip("What accepting calls it; the key of another label calls it that")
+        self._as.setText(f"accepted as {model.accepted_as}" if model.pending else "")
+        self._as.setToolTip(
+            "The label that was used last; the key of another label accepts as that"
+        )
         titles = [track.title for track in model.sources]
         with QSignalBlocker(self._source):
             if titles != [self._source.itemText(at) for at in range(self._source.count())]:
