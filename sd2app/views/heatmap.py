@@ -12,7 +12,6 @@ from PySide6.QtGui import (
     QPainter,
     QPaintEvent,
     QPen,
-    QPixmap,
     QWheelEvent,
 )
 from PySide6.QtWidgets import QSizePolicy, QWidget
@@ -25,6 +24,7 @@ from sd2app.models.tracks import UNCERTAIN_SHARE, PointerModel, Reading, TrackMo
 from sd2app.models.visible_span import VisibleSpanModel
 from sd2app.views.label_painting import paint_regions
 from sd2app.views.map_widget import MapWidget, paint_cursor
+from sd2app.views.still import Still
 from sd2app.views.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, signed_text, ticks
 from sd2app.views.time_wheel import turn_wheel
 
@@ -65,7 +65,7 @@ class HeatmapView(MapWidget):
         self._button: QWidget | None = None
         self.setMinimumHeight(96)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self._still: QPixmap | None = None
+        self._still = Still(self)
         self._room_px = 0
         span.changed.connect(self.invalidate)
         for signal in (track.status_changed, labels.changed, labels.selection_changed):
@@ -79,12 +79,12 @@ class HeatmapView(MapWidget):
 
     def invalidate(self) -> None:
         """Draw the map anew, and all that is around it."""
-        self._still = None
+        self._still.forget()
         super().invalidate()
 
     def redraw(self) -> None:
         """Draw what is on the map and around it anew."""
-        self._still = None
+        self._still.forget()
         self.update()
 
     def set_hint(self, hint: str) -> None:
@@ -149,15 +149,10 @@ class HeatmapView(MapWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Header, map, marked bins, axis, labels; over what is kept of them, the cursors."""
-        if self._still is None or self._button_px != self._room_px:
-            ratio = self.devicePixelRatioF()
-            self._still = QPixmap(self.size() * ratio)
-            self._still.setDevicePixelRatio(ratio)
-            with QPainter(self._still) as painter:
-                painter.setFont(self.font())
-                self._paint(painter)
+        if self._button_px != self._room_px:
+            self._still.forget()
         with QPainter(self) as painter:
-            painter.drawPixmap(0, 0, self._still)
+            self._still.paint(painter, self._paint)
             if self._track.map is not None:
                 self._paint_cursors(painter, self.plot_rect())
 

@@ -19,6 +19,7 @@ from sd2app.models.visible_span import VisibleSpanModel
 from sd2app.views.label_grip import Grip, grip_at, words
 from sd2app.views.label_painting import lane_box, paint_span, paint_spans
 from sd2app.views.map_widget import paint_cursor
+from sd2app.views.still import Still
 from sd2app.views.time_axis import GUTTER_PX, MARGIN_PX, TimeScale
 from sd2app.views.time_wheel import turn_wheel
 
@@ -56,6 +57,7 @@ class LabelTimeline(QWidget):
         self._pointer_px = 0.0
         self._attracted = self._cutting = False
         self._rows = LabelRows.of(labels.labels.tracks, labels.arrays, labels.marks)
+        self._still = Still(self)
         self._scroll = QTimer(self)
         self._scroll.setInterval(_SCROLL_MS)
         self._scroll.timeout.connect(self._scroll_on)
@@ -70,10 +72,10 @@ class LabelTimeline(QWidget):
             labels.selection_changed,
             loop.changed,
             span.changed,
-            playback.frame_changed,
             display.theme_changed,
         ):
-            signal.connect(self.update)
+            signal.connect(self._redraw)
+        playback.frame_changed.connect(self.update)
         self._follow()
 
     def sizeHint(self) -> QSize:
@@ -94,35 +96,38 @@ class LabelTimeline(QWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Names, spans, what is being marked, cursor."""
+        scale, model, rows = self.scale, self._labels, self._rows
+        plot = self._plot_rect()
         with QPainter(self) as painter:
-            self._paint(painter)
+            self._still.paint(painter, self._paint)
+            painter.setClipRect(plot)
+            if not (model.labels.spans or model.marks or self._edits.refusal) and rows.tracks:
+                self._paint_hint(painter, QRectF(0, 0, self.width(), ROW_PX))
+            for mark, lane in zip(model.marks, rows.mark_lanes, strict=True):
+                left, right = sorted((scale.x_of(mark.start_s), scale.x_of(self._playback.time_s)))
+                box = lane_box(rows.row_of(mark.track), lane, left, right)
+                colour, palette = model.colour_of(mark.label), self._display.palette
+                paint_span(painter, box, f"{mark.label} …", colour, palette, selected=True)
+            paint_cursor(painter, plot, scale.x_of(self._playback.time_s))
+
+    def _plot_rect(self) -> QRectF:
+        return QRectF(GUTTER_PX, 0, self.width() - GUTTER_PX - MARGIN_PX, self.height())
 
     def _paint(self, painter: QPainter) -> None:
-        palette, scale, model = self._display.palette, self.scale, self._labels
+        """What stands still: names, rows, spans."""
+        palette, rows = self._display.palette, self._rows.tracks
         painter.fillRect(self.rect(), QColor(palette.panel))
-        plot = QRectF(GUTTER_PX, 0, self.width() - GUTTER_PX - MARGIN_PX, self.height())
-        rows = self._rows
         self._paint_names(painter)
-        for row in rows.tracks:
+        for row in rows:
             whole = QRectF(0, row.top_px, self.width(), row.height_px)
             painter.fillRect(whole.adjusted(GUTTER_PX, 1, -MARGIN_PX, -1), QColor(palette.well))
-        painter.save()
+        plot = self._plot_rect()
         painter.setClipRect(plot)
-        if not model.labels.spans and not model.marks and rows.tracks and not self._edits.refusal:
-            self._paint_hint(painter, QRectF(0, 0, self.width(), ROW_PX))
-        paint_spans(painter, plot, scale, model, rows.tracks, palette)
-        for mark, lane in zip(model.marks, rows.mark_lanes, strict=True):
-            left, right = sorted((scale.x_of(mark.start_s), scale.x_of(self._playback.time_s)))
-            box = lane_box(rows.row_of(mark.track), lane, left, right)
-            paint_span(
-                painter, box, f"{mark.label} …", model.colour_of(mark.label), palette, selected=True
-            )
-        painter.restore()
-        paint_cursor(painter, plot, scale.x_of(self._playback.time_s))
+        paint_spans(painter, plot, self.scale, self._labels, rows, palette)
 
     def _paint_names(self, painter: QPainter) -> None:
         palette, rows = self._display.palette, self._rows.tracks
-        room_px = GUTTER_PX - 8
+        room_px = GUTTER_PX - 11
         painter.save()
         if any(painter.fontMetrics().horizontalAdvance(row.name) > room_px for row in rows):
             font = painter.font()
@@ -136,7 +141,7 @@ class LabelTimeline(QWidget):
             if chosen:
                 bar = QRectF(0, row.top_px + 3, _CHOSEN_PX, row.height_px - 6)
                 painter.fillRect(bar, QColor(palette.accent))
-            room = QRectF(2, row.top_px, room_px, row.height_px)
+            room = QRectF(5, row.top_px, room_px, row.height_px)
             whole = metrics.horizontalAdvance(row.name) <= room_px
             words = max(map(metrics.horizontalAdvance, row.name.split()))
             if not whole and words <= room_px and row.height_px > 2 * metrics.height():
@@ -160,6 +165,10 @@ class LabelTimeline(QWidget):
         labels = self._labels
         self._rows = LabelRows.of(labels.labels.tracks, labels.arrays, labels.marks)
         self.setFixedHeight(self.sizeHint().height())
+        self._redraw()
+
+    def _redraw(self) -> None:
+        self._still.forget()
         self.update()
 
     # --- the hand -------------------------------------------------------------------------

@@ -1,0 +1,32 @@
+"""What of a view stands still while it plays, kept as a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtGui import QPainter, QPixmap
+from PySide6.QtWidgets import QWidget
+
+
+class Still:
+    """Painted once, until it is forgotten or the view has another size."""
+
+    def __init__(self, view: QWidget) -> None:
+        self._view = view
+        self._picture: QPixmap | None = None
+
+    def forget(self) -> None:
+        """Something in it has changed."""
+        self._picture = None
+
+    def paint(self, painter: QPainter, draw: Callable[[QPainter], None]) -> None:
+        """Put it on the view; ``draw`` makes it where it is not there."""
+        ratio = self._view.devicePixelRatioF()
+        size = self._view.size() * ratio
+        if self._picture is None or self._picture.size() != size:
+            self._picture = QPixmap(size)
+            self._picture.setDevicePixelRatio(ratio)
+            with QPainter(self._picture) as own:
+                own.setFont(self._view.font())
+                draw(own)
+        painter.drawPixmap(0, 0, self._picture)
