@@ -58,6 +58,14 @@ def trade(window: MainWindow) -> None:
     window.measure_scene()
 
 
+def labels(window: MainWindow) -> None:
+    """The spans of the sample as a table beside the maps, one of them selected."""
+    window.resize(1280, 960)
+    window.show_labels()
+    span = window.context.labels.labels.spans[2]
+    window.context.label_edits.go_to(span)
+
+
 def real(window: MainWindow) -> None:
     """A real person with the mesh fitted to the video."""
     window.context.playback.seek(1.9)
@@ -203,6 +211,7 @@ def main() -> None:
     take(application, "sample.png", swipes, sample)
     take(application, "dark.png", swipes, far_in_the_dark)
     take(application, "trade.png", swipes, trade)
+    take(application, "labels.png", swipes, labels)
     comparison(application)
     training(application)
     walk = [SHARED / "video" / "walk.mkv", SHARED / "mesh" / "walk.npz"]

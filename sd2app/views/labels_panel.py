@@ -75,7 +75,12 @@ class LabelsPanel(QWidget):
         layout.setSpacing(6)
         layout.addLayout(row)
         layout.addWidget(self._pages, 1)
-        for signal in (model.rowsInserted, model.rowsRemoved):
+        for signal in (
+            model.rowsInserted,
+            model.rowsRemoved,
+            c.labels.changed,
+            self._pages.currentChanged,
+        ):
             signal.connect(self._show_count)
         self._show_count()
 
@@ -111,4 +116,4 @@ class LabelsPanel(QWidget):
         return button
 
     def _show_count(self) -> None:
-        self._count.setText(self.model.words)
+        self._count.setText(self.model.words if self._pages.currentIndex() == 0 else "")

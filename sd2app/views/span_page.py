@@ -50,7 +50,7 @@ class SpanPage(QWidget):
         columns.setAccessibleName("Columns")
         columns.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         columns.setStyleSheet("QToolButton::menu-indicator { image: none; }")
-        columns.setMenu(table.columns_menu())
+        columns.setMenu(table.columns_menu)
         row.addWidget(columns)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)

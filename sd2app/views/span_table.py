@@ -67,7 +67,7 @@ class SpanTable(CellTable):
         header.setMinimumSectionSize(40)
         header.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         header.customContextMenuRequested.connect(
-            lambda at: self.columns_menu().exec(header.mapToGlobal(at))
+            lambda at: self.columns_menu.exec(header.mapToGlobal(at))
         )
         metrics = self.fontMetrics()
         hidden = self._hidden()
@@ -75,11 +75,12 @@ class SpanTable(CellTable):
             widest_px = max(map(metrics.horizontalAdvance, (column.wide, column.heading)))
             self.setColumnWidth(place, widest_px + _PADDING_PX)
             self.setColumnHidden(place, column.id in hidden)
+        self.columns_menu = self._made_columns_menu()
+        """Which columns are shown."""
         self.sortByColumn(0, Qt.SortOrder.AscendingOrder)
         self.setSortingEnabled(True)
 
-    def columns_menu(self) -> QMenu:
-        """Which columns are shown."""
+    def _made_columns_menu(self) -> QMenu:
         menu = QMenu("Columns", self)
         menu.setToolTipsVisible(True)
         for place, column in enumerate(COLUMNS):

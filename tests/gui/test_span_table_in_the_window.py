@@ -236,7 +236,7 @@ def test_the_panel_is_as_wide_as_its_table_needs_and_others_are_as_before(labell
 
 def test_columns_are_chosen_and_remembered(labelled) -> None:
     assert table(labelled).isColumnHidden(AT["author"])
-    menu = table(labelled).columns_menu()
+    menu = table(labelled).columns_menu
     next(one for one in menu.actions() if one.text() == "Author").trigger()
     assert not table(labelled).isColumnHidden(AT["author"])
     assert "author" not in labelled.context.settings.stored("span_table/hidden", "")
