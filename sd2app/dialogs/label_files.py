@@ -100,7 +100,10 @@ class LabelFileDialogs:
         c = self._context
         source = c.cut_out.source()
         offered = groups(c.labels.labels, c.labels.selected)
-        if source is None or not offered[-1][1]:
+        if source is None:
+            return
+        if not offered[-1][1]:
+            self._messages.warn("There is nothing to cut out: accept the suggestions first.")
             return
         dialog = CutOutDialog(offered, source, self._parent)
         accepted = dialog.exec() == QDialog.DialogCode.Accepted

@@ -8,6 +8,7 @@ from pathlib import Path
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.jobs.latest import Emit, LatestRunner
+from sd2core.errors import Sd2Error
 from sd2core.labels.formats import FORMATS, LabelFormat, Loss, would_lose, write_labels
 from sd2core.labels.spans import Labels
 from sd2core.timebase import Timebase
@@ -98,6 +99,14 @@ class LabelExportModel(QObject):
         """Write the file, with the usual ending where the name has none."""
         labels, base, chosen, media = self._labels, self._timebase, self._format, self._media
         target = path if path.suffix else path.with_suffix(chosen.suffixes[0])
+        if target != path and target.exists():
+            # Nobody was asked about that one.
+            self._refuse(
+                Sd2Error(
+                    f"{target} exists", "another name", "Type the ending as well to replace it"
+                )
+            )
+            return
 
         def write(emit: Emit) -> Written:
             losses = write_labels(target, labels, base, chosen.name, media=media)

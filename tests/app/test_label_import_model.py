@@ -112,7 +112,12 @@ def test_an_export_says_its_losses_before_and_after(qtbot, tmp_path) -> None:
     assert written.path == tmp_path / "mine.txt"
     assert "keeps no notes: 1 note left out" in str(written)
     assert len(read_labels(written.path).spans) == 1
+    before = written.path.read_bytes()
+    model.export(tmp_path / "mine")
+    assert f"{written.path} exists" in model.problem
+    assert written.path.read_bytes() == before
     model.export(tmp_path / "no such folder" / "mine.txt")
+    assert not model.problem
     qtbot.waitUntil(lambda: bool(model.problem), timeout=10_000)
     assert not model.exporting
     model.close()
