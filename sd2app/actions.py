@@ -14,13 +14,14 @@ from sd2app.actions_by_hand import MARKING, SPANS, TRACKS
 from sd2app.actions_of_labels import COMPARING, LABEL_FILES, SUGGESTIONS
 
 MOUSE = (
-    ("Click or drag in a heatmap or the ruler", "Go to that time"),
+    ("Click or drag in a heatmap or the ruler", "Go to that time; a click in a heatmap selects"),
     ("Wheel over a heatmap", "Zoom in on time, about the pointer"),
     ("Shift+wheel, middle drag", "Pan in time"),
     ("Double click in a heatmap", "Play the span there in a loop; none: the whole recording"),
     ("Drag an empty place of the labels", "Mark a span; with Shift also over others, cutting them"),
     ("Drag a span or an edge of it", "Move or shorten it; Alt: nothing attracts it"),
     ("Click a span, Ctrl+click, Shift+click", "Select it and go to its start, or several"),
+    ("Drag an edge of a selected span in a heatmap", "Move that edge"),
     ("Double click a span", "Play it in a loop"),
     ("Drag the title of the radar's heatmap", "Align the capture in time"),
     ("Drag the frame or its edges in the overview", "Pan or zoom in time"),
