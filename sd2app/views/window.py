@@ -190,17 +190,15 @@ class MainWindow(QMainWindow):
         from sd2app.views.agreement_panel import AgreementPanel
         from sd2app.views.labels_panel import LabelsPanel
         from sd2app.views.page_widths import PageWidths
+        from sd2app.views.panes import spectrum_pane, video_pane
         from sd2app.views.sensor_panel import SensorPanel
         from sd2app.views.side_panel import SidePanel
+        from sd2app.views.tracks import Tracks
         from sd2app.views.trade_panel import TradePanel
         from sd2app.views.training_panel import TrainingPanel
-        from sd2app.views.video_bar import VideoBar
 
         c = self.context
-        video = QVBoxLayout()
-        video.addWidget(VideoBar(c.overlay, self._actions))
-        video.addWidget(self._video_view(), 1)
-        fill(self._panels["video"], video)
+        fill(self._panels["video"], video_pane(c, self._actions))
         to_camera, aim = self._actions["sensor_to_camera"], self._actions["aim_sensor"]
         sensor = SensorPanel(c.sensor, c.document, c.synthesis, c.edits, to_camera, aim)
         trade = TradePanel(c.trade, c.display, self._actions["measure"])
@@ -213,34 +211,9 @@ class MainWindow(QMainWindow):
         self.side = SidePanel({**pages, "Labels": self.labels_panel, "Agree": agree})
         fill(self._panels["sensor"], self.side)
         self._widths = PageWidths(self._top, self.side, {"Labels": _LABELS_PX}, self._settings)
-        self._fill_tracks()
-
-    def _fill_tracks(self) -> None:
-        from sd2app.views.level_bar import LevelBar
-        from sd2app.views.spectrum import Curve, SpectrumView
-        from sd2app.views.tracks import Tracks
-
-        c = self.context
         self._tracks = Tracks(c, self._models, self._actions)
         fill(self._panels["tracks"], self._tracks)
-        side = QVBoxLayout()
-        curves = tuple(
-            Curve(track, colour)
-            for track, colour in zip(
-                c.tracks, ("synthetic", "denoised", "before", "real"), strict=True
-            )
-        )
-        side.addWidget(SpectrumView(curves, c.playback, c.display, c.pointer), 1)
-        side.addWidget(LevelBar(c.display, c.tracks, self._actions["uncertain"]))
-        fill(self._panels["spectrum"], side)
-
-    def _video_view(self) -> QWidget:
-        from sd2app.views.video import VideoView
-
-        c = self.context
-        return VideoView(
-            c.video, c.document, c.playback, c.display, c.overlay, c.fit, c.fit_follower
-        )
+        fill(self._panels["spectrum"], spectrum_pane(c, self._actions))
 
     def _fit_bar(self) -> QWidget:
         from sd2app.views.fit_bar import FitBar
@@ -285,57 +258,18 @@ class MainWindow(QMainWindow):
         fill(self._panels["scene"], layout)
 
     def _connect(self) -> None:
+        from sd2app.views.window_signals import connect_sentences, signals_of_actions
+
         c = self.context
-        c.document.opened.connect(self._show_document)
-        c.document.changed.connect(self._refresh)
-        c.document.failed.connect(self.messages.warn)
-        c.document.noted.connect(self.messages.note)
-        c.fit_taker.noted.connect(self.messages.note)
-        c.synthesis.failed.connect(self.messages.warn)
-        c.trade.failed.connect(self.messages.warn)
-        c.uncertainty.failed.connect(self.messages.warn)
-        for model in (c.label_session, c.label_edits):
-            model.failed.connect(self.messages.warn)
-        c.label_session.noted.connect(self.messages.note)
+        connect_sentences(c, self.messages)
         self.labels_panel.model.noted.connect(self.messages.note)
-        c.denoise.failed.connect(self.messages.warn)
-        c.denoise.noted.connect(self.messages.note)
-        c.trade.noted.connect(self.messages.note)
-        for model in (c.training, c.training_use):
-            model.noted.connect(self.messages.note)
-            model.failed.connect(self.messages.warn)
+        c.document.opened.connect(self._show_document)
         c.training.changed.connect(lambda: self.side.set_mark("Train", c.training.mark))
-        c.video.failed.connect(self.messages.warn)
-        c.document.undo_stack.indexChanged.connect(self._refresh)
-        c.document.undo_stack.cleanChanged.connect(self._refresh)
-        for signal in (
-            c.playback.playing_changed,
-            c.playback.loop_changed,
-            c.display.mesh_changed,
-            c.overlay.changed,
-            c.uncertainty.changed,
-            c.denoise.changed,
-            c.live.changed,
-            c.difference.state_changed,
-            c.fit.state_changed,
-            c.synthesis.completed,
-            c.trade.plan_changed,
-            c.trade.measured.changed,
-            c.label_session.changed,
-            c.labels.changed,
-            c.labels.selection_changed,
-            c.labels.marks_changed,
-            c.keys.changed,
-            c.label_dragging.changed,
-            c.span_loop.changed,
-            c.suggestions.changed,
-            c.agreement.changed,
-        ):
-            signal.connect(self._refresh)
         # Without a person in the frame there is nothing to aim at.
         c.synthesis.target_changed.connect(lambda: self._actions.refresh_one("aim_sensor"))
         c.display.theme_changed.connect(self._restyle)
-        c.display.theme_changed.connect(self._refresh)
+        for signal in signals_of_actions(c):
+            signal.connect(self._refresh)
 
     # --- following the models -------------------------------------------------------------
 

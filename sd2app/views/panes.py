@@ -1,0 +1,38 @@
+"""What the window's plain panes hold."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from PySide6.QtWidgets import QVBoxLayout
+
+from sd2app.views.level_bar import LevelBar
+from sd2app.views.spectrum import Curve, SpectrumView
+from sd2app.views.video import VideoView
+from sd2app.views.video_bar import VideoBar
+
+if TYPE_CHECKING:
+    from sd2app.action_set import ActionSet
+    from sd2app.context import Context
+
+_COLOURS = ("synthetic", "denoised", "before", "real")
+
+
+def video_pane(context: Context, actions: ActionSet) -> QVBoxLayout:
+    """The video under its bar."""
+    c = context
+    layout = QVBoxLayout()
+    layout.addWidget(VideoBar(c.overlay, actions))
+    view = VideoView(c.video, c.document, c.playback, c.display, c.overlay, c.fit, c.fit_follower)
+    layout.addWidget(view, 1)
+    return layout
+
+
+def spectrum_pane(context: Context, actions: ActionSet) -> QVBoxLayout:
+    """The spectra of this frame over the levels of all maps."""
+    c = context
+    curves = tuple(Curve(track, colour) for track, colour in zip(c.tracks, _COLOURS, strict=True))
+    layout = QVBoxLayout()
+    layout.addWidget(SpectrumView(curves, c.playback, c.display, c.pointer), 1)
+    layout.addWidget(LevelBar(c.display, c.tracks, actions["uncertain"]))
+    return layout
