@@ -9,10 +9,12 @@ NO_TESTS_COLLECTED=5
 # when the machine does other work.
 export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 pytest=".venv/bin/python -m pytest"
+# Files side by side, so that what a file shares is made once.
+side_by_side="-n logical --maxprocesses 4 --dist loadfile"
 expression=$1
 
 echo "== Tests without a display"
-QT_QPA_PLATFORM=offscreen $pytest -m "($expression) and not gl" < /dev/null
+QT_QPA_PLATFORM=offscreen $pytest $side_by_side -m "($expression) and not gl" < /dev/null
 offscreen=$?
 
 echo "== Tests on a display"

@@ -44,7 +44,7 @@ _TOLD_BY = ("slopes", "depth_m", "trunk_m")
 
 # Measured on simulated people (docs/decisions/0022): what the lifter says of its
 # velocities, and the fit's error across the view per error of a landmark there.
-_ALONG = 0.42
+_ALONG = 0.22
 _ACROSS_PER_S = 3.0
 
 _UNSEEN_MPS = 0.3

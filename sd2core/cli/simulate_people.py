@@ -66,7 +66,7 @@ def add_people(kinds: argparse._SubParsersAction) -> None:
         type=positive_int,
         metavar="N",
         help="of optimisation (default: %(default)s)",
-        default=2200,
+        default=5000,
     )
     train.add_argument("--out", type=Path, required=True, metavar="FILE", help="to write (.npz)")
     train.add_argument("--seed", type=int, default=0, metavar="S", help="of all that is random")

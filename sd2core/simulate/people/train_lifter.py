@@ -77,7 +77,7 @@ class Recipe:
     width: int = 128
     dilations: tuple[int, ...] = (1, 2, 4, 8, 2, 1)
     dropout: float = 0.1
-    steps: int = 2200
+    steps: int = 5000
     emulated_share: float = 0.6
     batch: int = 24
     frames: int = 64
