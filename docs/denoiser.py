@@ -76,8 +76,10 @@ square on at 2.2 m; the mean noise is taken off, and what does not rise above it
 16 are empty in both.
 
 The errors are not invented: `sd2 simulate fit-errors` measured them on the sixteen clips of
-[fitting.md](fitting.md), and bodies that are disturbed by them, scored as the fits are, give: hands
-along the line of sight 0.31 m/s RMS (fits 0.24), correlation 0.92 (0.95), Doppler maps of gestures
+[fitting.md](fitting.md), fitted with the lifter that was bundled before ([decision
+18](decisions/0018-the-temporal-lifter.md)). Bodies that are disturbed by them, scored as those fits
+are, give: hands along the line of sight 0.31 m/s RMS (fits 0.24), correlation 0.92 (0.95), Doppler
+maps of gestures
 L1 0.51 (0.55). What is simulated and what is not (reflections in the room, glints, clothes, other
 people, fits that lose the person) is [decision 26](decisions/0026-the-simulated-campaign.md).
 
