@@ -27,7 +27,7 @@ help:
 	@echo "make accuracy     docs/accuracy-and-speed.md, measured (some five minutes)"
 	@echo "make fitting      docs/fitting.md, measured (some ten minutes)"
 	@echo "make denoiser     docs/denoiser.md, trained and measured (hours)"
-	@echo "make range-synthesis  docs/range-synthesis.md, trained (an hour)"
+	@echo "make range-synthesis  docs/range-synthesis.md, trained (half an hour)"
 	@echo "make clean        remove what the above made, .venv included"
 
 setup: system-packages $(COMPILED) landmark-models

@@ -1,4 +1,4 @@
-"""Makes ``range-synthesis.md``: ``make range-synthesis``, about an hour and a half.
+"""Makes ``range-synthesis.md``: ``make range-synthesis``, about half an hour.
 
 Whether a denoiser profits from seeing each motion from several places. Campaign and runs
 stay in ``build/range-synthesis`` (or ``--folder``); what is there is not made again.
@@ -62,8 +62,8 @@ def main() -> None:
     """Make what is missing, measure and write the page."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--folder", type=Path, default=DOCS.parent / "build" / "range-synthesis")
-    parser.add_argument("--minutes", type=float, default=36.0, help="of all people")
-    parser.add_argument("--epochs", type=int, default=60, help="of all sensors")
+    parser.add_argument("--minutes", type=float, default=24.0, help="of all people")
+    parser.add_argument("--epochs", type=int, default=80, help="of all sensors")
     parser.add_argument("--seeds", type=int, default=2)
     options = parser.parse_args()
     folder: Path = options.folder

@@ -222,6 +222,7 @@ def build_context(
             training, denoise, synthetic, before, denoised, real, user_models_folder, parent
         ),
     )
+    context.label_edits.done_at.connect(span.reveal_any)
     document.opened.connect(lambda: _take_over(context))
     document.changed.connect(lambda: _follow_capture(context))
     playback.frame_changed.connect(

@@ -14,6 +14,7 @@ from sd2app.models.labels import LabelsModel
 from sd2app.models.playback import PlaybackModel
 from sd2core.errors import Sd2Error
 from sd2core.labels import edits, span_fields
+from sd2core.labels.comparison import changed_stretch
 from sd2core.labels.edits import Edit, Side
 from sd2core.labels.group_edits import duplicate_together, nudge_together
 from sd2core.labels.spans import Labels, Span
@@ -50,10 +51,12 @@ class LabelEdits(QObject):
     Each edit is on disk when it is made (see :class:`.models.label_session.LabelSession`).
     Times are the frames of the playback clock. What cannot be done changes nothing, and
     ``failed`` says why. ``applying`` comes before an edit: a hand that drags is to let go.
+    ``done_at`` comes after one, also when it is taken back: from when to when spans differ.
     """
 
     failed = Signal(str)
     applying = Signal()
+    done_at = Signal(float, float)
 
     def __init__(
         self,
@@ -220,3 +223,5 @@ class LabelEdits(QObject):
         self._session.keep(name, before, after)
         recording.labels = after
         self._labels.set_labels(after)
+        if (stretch := changed_stretch(before, after)) is not None:
+            self.done_at.emit(*stretch)

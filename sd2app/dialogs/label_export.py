@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import (
     QDialog,
-    QDialogButtonBox,
     QFileDialog,
     QFormLayout,
     QVBoxLayout,
     QWidget,
 )
 
+from sd2app.dialogs.export_buttons import ExportButtons
 from sd2app.models.label_export import LabelExportModel
 from sd2app.views.inputs import Choice
 from sd2app.views.panel_parts import rule, sentence
@@ -32,13 +31,8 @@ class LabelExportDialog(QDialog):
             self._format.addItem(one.title, one.name)
         self._format.currentIndexChanged.connect(lambda _: model.choose(self._format.currentData()))
         self._about, self._losses = sentence(""), sentence("")
-        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel, self)
-        self._export = buttons.addButton("Export…", QDialogButtonBox.ButtonRole.ActionRole)
-        self._export.setDefault(True)
-        self._export.clicked.connect(self._ask)
-        for button in buttons.buttons():
-            button.setIcon(QIcon())
-        buttons.rejected.connect(self.reject)
+        buttons = ExportButtons(self, self._ask)
+        self._export = buttons.export
         form = QFormLayout()
         form.setHorizontalSpacing(12)
         form.addRow("For", self._format)

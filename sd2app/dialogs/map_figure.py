@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import (
     QCheckBox,
     QDialog,
-    QDialogButtonBox,
     QFormLayout,
     QHBoxLayout,
     QVBoxLayout,
     QWidget,
 )
 
+from sd2app.dialogs.export_buttons import ExportButtons
 from sd2app.dialogs.figure_file import ask_figure
 from sd2app.dialogs.figure_preview import FigurePreview
 from sd2app.models.figure import FigureModel
@@ -29,13 +28,8 @@ class MapFigureDialog(QDialog):
         super().__init__(parent)
         self._model, self._name = model, name
         self.setWindowTitle("Export figure of the maps")
-        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel, self)
-        self._export = buttons.addButton("Export…", QDialogButtonBox.ButtonRole.ActionRole)
-        self._export.setDefault(True)
-        self._export.clicked.connect(self._ask)
-        for button in buttons.buttons():
-            button.setIcon(QIcon())
-        buttons.rejected.connect(self.reject)
+        buttons = ExportButtons(self, self._ask)
+        self._export = buttons.export
         layout = QVBoxLayout(self)
         layout.setContentsMargins(16, 16, 16, 16)
         layout.setSpacing(16)

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QSignalBlocker
-from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import (
     QCheckBox,
     QDialog,
-    QDialogButtonBox,
     QFormLayout,
     QHBoxLayout,
     QLabel,
@@ -16,6 +14,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from sd2app.dialogs.export_buttons import ExportButtons
 from sd2app.dialogs.figure_file import ask_figure
 from sd2app.dialogs.figure_preview import FigurePreview
 from sd2app.models.strip import StripModel
@@ -38,13 +37,8 @@ class StripDialog(QDialog):
         self.setWindowTitle("Export strip of frames")
         self._build_frames()
         self._build_looks()
-        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel, self)
-        self._export = buttons.addButton("Export…", QDialogButtonBox.ButtonRole.ActionRole)
-        self._export.setDefault(True)
-        self._export.clicked.connect(self._ask)
-        for button in buttons.buttons():
-            button.setIcon(QIcon())
-        buttons.rejected.connect(self.reject)
+        buttons = ExportButtons(self, self._ask)
+        self._export = buttons.export
         layout = QVBoxLayout(self)
         layout.setContentsMargins(16, 16, 16, 16)
         layout.setSpacing(16)

@@ -74,3 +74,8 @@ class VisibleSpanModel(QObject):
         """Turn the page when ``time_s`` has left the stretch."""
         if time_s < self.start_s or time_s >= self.end_s:
             self.set_span(time_s, time_s + self.duration_s)
+
+    def reveal_any(self, start_s: float, end_s: float) -> None:
+        """Turn the page where nothing between two times is shown."""
+        if end_s <= self.start_s or start_s >= self.end_s:
+            self.reveal(start_s)

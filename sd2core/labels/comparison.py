@@ -47,3 +47,14 @@ def compare(before: Labels, after: Labels) -> Comparison:
         tracks=before.tracks != after.tracks,
         label_set=before.label_set != after.label_set,
     )
+
+
+def changed_stretch(before: Labels, after: Labels) -> tuple[float, float] | None:
+    """From the first to the last second of spans in which two states differ; None: in none."""
+    old = {span.id: span for span in before.spans}
+    new = {span.id: span for span in after.spans}
+    differ = [span for one, span in new.items() if old.get(one) != span]
+    differ += [span for one, span in old.items() if new.get(one) != span]
+    if not differ:
+        return None
+    return min(span.start_s for span in differ), max(span.end_s for span in differ)

@@ -140,3 +140,11 @@ def window(empty_window, small_recording, qtbot):
     qtbot.waitUntil(lambda: empty_window.settled, timeout=20_000)
     qtbot.waitUntil(lambda: empty_window.context.synthesis.complete, timeout=20_000)
     return empty_window
+
+
+@pytest.fixture
+def labelled(window, qtbot, recording_copy):
+    """The window on the small recording: "there" 0.2 to 0.8 s, "back" 1 to 2 s, 60 frames."""
+    window.open_paths([recording_copy])
+    qtbot.waitUntil(lambda: window.settled and window.context.synthesis.complete, timeout=20_000)
+    return window

@@ -29,14 +29,6 @@ THERE, BACK = ("there", 6, 24), ("back", 30, 60)
 
 
 @pytest.fixture
-def labelled(window, qtbot, recording_copy):
-    """The window on the small recording: "there" 0.2 to 0.8 s, "back" 1 to 2 s, 60 frames."""
-    window.open_paths([recording_copy])
-    qtbot.waitUntil(lambda: window.settled and window.context.synthesis.complete, timeout=20_000)
-    return window
-
-
-@pytest.fixture
 def two_tracks(labelled):
     """The same with a track on which spans may overlap."""
     assert labelled.context.label_tracks.add("Hands", "free")

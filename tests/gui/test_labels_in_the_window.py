@@ -15,14 +15,6 @@ from sd2core.recording import Recording, Span, open_recording
 NONE = Qt.KeyboardModifier.NoModifier
 
 
-@pytest.fixture
-def labelled(window, qtbot, recording_copy):
-    """The window on the small recording: "there" 0.2 to 0.8 s, "back" 1 to 2 s, 60 frames."""
-    window.open_paths([recording_copy])
-    qtbot.waitUntil(lambda: window.settled and window.context.synthesis.complete, timeout=20_000)
-    return window
-
-
 def spans(window) -> list[tuple[str, int, int]]:
     """What is labelled, in frames."""
     base = window.context.playback.timebase

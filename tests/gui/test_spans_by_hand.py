@@ -30,14 +30,6 @@ from sd2app.views.timeline import TimeRuler
 THERE, BACK = ("there", 6, 24), ("back", 30, 60)
 
 
-@pytest.fixture
-def labelled(window, qtbot, recording_copy):
-    """The window on the small recording: "there" 0.2 to 0.8 s, "back" 1 to 2 s, 60 frames."""
-    window.open_paths([recording_copy])
-    qtbot.waitUntil(lambda: window.settled and window.context.synthesis.complete, timeout=20_000)
-    return window
-
-
 def looping(window) -> str:
     """What the transport says of a loop."""
     buttons = window.findChildren(QToolButton)
@@ -261,3 +253,17 @@ def test_the_wheel_over_the_labels_zooms_as_over_the_maps(labelled) -> None:
     QApplication.sendEvent(view, event)
     assert span.duration_s == pytest.approx(1.6)
     assert view.scale.time_of(place.x()) == pytest.approx(0.5, abs=0.01)
+
+
+def test_undo_moves_the_view_only_to_show_the_change(labelled) -> None:
+    span, undo = labelled.context.span, labelled.context.document.undo_stack.undo
+    click(labelled, 0.5)
+    key(labelled, "Backspace")
+    assert spans(labelled) == [BACK]
+    span.set_span(0.7, 1.4)
+    undo()
+    assert spans(labelled) == [THERE, BACK]
+    assert (span.start_s, span.end_s) == (0.7, 1.4), "0.2 to 0.8 s can be seen in part"
+    span.set_span(1.2, 1.6)
+    labelled.context.document.undo_stack.redo()
+    assert span.start_s == pytest.approx(0.2)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 from labelled import even, imported, random_edit
 
-from sd2core.labels.comparison import Comparison, compare
+from sd2core.labels.comparison import Comparison, changed_stretch, compare
 from sd2core.labels.spans import Labels, Span, Track
 
 START = imported(even(), 7)
@@ -38,3 +38,14 @@ def test_words() -> None:
     assert str(Comparison(0, 1, 0, False, True)) == "1 span changed, another label set"
     assert str(Comparison(0, 0, 12_345, False, False)) == "12,345 spans removed"
     assert str(compare(START, START)) == ""
+
+
+def test_a_change_lies_where_spans_differ() -> None:
+    spans = list(START.spans)
+    moved = replace(spans[3], end_s=(spans[3].start_s + spans[3].end_s) / 2)
+    after = replace(START, spans=(*spans[:3], moved, *spans[4:]))
+    assert changed_stretch(START, START) is None
+    assert changed_stretch(START, after) == (spans[3].start_s, spans[3].end_s)
+    without = replace(START, spans=tuple(spans[:2] + spans[4:]))
+    ends_s = max(spans[2].end_s, spans[3].end_s)
+    assert changed_stretch(without, START) == (spans[2].start_s, ends_s)
