@@ -49,6 +49,7 @@ def _style_sheet(c: Palette) -> str:
     QMenuBar {{ padding: 2px 4px; }}
     QMenuBar::item {{ padding: 4px 8px; border-radius: 4px; background: transparent; }}
     QMenuBar::item:selected {{ background: {c.well}; }}
+    QDialogButtonBox {{ dialogbuttonbox-buttons-have-icons: 0; }}
     QSplitter::handle {{ background: {c.window}; }}
     QToolTip {{ border: 1px solid {c.border}; padding: 4px; }}
     QFrame#panel {{ background: {c.panel}; border: 1px solid {c.border}; border-radius: 6px; }}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import QDialog, QDialogButtonBox
 
 
@@ -23,6 +22,4 @@ class ExportButtons(QDialogButtonBox):
         self.export = self.addButton("Export…", QDialogButtonBox.ButtonRole.ActionRole)
         self.export.setDefault(True)
         self.export.clicked.connect(ask)
-        for button in self.buttons():
-            button.setIcon(QIcon())
         self.rejected.connect(dialog.reject)

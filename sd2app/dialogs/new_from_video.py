@@ -6,7 +6,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import QSignalBlocker, Qt
-from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import (
     QCheckBox,
     QDialog,
@@ -50,8 +49,6 @@ class NewFromVideoDialog(QDialog):
         self._buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel, self)
         self._begin = self._buttons.addButton("Fit", QDialogButtonBox.ButtonRole.AcceptRole)
         self._begin.setDefault(True)
-        for button in self._buttons.buttons():
-            button.setIcon(QIcon())  # some platforms have one for Cancel, and none for Fit
         self._buttons.accepted.connect(self.accept)
         self._buttons.rejected.connect(self.reject)
         self._lay_out()
