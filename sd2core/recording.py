@@ -13,7 +13,7 @@ import shutil
 import tempfile
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING
 
 from sd2core.atomic import atomic_write_text
 from sd2core.errors import Sd2Error
@@ -30,17 +30,14 @@ from sd2core.recording_document import (
     read_document,
 )
 from sd2core.relative_paths import (
-    common_suffix_length,
     free_path,
     is_absolute,
-    is_pattern,
-    is_there,
     located_path,
-    paths_named,
     plain_path,
     remove,
     stored_path,
 )
+from sd2core.relinking import ROLES, Relinked, Role, exists, find_again, is_many
 from sd2core.sensor import VirtualSensor
 
 if TYPE_CHECKING:
@@ -52,35 +49,11 @@ if TYPE_CHECKING:
 
 SUFFIX = ".sd2"
 
-Role = Literal["video", "mesh", "faces", "radar", "denoiser"]
-"""What a file is to the recording."""
-
 _PLACED_BY_VIDEO = {".pkl", ".pickle", ".joblib"}
 """Outputs of body models, which know their place only in the picture's pixels."""
 
-ROLES: tuple[Role, ...] = get_args(Role)
-
 _AIDS: set[Role] = {"faces", "denoiser"}
 """Files that are nothing to look at by themselves."""
-
-
-@dataclass(frozen=True)
-class Relinked:
-    """What :meth:`Recording.relink` did, by role.
-
-    Parameters
-    ----------
-    found : dict
-        New path of every file that was found.
-    ambiguous : dict
-        Candidates that fit equally well; nothing was changed for these.
-    missing : tuple of Role
-        Files that no name under the folder fits.
-    """
-
-    found: dict[Role, Path]
-    ambiguous: dict[Role, tuple[Path, ...]]
-    missing: tuple[Role, ...]
 
 
 @dataclass(eq=False)
@@ -199,7 +172,7 @@ class Recording:
         folder = _new_folder(Path(folder))
         files: dict[Role, Path] = {}
         for role, path in self._files().items():
-            if not _exists(role, Path(path)):
+            if not exists(role, Path(path)):
                 if role == "denoiser":  # everything else can be shown without it
                     continue
                 raise Sd2Error(f"The {role} {path} does not exist", "a file or folder")
@@ -251,52 +224,24 @@ class Recording:
 
     def missing(self) -> dict[Role, Path]:
         """Files that are not where the recording says."""
-        return {role: path for role, path in self._files().items() if not _exists(role, path)}
+        return {role: path for role, path in self._files().items() if not exists(role, path)}
 
     def relink(self, folder: Path, progress: Progress = silent) -> Relinked:
-        """Find all missing files by name under one folder, and save.
-
-        Of several files with the right name, the one whose path agrees with the
-        stored one over the most trailing parts is taken, when it is the only one.
+        """Find all missing files by name under one folder, and save where it was saved before.
 
         Parameters
         ----------
         folder : Path
-            Searched with everything below it.
+            Searched as :func:`~sd2core.relinking.find_again` does.
         progress : Progress
             Called with (folders searched, 0), as the total is not known.
         """
-        folder = Path(folder)
-        if not folder.is_dir():
-            raise Sd2Error(f"{folder} is not a folder", "the folder to search for missing files")
-        missing = self.missing()
-        folders = {path.parent.name for role, path in missing.items() if _is_pattern(role, path)}
-        names = {path.name for path in missing.values()}
-        candidates = paths_named(names | folders, folder, progress)
-        found: dict[Role, Path] = {}
-        ambiguous: dict[Role, tuple[Path, ...]] = {}
-        for role, path in missing.items():
-            # Files of a pattern are found by their folder, unless it is one file's own name.
-            by_folder = _is_pattern(role, path) and path.name not in candidates
-            old = path.parent if by_folder else path
-            rest = path.relative_to(old)
-            same_name = [p for p in candidates.get(old.name, []) if _exists(role, p / rest)]
-            agreement = [common_suffix_length(path, old) for path in same_name]
-            best = [
-                path
-                for path, parts in zip(same_name, agreement, strict=True)
-                if parts == max(agreement)
-            ]
-            if len(best) == 1:
-                found[role] = best[0] / rest
-            elif best:
-                ambiguous[role] = tuple(sorted(best))
-        for role, path in found.items():
+        relinked = find_again(self.missing(), Path(folder), progress)
+        for role, path in relinked.found.items():
             setattr(self, role, path)
-        if found:
+        if relinked.found and (self.folder / FILE_NAME).exists():
             self.save()
-        left = tuple(role for role in missing if role not in found and role not in ambiguous)
-        return Relinked(found, ambiguous, left)
+        return relinked
 
     def save(self, timebase: Timebase | None = None) -> None:
         """Write ``recording.json`` in one step, keeping fields this version does not know.
@@ -406,7 +351,7 @@ class Recording:
         if path is None:
             has = ", ".join(self._files()) or "nothing"
             raise Sd2Error(f"{self.folder} holds no {role}", f"a {role}; it has {has}")
-        if not _exists(role, path):
+        if not exists(role, path):
             raise Sd2Error(
                 f"The {role} of {self.folder} is not at {path}",
                 "the file where the recording says",
@@ -468,15 +413,6 @@ def _sensor(document: Document, file: Path) -> VirtualSensor:
         raise Sd2Error(f"{file}: {error.found}", error.expected, error.remedy) from error
 
 
-def _is_pattern(role: Role, path: Path) -> bool:
-    # Only a mesh is made of many files.
-    return role == "mesh" and is_pattern(path)
-
-
-def _exists(role: Role, path: Path) -> bool:
-    return is_there(path) if role == "mesh" else path.exists()
-
-
 def _new_folder(folder: Path) -> Path:
     folder = plain_path(folder)
     if folder.suffix != SUFFIX:
@@ -505,7 +441,7 @@ def _copied(
     inside: dict[Role, Path] = {}
     for done, (role, source) in enumerate(files.items()):
         progress(done, len(files))
-        if _is_pattern(role, source):
+        if is_many(role, source):
             raise Sd2Error(
                 f"{source} stands for several files", "a folder, for copying", "Give their folder"
             )

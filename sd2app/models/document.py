@@ -17,7 +17,8 @@ from sd2app.models.jobs import Job, JobsModel
 from sd2core.body.camera import PinholeCamera
 from sd2core.labels.spans import Labels
 from sd2core.mesh import MeshSequence
-from sd2core.recording import Recording, Relinked
+from sd2core.recording import Recording
+from sd2core.relinking import Relinked
 from sd2core.sensor import VelocityAxis
 from sd2core.spectrum import DopplerMap
 from sd2core.timebase import Timebase
@@ -295,7 +296,8 @@ class DocumentModel(QObject):
             return None
         relinked = self.recording.relink(folder)
         if relinked.found:
-            self._tell_saved()
+            if self._content is not None and self._content.saved:
+                self._tell_saved()
             self.reload()
         return relinked
 

@@ -321,6 +321,16 @@ class TestRelink:
         assert not again.missing()
         assert content(again)["video"] == "../../disk/walk.mkv"
 
+    def test_what_was_never_saved_is_not_saved(
+        self, files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        files.rename(tmp_path / "disk")
+        (tmp_path / "here").mkdir()
+        monkeypatch.chdir(tmp_path / "here")
+        unsaved = Recording(Path(), video=files / "walk.mkv")
+        assert unsaved.relink(tmp_path).found == {"video": tmp_path / "disk" / "walk.mkv"}
+        assert not list((tmp_path / "here").iterdir())
+
     def test_the_longest_common_path_wins(self, files: Path, tmp_path: Path) -> None:
         made = make(files)
         for name in ("one", "two"):
