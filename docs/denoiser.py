@@ -138,6 +138,8 @@ Judged on the same takes.
 
 Input and target of a segment scaled together, as if the person were up to twice as near or as far
 (`--range-factor 2`); everything else as the S4 above. The campaign itself has people at 1.5 to 4 m.
+What learning from moved sensors gives (`--placements all`) is in
+[range-synthesis.md](range-synthesis.md).
 
 {range_tables}
 """
