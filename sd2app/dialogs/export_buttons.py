@@ -19,7 +19,12 @@ class ExportButtons(QDialogButtonBox):
 
     def __init__(self, dialog: QDialog, ask: Callable[[], None]) -> None:
         super().__init__(QDialogButtonBox.StandardButton.Cancel, dialog)
-        self.export = self.addButton("Export…", QDialogButtonBox.ButtonRole.ActionRole)
-        self.export.setDefault(True)
-        self.export.clicked.connect(ask)
+        self._export = self.addButton("Export…", QDialogButtonBox.ButtonRole.ActionRole)
+        self._export.setDefault(True)
+        self._export.clicked.connect(ask)
         self.rejected.connect(dialog.reject)
+
+    def show_state(self, *, possible: bool, exporting: bool) -> None:
+        """Whether there is something to export, and whether it is being written."""
+        self._export.setEnabled(possible and not exporting)
+        self._export.setText("Exporting…" if exporting else "Export…")

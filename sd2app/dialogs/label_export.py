@@ -31,8 +31,7 @@ class LabelExportDialog(QDialog):
             self._format.addItem(one.title, one.name)
         self._format.currentIndexChanged.connect(lambda _: model.choose(self._format.currentData()))
         self._about, self._losses = sentence(""), sentence("")
-        buttons = ExportButtons(self, self._ask)
-        self._export = buttons.export
+        self._buttons = ExportButtons(self, self._ask)
         form = QFormLayout()
         form.setHorizontalSpacing(12)
         form.addRow("For", self._format)
@@ -44,7 +43,7 @@ class LabelExportDialog(QDialog):
         layout.addWidget(rule())
         layout.addWidget(self._losses)
         layout.addStretch(1)
-        layout.addWidget(buttons)
+        layout.addWidget(self._buttons)
         model.changed.connect(self._refresh)
         model.written.connect(lambda _: self.accept())
         self._refresh()
@@ -68,8 +67,7 @@ class LabelExportDialog(QDialog):
         self._losses.style().unpolish(self._losses)
         self._losses.style().polish(self._losses)
         self._losses.setText(text)
-        self._export.setEnabled(model.losses is not None and not model.exporting)
-        self._export.setText("Exporting…" if model.exporting else "Export…")
+        self._buttons.show_state(possible=model.losses is not None, exporting=model.exporting)
 
     def _ask(self) -> None:
         chosen = self._model.format

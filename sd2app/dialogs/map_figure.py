@@ -6,7 +6,6 @@ from PySide6.QtWidgets import (
     QCheckBox,
     QDialog,
     QFormLayout,
-    QHBoxLayout,
     QVBoxLayout,
     QWidget,
 )
@@ -17,6 +16,7 @@ from sd2app.dialogs.figure_preview import FigurePreview
 from sd2app.models.figure import FigureModel
 from sd2app.palette import Palette
 from sd2app.views.inputs import Choice
+from sd2app.views.panel_parts import side_by_side
 
 
 class MapFigureDialog(QDialog):
@@ -28,14 +28,13 @@ class MapFigureDialog(QDialog):
         super().__init__(parent)
         self._model, self._name = model, name
         self.setWindowTitle("Export figure of the maps")
-        buttons = ExportButtons(self, self._ask)
-        self._export = buttons.export
+        self._buttons = ExportButtons(self, self._ask)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(16, 16, 16, 16)
         layout.setSpacing(16)
         layout.addWidget(FigurePreview(model, palette, self), 1)
         layout.addLayout(self._choices())
-        layout.addWidget(buttons)
+        layout.addWidget(self._buttons)
         model.changed.connect(self._refresh)
         model.written.connect(lambda _: self.accept())
         self._refresh()
@@ -61,10 +60,10 @@ class MapFigureDialog(QDialog):
         form = QFormLayout()
         form.setHorizontalSpacing(16)
         form.setVerticalSpacing(8)
-        form.addRow("Maps", _row(*maps))
-        form.addRow("Stretch", _row(stretch))
+        form.addRow("Maps", side_by_side(*maps, spacing_px=16))
+        form.addRow("Stretch", side_by_side(stretch, spacing_px=16))
         if more:
-            form.addRow("With", _row(*more))
+            form.addRow("With", side_by_side(*more, spacing_px=16))
         return form
 
     def _box(self, text: str, chosen: object) -> QCheckBox:
@@ -75,19 +74,9 @@ class MapFigureDialog(QDialog):
 
     def _refresh(self) -> None:
         model = self._model
-        self._export.setEnabled(not (model.exporting or model.problem))
-        self._export.setText("Exporting…" if model.exporting else "Export…")
+        self._buttons.show_state(possible=not model.problem, exporting=model.exporting)
 
     def _ask(self) -> None:
         path = ask_figure(self, "Export figure of the maps", self._name)
         if path is not None:
             self._model.export(path)
-
-
-def _row(*widgets: QWidget) -> QHBoxLayout:
-    row = QHBoxLayout()
-    row.setSpacing(16)
-    for widget in widgets:
-        row.addWidget(widget)
-    row.addStretch(1)
-    return row

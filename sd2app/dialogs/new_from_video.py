@@ -25,6 +25,7 @@ from sd2app.models.fit_setup import ANGLES_DEG, DEFAULT_STATURE_M, STATURES_M, F
 from sd2app.palette import Palette
 from sd2app.views.elided import ElidedLabel
 from sd2app.views.inputs import Choice, NumberBox
+from sd2app.views.panel_parts import side_by_side
 from sd2app.views.time_axis import clock_text
 
 VIDEOS = "Video (*.mp4 *.mkv *.mov *.avi *.webm *.m4v *.mpg *.ts *.wmv);;All files (*)"
@@ -110,7 +111,7 @@ class NewFromVideoDialog(QDialog):
         form.addRow("Video", _row(self._video, self._other_video))
         form.addRow("Person", _row(self._person, self._clear))
         form.addRow("", _hint("Drag a rectangle around the person, where there are several."))
-        form.addRow("Body height", _row(self._known, self._stature, end=True))
+        form.addRow("Body height", side_by_side(self._known, self._stature))
         form.addRow(
             "",
             _hint(
@@ -118,7 +119,7 @@ class NewFromVideoDialog(QDialog):
                 " and velocities are proportional to it."
             ),
         )
-        form.addRow("Camera", _row(self._camera, self._angle, self._focal, end=True))
+        form.addRow("Camera", side_by_side(self._camera, self._angle, self._focal))
         form.addRow("Save as", _row(self._folder, self._other_folder))
         right = QVBoxLayout()
         right.addLayout(form)
@@ -218,13 +219,11 @@ def _small_button(text: str, tip: str, run: Callable[[], object]) -> QToolButton
     return button
 
 
-def _row(*widgets: QWidget, end: bool = False) -> QHBoxLayout:
+def _row(*widgets: QWidget) -> QHBoxLayout:
     row = QHBoxLayout()
     row.setSpacing(8)
     for number, widget in enumerate(widgets):
-        row.addWidget(widget, 0 if number or end else 1)
-    if end:
-        row.addStretch(1)
+        row.addWidget(widget, 0 if number else 1)
     return row
 
 

@@ -20,6 +20,7 @@ from sd2app.dialogs.figure_preview import FigurePreview
 from sd2app.models.strip import StripModel
 from sd2app.palette import Palette
 from sd2app.views.inputs import Choice, NumberBox
+from sd2app.views.panel_parts import side_by_side
 
 _WAYS = (("spread", "spread evenly"), ("around", "around the cursor"), ("list", "list or ranges"))
 _ROWS = (("video", "video"), ("mesh", "mesh"), ("overlay", "mesh over video"))
@@ -37,14 +38,13 @@ class StripDialog(QDialog):
         self.setWindowTitle("Export strip of frames")
         self._build_frames()
         self._build_looks()
-        buttons = ExportButtons(self, self._ask)
-        self._export = buttons.export
+        self._buttons = ExportButtons(self, self._ask)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(16, 16, 16, 16)
         layout.setSpacing(16)
         layout.addWidget(FigurePreview(model, palette, self), 1)
         layout.addLayout(self._lay_out())
-        layout.addWidget(buttons)
+        layout.addWidget(self._buttons)
         model.changed.connect(self._refresh)
         model.written.connect(lambda _: self.accept())
         self._refresh()
@@ -102,11 +102,11 @@ class StripDialog(QDialog):
         for form in (left, right):
             form.setVerticalSpacing(8)
             form.setHorizontalSpacing(16)
-        left.addRow("Frames", _row(self._way, self._count, self._step, self._list))
-        left.addRow("Columns", _row(self._columns))
-        right.addRow("Rows", _row(*self._rows.values()))
-        right.addRow("Mesh", _row(self._shape, QLabel("colour"), self._colour, self._limit))
-        right.addRow("Part", _row(self._whole))
+        left.addRow("Frames", side_by_side(self._way, self._count, self._step, self._list))
+        left.addRow("Columns", side_by_side(self._columns))
+        right.addRow("Rows", side_by_side(*self._rows.values()))
+        right.addRow("Mesh", side_by_side(self._shape, QLabel("colour"), self._colour, self._limit))
+        right.addRow("Part", side_by_side(self._whole))
         columns = QHBoxLayout()
         columns.setSpacing(32)
         columns.addLayout(left, 1)
@@ -139,19 +139,9 @@ class StripDialog(QDialog):
         self._limit.setEnabled(options.colour == "velocity")
         with QSignalBlocker(self._whole):
             self._whole.setChecked(options.whole)
-        self._export.setEnabled(not (model.exporting or model.problem))
-        self._export.setText("Exporting…" if model.exporting else "Export…")
+        self._buttons.show_state(possible=not model.problem, exporting=model.exporting)
 
     def _ask(self) -> None:
         path = ask_figure(self, "Export strip of frames", self._name)
         if path is not None:
             self._model.export(path)
-
-
-def _row(*widgets: QWidget) -> QHBoxLayout:
-    row = QHBoxLayout()
-    row.setSpacing(8)
-    for widget in widgets:
-        row.addWidget(widget)
-    row.addStretch(1)
-    return row

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFrame, QLabel, QToolButton, QWidget
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QToolButton, QWidget
 
 
 def title(text: str) -> QLabel:
@@ -44,3 +44,13 @@ def outlined(text: str, tip: str, run: Callable[[], object] | None, parent: QWid
     if run is not None:
         button.clicked.connect(lambda: run())
     return button
+
+
+def side_by_side(*widgets: QWidget, spacing_px: int = 8) -> QHBoxLayout:
+    """Widgets in a row that begins at the left and leaves the rest empty."""
+    row = QHBoxLayout()
+    row.setSpacing(spacing_px)
+    for widget in widgets:
+        row.addWidget(widget)
+    row.addStretch(1)
+    return row

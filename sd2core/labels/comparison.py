@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sd2core.labels.spans import Labels
+from sd2core.labels.spans import Labels, Span
 
 
 @dataclass(frozen=True)
@@ -51,10 +52,22 @@ def compare(before: Labels, after: Labels) -> Comparison:
 
 def changed_stretch(before: Labels, after: Labels) -> tuple[float, float] | None:
     """From the first to the last second of spans in which two states differ; None: in none."""
-    old = {span.id: span for span in before.spans}
-    new = {span.id: span for span in after.spans}
-    differ = [span for one, span in new.items() if old.get(one) != span]
-    differ += [span for one, span in old.items() if new.get(one) != span]
+    first, stop = same_ends(before.spans, after.spans)
+    old = before.spans[first : len(before.spans) - stop]
+    new = after.spans[first : len(after.spans) - stop]
+    differ = set(old) ^ set(new)
     if not differ:
         return None
     return min(span.start_s for span in differ), max(span.end_s for span in differ)
+
+
+def same_ends(one: Sequence[Span], other: Sequence[Span]) -> tuple[int, int]:
+    """How many spans are the same at the start, and how many of the others at the end.
+
+    The very same, which spans are that an edit did not touch: 10,000 are soon looked at.
+    """
+    shorter = min(len(one), len(other))
+    first = next((k for k in range(shorter) if one[k] is not other[k]), shorter)
+    rest = shorter - first
+    stop = next((k for k in range(rest) if one[-1 - k] is not other[-1 - k]), rest)
+    return first, stop

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import json
 import zlib
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from pydantic import FiniteFloat, NonNegativeInt
 
+from sd2core.labels.comparison import same_ends
 from sd2core.labels.entries import (
     Entry,
     LabelsEntry,
@@ -26,7 +26,7 @@ from sd2core.labels.entries import (
     span_entry,
     track_entries,
 )
-from sd2core.labels.spans import Labels, Span
+from sd2core.labels.spans import Labels
 
 FORMAT: Literal["sd2-labels-journal"] = "sd2-labels-journal"
 VERSION = 1
@@ -141,7 +141,7 @@ def change(name: str, time_unix_s: float, before: Labels, after: Labels) -> dict
     content: dict[str, Any] = {"name": name, "time_unix_s": time_unix_s}
     if before.spans is not after.spans:
         # Spans that an edit did not touch are the very same; those that equal others do no harm.
-        first, stop = _same_ends(before.spans, after.spans)
+        first, stop = same_ends(before.spans, after.spans)
         old = {span.id: span for span in before.spans[first : len(before.spans) - stop]}
         new = after.spans[first : len(after.spans) - stop]
         put = [span_entry(span) for span in new if old.pop(span.id, None) is not span]
@@ -154,15 +154,6 @@ def change(name: str, time_unix_s: float, before: Labels, after: Labels) -> dict
     if before.label_set != after.label_set:
         content["label_set"] = label_set_entry(after.label_set)
     return content
-
-
-def _same_ends(one: Sequence[Span], other: Sequence[Span]) -> tuple[int, int]:
-    """How many spans are the same at the start, and how many of the others at the end."""
-    shorter = min(len(one), len(other))
-    first = next((k for k in range(shorter) if one[k] is not other[k]), shorter)
-    rest = shorter - first
-    stop = next((k for k in range(rest) if one[-1 - k] is not other[-1 - k]), rest)
-    return first, stop
 
 
 def replay(records: list[bytes]) -> Replayed:
