@@ -129,8 +129,8 @@ def _paired(
     some_a, some_b = [a[row] for row in rows], [b[column] for column in columns]
     iou = iou_of(some_a, some_b)
     same = np.array([[x.label == y.label for y in some_b] for x in some_a])
-    # Rounding must not lose the match of a span with itself at a threshold of 1.
-    allowed = iou >= min_iou - 1e-12
+    # A span's IoU with itself is exactly 1: its length, over twice that less it.
+    allowed = iou >= min_iou
     # A sum of IoU is at most the number of matches, which is below `above`.
     above = min(iou.shape) + 1.0
     worth = np.where(allowed, above**2 + above * same + iou, 0.0)
