@@ -17,6 +17,10 @@ from sd2core.errors import Sd2Error
 from sd2core.labels.spans import Span
 from sd2core.timebase import Timebase
 
+# One frame of two is half of them wherever in a recording they lie: subtracting times of hours
+# leaves an IoU of single frames uncertain by 1e-10.
+_ROUNDING = 1e-9
+
 
 @dataclass(frozen=True)
 class Match:
@@ -129,8 +133,7 @@ def _paired(
     some_a, some_b = [a[row] for row in rows], [b[column] for column in columns]
     iou = iou_of(some_a, some_b)
     same = np.array([[x.label == y.label for y in some_b] for x in some_a])
-    # A span's IoU with itself is exactly 1: its length, over twice that less it.
-    allowed = iou >= min_iou
+    allowed = iou >= min_iou - _ROUNDING
     # A sum of IoU is at most the number of matches, which is below `above`.
     above = min(iou.shape) + 1.0
     worth = np.where(allowed, above**2 + above * same + iou, 0.0)

@@ -156,7 +156,7 @@ def test_matches_are_the_best_there_are(a: Labels, b: Labels, min_iou: float) ->
         return both / (x.duration_s + y.duration_s - both)
 
     def worth(pairs: list[tuple[Span, Span]]) -> tuple[int, int, float]:
-        good = [(x, y) for x, y in pairs if iou(x, y) >= min_iou]
+        good = [(x, y) for x, y in pairs if iou(x, y) >= min_iou - 1e-9]
         return (
             len(good),
             sum(x.label == y.label for x, y in good),
@@ -172,10 +172,18 @@ def test_matches_are_the_best_there_are(a: Labels, b: Labels, min_iou: float) ->
     assert len(found.matches) == best[0]
     assert sum(match.same_label for match in found.matches) == best[1]
     assert sum(match.iou for match in found.matches) == pytest.approx(best[2])
-    assert all(match.iou >= min_iou for match in found.matches)
+    assert all(match.iou >= min_iou - 1e-9 for match in found.matches)
     assert len({match.a.id for match in found.matches}) == len(found.matches)
     assert len(found.matches) + len(found.only_a) == len(few)
     assert len(found.matches) + len(found.only_b) == len(many)
+
+
+@given(st.integers(0, 500_000), st.sampled_from([29.97, 30.0, 60.0, 90.0]))
+def test_half_is_half_wherever_it_lies(frame: int, rate_hz: float) -> None:
+    one = span(1, frame / rate_hz, (frame + 1) / rate_hz)
+    two = span(1, frame / rate_hz, (frame + 2) / rate_hz)
+    assert len(match_spans([one], [two], CLOCK, min_iou=0.5).matches) == 1
+    assert not match_spans([one], [two], CLOCK, min_iou=0.5001).matches
 
 
 def test_more_matches_go_before_better_ones() -> None:

@@ -54,7 +54,7 @@ def test_matching_in_groups_is_matching_at_once(mine, theirs, min_iou) -> None:
     iou = iou_of(mine.spans, theirs.spans)
     same = np.array([[x.label == y.label for y in theirs.spans] for x in mine.spans])
     same = same.reshape(iou.shape)
-    allowed = iou >= min_iou - 1e-12
+    allowed = iou >= min_iou - 1e-9
     above = min(iou.shape) + 1.0
     worth = np.where(allowed, above**2 + above * same + iou, 0.0)
     rows, columns = linear_sum_assignment(worth, maximize=True)
