@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from sd2core.cli.ladder import add_wish, chosen
 from sd2core.cli.options import (
@@ -26,7 +26,7 @@ from sd2core.errors import Sd2Error
 if TYPE_CHECKING:
     from sd2core.doppler import SynthesisOptions, Synthesizer
     from sd2core.mesh import MeshSequence
-    from sd2core.sensor import VelocityAxis, VirtualSensor
+    from sd2core.sensor import VirtualSensor
     from sd2core.spectrum import DopplerMap
 
 _RUNGS = (
@@ -304,35 +304,8 @@ def _by_fmcw(options: argparse.Namespace, mesh: MeshSequence, sensor: VirtualSen
 
 def synthesis_options(options: argparse.Namespace) -> SynthesisOptions:
     """The preset with what is given on the command line in its place."""
-    from sd2core.doppler import PRESETS
-    from sd2core.sensor import VelocityAxis
+    from sd2core.doppler.options import chosen_options
 
-    preset = PRESETS[options.preset]
     names = ("visibility", *_COUNTING_ONLY)
-    given: dict[str, Any] = {
-        name: getattr(options, name) for name in names if getattr(options, name) is not None
-    }
-    axis = VelocityAxis(options.bins or preset.axis.bins, options.v_max or preset.axis.v_max_mps)
-    if axis != preset.axis and "null_bins" not in given:
-        given["null_bins"] = same_velocities(preset.null_bins, preset.axis, axis)
-    return replace(preset, axis=axis, **given)
-
-
-def same_velocities(
-    bins: tuple[int, ...], axis: VelocityAxis, other: VelocityAxis
-) -> tuple[int, ...]:
-    """Bins of ``other`` whose centre lies in one of the ``bins`` of ``axis``.
-
-    Those at 0 m/s belong to them where they do on ``axis``, however wide they are.
-    """
-    at_zero = _bins_at_zero(other) if _bins_at_zero(axis).intersection(bins) else set()
-    return tuple(
-        number
-        for number, centre_mps in enumerate(other.centres_mps)
-        if number in at_zero or axis.bin_of(float(centre_mps)) in bins
-    )
-
-
-def _bins_at_zero(axis: VelocityAxis) -> set[int]:
-    # Of an even number of bins, two meet at 0.
-    return {(axis.bins - 1) // 2, axis.bins // 2}
+    given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
+    return chosen_options(options.preset, options.bins, options.v_max, given)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from typing import Literal, get_args
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, get_args
 
 from sd2core.errors import Sd2Error
 from sd2core.sensor import VelocityAxis
@@ -157,3 +158,50 @@ PRESETS: dict[str, SynthesisOptions] = {
     ),
 }
 """Named options; ``paper`` is the default."""
+
+
+def chosen_options(
+    preset: str, bins: int | None, v_max_mps: float | None, given: Mapping[str, Any]
+) -> SynthesisOptions:
+    """A preset with what is given in its place.
+
+    Parameters
+    ----------
+    preset : str
+    bins, v_max_mps : optional
+        Of the velocity axis. On another axis the same velocities are nulled, unless
+        ``null_bins`` is given.
+    given : mapping
+        Other fields by their names.
+
+    Raises
+    ------
+    Sd2Error
+        For values that are not allowed.
+    """
+    base = PRESETS[preset]
+    axis = VelocityAxis(bins or base.axis.bins, v_max_mps or base.axis.v_max_mps)
+    values = dict(given)
+    if axis != base.axis and "null_bins" not in values:
+        values["null_bins"] = same_velocities(base.null_bins, base.axis, axis)
+    return replace(base, axis=axis, **values)
+
+
+def same_velocities(
+    bins: tuple[int, ...], axis: VelocityAxis, other: VelocityAxis
+) -> tuple[int, ...]:
+    """Bins of ``other`` whose centre lies in one of the ``bins`` of ``axis``.
+
+    Those at 0 m/s belong to them where they do on ``axis``, however wide they are.
+    """
+    at_zero = _bins_at_zero(other) if _bins_at_zero(axis).intersection(bins) else set()
+    return tuple(
+        number
+        for number, centre_mps in enumerate(other.centres_mps)
+        if number in at_zero or axis.bin_of(float(centre_mps)) in bins
+    )
+
+
+def _bins_at_zero(axis: VelocityAxis) -> set[int]:
+    # Of an even number of bins, two meet at 0.
+    return {(axis.bins - 1) // 2, axis.bins // 2}

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, field, fields, replace
@@ -11,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from sd2core.errors import Sd2Error
-from sd2core.relative_paths import located_path, stored_path
+from sd2core.relative_paths import located_path
 from sd2core.segments import LENGTH, OVERLAP
+from sd2core.toml_text import toml_lines
 from sd2core.train.rules import Allowed, choice, flag, number, paths, refused, table, text, texts
 
 
@@ -284,36 +283,13 @@ def config_text(config: TrainConfig, folder: Path) -> str:
     for section in _SECTIONS:
         lines += ["", f"[{section}]"]
         record = getattr(config, section)
-        tables = {}
-        for one in fields(record):
-            value = getattr(record, one.name)
-            if isinstance(value, Mapping):
-                tables[one.name] = value
-            elif value is not None:
-                lines.append(f"{one.name} = {_toml(value, folder)}")
+        values = {one.name: getattr(record, one.name) for one in fields(record)}
+        tables = {name: value for name, value in values.items() if isinstance(value, Mapping)}
+        plain = {name: value for name, value in values.items() if name not in tables}
+        lines += toml_lines(plain, folder)
         for name, content in tables.items():
-            lines += ["", f"[{section}.{name}]"]
-            lines += [f"{_bare(key)} = {_toml(value, folder)}" for key, value in content.items()]
+            lines += ["", f"[{section}.{name}]", *toml_lines(content, folder)]
     return "\n".join(lines) + "\n"
-
-
-def _toml(value: Any, folder: Path) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(_toml(one, folder) for one in value) + "]"
-    if isinstance(value, Path):
-        value = stored_path(value.absolute(), folder.absolute())
-    return _text(value) if isinstance(value, str) else json.dumps(value)
-
-
-def _text(value: str) -> str:
-    """As a basic string of TOML: JSON's, but for one character."""
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
-def _bare(key: str) -> str:
-    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else _text(key)
 
 
 def _check(record: Any, section: str) -> None:

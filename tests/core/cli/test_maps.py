@@ -12,8 +12,9 @@ import pytest
 from cli_outcome import Sd2
 
 from sd2core.cli import build_parser
-from sd2core.cli.synth import same_velocities, synthesis_options
+from sd2core.cli.synth import synthesis_options
 from sd2core.doppler import PRESETS
+from sd2core.doppler.options import same_velocities
 from sd2core.sensor import VelocityAxis
 from sd2core.spectrum import DopplerMap
 

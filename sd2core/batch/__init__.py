@@ -1,0 +1,1 @@
+"""Many recordings × placements: fit, synthesise, denoise and export them on many processes."""

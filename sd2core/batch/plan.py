@@ -1,0 +1,292 @@
+"""What a batch is told: a frozen record, checked strictly. See ``docs/formats.md``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, get_args
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    PositiveInt,
+    StringConstraints,
+    field_validator,
+    model_validator,
+)
+
+from sd2core.body.model import Resolution
+from sd2core.doppler.options import (
+    PRESETS,
+    Beyond,
+    DepthResolution,
+    RangeLaw,
+    SynthesisOptions,
+    Visibility,
+    Weight,
+    chosen_options,
+)
+from sd2core.errors import Sd2Error
+from sd2core.placements import Placements, placements_from_dict
+from sd2core.segments import LENGTH, OVERLAP
+from sd2core.sensor import Vector, VirtualSensor
+
+FORMAT: Literal["sd2-batch-plan"] = "sd2-batch-plan"
+VERSION: Literal[1] = 1
+
+Step = Literal["inspect", "fit", "synthesise", "denoise", "export"]
+"""What is done, in this order; ``inspect`` is the look at what a recording holds."""
+
+STEPS: tuple[Step, ...] = get_args(Step)
+
+Text = Annotated[str, StringConstraints(pattern=r"\S")]
+Positive = Annotated[FiniteFloat, Field(gt=0)]
+NotNegative = Annotated[FiniteFloat, Field(ge=0)]
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class Recordings(_Section):
+    """What is worked on.
+
+    Parameters
+    ----------
+    files : tuple of str
+        Recordings (``.sd2``), videos and meshes, by name or by pattern; ``**`` is any
+        number of folders. Relative to the plan's folder.
+    subjects : {"recording", "folder"}
+        Who is in a recording that ``subject_of`` does not name: somebody of its own, or
+        whoever is in all that lie in the same folder.
+    subject_of : mapping of str to str
+        Pattern of a file's name, or of the end of its path, to a subject; the first that
+        fits holds.
+    """
+
+    files: Annotated[tuple[Text, ...], Field(min_length=1)]
+    subjects: Literal["recording", "folder"] = "recording"
+    subject_of: Mapping[Text, Text] = Field(default_factory=dict)
+
+
+class Fit(_Section):
+    """How videos without a mesh become meshes, as ``sd2 fit`` does it.
+
+    Parameters
+    ----------
+    resolution : {"low", "medium", "high"}
+    stature_m : float, optional
+        Of everybody who is not in ``stature_of``.
+    stature_of : mapping of str to float
+        Subject to stature in metres.
+    focal_px, field_of_view_deg : float, optional
+        Of the camera.
+    max_gap_s : float, optional
+        The longest gap without the person that is bridged.
+    models : str, optional
+        Folder of the landmark models.
+    """
+
+    resolution: Resolution = "medium"
+    stature_m: Positive | None = None
+    stature_of: Mapping[Text, Positive] = Field(default_factory=dict)
+    focal_px: Positive | None = None
+    field_of_view_deg: Positive | None = None
+    max_gap_s: NotNegative | None = None
+    models: Text | None = None
+
+
+class Synthesise(_Section):
+    """How a mesh becomes a synthetic Doppler map, as ``sd2 synth`` does it.
+
+    Parameters
+    ----------
+    preset : {"paper", "vid2doppler"}
+    tolerance : float, optional
+        Error that is allowed, as a share: the cheapest plan within it is chosen, once per
+        recording. Without it the options say how.
+    others
+        As :class:`~sd2core.doppler.options.SynthesisOptions` has them; those that are not
+        given come from the preset.
+    """
+
+    preset: Literal["paper", "vid2doppler"] = "paper"
+    tolerance: Positive | None = None
+    vertices_kept: Annotated[FiniteFloat, Field(gt=0, le=1)] | None = None
+    visibility: Visibility | None = None
+    depth_resolution: DepthResolution | None = None
+    mask_stride: PositiveInt | None = None
+    weight: Weight | None = None
+    bins: PositiveInt | None = None
+    v_max_mps: Positive | None = None
+    null_bins: tuple[int, ...] | None = None
+    beyond: Beyond | None = None
+    range_exponent: NotNegative | None = None
+    reference_range_m: Positive | None = None
+    range_law: RangeLaw | None = None
+    trajectory_smoothing_s: NotNegative | None = None
+    oversampling: PositiveInt | None = None
+    velocity_sigma_bins: NotNegative | None = None
+    time_sigma_s: NotNegative | None = None
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Synthesise:
+        if self.tolerance is not None:
+            for name in _CHOSEN_BY_TOLERANCE:
+                if getattr(self, name) is not None:
+                    raise ValueError(f"tolerance chooses {name}; give one of the two")
+            if PRESETS[self.preset].velocity != "central":
+                raise ValueError(f"the preset {self.preset} has nothing that tolerance can choose")
+        try:
+            self.options()
+        except Sd2Error as error:
+            raise ValueError(str(error)) from None
+        return self
+
+    def options(self) -> SynthesisOptions:
+        """The preset with what is given in its place."""
+        given = {
+            name: value
+            for name in SynthesisOptions.__dataclass_fields__
+            if (value := getattr(self, name, None)) is not None
+        }
+        return chosen_options(self.preset, self.bins, self.v_max_mps, given)
+
+
+_CHOSEN_BY_TOLERANCE = (
+    "vertices_kept",
+    "visibility",
+    "depth_resolution",
+    "mask_stride",
+    "range_law",
+    "beyond",
+    "oversampling",
+)
+
+
+class Denoise(_Section):
+    """How synthetic maps become what a radar would show, as ``sd2 denoise`` does it.
+
+    Parameters
+    ----------
+    model : str
+        A model file, or the name of an installed model.
+    """
+
+    model: Text = "denoiser"
+
+
+class Export(_Section):
+    """How maps become a data set to learn from, as ``sd2 export`` does it.
+
+    Parameters
+    ----------
+    format : {"zarr", "hdf5", "npz"}
+    segment_frames, overlap_frames : int
+    """
+
+    format: Literal["zarr", "hdf5", "npz"] = "zarr"
+    segment_frames: Annotated[int, Field(ge=2, le=10_000)] = LENGTH
+    overlap_frames: Annotated[int, Field(ge=0)] = OVERLAP
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Export:
+        if self.overlap_frames >= self.segment_frames:
+            raise ValueError("overlap_frames must be less than segment_frames")
+        return self
+
+
+class BatchPlan(_Section):
+    """All that a batch is told. A step whose section is absent is not done.
+
+    Parameters
+    ----------
+    out : str
+        Folder of the results, relative to the plan's folder.
+    recordings : Recordings
+    placements : mapping
+        Where the sensor is put: ``kind = "recording"`` (each recording's own sensor, the
+        camera where it has none), ``kind = "positions"`` with ``positions_m``, or what
+        :func:`sd2core.placements.placements_from_dict` reads (``"grid"``, ``"cloud"``), around
+        the body of each recording.
+    fit, synthesise, denoise, export : optional
+    """
+
+    format: Literal["sd2-batch-plan"] = FORMAT
+    version: Literal[1] = VERSION
+    out: Text
+    recordings: Recordings
+    placements: Mapping[str, Any] = Field(default_factory=lambda: {"kind": "recording"})
+    fit: Fit | None = None
+    synthesise: Synthesise | None = None
+    denoise: Denoise | None = None
+    export: Export | None = None
+
+    @field_validator("placements")
+    @classmethod
+    def _placed(cls, content: Mapping[str, Any]) -> Mapping[str, Any]:
+        _placements(content)
+        return content
+
+    @model_validator(mode="after")
+    def _complete(self) -> BatchPlan:
+        if self.fit is None and self.synthesise is None:
+            raise ValueError("nothing is to be done: give a section [fit] or [synthesise]")
+        for name in ("denoise", "export"):
+            if getattr(self, name) is not None and self.synthesise is None:
+                raise ValueError(f"[{name}] works on maps: give a section [synthesise] as well")
+        return self
+
+    @property
+    def placement_count(self) -> int:
+        """Placements per recording."""
+        if self.synthesise is None:
+            return 0
+        where = _placements(self.placements)
+        if where is None:
+            return 1
+        return len(where) if isinstance(where, tuple) else len(where.places())
+
+    def sensors(self, own: VirtualSensor, target_m: Vector) -> tuple[VirtualSensor, ...]:
+        """The sensors that look at one recording.
+
+        Parameters
+        ----------
+        own : VirtualSensor
+            The recording's own one.
+        target_m : tuple of 3 floats
+            Where its body is.
+        """
+        where = _placements(self.placements)
+        if where is None:
+            return (own,)
+        if isinstance(where, tuple):
+            return tuple(VirtualSensor(position_m=place) for place in where)
+        return where.sensors(target_m)
+
+
+class _Positions(_Section):
+    kind: Literal["positions"]
+    positions_m: Annotated[
+        tuple[tuple[FiniteFloat, FiniteFloat, FiniteFloat], ...], Field(min_length=1)
+    ]
+
+
+def _placements(content: Mapping[str, Any]) -> Placements | tuple[Vector, ...] | None:
+    """A spec, positions, or None for the recording's own sensor."""
+    kind = content.get("kind")
+    if kind == "recording":
+        if len(content) > 1:
+            raise ValueError('kind = "recording" takes nothing else')
+        return None
+    if kind == "positions":
+        return _Positions.model_validate(content, strict=False).positions_m
+    try:
+        return placements_from_dict(content)
+    except Sd2Error as error:
+        if kind in ("grid", "cloud"):
+            raise ValueError(str(error)) from None
+        raise ValueError(
+            f'kind is {kind!r}; expected "recording", "positions", "grid" or "cloud"'
+        ) from None

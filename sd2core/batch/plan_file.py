@@ -1,0 +1,153 @@
+"""Plans as TOML files: read with errors that name file, line and key, and written."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from sd2core.atomic import atomic_write_text
+from sd2core.batch.plan import BatchPlan
+from sd2core.errors import Sd2Error
+from sd2core.relative_paths import is_absolute, located_path, stored_path
+from sd2core.toml_text import toml_lines
+
+_HEADER = re.compile(r"\s*\[+\s*([^\[\]]+?)\s*\]+")
+_KEY = re.compile(r"""\s*([A-Za-z0-9_."'* /\\-]+?)\s*=""")
+_HINT = "docs/formats.md says what a plan holds"
+
+
+def read_plan(path: Path) -> BatchPlan:
+    """Read a TOML file; paths in the plan that is returned are absolute.
+
+    Raises
+    ------
+    Sd2Error
+        When it cannot be read, is no TOML, or says what is not allowed; it names file,
+        line and key.
+    """
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise Sd2Error(f"{path} does not exist", "a plan of a batch (.toml)") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise Sd2Error(f"{path} cannot be read ({error})", "a plan of a batch (.toml)") from error
+    return plan_from_text(text, path.absolute().parent, str(path))
+
+
+def plan_from_text(text: str, folder: Path, source: str = "The plan") -> BatchPlan:
+    """A plan from TOML; paths in the text are relative to ``folder``, afterwards absolute.
+
+    Raises
+    ------
+    Sd2Error
+        As :func:`read_plan`.
+    """
+    try:
+        # Strict as JSON is: lists are lists and numbers are numbers. TOML's dates are neither.
+        content = json.dumps(tomllib.loads(text))
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise Sd2Error(f"{source} is no TOML: {error}", "TOML", _HINT) from error
+    except TypeError as error:
+        raise Sd2Error(
+            f"{source} holds a date or a time ({error})", "texts, numbers, lists and tables", _HINT
+        ) from error
+    try:
+        plan = BatchPlan.model_validate_json(content)
+    except ValidationError as error:
+        raise _in_words(error, text, source) from error
+    return _with_paths(plan, lambda stored: str(located_path(stored, folder)))
+
+
+def plan_text(plan: BatchPlan, folder: Path) -> str:
+    """As TOML, with paths relative to a folder; :func:`plan_from_text` gives the same again."""
+    plan = _with_paths(plan, lambda path: stored_path(Path(path), folder))
+    content = plan.model_dump(mode="json", exclude_defaults=True)
+    content = {"format": plan.format, "version": plan.version, **content}
+    content["placements"] = dict(plan.placements)
+    lines = ["# Plan of `sd2 batch`; docs/formats.md says what it may hold."]
+    lines += toml_lines({k: v for k, v in content.items() if not isinstance(v, dict)}, folder)
+    for section in ("recordings", "placements", "fit", "synthesise", "denoise", "export"):
+        # A section that is there is done, even with nothing in it.
+        if getattr(plan, section) is not None:
+            lines += _section_lines(section, content.get(section, {}), folder)
+    return "\n".join(lines) + "\n"
+
+
+def write_plan(path: Path, plan: BatchPlan) -> None:
+    """Write a plan in one step, with paths relative to the file's folder."""
+    path = Path(path)
+    atomic_write_text(path, plan_text(plan, path.absolute().parent))
+
+
+def _section_lines(name: str, table: Mapping[str, Any], folder: Path) -> list[str]:
+    tables = {key: value for key, value in table.items() if isinstance(value, Mapping)}
+    plain = {key: value for key, value in table.items() if key not in tables}
+    lines = ["", f"[{name}]", *toml_lines(plain, folder)]
+    for key, content in tables.items():
+        lines += ["", f"[{name}.{key}]", *toml_lines(content, folder)]
+    return lines
+
+
+def _with_paths(plan: BatchPlan, changed: Any) -> BatchPlan:
+    recordings = plan.recordings.model_copy(
+        update={"files": tuple(changed(file) for file in plan.recordings.files)}
+    )
+    updates: dict[str, Any] = {"out": changed(plan.out), "recordings": recordings}
+    if plan.fit is not None and plan.fit.models is not None:
+        updates["fit"] = plan.fit.model_copy(update={"models": changed(plan.fit.models)})
+    if plan.denoise is not None and _is_path(plan.denoise.model):
+        updates["denoise"] = plan.denoise.model_copy(update={"model": changed(plan.denoise.model)})
+    return plan.model_copy(update=updates)
+
+
+def _is_path(model: str) -> bool:
+    """Whether a model is named by its file; the others are installed ones."""
+    return is_absolute(model) or Path(model).name != model or model.endswith(".safetensors")
+
+
+def _in_words(error: ValidationError, text: str, source: str) -> Sd2Error:
+    first = error.errors()[0]
+    keys = tuple(str(part) for part in first["loc"])
+    line = line_of(text, keys)
+    where = source if line is None else f"{source}, line {line}"
+    name, kind = ".".join(keys), first["type"]
+    if kind == "missing":
+        return Sd2Error(f"{where}: {name} is missing", "it in the plan", _HINT)
+    if kind == "extra_forbidden":
+        return Sd2Error(f"{where}: {name} is not known", "a key that a plan may hold", _HINT)
+    message = first["msg"].removeprefix("Value error, ")
+    if kind == "value_error":
+        return Sd2Error(f"{where}: {name}: {message}" if name else f"{where}: {message}")
+    return Sd2Error(f"{where}: {name} is {first['input']!r}", message, _HINT)
+
+
+def line_of(text: str, keys: tuple[str, ...]) -> int | None:
+    """Number of the line, from 1, on which a key of a TOML text stands.
+
+    Where the key itself is not there, the line of the innermost table around it that is.
+    """
+    lines: dict[tuple[str, ...], int] = {}
+    table: tuple[str, ...] = ()
+    for number, line in enumerate(text.splitlines(), start=1):
+        if header := _HEADER.match(line):
+            table = _parts(header[1])
+            lines.setdefault(table, number)
+        elif key := _KEY.match(line):
+            lines.setdefault(table + _parts(key[1]), number)
+    for length in range(len(keys), 0, -1):
+        if keys[:length] in lines:
+            return lines[keys[:length]]
+    return None
+
+
+def _parts(name: str) -> tuple[str, ...]:
+    if name[:1] in "\"'":
+        return (name.strip("\"'"),)
+    return tuple(part.strip().strip("\"'") for part in name.split("."))
