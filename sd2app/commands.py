@@ -11,6 +11,7 @@ from PySide6.QtGui import QUndoCommand
 from sd2app.models.denoise_choice import DenoiserChoice
 from sd2app.models.document import DocumentModel
 from sd2app.models.sensor import SensorModel
+from sd2core.placements import Placements
 from sd2core.sensor import Vector, VirtualSensor, aimed_at
 
 if TYPE_CHECKING:
@@ -78,6 +79,16 @@ class Edits:
         self._sensor.set_sensor(sensor)
         if self._document.recording is not None:
             self._document.recording.sensor = sensor
+
+    # --- placements -----------------------------------------------------------------------
+
+    def plan_placements(self, placements: Placements | None) -> None:
+        """Plan other places for sensors around the body, or none."""
+        recording = self._document.recording
+        if recording is not None:
+            before = recording.placements
+            self._document.set_placements(placements)
+            self._push("Plan placements", self._document.set_placements, before, placements)
 
     # --- alignment of the real capture ----------------------------------------------------
 

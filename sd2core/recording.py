@@ -19,6 +19,7 @@ from sd2core.atomic import atomic_write_text
 from sd2core.errors import Sd2Error
 from sd2core.labels.files import FILE_NAME as LABELS_NAME
 from sd2core.labels.files import labels_of, read_labels, write_labels
+from sd2core.placements import Placements, placements_from_dict
 from sd2core.progress import Progress, silent
 from sd2core.recording_document import (
     FILE_NAME,
@@ -77,6 +78,8 @@ class Recording:
         The same by the name of a model that comes with the program; empty where the map
         is not to be denoised. Neither: nobody has chosen.
     sensor : VirtualSensor
+    placements : PlacementGrid, PlacementCloud or None
+        Where else sensors are planned, around the body.
     spans : tuple of Span
         Labels as ``recording.json`` itself can hold them: those of a recording that nobody
         has labelled here.
@@ -101,6 +104,7 @@ class Recording:
     denoiser: Path | None = None
     bundled_denoiser: str | None = None
     sensor: VirtualSensor = field(default_factory=VirtualSensor)
+    placements: Placements | None = None
     spans: tuple[Span, ...] = ()
     labels: Labels | None = None
     labels_elsewhere: bool = False
@@ -266,6 +270,7 @@ class Recording:
         document.camera = self.camera
         document.radar_offset_s = _finite(self.radar_offset_s, "radar offset in seconds")
         document.bundled_denoiser = self.bundled_denoiser
+        document.placements = None if self.placements is None else self.placements.as_dict()
         document.spans = tuple(self.spans)
         for name in ("position_m", "azimuth_deg", "elevation_deg", "field_of_view_deg"):
             setattr(document.sensor, name, getattr(self.sensor, name))
@@ -390,6 +395,7 @@ def open_recording(path: Path) -> Recording:
         mesh_reading=document.mesh_reading,
         radar_offset_s=document.radar_offset_s,
         sensor=_sensor(document, folder / FILE_NAME),
+        placements=_placements(document, folder / FILE_NAME),
         spans=document.spans,
         title=document.title or folder.stem,
         simulated=document.simulated,
@@ -409,6 +415,15 @@ def _sensor(document: Document, file: Path) -> VirtualSensor:
             elevation_deg=entry.elevation_deg,
             field_of_view_deg=entry.field_of_view_deg,
         )
+    except Sd2Error as error:
+        raise Sd2Error(f"{file}: {error.found}", error.expected, error.remedy) from error
+
+
+def _placements(document: Document, file: Path) -> Placements | None:
+    if document.placements is None:
+        return None
+    try:
+        return placements_from_dict(document.placements)
     except Sd2Error as error:
         raise Sd2Error(f"{file}: {error.found}", error.expected, error.remedy) from error
 

@@ -119,6 +119,7 @@ class Document(BaseModel):
     denoiser: StoredPath | None = None
     bundled_denoiser: str | None = None
     sensor: SensorEntry = SensorEntry()
+    placements: dict[str, Any] | None = None
     spans: tuple[Span, ...] = ()
 
 

@@ -1,4 +1,4 @@
-"""Where a body is during a clip, and the sensors that are placed around it."""
+"""Where a body is during a clip and how it moves, and what that asks of sensors around it."""
 
 from __future__ import annotations
 
@@ -11,14 +11,48 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.mesh import MeshSequence
 from sd2core.placements import Placements
-from sd2core.sensor import Vector, VirtualSensor
+from sd2core.progress import Progress, silent
+from sd2core.sensor import RadarConfig, Vector, VirtualSensor
 
-_SAMPLED_FRAMES = 200
+_SAMPLED_FRAMES = 100
+_SAMPLED_VERTICES = 200
+_FASTEST_SHARE = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """What the body asks of each of N sensors.
+
+    Parameters
+    ----------
+    inside : bool array, shape (N,)
+        Whether the sensor stands in the box around the body at some time.
+    farthest_m : array, shape (N,)
+        To the farthest corner of that box, at any time.
+    fastest_mps : array, shape (N,)
+        Radial velocity, without its sign, that 1 % of the vertices exceed in some frame.
+    """
+
+    inside: NDArray[np.bool_]
+    farthest_m: NDArray[np.float64]
+    fastest_mps: NDArray[np.float64]
+
+    def out_of_range(self, radar: RadarConfig) -> NDArray[np.bool_]:
+        """Which of a radar's sensors would see part of the body folded in range."""
+        return self.farthest_m > radar.range_max_m
+
+    def aliasing(self, radar: RadarConfig) -> NDArray[np.bool_]:
+        """Which of a radar's sensors would see part of the body folded in velocity."""
+        return self.fastest_mps > radar.v_max_mps
+
+    def beyond(self, radar: RadarConfig) -> NDArray[np.bool_]:
+        """Which places are no good for a radar, for any of these reasons."""
+        return self.inside | self.out_of_range(radar) | self.aliasing(radar)
 
 
 @dataclass(frozen=True, eq=False)
 class Whereabouts:
-    """Where a body is, from up to 200 frames with a person, spread over the clip.
+    """A body in up to 100 frames with a person, spread over the clip.
 
     Parameters
     ----------
@@ -26,12 +60,17 @@ class Whereabouts:
         What sensors look at: the mean over time of the median vertex, which is inside the
         torso whatever the limbs do.
     low_m, high_m : arrays, shape (n, 3)
-        Corners of the box around the body in each of these frames.
+        Corners of the box around the body in each frame.
+    points_m, velocity_mps : arrays, shape (n, k, 3)
+        Up to 200 vertices of each frame and their motion to the next one; zero where there
+        is no person in that.
     """
 
     target_m: Vector
     low_m: NDArray[np.float64]
     high_m: NDArray[np.float64]
+    points_m: NDArray[np.float64]
+    velocity_mps: NDArray[np.float64]
 
     @classmethod
     def of(cls, mesh: MeshSequence) -> Whereabouts:
@@ -49,22 +88,21 @@ class Whereabouts:
                 "somebody to place sensors around",
             )
         picked = there[np.linspace(0, len(there) - 1, min(len(there), _SAMPLED_FRAMES)).astype(int)]
+        stride = -(-mesh.vertex_count // _SAMPLED_VERTICES)
         middle, low, high = np.empty((3, len(picked), 3))
-        for row, frame in enumerate(picked):
-            vertices = mesh.frame(int(frame))
-            middle[row] = np.median(vertices, axis=0)
-            low[row], high[row] = vertices.min(axis=0), vertices.max(axis=0)
+        points = np.empty((len(picked), len(range(0, mesh.vertex_count, stride)), 3))
+        velocity = np.zeros_like(points)
+        for row, frame in enumerate(picked.tolist()):
+            following = min(frame + 1, int(mesh.presence.last[frame]))
+            vertices = mesh.read(frame, following + 1)
+            middle[row] = np.median(vertices[0], axis=0)
+            low[row], high[row] = vertices[0].min(axis=0), vertices[0].max(axis=0)
+            points[row] = vertices[0, ::stride]
+            if following > frame:
+                passed_s = mesh.times_s[following] - mesh.times_s[frame]
+                velocity[row] = (vertices[1, ::stride] - points[row]) / passed_s
         x, y, z = middle.mean(axis=0).tolist()
-        return cls((x, y, z), low, high)
-
-    def inside(self, sensors: Sequence[VirtualSensor]) -> NDArray[np.bool_]:
-        """Which sensors stand in the box around the body at some time, shape (n,)."""
-        result = np.zeros(len(sensors), dtype=bool)
-        for number, sensor in enumerate(sensors):
-            position = np.asarray(sensor.position_m)
-            within = (self.low_m < position) & (position < self.high_m)  # (frames, 3)
-            result[number] = bool(within.all(axis=1).any())
-        return result
+        return cls((x, y, z), low, high, points, velocity)
 
     def sensors(self, placements: Placements) -> tuple[VirtualSensor, ...]:
         """A sensor per place, aimed at the body.
@@ -75,8 +113,8 @@ class Whereabouts:
             When one would stand in the body.
         """
         sensors = placements.sensors(self.target_m)
-        wrong = np.flatnonzero(self.inside(sensors))
-        if len(wrong):
+        wrong = [number for number, one in enumerate(sensors) if self._holds(one)]
+        if wrong:
             raise Sd2Error(
                 f"{len(wrong)} of {len(sensors)} placements stand in the body,"
                 f" such as {placements.places()[wrong[0]].words}",
@@ -84,3 +122,27 @@ class Whereabouts:
                 "Place them farther away",
             )
         return sensors
+
+    def seen_by(self, sensors: Sequence[VirtualSensor], progress: Progress = silent) -> Sight:
+        """What the body asks of sensors; a millisecond for each."""
+        inside = np.zeros(len(sensors), dtype=bool)
+        farthest_m, fastest_mps = np.zeros((2, len(sensors)))
+        # Which of the vertices of a frame 1 % are faster than.
+        rank = int(np.ceil((1.0 - _FASTEST_SHARE) * self.points_m.shape[1])) - 1
+        for number, sensor in enumerate(sensors):
+            progress(number, len(sensors))
+            position = np.asarray(sensor.position_m)
+            inside[number] = self._holds(sensor)
+            corner = np.maximum(np.abs(self.low_m - position), np.abs(self.high_m - position))
+            farthest_m[number] = np.linalg.norm(corner, axis=1).max()
+            sight = self.points_m - position
+            range_m = np.maximum(np.linalg.norm(sight, axis=2), 1e-9)
+            radial_mps = np.abs(np.einsum("nki,nki->nk", self.velocity_mps, sight)) / range_m
+            fastest_mps[number] = np.partition(radial_mps, rank, axis=1)[:, rank].max()
+        progress(len(sensors), len(sensors))
+        return Sight(inside, farthest_m, fastest_mps)
+
+    def _holds(self, sensor: VirtualSensor) -> bool:
+        position = np.asarray(sensor.position_m)
+        within = (self.low_m < position) & (position < self.high_m)  # (frames, 3)
+        return bool(within.all(axis=1).any())

@@ -17,6 +17,7 @@ from sd2app.models.jobs import Job, JobsModel
 from sd2core.body.camera import PinholeCamera
 from sd2core.labels.spans import Labels
 from sd2core.mesh import MeshSequence
+from sd2core.placements import Placements
 from sd2core.recording import Recording
 from sd2core.relinking import Relinked
 from sd2core.sensor import VelocityAxis
@@ -241,6 +242,13 @@ class DocumentModel(QObject):
             choice.put_into(recording)
             self.changed.emit()
 
+    def set_placements(self, placements: Placements | None) -> None:
+        """Plan other places for sensors, or none."""
+        recording = self.recording
+        if recording is not None and placements != recording.placements:
+            recording.placements = placements
+            self.changed.emit()
+
     def set_clutter(self, clutter: Clutter) -> None:
         """Remove static echoes another way."""
         if clutter == self._clutter:
@@ -320,5 +328,6 @@ class DocumentModel(QObject):
 
 def _keep_edits(before: Recording, after: Recording) -> None:
     """What was edited while files were read holds for what was read."""
-    for name in ("labels", "sensor", "radar_offset_s", "denoiser", "bundled_denoiser"):
+    kept = "labels", "sensor", "placements", "radar_offset_s", "denoiser", "bundled_denoiser"
+    for name in kept:
         setattr(after, name, getattr(before, name))

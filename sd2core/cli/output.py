@@ -44,6 +44,14 @@ def counted(number: int, what: str) -> str:
     return f"{number:,} {what}" + ("" if number == 1 else "s")
 
 
+def duration(seconds: float) -> str:
+    """How long something takes: seconds, minutes, or hours and minutes."""
+    if seconds < 60:
+        return f"{seconds:.2g} s" if seconds < 10 else f"{seconds:.0f} s"
+    minutes = round(seconds / 60)
+    return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60:02d} min"
+
+
 def print_rows(rows: Sequence[Sequence[str]], *, right: Collection[int] = ()) -> None:
     """Print a table whose first row is its heading; ``right`` are columns of numbers."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]

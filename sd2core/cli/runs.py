@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sd2core.cli.options import add_command, add_json
-from sd2core.cli.output import print_facts, print_json
+from sd2core.cli.output import duration, print_facts, print_json
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
@@ -141,8 +141,8 @@ def _done(status: RunStatus) -> str:
 def _times(status: RunStatus) -> str:
     if status.elapsed_s is None:
         return ""
-    left = f", {_duration(status.left_s)} left" if status.left_s is not None else ""
-    return f"{_duration(status.elapsed_s)}{left}"
+    left = f", {duration(status.left_s)} left" if status.left_s is not None else ""
+    return f"{duration(status.elapsed_s)}{left}"
 
 
 def _validation(status: RunStatus) -> str:
@@ -150,10 +150,3 @@ def _validation(status: RunStatus) -> str:
         return ""
     mae_mps = status.validation_mae_mps
     return f"{status.validation_rmse:.4f}" + ("" if mae_mps is None else f", {mae_mps:.3f} m/s")
-
-
-def _duration(seconds: float) -> str:
-    if seconds < 60:
-        return f"{seconds:.0f} s"
-    minutes = round(seconds / 60)
-    return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60:02d} min"

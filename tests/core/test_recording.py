@@ -16,6 +16,7 @@ from sd2core.errors import Sd2Error
 from sd2core.labels.files import write_labels
 from sd2core.labels.spans import Labels
 from sd2core.labels.spans import Span as LabelSpan
+from sd2core.placements import PlacementCloud, PlacementGrid
 from sd2core.recording import (
     FILE_NAME,
     VERSION,
@@ -511,6 +512,27 @@ def test_the_chosen_denoiser_moves_with_the_recording(files: Path, tmp_path: Pat
     again.save()
     assert open_recording(again.folder).bundled_denoiser == ""
     assert open_recording(again.folder).denoiser is None
+
+
+def test_planned_placements_are_kept(files: Path) -> None:
+    made = make(files)
+    assert made.placements is None
+    for planned in (
+        PlacementGrid((1.0, 2.0), (-30.0, 30.0)),
+        PlacementCloud(7, (1.0, 3.0), seed=4),
+        None,
+    ):
+        made.placements = planned
+        made.save()
+        assert open_recording(made.folder).placements == planned
+
+
+def test_damaged_placements_are_named(files: Path) -> None:
+    made = make(files)
+    damaged = {**content(made), "placements": {"kind": "grid", "ranges_m": [0.0]}}
+    (made.folder / FILE_NAME).write_text(json.dumps(damaged))
+    with pytest.raises(Sd2Error, match=r"recording\.json: A placement has the range 0 m"):
+        open_recording(made.folder)
 
 
 def test_a_missing_denoiser_is_named_and_hinders_nothing(files: Path) -> None:

@@ -1,0 +1,262 @@
+"""``sd2 placements``: sensors around a body, where they stand and what their maps cost."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sd2core.cli.ladder import add_wish
+from sd2core.cli.options import add_command, add_json, add_mesh_reading, positive_int
+from sd2core.cli.output import counted, duration, print_facts, print_json, print_rows, progress_bar
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    from sd2core.ladder import Choice
+    from sd2core.mesh import MeshSequence
+    from sd2core.placement_cost import PlacementCost
+    from sd2core.placements import Placements
+    from sd2core.recording import Recording
+    from sd2core.sensor import RadarConfig, VirtualSensor
+    from sd2core.whereabouts import Sight
+
+_TOLERANCE = 0.02
+_LIMITS = (
+    ("inside", "stand in the body"),
+    ("out_of_range", "see it beyond the radar's range"),
+    ("aliasing", "see it faster than the radar can tell"),
+)
+
+
+def add_commands(commands: argparse._SubParsersAction) -> None:
+    """Add ``placements``."""
+    parser = add_command(
+        commands,
+        "placements",
+        "plan sensors around a body, and say what a map from each would cost",
+        handler=_placements,
+        description=(
+            "A grid of every range, azimuth and elevation that is given, or with --cloud as many\n"
+            "random places between them. Ranges are distances from the body's centre; azimuth 0\n"
+            "is between body and camera and grows to the right in the picture, elevation upwards.\n"
+            "A list is 1,2,4 or 1:4:0.5, which holds both ends. Without any of it, the places\n"
+            "that the recording plans are listed."
+        ),
+        examples=(
+            "  sd2 placements walk.sd2 --ranges 1:4:1 --azimuths -60:60:30 --out grid.json\n"
+            "  sd2 placements walk.sd2 --cloud 200 --ranges 1:4 --azimuths -60:60"
+            " --elevations -10:40\n"
+            "  sd2 placements walk.sd2 --placements grid.json --json"
+        ),
+    )
+    parser.add_argument("mesh", type=Path, metavar="RECORDING", help="a recording, or a mesh")
+    parser.add_argument(
+        "--ranges", metavar="LIST", help="distances in metres; with --cloud from:to, as 1:4"
+    )
+    parser.add_argument(
+        "--azimuths", metavar="LIST", help="degrees; with --cloud from:to (default: 0)"
+    )
+    parser.add_argument(
+        "--elevations", metavar="LIST", help="degrees; with --cloud from:to (default: 0)"
+    )
+    parser.add_argument(
+        "--cloud", type=positive_int, metavar="N", help="N random places instead of a grid"
+    )
+    parser.add_argument("--seed", type=int, metavar="S", help="of the random places (default: 0)")
+    parser.add_argument(
+        "--placements", type=Path, metavar="FILE", help="those of a file, as --out writes it"
+    )
+    parser.add_argument("--out", type=Path, metavar="FILE.json", help="write the plan")
+    add_wish(parser, "2%%")
+    add_mesh_reading(parser)
+    add_json(parser)
+
+
+def _placements(options: argparse.Namespace) -> int:
+    from sd2core.cli.reading import check_output, load_mesh_as_told, recording_as_told
+    from sd2core.placements import write_placements
+    from sd2core.recording import is_recording
+    from sd2core.whereabouts import Whereabouts
+
+    if options.out is not None:
+        check_output(options.out, ".json")
+    recording = None
+    if is_recording(options.mesh):
+        recording = recording_as_told(options.mesh, options)
+    placements = _spec(options, recording)
+    if recording is None:
+        mesh = load_mesh_as_told(options.mesh, options)
+    else:
+        with progress_bar("Reading the mesh") as progress:
+            mesh = recording.load_mesh(progress)
+    body = Whereabouts.of(mesh)
+    sensors = placements.sensors(body.target_m)
+    with progress_bar("Looking", "place") as progress:
+        sight = body.seen_by(sensors, progress)
+    choice, cost = _cost(mesh, placements, sensors, options)
+    if options.out is not None:
+        write_placements(options.out, placements)
+    radar = _radar(recording)
+    if options.json:
+        print_json(
+            {
+                "placements": placements.as_dict(),
+                "target_m": body.target_m,
+                "radar": {
+                    "name": radar.name,
+                    "range_max_m": radar.range_max_m,
+                    "v_max_mps": radar.v_max_mps,
+                },
+                "places": _listed(placements, sensors, sight, radar),
+                "cost": {
+                    "maps": cost.maps,
+                    "frames": cost.frames,
+                    "frame_ms": cost.frame_ms,
+                    "total_s": cost.total_s,
+                    "total_bytes": cost.total_bytes,
+                },
+                "choice": choice.to_json(),
+            }
+        )
+    else:
+        _print(options.mesh, placements, sensors, sight, radar, cost, choice)
+    return 0
+
+
+def _spec(options: argparse.Namespace, recording: Recording | None) -> Placements:
+    """What is given, or what the recording plans."""
+    from sd2core.placements import PlacementCloud, PlacementGrid, read_placements
+    from sd2core.typed_numbers import interval_of, numbers_of
+
+    typed = {
+        f"--{name}": getattr(options, name)
+        for name in ("ranges", "azimuths", "elevations", "cloud", "seed")
+        if getattr(options, name) is not None
+    }
+    if options.placements is not None:
+        if typed:
+            raise Sd2Error(f"--placements is given with {', '.join(typed)}", "one of the two")
+        return read_placements(options.placements)
+    if not typed:
+        if recording is not None and recording.placements is not None:
+            return recording.placements
+        raise Sd2Error(
+            f"{options.mesh} plans no placements",
+            "--ranges with --azimuths and --elevations, --cloud, or --placements FILE",
+        )
+    if options.ranges is None:
+        raise Sd2Error(f"{', '.join(typed)} is given without --ranges", "distances from the body")
+    azimuths, elevations = options.azimuths or "0", options.elevations or "0"
+    if options.cloud is None:
+        if options.seed is not None:
+            raise Sd2Error("--seed is given without --cloud", "it for random places only")
+        return PlacementGrid(
+            numbers_of(options.ranges), numbers_of(azimuths), numbers_of(elevations)
+        )
+    return PlacementCloud(
+        options.cloud,
+        interval_of(options.ranges),
+        interval_of(azimuths),
+        interval_of(elevations),
+        options.seed or 0,
+    )
+
+
+def _radar(recording: Recording | None) -> RadarConfig:
+    """Of the recording's capture, or the paper's."""
+    from sd2core.sensor import PAPER_RADAR
+
+    if recording is None or recording.radar is None or "radar" in recording.missing():
+        return PAPER_RADAR
+    return PAPER_RADAR if recording.holds_radar_map else recording.load_capture().config
+
+
+def _cost(
+    mesh: MeshSequence,
+    placements: Placements,
+    sensors: tuple[VirtualSensor, ...],
+    options: argparse.Namespace,
+) -> tuple[Choice, PlacementCost]:
+    """What the ladder says where the sensor has the median of all ranges."""
+    from sd2core.cli.ladder import chosen
+    from sd2core.doppler import PRESETS
+    from sd2core.ladder.choosing import checked_options
+    from sd2core.placement_cost import PlacementCost
+
+    places = placements.places()
+    middle = sorted(range(len(places)), key=lambda number: places[number].range_m)[len(places) // 2]
+    synthesis = checked_options(mesh, PRESETS["paper"])
+    tolerance = options.tolerance
+    if tolerance is None and options.budget_ms is None:
+        tolerance = _TOLERANCE
+    choice = chosen(mesh, sensors[middle], synthesis, tolerance, options.budget_ms, dragging=False)
+    return choice, PlacementCost(
+        len(sensors), mesh.frame_count, choice.cost_ms, synthesis.axis.bins
+    )
+
+
+def _listed(
+    placements: Placements,
+    sensors: tuple[VirtualSensor, ...],
+    sight: Sight,
+    radar: RadarConfig,
+) -> list[dict[str, Any]]:
+    out_of_range, aliasing = sight.out_of_range(radar), sight.aliasing(radar)
+    return [
+        {
+            "range_m": place.range_m,
+            "azimuth_deg": place.azimuth_deg,
+            "elevation_deg": place.elevation_deg,
+            "position_m": sensor.position_m,
+            "farthest_m": float(sight.farthest_m[number]),
+            "fastest_mps": float(sight.fastest_mps[number]),
+            "inside": bool(sight.inside[number]),
+            "out_of_range": bool(out_of_range[number]),
+            "aliasing": bool(aliasing[number]),
+        }
+        for number, (place, sensor) in enumerate(zip(placements.places(), sensors, strict=True))
+    ]
+
+
+def _print(
+    path: Path,
+    placements: Placements,
+    sensors: tuple[VirtualSensor, ...],
+    sight: Sight,
+    radar: RadarConfig,
+    cost: PlacementCost,
+    choice: Choice,
+) -> None:
+    listed = _listed(placements, sensors, sight, radar)
+    numbers = {name: sum(one[name] for one in listed) for name, _ in _LIMITS}
+    beyond = [f"{numbers[name]} {words}" for name, words in _LIMITS if numbers[name]]
+    limits = f"{radar.range_max_m:.1f} m, ±{radar.v_max_mps:.2f} m/s"
+    print_facts(
+        f"{counted(len(sensors), 'placement')} around the body of {path}",
+        {
+            "radar": f"{radar.name}: {limits}",
+            "beyond it": ", ".join(beyond) or "none",
+            "cost": f"{counted(cost.maps, 'map')} of {counted(cost.frames, 'frame')}:"
+            f" {duration(cost.total_s)}, {cost.total_bytes / 1e6:,.1f} MB before compression",
+            "plan": choice.summary,
+        },
+    )
+    heading = ("range m", "azimuth °", "elevation °", "x", "y", "z", "up to m", "up to m/s", "")
+    rows = [heading]
+    for one in listed:
+        x, y, z = one["position_m"]
+        why = ", ".join(words for name, words in _LIMITS if one[name])
+        rows.append(
+            (
+                f"{one['range_m']:.2f}",
+                f"{one['azimuth_deg']:.1f}",
+                f"{one['elevation_deg']:.1f}",
+                f"{x:.2f}",
+                f"{y:.2f}",
+                f"{z:.2f}",
+                f"{one['farthest_m']:.2f}",
+                f"{one['fastest_mps']:.2f}",
+                why,
+            )
+        )
+    print_rows(rows, right=range(8))

@@ -1,0 +1,44 @@
+"""What the maps of many placements cost, from what one frame of one map costs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+_VALUE_BYTES, _TIME_BYTES = 4, 8
+"""Single precision for values, double for times."""
+
+
+@dataclass(frozen=True)
+class PlacementCost:
+    """Time and room that a map per placement takes.
+
+    Parameters
+    ----------
+    maps, frames : int
+        Maps, and frames of each.
+    frame_ms : float
+        Of the plan that holds the tolerance, per frame on all cores, as the ladder measured
+        it on the scene.
+    bins : int
+        Velocity bins of a map.
+    """
+
+    maps: int
+    frames: int
+    frame_ms: float
+    bins: int = 32
+
+    @property
+    def map_s(self) -> float:
+        """Seconds per map."""
+        return 1e-3 * self.frame_ms * self.frames
+
+    @property
+    def total_s(self) -> float:
+        """Seconds for all of them, without what is done once per clip."""
+        return self.maps * self.map_s
+
+    @property
+    def total_bytes(self) -> int:
+        """Values and times of all maps, before compression."""
+        return self.maps * self.frames * (_VALUE_BYTES * self.bins + _TIME_BYTES)

@@ -1,0 +1,82 @@
+"""Lists of numbers as people type them: ``1, 2.5, 4`` and ``-60:60:30``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from sd2core.errors import Sd2Error
+
+_MOST = 10_000
+_AS_RANGE = 3
+"""So many evenly spaced numbers are shorter as a range."""
+
+
+def numbers_of(text: str) -> tuple[float, ...]:
+    """Parse numbers and ranges ``from:to:step``, which hold both ends, set apart by commas.
+
+    Raises
+    ------
+    Sd2Error
+        When it is neither, or there are more than 10000.
+    """
+    found: list[float] = []
+    for part in text.replace("−", "-").split(","):
+        words = part.split(":")
+        try:
+            values = [float(word) for word in words]
+        except ValueError:
+            values = []
+        if len(values) not in (1, 3) or not all(math.isfinite(value) for value in values):
+            raise Sd2Error(
+                f"{part.strip()!r} is not a number", "numbers such as 1, 2.5 or -60:60:30"
+            )
+        found += values if len(values) == 1 else _range(part, *values)
+    return tuple(found)
+
+
+def interval_of(text: str) -> tuple[float, float]:
+    """Parse ``from:to``; a single number is both.
+
+    Raises
+    ------
+    Sd2Error
+        When it is neither.
+    """
+    try:
+        values = [float(word) for word in text.replace("−", "-").split(":")]
+    except ValueError:
+        values = []
+    if len(values) not in (1, 2) or not all(math.isfinite(value) for value in values):
+        raise Sd2Error(f"{text!r} is not an interval", "from:to, such as -60:60, or one number")
+    return (values[0], values[-1])
+
+
+def text_of(numbers: Sequence[float]) -> str:
+    """What :func:`numbers_of` reads; evenly spaced numbers as a range."""
+    first, last = numbers[0], numbers[-1]
+    step = (last - first) / (len(numbers) - 1) if len(numbers) > 1 else 0.0
+    if len(numbers) >= _AS_RANGE and step:
+        text = ":".join(map(_plain, (first, last, step)))
+        try:
+            if numbers_of(text) == tuple(numbers):
+                return text
+        except Sd2Error:  # a step that no longer leads to the end once it is rounded
+            pass
+    return ", ".join(map(_plain, numbers))
+
+
+def _range(part: str, first: float, last: float, step: float) -> list[float]:
+    length = (last - first) / step if step else math.inf
+    steps = round(length) if abs(length) < _MOST else -1
+    if steps < 0 or abs(length - steps) > 1e-6:
+        raise Sd2Error(
+            f"{part.strip()!r} does not come to its end",
+            f"a step that leads from {first:g} to {last:g}, in at most {_MOST} steps",
+        )
+    # Without the digits that only rounding brings in.
+    return [round(first + number * step, 9) for number in range(steps)] + [last]
+
+
+def _plain(value: float) -> str:
+    return repr(int(value)) if value == int(value) and abs(value) < 1e15 else repr(value)
