@@ -12,6 +12,7 @@ from sd2core.denoise.card import ModelCard
 from sd2core.errors import Sd2Error
 from sd2core.presence import Presence, runs
 from sd2core.spectrum import DopplerMap
+from sd2core.timebase import Timebase
 
 Stretch = NDArray[np.float32]
 """Energies without a gap, (frames, bins)."""
@@ -70,9 +71,23 @@ def check_map(doppler: DopplerMap, card: ModelCard) -> None:
 
 def stretches(doppler: DopplerMap, card: ModelCard) -> list[tuple[int, int]]:
     """Half-open runs of frames that are clips of their own: without gaps, with a person."""
-    times_s = doppler.times_s
-    there = Presence.of(doppler.present, len(times_s)).there
-    longest_s = _BREAK_FRAMES * max(doppler.timebase.frame_duration_s, 1 / card.frame_rate_hz)
+    there = Presence.of(doppler.present, len(doppler.timebase)).there
+    return clips(doppler.times_s, there, card.frame_rate_hz)
+
+
+def clips(
+    times_s: NDArray[np.float64], there: NDArray[np.bool_], frame_rate_hz: float
+) -> list[tuple[int, int]]:
+    """Half-open runs of marked frames between which no time is missing.
+
+    Parameters
+    ----------
+    times_s : float64 array, shape (frames,)
+    there : bool array, shape (frames,)
+    frame_rate_hz : float
+        At which they are to be used.
+    """
+    longest_s = _BREAK_FRAMES * max(Timebase(times_s).frame_duration_s, 1 / frame_rate_hz)
     breaks = np.flatnonzero(np.diff(times_s) > longest_s) + 1
     found: list[tuple[int, int]] = []
     for start, stop in runs(there):

@@ -1,0 +1,219 @@
+"""A source cut into segments: pure functions from maps to rows of a data set.
+
+Segments lie within clips: runs of frames with a person, between which no time is missing.
+Where frames come evenly and at the rate of the data set, a segment holds them as they are.
+Otherwise the clip is brought to that rate first: energies are interpolated linearly, a label
+is that of the nearest frame, and a map is known where both its neighbours are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.datasets.options import DatasetOptions
+from sd2core.datasets.source import KINDS, Outline, Source
+from sd2core.denoise.matching import clips, interpolated, is_regular
+from sd2core.segments import cut, segment_starts
+from sd2core.spectrum import MapKind
+
+_BLOCK = 256
+"""Segments that are in memory at a time, besides the maps of the source."""
+
+Arrays = dict[str, NDArray]
+
+
+@dataclass(frozen=True, eq=False)
+class Clip:
+    """A run of frames that segments are cut from.
+
+    Parameters
+    ----------
+    start, stop : int
+        Half-open frames of the source.
+    times_s : float64 array, shape (frames,)
+        Of its frames as segments hold them.
+    resampled : bool
+        Whether these are other times than those of the source.
+    starts : int64 array, shape (segments,)
+        First frames of the segments, within the clip.
+    """
+
+    start: int
+    stop: int
+    times_s: NDArray[np.float64]
+    resampled: bool
+    starts: NDArray[np.int64]
+
+
+def clips_of(
+    times_s: NDArray[np.float64],
+    present: NDArray[np.bool_] | None,
+    frame_rate_hz: float,
+    length: int,
+    overlap: int,
+) -> list[Clip]:
+    """Clips of a source, with the places of their segments.
+
+    Parameters
+    ----------
+    times_s : float64 array, shape (frames,)
+    present : bool array, shape (frames,), optional
+        Frames with a person; None: all.
+    frame_rate_hz : float
+        Of the segments.
+    length, overlap : int
+    """
+    there = np.ones(len(times_s), bool) if present is None else present
+    found = []
+    for start, stop in clips(times_s, there, frame_rate_hz):
+        own_s = times_s[start:stop]
+        resampled = not is_regular(own_s, frame_rate_hz)
+        if resampled:
+            count = int(np.floor((own_s[-1] - own_s[0]) * frame_rate_hz + 1e-6)) + 1
+            own_s = own_s[0] + np.arange(count) / frame_rate_hz
+        starts = segment_starts(len(own_s), length, overlap)
+        found.append(Clip(start, stop, own_s, resampled, starts))
+    return found
+
+
+def count_segments(
+    outline: Outline, frame_rate_hz: float, options: DatasetOptions
+) -> tuple[int, dict[str, int]]:
+    """How many segments a source gives, and how many of each label."""
+    counts: dict[str, int] = {}
+    total = 0
+    for clip in clips_of(
+        outline.times_s, outline.present, frame_rate_hz, options.length, options.overlap
+    ):
+        label = _label(outline.times_s, outline.label, clip)
+        windows = label[clip.starts[:, None] + np.arange(options.length)]
+        named, _ = label_of_segments(windows, len(outline.labels), options)
+        for number, count in enumerate(np.bincount(named, minlength=len(outline.labels)).tolist()):
+            if count:
+                name = outline.labels[number]
+                counts[name] = counts.get(name, 0) + count
+        total += len(clip.starts)
+    return total, counts
+
+
+def cut_source(
+    source: Source,
+    frame_rate_hz: float,
+    null_bins: Sequence[int],
+    label_numbers: NDArray[np.int16],
+    options: DatasetOptions,
+) -> Iterator[Arrays]:
+    """Rows of a data set, in blocks of a bounded number of segments.
+
+    Parameters
+    ----------
+    source : Source
+    frame_rate_hz : float
+    null_bins : sequence of int
+        Set to zero.
+    label_numbers : int16 array, shape (labels,)
+        What each label of the source is in the data set.
+    options : DatasetOptions
+
+    Yields
+    ------
+    dict of str to array
+        Per segment, first axis: the kinds the source has and ``available``, ``label``,
+        ``segment_label``, ``purity``, ``start_s``, ``start_frame``.
+    """
+    known = source.known
+    kinds = [kind for kind in options.kinds if kind in source.maps]
+    length = options.length
+    for clip in clips_of(source.times_s, source.present, frame_rate_hz, length, options.overlap):
+        label = label_numbers[_label(source.times_s, source.label, clip)]
+        there = {kind: _known(source.times_s, known[kind], clip) for kind in kinds}
+        values = {
+            kind: _values(source.maps[kind].values, source.times_s, clip, null_bins)
+            for kind in kinds
+        }
+        for begun in range(0, len(clip.starts), _BLOCK):
+            starts = clip.starts[begun : begun + _BLOCK]
+            places = starts[:, None] + np.arange(length)  # (segments, length)
+            arrays: Arrays = {"available": np.zeros((len(starts), len(KINDS)), bool)}
+            for kind in kinds:
+                whole = there[kind][places].all(axis=1)
+                # A map that is partly unknown says nothing, rather than something false.
+                arrays[kind] = cut(values[kind], starts, length) * whole[:, None, None]
+                arrays["available"][:, KINDS.index(kind)] = whole
+            arrays["label"] = label[places]
+            arrays["segment_label"], arrays["purity"] = label_of_segments(
+                arrays["label"], int(label_numbers.max()) + 1, options
+            )
+            arrays["start_s"] = clip.times_s[starts]
+            arrays["start_frame"] = (
+                np.searchsorted(source.times_s, arrays["start_s"] + 1e-9, side="right") - 1
+                if clip.resampled
+                else clip.start + starts
+            )
+            yield arrays
+
+
+def label_of_segments(
+    windows: NDArray[np.integer], labels: int, options: DatasetOptions
+) -> tuple[NDArray[np.int16], NDArray[np.float32]]:
+    """Label of every segment by the rule, and the share of its frames that have it.
+
+    Parameters
+    ----------
+    windows : int array, shape (segments, length)
+        Labels of the frames; 0 is background.
+    labels : int
+        How many there are.
+    options : DatasetOptions
+    """
+    counts = np.stack([(windows == number).sum(axis=1) for number in range(labels)], axis=1)
+    if options.label_rule == "majority" or labels == 1:
+        named = counts.argmax(axis=1)
+    else:
+        gesture = 1 + counts[:, 1:].argmax(axis=1)
+        frames = np.take_along_axis(counts, gesture[:, None], axis=1)[:, 0]
+        enough = (frames > 0) & (frames >= options.min_share * windows.shape[1] - 1e-9)
+        named = np.where(enough, gesture, 0)
+    purity = np.take_along_axis(counts, named[:, None], axis=1)[:, 0] / windows.shape[1]
+    return named.astype(np.int16), purity.astype(np.float32)
+
+
+def spectra_kinds(arrays: Arrays) -> list[MapKind]:
+    """Kinds that a block holds."""
+    return [kind for kind in KINDS if kind in arrays]
+
+
+def _values(
+    values: NDArray[np.float32],
+    times_s: NDArray[np.float64],
+    clip: Clip,
+    null_bins: Sequence[int],
+) -> NDArray[np.float32]:
+    """Energies of a clip at its own times, (frames, bins)."""
+    own = values.T[clip.start : clip.stop].copy()
+    if clip.resampled:
+        own = interpolated(own, times_s[clip.start : clip.stop], clip.times_s)
+    own[:, list(null_bins)] = 0.0
+    return own
+
+
+def _label(
+    times_s: NDArray[np.float64], label: NDArray[np.integer], clip: Clip
+) -> NDArray[np.integer]:
+    own = label[clip.start : clip.stop]
+    if not clip.resampled:
+        return own
+    middles_s = (times_s[clip.start : clip.stop - 1] + times_s[clip.start + 1 : clip.stop]) / 2
+    return own[np.searchsorted(middles_s, clip.times_s)]
+
+
+def _known(times_s: NDArray[np.float64], known: NDArray[np.bool_], clip: Clip) -> NDArray[np.bool_]:
+    own = known[clip.start : clip.stop]
+    if not clip.resampled:
+        return own
+    share = np.interp(clip.times_s, times_s[clip.start : clip.stop], own.astype(np.float64))
+    return share > 1 - 1e-6

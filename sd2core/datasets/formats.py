@@ -1,0 +1,223 @@
+"""A finished store as one file: HDF5 or NPZ, with the same arrays and the same description."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sd2core.atomic import atomic_write
+from sd2core.datasets.layout import (
+    FORMAT,
+    VERSION,
+    FileFormat,
+    Header,
+    bytes_per_segment,
+    check_format,
+    chunk_of,
+    row_shapes,
+)
+from sd2core.errors import Sd2Error
+from sd2core.progress import Progress, silent
+
+NPZ_LIMIT_BYTES = 1 << 30
+"""An NPZ is written and read whole: larger ones do not fit beside what else is in memory."""
+
+META, SOURCES = "meta", "sources"
+
+
+def refuse_large_npz(out: Path, segments: int, header: Header) -> None:
+    """Refuse an NPZ that nobody could open.
+
+    Raises
+    ------
+    Sd2Error
+    """
+    size = segments * bytes_per_segment(header.length, header.axis.bins, len(header.kinds))
+    if size > NPZ_LIMIT_BYTES:
+        raise Sd2Error(
+            f"{out} would hold {segments:,} segments, {size / 1e9:.1f} GB",
+            f"up to {NPZ_LIMIT_BYTES / 1e9:.1f} GB in an .npz, which is read whole",
+            "Write it as .zarr or .h5, which are read in parts",
+        )
+
+
+def write_packed(
+    out: Path,
+    form: FileFormat,
+    header: Header,
+    arrays: dict[str, Any],
+    sources: Iterable[dict[str, Any]],
+    progress: Progress = silent,
+) -> None:
+    """Write a data set as one file, in one step.
+
+    Parameters
+    ----------
+    out : Path
+    form : {"hdf5", "npz"}
+    header : Header
+    arrays : dict of str to array
+        As Zarr or h5py has them: read in parts.
+    sources : iterable of dict
+    progress : Progress
+        Counts segments.
+    """
+    if form == "npz":
+        _write_npz(out, header, arrays, sources)
+    else:
+        _write_hdf5(out, header, arrays, sources, progress)
+
+
+def open_hdf5(path: Path) -> tuple[Header, dict[str, Any], Any]:
+    """Header and arrays of an HDF5 data set, and the open file.
+
+    Raises
+    ------
+    Sd2Error
+        When it is none, or damaged.
+    """
+    import h5py
+
+    try:
+        file = h5py.File(path, "r")
+    except OSError as error:
+        raise Sd2Error(
+            f"{path} cannot be read as HDF5 ({error})", "a data set that `sd2 export` made"
+        ) from error
+    try:
+        if META not in file:
+            raise Sd2Error(f"{path} holds no data set", "one that `sd2 export` made")
+        header = Header.from_dict(_json(file[META][()].decode("utf-8"), path), path)
+        return header, {name: file[name] for name in _whole(header, file.keys(), path)}, file
+    except BaseException:
+        file.close()
+        raise
+
+
+def open_npz(path: Path) -> tuple[Header, dict[str, Any], list[dict[str, Any]]]:
+    """Header, arrays and sources of an NPZ data set, all of it read.
+
+    Raises
+    ------
+    Sd2Error
+        When it is none, or damaged.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            found = {name: data[name] for name in data.files}
+    except Exception as error:  # a damaged archive fails in many ways
+        raise Sd2Error(
+            f"{path} cannot be read ({error})", "a data set that `sd2 export` made"
+        ) from error
+    if META not in found:
+        raise Sd2Error(f"{path} holds no data set", "one that `sd2 export` made")
+    header = Header.from_dict(_json(str(found[META]), path), path)
+    lines = [_json(str(line), path) for line in found.get(SOURCES, ())]
+    return header, {name: found[name] for name in _whole(header, found.keys(), path)}, lines
+
+
+def hdf5_sources(file: Any, path: Path) -> Iterator[dict[str, Any]]:
+    """Sources of an open HDF5 data set, one after another."""
+    lines = file[SOURCES]
+    for number in range(len(lines)):
+        yield _json(lines[number].decode("utf-8"), path)
+
+
+def is_dataset_file(path: Path) -> bool:
+    """Whether an ``.h5`` or ``.npz`` is a data set; reads its directory only."""
+    import zipfile
+
+    if path.suffix.lower() == ".npz":
+        try:
+            with zipfile.ZipFile(path) as archive:
+                return {f"{META}.npy", "segment_label.npy"} <= {*archive.namelist()}
+        except (OSError, zipfile.BadZipFile):
+            return False
+    import h5py
+
+    try:
+        with h5py.File(path, "r") as file:
+            return bool(file.attrs.get("format", "") == FORMAT)
+    except OSError:
+        return False
+
+
+def _write_npz(
+    out: Path, header: Header, arrays: dict[str, Any], sources: Iterable[dict[str, Any]]
+) -> None:
+    content: dict[str, Any] = {name: np.asarray(arrays[name][:]) for name in row_shapes(header)}
+    content[META] = json.dumps(header.as_dict())
+    content[SOURCES] = np.array([json.dumps(entry, ensure_ascii=False) for entry in sources])
+    with atomic_write(out) as stream:
+        np.savez_compressed(stream, **content)
+
+
+def _write_hdf5(
+    out: Path,
+    header: Header,
+    arrays: dict[str, Any],
+    sources: Iterable[dict[str, Any]],
+    progress: Progress,
+) -> None:
+    import h5py
+
+    rows = arrays["start_s"].shape[0]
+    names = row_shapes(header)
+    with _file_in_place_of(out) as made, h5py.File(made, "w") as file:
+        file.attrs["format"], file.attrs["version"] = FORMAT, VERSION
+        file[META] = json.dumps(header.as_dict(), ensure_ascii=False)
+        for number, (name, (kind, row)) in enumerate(names.items()):
+            chunk = (min(chunk_of(row)[0], rows), *row)
+            target = file.create_dataset(
+                name, shape=(rows, *row), dtype=kind, chunks=chunk, compression="gzip",
+                compression_opts=1, shuffle=True,
+            )  # fmt: skip
+            step = 16 * chunk_of(row)[0]
+            for start in range(0, rows, step):
+                stop = min(start + step, rows)
+                target[start:stop] = arrays[name][start:stop]
+                progress(number * rows + stop, len(names) * rows)
+        text = h5py.string_dtype("utf-8")
+        lines = file.create_dataset(SOURCES, shape=(0,), maxshape=(None,), dtype=text, chunks=(64,))
+        for number, entry in enumerate(sources):
+            lines.resize((number + 1,))
+            lines[number] = json.dumps(entry, ensure_ascii=False)
+
+
+@contextmanager
+def _file_in_place_of(path: Path) -> Iterator[Path]:
+    """A name to write to, which takes the place of ``path`` when the block succeeds.
+
+    HDF5 writes to a file of its own, not to an open stream.
+    """
+    import os
+
+    made = path.with_name(f".sd2-{os.getpid()}-{path.name}")
+    try:
+        yield made
+        with made.open("r+b") as stream:
+            os.fsync(stream.fileno())
+        made.replace(path)
+    finally:
+        made.unlink(missing_ok=True)
+
+
+def _json(text: str, path: Path) -> Any:
+    try:
+        return json.loads(text)
+    except ValueError as error:
+        raise Sd2Error(f"{path}: its description is damaged ({error})", "JSON") from error
+
+
+def _whole(header: Header, there: Iterable[str], path: Path) -> list[str]:
+    check_format(header.as_dict(), path)
+    names = list(row_shapes(header))
+    missing = sorted({*names} - {*there})
+    if missing:
+        raise Sd2Error(f"{path} lacks {', '.join(missing)}", "a data set that is whole")
+    return names

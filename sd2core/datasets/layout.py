@@ -1,0 +1,209 @@
+"""Names, shapes and types of what a data set holds, the same in every format."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from sd2core.datasets.options import LabelRule
+from sd2core.datasets.source import KINDS
+from sd2core.errors import Sd2Error
+from sd2core.sensor import VelocityAxis
+from sd2core.spectrum import MapKind
+
+FORMAT = "sd2-dataset"
+VERSION = 1
+
+SPLITS = ("train", "validation", "test")
+"""Numbers in the array ``split`` are places in this tuple."""
+
+FileFormat = Literal["zarr", "hdf5", "npz"]
+SUFFIXES: dict[str, FileFormat] = {".zarr": "zarr", ".h5": "hdf5", ".hdf5": "hdf5", ".npz": "npz"}
+
+COLUMNS: dict[str, tuple[str, tuple[int, ...]]] = {
+    "segment_label": ("int16", ()),
+    "purity": ("float32", ()),
+    "subject": ("int32", ()),
+    "split": ("int8", ()),
+    "source": ("int32", ()),
+    "placement": ("int32", ()),
+    "start_s": ("float64", ()),
+    "start_frame": ("int64", ()),
+    "sensor_position_m": ("float64", (3,)),
+    "sensor_direction_deg": ("float64", (2,)),
+    "range_m": ("float32", ()),
+    "azimuth_deg": ("float32", ()),
+    "elevation_deg": ("float32", ()),
+    "available": ("bool", (len(KINDS),)),
+}
+"""One row per segment: type, and shape of a row. ``label`` and the maps are besides."""
+
+CHUNK_SEGMENTS = 32
+CHUNK_ROWS = 8192
+
+
+@dataclass(frozen=True)
+class Header:
+    """What holds for all segments of a data set.
+
+    Parameters
+    ----------
+    length, overlap : int
+        Frames of a segment, and how many neighbours share.
+    axis : VelocityAxis
+    null_bins : tuple of int
+        Zero on purpose, in all kinds.
+    frame_rate_hz : float
+    label_rule, min_share
+        As :class:`~sd2core.datasets.options.DatasetOptions` has them.
+    kinds_wanted, kinds : tuple of str
+        Those that were asked for, and those that some segment has.
+    labels : tuple of str
+        Numbers in ``label`` and ``segment_label`` are places in it; the first is background.
+    classes : dict of str to str
+        What a classifier calls a label.
+    subjects : tuple of str
+        Numbers in ``subject`` are places in it.
+    splits : dict of str to tuple of str
+        Subjects of each split.
+    units : dict of str to tuple of str
+        What 1 means in each kind; several where sources differ.
+    title : str
+    made_by : str
+        Program and version.
+    provenance : dict
+    """
+
+    length: int
+    overlap: int
+    axis: VelocityAxis
+    null_bins: tuple[int, ...]
+    frame_rate_hz: float
+    label_rule: LabelRule
+    min_share: float
+    kinds_wanted: tuple[MapKind, ...] = KINDS
+    kinds: tuple[MapKind, ...] = ()
+    labels: tuple[str, ...] = ("background",)
+    classes: dict[str, str] = field(default_factory=dict)
+    subjects: tuple[str, ...] = ()
+    splits: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    units: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    title: str = ""
+    made_by: str = ""
+    provenance: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def simulated(self) -> bool:
+        """Whether any radar of it was computed."""
+        return "simulated" in self.kinds
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "format": FORMAT,
+            "version": VERSION,
+            "length": self.length,
+            "overlap": self.overlap,
+            "bins": self.axis.bins,
+            "v_max_mps": self.axis.v_max_mps,
+            "null_bins": list(self.null_bins),
+            "frame_rate_hz": self.frame_rate_hz,
+            "label_rule": self.label_rule,
+            "min_share": self.min_share,
+            "kinds_wanted": list(self.kinds_wanted),
+            "kinds": list(self.kinds),
+            "all_kinds": list(KINDS),
+            "labels": list(self.labels),
+            "classes": dict(self.classes),
+            "subjects": list(self.subjects),
+            "splits": {name: list(subjects) for name, subjects in self.splits.items()},
+            "units": {name: list(units) for name, units in self.units.items()},
+            "title": self.title,
+            "made_by": self.made_by,
+            "provenance": self.provenance,
+        }
+
+    @classmethod
+    def from_dict(cls, entry: dict[str, Any], path: Path) -> Header:
+        """Read what :meth:`as_dict` made; ``path`` is for messages.
+
+        Raises
+        ------
+        Sd2Error
+            When it is of another format or version, or damaged.
+        """
+        check_format(entry, path)
+        try:
+            return cls(
+                length=int(entry["length"]),
+                overlap=int(entry["overlap"]),
+                axis=VelocityAxis(int(entry["bins"]), float(entry["v_max_mps"])),
+                null_bins=tuple(entry["null_bins"]),
+                frame_rate_hz=float(entry["frame_rate_hz"]),
+                label_rule=entry["label_rule"],
+                min_share=float(entry["min_share"]),
+                kinds_wanted=tuple(entry["kinds_wanted"]),
+                kinds=tuple(entry["kinds"]),
+                labels=tuple(entry["labels"]),
+                classes=dict(entry["classes"]),
+                subjects=tuple(entry["subjects"]),
+                splits={name: tuple(subjects) for name, subjects in entry["splits"].items()},
+                units={name: tuple(units) for name, units in entry["units"].items()},
+                title=str(entry["title"]),
+                made_by=str(entry["made_by"]),
+                provenance=dict(entry["provenance"]),
+            )
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise Sd2Error(
+                f"{path}: its description is damaged ({error!r})", f"{FORMAT} {VERSION}"
+            ) from error
+
+
+def check_format(entry: Any, path: Path) -> None:
+    """Refuse what is no data set, or one of a later version."""
+    found = entry.get("format") if isinstance(entry, dict) else None
+    if found != FORMAT:
+        raise Sd2Error(f"{path} holds no data set", "one that `sd2 export` made")
+    version = entry.get("version")
+    if not isinstance(version, int) or not 1 <= version <= VERSION:
+        raise Sd2Error(
+            f"{path} is a data set of version {version!r}",
+            f"a version from 1 to {VERSION}",
+            "Open it with the version of SD² Studio that wrote it, or a later one",
+        )
+
+
+def format_of(path: Path) -> FileFormat:
+    """Format of a data set by the ending of its name.
+
+    Raises
+    ------
+    Sd2Error
+        For another ending.
+    """
+    found = SUFFIXES.get(path.suffix.lower())
+    if found is None:
+        raise Sd2Error(f"The data set is to be {path}", f"a name ending in {', '.join(SUFFIXES)}")
+    return found
+
+
+def row_shapes(header: Header) -> dict[str, tuple[str, tuple[int, ...]]]:
+    """Type and shape of a row of every array that the header implies."""
+    maps = dict.fromkeys(header.kinds, ("float32", (header.length, header.axis.bins)))
+    return maps | {"label": ("int16", (header.length,))} | COLUMNS
+
+
+def chunk_of(row: tuple[int, ...]) -> tuple[int, ...]:
+    """Shape of a chunk of rows of this shape."""
+    return (CHUNK_SEGMENTS if len(row) == 2 else CHUNK_ROWS, *row)
+
+
+def bytes_per_segment(header_length: int, bins: int, kinds: int) -> int:
+    """What a segment takes before compression."""
+    import numpy as np
+
+    columns = sum(
+        np.dtype(kind).itemsize * int(np.prod(row, dtype=int)) for kind, row in COLUMNS.values()
+    )
+    return 4 * header_length * bins * kinds + 2 * header_length + columns

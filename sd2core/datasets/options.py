@@ -1,0 +1,85 @@
+"""What a data set is to be like."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any, Literal, get_args
+
+from sd2core.datasets.source import KINDS
+from sd2core.errors import Sd2Error
+from sd2core.segments import LENGTH, OVERLAP, segment_starts
+from sd2core.spectrum import MapKind
+
+LabelRule = Literal["foreground", "majority"]
+"""How a segment gets its label from those of its frames; see :class:`DatasetOptions`."""
+
+LABEL_RULES: tuple[LabelRule, ...] = get_args(LabelRule)
+MIN_SHARE = 0.2
+
+
+@dataclass(frozen=True)
+class DatasetOptions:
+    """What a data set is to be like.
+
+    Parameters
+    ----------
+    kinds : tuple of str
+        Maps to take, where a source has them.
+    length, overlap : int
+        Frames of a segment, and how many it shares with the next one.
+    frame_rate_hz : float, optional
+        Of all segments; None: that of the first source. Sources at another rate, or whose
+        frames come unevenly, are brought to it.
+    null_bins : tuple of int, optional
+        Bins that are zero in all kinds; None: those of the first source.
+    label_rule : {"foreground", "majority"}
+        ``foreground``: the label other than background that most frames have, where they
+        are at least ``min_share`` of the segment, otherwise background: a gesture that is
+        shorter than half a segment still names it. ``majority``: the label that most
+        frames have, background included. Of equal counts the lower label wins.
+    min_share : float
+        0 to 1.
+    validation, test : tuple of str, optional
+        Subjects that validate and test; None: chosen as
+        :func:`sd2core.train.data.split_subjects` does.
+    title : str
+    provenance : dict
+        How the data set was made; kept as JSON.
+
+    Raises
+    ------
+    Sd2Error
+        When one of them cannot be.
+    """
+
+    kinds: tuple[MapKind, ...] = KINDS
+    length: int = LENGTH
+    overlap: int = OVERLAP
+    frame_rate_hz: float | None = None
+    null_bins: tuple[int, ...] | None = None
+    label_rule: LabelRule = "foreground"
+    min_share: float = MIN_SHARE
+    validation: tuple[str, ...] | None = None
+    test: tuple[str, ...] | None = None
+    title: str = ""
+    provenance: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not self.kinds or not {*self.kinds} <= {*KINDS}:
+            raise Sd2Error(
+                f"The kinds of maps are {', '.join(self.kinds) or 'none'}",
+                f"some of {', '.join(KINDS)}",
+            )
+        object.__setattr__(self, "kinds", tuple(kind for kind in KINDS if kind in self.kinds))
+        if self.length < 1:
+            raise Sd2Error(f"Segments are {self.length} frames long", "1 or more")
+        segment_starts(0, self.length, self.overlap)  # refuses an overlap that cannot be
+        if self.frame_rate_hz is not None and not 0 < self.frame_rate_hz < math.inf:
+            raise Sd2Error(f"The frame rate is {self.frame_rate_hz}", "a positive number")
+        if self.label_rule not in LABEL_RULES:
+            raise Sd2Error(
+                f"The label rule is {self.label_rule!r}", f"one of {', '.join(LABEL_RULES)}"
+            )
+        if not 0 <= self.min_share <= 1:
+            raise Sd2Error(f"The least share of a label is {self.min_share}", "0 to 1")

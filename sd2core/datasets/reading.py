@@ -1,0 +1,127 @@
+"""Data sets read back, the same way from Zarr, HDF5 and NPZ."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.datasets import formats, store
+from sd2core.datasets.layout import SPLITS, FileFormat, Header, format_of
+from sd2core.errors import Sd2Error
+
+
+class Dataset:
+    """An open data set; arrays are read in the parts that are asked for.
+
+    Get one from :func:`open_dataset`. ``dataset["synthetic"][10:20]`` is an array of shape
+    (10, length, bins); ``docs/formats.md`` lists all names.
+
+    Parameters
+    ----------
+    path : Path
+    form : {"zarr", "hdf5", "npz"}
+    header : Header
+    arrays : dict of str to array
+    sources : list of dict, optional
+        As an NPZ holds them.
+    file : object, optional
+        To close.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        form: FileFormat,
+        header: Header,
+        arrays: dict[str, Any],
+        sources: list[dict[str, Any]] | None = None,
+        file: Any = None,
+    ) -> None:
+        self.path = path
+        self.form = form
+        self.header = header
+        self.arrays = arrays
+        self._sources = sources
+        self._file = file
+
+    def __len__(self) -> int:
+        """Segments."""
+        return int(self.arrays["start_s"].shape[0])
+
+    def __getitem__(self, name: str) -> Any:
+        """An array by its name, to be sliced."""
+        if name not in self.arrays:
+            raise Sd2Error(f"{self.path} has no {name!r}", f"one of {', '.join(self.arrays)}")
+        return self.arrays[name]
+
+    def __enter__(self) -> Dataset:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file, where it is one."""
+        if self._file is not None:
+            self._file.close()
+            self._file = None
+
+    def sources(self) -> Iterator[dict[str, Any]]:
+        """What is known of each source, in the order of the array ``source``."""
+        if self._sources is not None:
+            yield from self._sources
+        elif self.form == "zarr":
+            yield from store.read_sources(self.path / store.SOURCES_NAME)
+        else:
+            yield from formats.hdf5_sources(self._file, self.path)
+
+    def of_split(self, split: str) -> NDArray[np.int64]:
+        """Numbers of the segments of a split, ascending.
+
+        Raises
+        ------
+        Sd2Error
+            For a name that is none.
+        """
+        if split not in SPLITS:
+            raise Sd2Error(f"The split is {split!r}", f"one of {', '.join(SPLITS)}")
+        return np.flatnonzero(self["split"][:] == SPLITS.index(split))
+
+
+def open_dataset(path: Path) -> Dataset:
+    """Open a data set by its path, whatever its format.
+
+    Raises
+    ------
+    Sd2Error
+        When it is none, damaged, not finished, or of a later version.
+    """
+    path = Path(path)
+    form = format_of(path)
+    if not path.exists():
+        raise Sd2Error(f"{path} does not exist", "a data set that `sd2 export` made")
+    if form == "zarr":
+        header, arrays = store.open_arrays(path)
+        return Dataset(path, form, header, arrays)
+    if form == "hdf5":
+        header, arrays, file = formats.open_hdf5(path)
+        return Dataset(path, form, header, arrays, file=file)
+    header, arrays, sources = formats.open_npz(path)
+    return Dataset(path, form, header, arrays, sources)
+
+
+def is_dataset(path: Path) -> bool:
+    """Whether a path looks like a data set; reads little."""
+    if path.is_dir():
+        return store.is_segment_store(path)
+    return path.suffix.lower() in (".h5", ".hdf5", ".npz") and formats.is_dataset_file(path)

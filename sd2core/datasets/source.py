@@ -1,0 +1,268 @@
+"""One source of segments: what one sensor shows of one recording, by kind of map."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+from sd2core.presence import Presence
+from sd2core.progress import Progress
+from sd2core.sensor import Vector, VirtualSensor, spherical_from_position
+from sd2core.spectrum import DopplerMap, MapKind
+
+BACKGROUND = "background"
+"""What frames are called in which nothing is labelled; always label 0."""
+
+KINDS: tuple[MapKind, ...] = ("synthetic", "denoised", "simulated", "real")
+assert {*KINDS} == {*get_args(MapKind)}
+
+FROM_A_MESH: tuple[MapKind, ...] = ("synthetic", "denoised")
+"""Kinds that say nothing where there is no person; the others are of a radar."""
+
+_LONGEST_LIST = 64
+"""Of provenance: what is longer is a number per frame, and is left out."""
+
+
+class SourceKey(NamedTuple):
+    """What no two sources of a data set share."""
+
+    subject: str
+    recording: str
+    placement: int
+
+    @property
+    def title(self) -> str:
+        """To name it in a message."""
+        at = f", placement {self.placement}" if self.placement else ""
+        return f"{self.recording} of {self.subject}{at}"
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """What a source will hold, known before its maps are made: enough to count segments.
+
+    Parameters
+    ----------
+    kinds : tuple of str
+        Of its maps.
+    times_s : float64 array, shape (frames,)
+    present : bool array, shape (frames,), optional
+        Frames with a person; None: all.
+    label : int array, shape (frames,)
+        Index into ``labels``.
+    labels : tuple of str
+        The first is :data:`BACKGROUND`.
+    """
+
+    kinds: tuple[MapKind, ...]
+    times_s: NDArray[np.float64]
+    present: NDArray[np.bool_] | None
+    label: NDArray[np.integer]
+    labels: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """Maps of one recording as one sensor sees it, with a label per frame.
+
+    Parameters
+    ----------
+    subject, recording : str
+        Whose, and which; ``recording`` is unique within the subject.
+    placement : int
+        0 for the recording's own sensor; 1 and up are the same movement seen from elsewhere.
+    sensor : VirtualSensor
+    maps : mapping of kind to DopplerMap
+        On one axis and one clock. A map's ``present`` is False in frames of which it says
+        nothing: in a synthetic or denoised map those without a person, in a radar's map
+        those that the radar did not record.
+    label : int array, shape (frames,)
+        Index into ``labels``.
+    labels : tuple of str
+        The first is :data:`BACKGROUND`.
+    classes : mapping of str to str
+        What a classifier calls a label; labels that are not learnt from are absent.
+    target_m : tuple of 3 floats, optional
+        Mean place of the body, from which range and angles of the sensor follow.
+    provenance : dict
+        How it was made, as JSON can hold it, besides what the maps say of themselves.
+
+    Raises
+    ------
+    Sd2Error
+        When these do not fit together.
+    """
+
+    subject: str
+    recording: str
+    placement: int
+    sensor: VirtualSensor
+    maps: Mapping[MapKind, DopplerMap]
+    label: NDArray[np.integer]
+    labels: tuple[str, ...] = (BACKGROUND,)
+    classes: Mapping[str, str] = field(default_factory=dict)
+    target_m: Vector | None = None
+    provenance: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        title = self.key.title
+        if not self.maps:
+            raise Sd2Error(f"{title} has no map", f"one at least of {', '.join(KINDS)}")
+        first = next(iter(self.maps.values()))
+        for kind, doppler in self.maps.items():
+            if doppler.kind != kind:
+                raise Sd2Error(f"{title}: the {kind} map is of kind {doppler.kind}", kind)
+            if doppler.axis != first.axis:
+                raise Sd2Error(
+                    f"{title}: the {kind} map has {_axis_words(doppler)}, the {first.kind} one"
+                    f" {_axis_words(first)}",
+                    "one velocity axis",
+                )
+            if not np.array_equal(doppler.times_s, first.times_s):
+                raise Sd2Error(f"{title}: the {kind} map has a clock of its own", "one clock")
+            if not np.isfinite(doppler.values).all() or (doppler.values < 0).any():
+                raise Sd2Error(
+                    f"{title}: the {kind} map holds values that are negative or not finite",
+                    "finite values, zero or more",
+                )
+        _check_labels(title, self.label, self.labels, len(first.timebase))
+
+    @property
+    def key(self) -> SourceKey:
+        """What no other source shares."""
+        return SourceKey(self.subject, self.recording, self.placement)
+
+    @property
+    def times_s(self) -> NDArray[np.float64]:
+        """Of the frames, on the clock of the recording; (frames,)."""
+        return next(iter(self.maps.values())).times_s
+
+    @property
+    def known(self) -> dict[MapKind, NDArray[np.bool_]]:
+        """Frames of which each map says something, (frames,)."""
+        frames = len(self.times_s)
+        return {kind: Presence.of(one.present, frames).there for kind, one in self.maps.items()}
+
+    @property
+    def present(self) -> NDArray[np.bool_]:
+        """Frames with a person, as far as anything says so; (frames,).
+
+        Maps of a mesh say it. Where there is none, all frames count that a radar recorded.
+        """
+        known = self.known
+        of_mesh = [known[kind] for kind in FROM_A_MESH if kind in known]
+        if of_mesh:
+            return np.logical_and.reduce(of_mesh)
+        return np.logical_or.reduce(list(known.values()))
+
+    @property
+    def spherical(self) -> tuple[float, float, float]:
+        """Range in metres, azimuth and elevation in degrees as seen from the body; or NaN."""
+        if self.target_m is None:
+            return (float("nan"),) * 3
+        return spherical_from_position(self.target_m, self.sensor.position_m)
+
+    def outline(self) -> Outline:
+        """What it holds, without the values."""
+        return Outline(tuple(self.maps), self.times_s, self.present, self.label, self.labels)
+
+    def made_of(self) -> dict[str, Any]:
+        """Provenance of the source and of each map, without what is one value per frame."""
+        maps = {
+            kind: {"unit": one.unit, "null_bins": list(one.null_bins)} | _short(one.meta)
+            for kind, one in self.maps.items()
+        }
+        return _short(self.provenance) | {"maps": maps}
+
+    def fingerprint(self) -> str:
+        """The same for the same maps, labels and sensor."""
+        sums = hashlib.blake2b(digest_size=16)
+        sums.update(json.dumps([self.sensor.position_m, self.labels]).encode())
+        sums.update(np.ascontiguousarray(self.label, np.int16).data)
+        sums.update(np.ascontiguousarray(self.times_s).data)
+        for kind in KINDS:
+            if kind in self.maps:
+                sums.update(kind.encode())
+                sums.update(self.maps[kind].values.data)
+                sums.update(self.known[kind].tobytes())
+        return sums.hexdigest()
+
+
+@dataclass(frozen=True, eq=False)
+class LazySource:
+    """A source that is made when it is its turn, and not at all where it is there already.
+
+    Parameters
+    ----------
+    key : SourceKey
+    load : callable
+        Makes the source; may raise ``Sd2Error``, which leaves out this source alone.
+    fingerprint : str
+        Of what it is made of and how. A data set that holds a source of this key and of
+        another fingerprint is not gone on with. Empty: not compared.
+    outline : callable, optional
+        What it will hold, cheaply; needed for a dry run.
+    """
+
+    key: SourceKey
+    load: Callable[[Progress], Source]
+    fingerprint: str = ""
+    outline: Callable[[], Outline] | None = None
+
+
+def label_per_frame(
+    spans: Any, labels: tuple[str, ...], times_s: NDArray[np.float64]
+) -> NDArray[np.int16]:
+    """Label of every frame: that of the span that holds its time; 0 where none does.
+
+    Parameters
+    ----------
+    spans : sequence of Span
+        Later ones lie over earlier ones.
+    labels : tuple of str
+        The first is :data:`BACKGROUND`.
+    times_s : float64 array, shape (frames,)
+    """
+    label = np.zeros(len(times_s), np.int16)
+    for span in spans:
+        label[(times_s >= span.start_s) & (times_s < span.end_s)] = labels.index(span.label)
+    return label
+
+
+def _check_labels(
+    title: str, label: NDArray[np.integer], labels: tuple[str, ...], frames: int
+) -> None:
+    if not labels or labels[0] != BACKGROUND or len(set(labels)) < len(labels):
+        raise Sd2Error(
+            f"{title}: the labels are {', '.join(labels) or 'none'}",
+            f"{BACKGROUND} first, and each once",
+        )
+    if label.shape != (frames,) or label.dtype.kind not in "iu":
+        raise Sd2Error(
+            f"{title}: {frames} frames, labels of shape {label.shape} and type {label.dtype}",
+            "a whole number per frame",
+        )
+    if frames and not 0 <= label.min() <= label.max() < len(labels):
+        raise Sd2Error(
+            f"{title}: labels from {label.min()} to {label.max()}", f"0 to {len(labels) - 1}"
+        )
+
+
+def _axis_words(doppler: DopplerMap) -> str:
+    return f"{doppler.axis.bins} bins over ±{doppler.axis.v_max_mps:g} m/s"
+
+
+def _short(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        short = {str(name): _short(inner) for name, inner in value.items()}
+        return {name: inner for name, inner in short.items() if inner is not None}
+    if isinstance(value, list | tuple):
+        return None if len(value) > _LONGEST_LIST else [_short(inner) for inner in value]
+    return value

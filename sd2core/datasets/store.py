@@ -1,0 +1,257 @@
+"""The store that a data set grows in: Zarr, source by source, whole or not at all.
+
+``sources.jsonl`` beside the arrays has a line per source. A source counts once its line is
+there, so that a writer that was killed leaves whole sources, and the next one writes over
+what the killed one left.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sd2core.atomic import atomic_write
+from sd2core.datasets.cutting import Arrays
+from sd2core.datasets.layout import (
+    FORMAT,
+    Header,
+    check_format,
+    chunk_of,
+    row_shapes,
+)
+from sd2core.datasets.source import KINDS
+from sd2core.errors import Sd2Error
+
+SOURCES_NAME = "sources.jsonl"
+LOCK_NAME = ".sd2-lock"
+_TORN = "*.partial"
+"""What a killed Zarr leaves of a chunk that it was writing."""
+
+
+class SegmentStore:
+    """Rows of a data set on disk, appended source by source.
+
+    Parameters
+    ----------
+    path : Path
+        Folder; it holds a store already, see :meth:`begin`.
+    """
+
+    def __init__(self, path: Path) -> None:
+        import zarr
+
+        self.path = path
+        for left in path.rglob(_TORN):
+            left.unlink(missing_ok=True)
+        self._group = zarr.open_group(str(path), mode="r+")
+        self.header = Header.from_dict(dict(self._group.attrs), path)
+        # Asked for by name: Zarr complains when it lists a folder with other files in it.
+        names = [*KINDS, *row_shapes(self.header)]
+        self._arrays: dict[str, Any] = {
+            name: self._group[name] for name in dict.fromkeys(names) if name in self._group
+        }
+        _drop_torn_line(path / SOURCES_NAME)
+        self.rows = 0
+        self.sources = 0
+        for entry in read_sources(path / SOURCES_NAME):
+            self.rows = entry["stop"]
+            self.sources += 1
+
+    @classmethod
+    def begin(cls, path: Path, header: Header) -> SegmentStore:
+        """Make an empty store in a folder; what may be there of one is lost."""
+        group = _emptied(path, header)
+        for name, (kind, row) in row_shapes(header).items():
+            _create(group, name, kind, row, 0)
+        return cls(path)
+
+    @classmethod
+    def unpack(
+        cls, path: Path, header: Header, arrays: Any, sources: Iterable[dict[str, Any]]
+    ) -> SegmentStore:
+        """The store that a file was packed from."""
+        group = _emptied(path, header)
+        for name, (kind, row) in row_shapes(header).items():
+            rows = arrays[name].shape[0]
+            target: Any = _create(group, name, kind, row, rows)
+            step = 16 * chunk_of(row)[0]
+            for start in range(0, rows, step):
+                target[start : start + step] = arrays[name][start : start + step]
+        # Last, and in one step: without it the store is as if it had not been begun.
+        with atomic_write(path / SOURCES_NAME) as index:
+            for entry in sources:
+                index.write(_line(entry).encode("utf-8"))
+        return cls(path)
+
+    @property
+    def complete(self) -> bool:
+        """Whether nothing was appended since the header was last written."""
+        return bool(self._group.attrs["complete"])
+
+    def append(self, blocks: Iterable[Arrays], entry: dict[str, Any]) -> int:
+        """Add the segments of one source; they count once its line is written.
+
+        Parameters
+        ----------
+        blocks : iterable of dict of str to array
+            Of :func:`~sd2core.datasets.cutting.cut_source`.
+        entry : dict
+            What its line says, with a value for each of its columns in ``columns``.
+
+        Returns
+        -------
+        int
+            How many segments it has.
+        """
+        if self.complete:
+            self._group.attrs["complete"] = False
+        columns = entry.pop("columns")
+        stop = self.rows
+        for block in blocks:
+            start, stop = stop, stop + len(block["start_s"])
+            for kind in KINDS:
+                if kind in block and kind not in self._arrays:
+                    row = (self.header.length, self.header.axis.bins)
+                    self._arrays[kind] = _create(self._group, kind, "float32", row, start)
+            for name in self._arrays:
+                self._put(name, start, stop, block.get(name, columns.get(name, 0)))
+        entry |= {"start": self.rows, "stop": stop}
+        with (self.path / SOURCES_NAME).open("a", encoding="utf-8") as index:
+            index.write(_line(entry))
+            index.flush()
+            os.fsync(index.fileno())
+        added = stop - self.rows
+        self.rows = stop
+        self.sources += 1
+        return added
+
+    def entries(self) -> Iterator[dict[str, Any]]:
+        """Lines of the sources, one after another."""
+        yield from read_sources(self.path / SOURCES_NAME)
+
+    def finish(self, header: Header, split_of_subject: np.ndarray) -> None:
+        """Write the split of every segment and the header: the data set is complete.
+
+        Parameters
+        ----------
+        header : Header
+        split_of_subject : int8 array, shape (subjects,)
+        """
+        for name in [one for one in KINDS if one in self._arrays and one not in header.kinds]:
+            del self._group[name], self._arrays[name]
+        for array in self._arrays.values():
+            if array.shape[0] != self.rows:
+                array.resize((self.rows, *array.shape[1:]))
+        subject = self._arrays["subject"]
+        step = subject.chunks[0]
+        for start in range(0, self.rows, step):
+            stop = min(start + step, self.rows)
+            self._put("split", start, stop, split_of_subject[subject[start:stop]])
+        self._group.attrs.put(header.as_dict() | {"complete": True})
+        self.header = header
+
+    def _put(self, name: str, start: int, stop: int, values: Any) -> None:
+        array = self._arrays[name]
+        shape = (stop - start, *array.shape[1:])
+        if array.shape[0] < stop:
+            array.resize((stop, *shape[1:]))
+        array[start:stop] = np.broadcast_to(np.asarray(values, array.dtype), shape)
+
+
+def is_segment_store(path: Path) -> bool:
+    """Whether a folder looks like a data set, complete or not; reads one small file."""
+    try:
+        header = json.loads((path / "zarr.json").read_text(encoding="utf-8"))
+        return bool(header["attributes"]["format"] == FORMAT)
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
+
+
+def open_arrays(path: Path) -> tuple[Header, dict[str, Any]]:
+    """Header and arrays of a finished store; nothing is read but descriptions.
+
+    Raises
+    ------
+    Sd2Error
+        When it is none, or not finished.
+    """
+    import zarr
+
+    if not is_segment_store(path):
+        raise Sd2Error(f"{path} holds no data set", "one that `sd2 export` made")
+    group: Any = zarr.open_group(str(path), mode="r")
+    attributes = dict(group.attrs)
+    check_format(attributes, path)
+    if not attributes.get("complete"):
+        raise Sd2Error(
+            f"{path} was not written to its end",
+            "a finished data set",
+            "Run the command that made it once more: it goes on where it was",
+        )
+    header = Header.from_dict(attributes, path)
+    missing = [name for name in row_shapes(header) if name not in group]
+    if missing:
+        raise Sd2Error(f"{path} lacks {', '.join(missing)}", "a data set that is whole")
+    return header, {name: group[name] for name in row_shapes(header)}
+
+
+def read_sources(path: Path) -> Iterator[dict[str, Any]]:
+    """Lines of sources; the last one is left out when it was not written to its end."""
+    if not path.exists():
+        return
+    with path.open(encoding="utf-8") as lines:
+        for number, line in enumerate(lines, start=1):
+            if not line.endswith("\n"):
+                return
+            try:
+                entry = json.loads(line)
+                entry["subject"], entry["recording"], entry["placement"], entry["stop"]
+            except (ValueError, KeyError, TypeError):
+                raise Sd2Error(
+                    f"{path}: line {number} cannot be read: {line[:80]!r}", "one source, as JSON"
+                ) from None
+            yield entry
+
+
+def _emptied(path: Path, header: Header) -> Any:
+    import zarr
+
+    path.mkdir(exist_ok=True)
+    for left in path.iterdir():
+        if left.name == LOCK_NAME:
+            continue
+        if left.is_dir():
+            shutil.rmtree(left)
+        else:
+            left.unlink()
+    return zarr.open_group(str(path), mode="a", attributes=header.as_dict() | {"complete": False})
+
+
+def _line(entry: dict[str, Any]) -> str:
+    return json.dumps(entry, ensure_ascii=False) + "\n"
+
+
+def _create(group: Any, name: str, kind: str, row: tuple[int, ...], rows: int) -> Any:
+    fill = -1 if name == "split" else 0
+    return group.create_array(
+        name, shape=(rows, *row), dtype=kind, chunks=chunk_of(row), fill_value=fill
+    )
+
+
+def _drop_torn_line(path: Path) -> None:
+    if not path.exists():
+        return
+    with path.open("r+b") as file:
+        size = file.seek(0, os.SEEK_END)
+        back = min(size, 1 << 20)
+        file.seek(size - back)
+        tail = file.read()
+        if not tail or tail.endswith(b"\n"):
+            return
+        file.truncate(size - back + tail.rfind(b"\n") + 1)

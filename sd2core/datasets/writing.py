@@ -1,0 +1,433 @@
+"""Data sets written from a stream of sources, one source in memory at a time."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+from collections.abc import Iterable, Sized
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sd2core import __version__
+from sd2core.datasets.cutting import cut_source
+from sd2core.datasets.formats import refuse_large_npz, write_packed
+from sd2core.datasets.layout import SPLITS, FileFormat, Header, format_of
+from sd2core.datasets.options import DatasetOptions
+from sd2core.datasets.reading import open_dataset
+from sd2core.datasets.source import BACKGROUND, KINDS, LazySource, Source, SourceKey
+from sd2core.datasets.store import LOCK_NAME, SegmentStore, is_segment_store, open_arrays
+from sd2core.denoise.matching import MOST_RESAMPLED
+from sd2core.errors import Sd2Error
+from sd2core.file_lock import FileLock
+from sd2core.progress import Progress, silent
+from sd2core.spectrum import DopplerMap
+from sd2core.train.data import Split, split_subjects
+
+_STEPS = 1000
+"""Of progress per source."""
+
+
+@dataclass(frozen=True)
+class Failed:
+    """A source that could not be made, and why."""
+
+    key: SourceKey
+    reason: str
+
+
+@dataclass(frozen=True)
+class Written:
+    """What came of writing.
+
+    Parameters
+    ----------
+    path : Path
+    segments, sources : int
+        In the data set now.
+    added : int
+        Sources that were not there before.
+    failed : tuple of Failed
+    """
+
+    path: Path
+    segments: int
+    sources: int
+    added: int
+    failed: tuple[Failed, ...] = ()
+
+
+def write_dataset(
+    out: Path,
+    sources: Iterable[Source | LazySource],
+    options: DatasetOptions | None = None,
+    progress: Progress = silent,
+) -> Written:
+    """Write segments of all sources; goes on with a data set that was begun.
+
+    One source is in memory at a time. A source that is there already is left alone and a
+    :class:`~sd2core.datasets.source.LazySource` not even loaded, so a writer that was
+    killed, or that gets more sources later, does only what is missing. Zarr grows in place;
+    HDF5 and NPZ grow in the folder ``OUT.partial`` and appear complete.
+
+    Parameters
+    ----------
+    out : Path
+        Its ending says the format: ``.zarr``, ``.h5``, ``.hdf5`` or ``.npz``.
+    sources : iterable of Source or LazySource
+    options : DatasetOptions, optional
+    progress : Progress
+        Of all sources where their number is known; it may raise ``Cancelled``.
+
+    Returns
+    -------
+    Written
+        Sources that raised ``Sd2Error`` are in ``failed``; they do not stop the others.
+
+    Raises
+    ------
+    Sd2Error
+        When the place holds something else or a data set of other settings, a source of the
+        same key was made of something else, no source can be made, or there is no segment.
+    """
+    out = Path(out)
+    options = options or DatasetOptions()
+    form = format_of(out)
+    work = out if form == "zarr" else out.with_name(f"{out.name}.partial")
+    if not out.absolute().parent.is_dir():
+        raise Sd2Error(f"The folder {out.absolute().parent} does not exist", "an existing folder")
+    _refuse_other(out, form)
+    work.mkdir(exist_ok=True)
+    lock = FileLock(work / LOCK_NAME)
+    if not lock.take():
+        raise Sd2Error(f"Somebody is writing to {out}", "a data set of its own", "Wait for that")
+    try:
+        writer = _Writer(out, work, form, options)
+        written = writer.write(sources, progress)
+    finally:
+        lock.release()
+        if not is_segment_store(work):
+            shutil.rmtree(work, ignore_errors=True)
+    if form != "zarr":
+        shutil.rmtree(work, ignore_errors=True)
+    return written
+
+
+@dataclass
+class _Names:
+    """What sources have in common, in the order in which it came up."""
+
+    subjects: dict[str, int] = field(default_factory=dict)
+    labels: dict[str, int] = field(default_factory=lambda: {BACKGROUND: 0})
+    classes: dict[str, str] = field(default_factory=dict)
+    units: dict[str, dict[str, None]] = field(default_factory=dict)
+    kinds: set[str] = field(default_factory=set)
+
+    def learn(self, entry: dict[str, Any]) -> None:
+        """From the line of a source."""
+        self.subjects.setdefault(entry["subject"], len(self.subjects))
+        for label in entry["labels"]:
+            self.labels.setdefault(label, len(self.labels))
+        self.classes |= entry["classes"]
+        for kind, unit in entry["units"].items():
+            self.units.setdefault(kind, {})[unit] = None
+        self.kinds |= {*entry["segments_of_kind"]}
+
+    def check(self, source: Source) -> None:
+        """Refuse a source that calls the class of a label otherwise."""
+        for label, name in source.classes.items():
+            if self.classes.get(label, name) != name:
+                raise Sd2Error(
+                    f"{source.key.title}: the label {label!r} is of class {name!r}",
+                    f"{self.classes[label]!r}, as in the sources before",
+                )
+
+
+class _Writer:
+    def __init__(self, out: Path, work: Path, form: FileFormat, options: DatasetOptions) -> None:
+        self._out, self._work, self._form, self._options = out, work, form, options
+        self._names = _Names()
+        self._there: dict[bytes, str] = {}
+        self._store: SegmentStore | None = None
+        begun = SegmentStore(work) if is_segment_store(work) else None
+        if begun is not None and (begun.sources or work == out or not out.exists()):
+            self._store = begun
+            for entry in begun.entries():
+                self._know(entry)
+        elif form != "zarr" and out.exists():
+            with open_dataset(out) as there:
+                for entry in there.sources():
+                    self._know(entry)
+                _refuse_other_settings(out, there.header, options)
+        if self._store is not None:
+            _refuse_other_settings(out, self._store.header, options)
+
+    def write(self, sources: Iterable[Source | LazySource], progress: Progress) -> Written:
+        total = len(sources) if isinstance(sources, Sized) else 0
+        seen: set[bytes] = set()
+        failed: list[Failed] = []
+        first_error: Sd2Error | None = None
+        added = 0
+        for number, one in enumerate(sources):
+            digest = _digest(one.key)
+            if digest in seen:
+                raise Sd2Error(
+                    f"Two sources are {one.key.title}", "subject, recording and placement once"
+                )
+            seen.add(digest)
+            report = _part(progress, number, total)
+            report(0, 1)
+            if self._is_there(one, digest):
+                continue
+            try:
+                self._append(one, digest, report)
+                added += 1
+            except Sd2Error as error:
+                failed.append(Failed(one.key, str(error)))
+                first_error = first_error or error
+                continue
+            self._refuse_large()
+        if not self._there:
+            raise first_error or Sd2Error("There are no sources", "one at least")
+        segments, count = self._finish(progress)
+        return Written(self._out, segments, count, added, tuple(failed))
+
+    def _refuse_large(self) -> None:
+        if self._form == "npz" and self._store is not None:
+            kinds = tuple(kind for kind in KINDS if kind in self._names.kinds)
+            header = replace(self._store.header, kinds=kinds)
+            refuse_large_npz(self._out, self._store.rows, header)
+
+    def _is_there(self, one: Source | LazySource, digest: bytes) -> bool:
+        known = self._there.get(digest)
+        if known is None:
+            return False
+        now = one.fingerprint() if isinstance(one, Source) else one.fingerprint
+        if known and now and known != now:
+            raise Sd2Error(
+                f"{self._out} holds {one.key.title} already, made of something else",
+                "the same maps, labels and options as before",
+                "Write a new data set, or delete this one first",
+            )
+        return True
+
+    def _append(self, one: Source | LazySource, digest: bytes, progress: Progress) -> None:
+        if isinstance(one, Source):
+            source, fingerprint = one, one.fingerprint()
+        else:
+            source = one.load(lambda done, of: progress(int(900 * done / max(of, 1)), _STEPS))
+            fingerprint = one.fingerprint
+            if source.key != one.key:
+                raise Sd2Error(f"{one.key.title} turned out to be {source.key.title}")
+        store = self._open_store(source)
+        header = store.header
+        _check_fits(source, header)
+        self._names.check(source)
+        entry = _entry(source, header, fingerprint)
+        labels = dict(self._names.labels)
+        for name in source.labels:
+            labels.setdefault(name, len(labels))
+        numbers = np.array([labels[name] for name in source.labels], np.int16)
+        range_m, azimuth_deg, elevation_deg = source.spherical
+        sensor = source.sensor
+        entry["columns"] = {
+            "subject": self._names.subjects.get(source.subject, len(self._names.subjects)),
+            "split": -1,
+            "source": store.sources,
+            "placement": source.placement,
+            "sensor_position_m": sensor.position_m,
+            "sensor_direction_deg": (sensor.azimuth_deg, sensor.elevation_deg),
+            "range_m": range_m,
+            "azimuth_deg": azimuth_deg,
+            "elevation_deg": elevation_deg,
+        }
+        counts = entry["segments_of_kind"] = dict.fromkeys(source.maps, 0)
+
+        def counted() -> Any:
+            for block in cut_source(
+                source, header.frame_rate_hz, header.null_bins, numbers, self._options
+            ):
+                whole = block["available"].sum(axis=0).tolist()
+                for kind in counts:
+                    counts[kind] += whole[KINDS.index(kind)]
+                yield block
+
+        store.append(counted(), entry)
+        self._know(entry, digest)
+        progress(_STEPS, _STEPS)
+
+    def _open_store(self, source: Source) -> SegmentStore:
+        if self._store is None:
+            if self._out.exists() and self._form != "zarr":
+                with open_dataset(self._out) as there:
+                    self._store = SegmentStore.unpack(
+                        self._work, there.header, there.arrays, there.sources()
+                    )
+            else:
+                self._store = SegmentStore.begin(self._work, _header(source, self._options))
+        return self._store
+
+    def _finish(self, progress: Progress) -> tuple[int, int]:
+        store = self._store
+        names = self._names
+        if store is None:  # a file that holds everything already
+            with open_dataset(self._out) as there:
+                if self._final(there.header) == there.header:
+                    return len(there), len(self._there)
+                store = SegmentStore.unpack(self._work, there.header, there.arrays, there.sources())
+        if store.rows == 0:
+            raise Sd2Error(
+                f"No source has {self._options.length} frames on end with a person",
+                "one segment at least",
+                "Choose shorter segments",
+            )
+        header = self._final(store.header)
+        if not store.complete or header != store.header:
+            split_of = {name: number for number, name in enumerate(SPLITS)}
+            table = np.zeros(len(names.subjects), np.int8)
+            for split, subjects in header.splits.items():
+                for subject in subjects:
+                    table[names.subjects[subject]] = split_of[split]
+            store.finish(header, table)
+        if self._form != "zarr":
+            header, arrays = open_arrays(self._work)
+            write_packed(self._out, self._form, header, arrays, store.entries(), progress)
+        return store.rows, store.sources
+
+    def _final(self, header: Header) -> Header:
+        names = self._names
+        split: Split = split_subjects(
+            list(names.subjects), self._options.validation, self._options.test
+        )
+        return replace(
+            header,
+            kinds=tuple(kind for kind in KINDS if kind in names.kinds),
+            labels=tuple(names.labels),
+            classes=dict(names.classes),
+            subjects=tuple(names.subjects),
+            splits={
+                "train": split.training, "validation": split.validation, "test": split.test
+            },
+            units={kind: tuple(names.units[kind]) for kind in KINDS if kind in names.units},
+        )  # fmt: skip
+
+    def _know(self, entry: dict[str, Any], digest: bytes | None = None) -> None:
+        key = SourceKey(entry["subject"], entry["recording"], entry["placement"])
+        self._there[digest or _digest(key)] = entry["fingerprint"]
+        entry = entry | {
+            "segments_of_kind": {
+                kind: count for kind, count in entry["segments_of_kind"].items() if count
+            }
+        }
+        self._names.learn(entry)
+
+
+def _header(source: Source, options: DatasetOptions) -> Header:
+    first: DopplerMap = next(iter(source.maps.values()))
+    nulled = sorted({number for one in source.maps.values() for number in one.null_bins})
+    return Header(
+        length=options.length,
+        overlap=options.overlap,
+        axis=first.axis,
+        null_bins=tuple(nulled) if options.null_bins is None else tuple(options.null_bins),
+        frame_rate_hz=options.frame_rate_hz or round(first.timebase.frames_per_s, 3),
+        label_rule=options.label_rule,
+        min_share=options.min_share,
+        kinds_wanted=options.kinds,
+        title=options.title,
+        made_by=f"SD² Studio {__version__}",
+        provenance=options.provenance,
+    )
+
+
+def _check_fits(source: Source, header: Header) -> None:
+    title = source.key.title
+    if not {*source.maps} & {*header.kinds_wanted}:
+        raise Sd2Error(
+            f"{title} has maps of kind {', '.join(source.maps)}",
+            f"one of {', '.join(header.kinds_wanted)}",
+        )
+    for one in source.maps.values():
+        if one.axis != header.axis:
+            raise Sd2Error(
+                f"{title} has {one.axis.bins} bins over ±{one.axis.v_max_mps:g} m/s",
+                f"{header.axis.bins} over ±{header.axis.v_max_mps:g} m/s, as the data set has",
+            )
+        extra = sorted({*one.null_bins} - {*header.null_bins})
+        if extra:
+            raise Sd2Error(
+                f"{title}: bins {', '.join(map(str, extra))} of the {one.kind} map were emptied",
+                "energy there, as in the sources before",
+                "Export with --null-bins that name them, or make the maps anew",
+            )
+    rate_hz = next(iter(source.maps.values())).timebase.frames_per_s
+    factor = rate_hz / header.frame_rate_hz
+    if len(source.times_s) > 1 and not 1 / MOST_RESAMPLED <= factor <= MOST_RESAMPLED:
+        raise Sd2Error(
+            f"{title} has {rate_hz:.4g} frames/s",
+            f"{header.frame_rate_hz:g} frames/s, or up to {MOST_RESAMPLED:g} times more or less",
+        )
+
+
+def _entry(source: Source, header: Header, fingerprint: str) -> dict[str, Any]:
+    range_m, azimuth_deg, elevation_deg = source.spherical
+    kinds = [kind for kind in header.kinds_wanted if kind in source.maps]
+    return {
+        "subject": source.subject,
+        "recording": source.recording,
+        "placement": source.placement,
+        "fingerprint": fingerprint,
+        "frames": len(source.times_s),
+        "frames_with_person": int(source.present.sum()),
+        "frame_rate_hz": round(next(iter(source.maps.values())).timebase.frames_per_s, 3),
+        "labels": list(source.labels),
+        "classes": dict(source.classes),
+        "units": {kind: source.maps[kind].unit for kind in kinds},
+        "sensor": asdict(source.sensor),
+        "seen_from": None
+        if source.target_m is None
+        else {"range_m": range_m, "azimuth_deg": azimuth_deg, "elevation_deg": elevation_deg},
+        "provenance": source.made_of(),
+    }
+
+
+def _refuse_other(out: Path, form: FileFormat) -> None:
+    """Refuse to write over what is no data set."""
+    if form == "zarr":
+        if out.exists() and not is_segment_store(out) and (
+            not out.is_dir() or any(entry.name != LOCK_NAME for entry in out.iterdir())
+        ):  # fmt: skip
+            raise Sd2Error(f"{out} is there and holds no data set", "a new name")
+    elif out.exists():
+        open_dataset(out).close()
+
+
+def _refuse_other_settings(out: Path, there: Header, options: DatasetOptions) -> None:
+    for what, before, now in (
+        ("segments of", there.length, options.length),
+        ("an overlap of", there.overlap, options.overlap),
+        ("kinds", list(there.kinds_wanted), list(options.kinds)),
+        ("frames/s", there.frame_rate_hz, options.frame_rate_hz),
+        ("null bins", there.null_bins, options.null_bins),
+        ("the label rule", there.label_rule, options.label_rule),
+        ("the least share", there.min_share, options.min_share),
+    ):
+        if now is not None and before != now:
+            raise Sd2Error(
+                f"{out} was begun with {what} {before}",
+                f"{now}, as it is asked for now",
+                "Go on with the same settings, or write another data set",
+            )
+
+
+def _digest(key: SourceKey) -> bytes:
+    return hashlib.blake2b("\0".join(map(str, key)).encode(), digest_size=16).digest()
+
+
+def _part(progress: Progress, number: int, of: int) -> Progress:
+    """Progress of one source as that of all."""
+    return lambda done, total: progress(
+        number * _STEPS + int(_STEPS * done / max(total, 1)), of * _STEPS
+    )

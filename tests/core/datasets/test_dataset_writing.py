@@ -1,0 +1,307 @@
+"""What is written is read, in every format; a killed writer loses nothing but its last source."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import tracemalloc
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from made_sources import AXIS, CLASSES, LABELS, source
+
+from sd2core.datasets import formats
+from sd2core.datasets.layout import SPLITS, row_shapes
+from sd2core.datasets.options import DatasetOptions
+from sd2core.datasets.reading import is_dataset, open_dataset
+from sd2core.datasets.source import KINDS, LazySource, Source, SourceKey
+from sd2core.datasets.writing import write_dataset
+from sd2core.errors import Sd2Error
+from sd2core.progress import Cancelled, Progress
+
+OPTIONS = DatasetOptions(length=24, overlap=4)
+ENDINGS = (".zarr", ".h5", ".npz")
+
+
+def several() -> list[Source]:
+    return [
+        source("r1", "anna", kinds=("synthetic", "denoised", "real")),
+        source("r1", "anna", placement=1),
+        source("r2", "ben", frames=61, kinds=("synthetic", "simulated")),
+        source("r1", "carla", frames=20),  # too short for a segment
+        source("r1", "dora", frames=75),
+    ]
+
+
+def contents(path: Path) -> dict[str, np.ndarray]:
+    with open_dataset(path) as dataset:
+        return {name: np.asarray(dataset[name][:]) for name in row_shapes(dataset.header)}
+
+
+def tree(folder: Path) -> dict[str, bytes]:
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_what_is_written_is_read(tmp_path: Path, ending: str) -> None:
+    out = tmp_path / f"set{ending}"
+    sources = several()
+    written = write_dataset(out, sources, OPTIONS)
+    assert (written.sources, written.added, written.failed) == (5, 5, ())
+    assert is_dataset(out)
+    assert not is_dataset(tmp_path)
+    with open_dataset(out) as dataset:
+        header = dataset.header
+        assert len(dataset) == written.segments == 17
+        assert header.kinds == KINDS
+        assert (header.labels, header.classes, header.axis) == (LABELS, CLASSES, AXIS)
+        assert header.subjects == ("anna", "ben", "carla", "dora")
+        entries = list(dataset.sources())
+        assert [entry["subject"] for entry in entries] == [one.subject for one in sources]
+        assert entries[0]["provenance"]["maps"]["synthetic"]["kind"] == "synthetic"
+        assert "per_frame" not in entries[0]["provenance"]["maps"]["synthetic"]
+        rows = {name: dataset[name][:] for name in row_shapes(header)}
+        for row in range(len(dataset)):
+            one = sources[rows["source"][row]]
+            start = rows["start_frame"][row]
+            for number, kind in enumerate(KINDS):
+                assert rows["available"][row, number] == (kind in one.maps)
+                cut = one.maps[kind].values.T[start : start + 24] if kind in one.maps else 0
+                assert np.array_equal(rows[kind][row], np.broadcast_to(cut, (24, AXIS.bins)))
+            assert np.array_equal(rows["label"][row], one.label[start : start + 24])
+            assert rows["start_s"][row] == one.times_s[start]
+            assert header.subjects[rows["subject"][row]] == one.subject
+            assert rows["placement"][row] == one.placement
+            assert tuple(rows["sensor_position_m"][row]) == one.sensor.position_m
+            assert rows["range_m"][row] == np.float32(one.spherical[0])
+
+
+def test_the_three_formats_hold_the_same(tmp_path: Path) -> None:
+    found = []
+    for ending in ENDINGS:
+        write_dataset(tmp_path / f"set{ending}", several(), OPTIONS)
+        found.append(contents(tmp_path / f"set{ending}"))
+    headers = [open_dataset(tmp_path / f"set{ending}").header for ending in ENDINGS]
+    lines = [list(open_dataset(tmp_path / f"set{ending}").sources()) for ending in ENDINGS]
+    assert headers[0] == headers[1] == headers[2]
+    assert lines[0] == lines[1] == lines[2]
+    for other in found[1:]:
+        assert other.keys() == found[0].keys()
+        for name, values in other.items():
+            assert values.dtype == found[0][name].dtype
+            assert np.array_equal(values, found[0][name])
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_writing_again_adds_only_what_is_new(tmp_path: Path, ending: str) -> None:
+    grown, whole = tmp_path / f"grown{ending}", tmp_path / f"whole{ending}"
+    sources = several()
+    write_dataset(grown, sources[:2], OPTIONS)
+    assert write_dataset(grown, sources[:2], OPTIONS).added == 0
+    loaded: list[SourceKey] = []
+
+    def lazily(one: Source) -> LazySource:
+        def load(progress: Progress) -> Source:
+            loaded.append(one.key)
+            return one
+
+        return LazySource(one.key, load, one.fingerprint())
+
+    assert write_dataset(grown, [lazily(one) for one in sources], OPTIONS).added == 3
+    assert loaded == [one.key for one in sources[2:]]
+    write_dataset(whole, sources, OPTIONS)
+    for name, values in contents(whole).items():
+        assert np.array_equal(values, contents(grown)[name]), name
+    assert open_dataset(grown).header == open_dataset(whole).header
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from test_dataset_writing import OPTIONS, several
+from sd2core.datasets import store, writing
+
+calls = 0
+put = store.SegmentStore._put
+
+def put_or_die(self, *arguments):
+    global calls
+    calls += 1
+    if calls == int(sys.argv[2]):
+        os.kill(os.getpid(), signal.SIGKILL)
+    put(self, *arguments)
+
+store.SegmentStore._put = put_or_die
+writing.write_dataset(Path(sys.argv[1]), several(), OPTIONS)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
+@pytest.mark.parametrize(("ending", "call"), [(".zarr", 3), (".zarr", 43), (".h5", 25)])
+def test_a_killed_writer_goes_on_to_the_same_data_set(
+    tmp_path: Path, ending: str, call: int
+) -> None:
+    out, whole = tmp_path / f"killed{ending}", tmp_path / f"whole{ending}"
+    here = Path(__file__).parent
+    paths = os.pathsep.join([str(here), str(here.parents[2])])
+    ended = subprocess.run(
+        [sys.executable, "-c", KILLED, str(out), str(call)],
+        env={**os.environ, "PYTHONPATH": paths},
+        check=False,
+    )
+    assert ended.returncode == -signal.SIGKILL
+    if ending == ".zarr":
+        with pytest.raises(Sd2Error, match="not written to its end"):
+            open_dataset(out)
+    else:
+        assert not out.exists()
+    write_dataset(out, several(), OPTIONS)
+    write_dataset(whole, several(), OPTIONS)
+    if ending == ".zarr":
+        assert tree(out) == tree(whole)
+    else:
+        assert open_dataset(out).header == open_dataset(whole).header
+        for name, values in contents(whole).items():
+            assert np.array_equal(values, contents(out)[name])
+        assert [path.name for path in tmp_path.glob("*.partial")] == []
+
+
+def test_a_line_that_was_not_written_to_its_end_does_not_count(tmp_path: Path) -> None:
+    out = tmp_path / "set.zarr"
+    write_dataset(out, several()[:2], OPTIONS)
+    index = out / "sources.jsonl"
+    index.write_bytes(index.read_bytes()[:-7])
+    (out / "synthetic" / "c" / "0.1f.partial").write_bytes(b"torn")
+    assert write_dataset(out, several(), OPTIONS).added == 4
+    write_dataset(tmp_path / "whole.zarr", several(), OPTIONS)
+    assert tree(out) == tree(tmp_path / "whole.zarr")
+
+
+def test_who_cancels_can_go_on(tmp_path: Path) -> None:
+    out = tmp_path / "set.zarr"
+
+    def until_half(done: int, total: int) -> None:
+        if done * 2 > total:
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        write_dataset(out, several(), OPTIONS, until_half)
+    assert 0 < write_dataset(out, several(), OPTIONS).added < 5
+
+
+def test_no_subject_is_in_two_splits(tmp_path: Path) -> None:
+    people = [f"s{number}" for number in range(7)]
+    sources = [source("r1", name, placement=p) for name in people for p in (0, 1)]
+    out = tmp_path / "set.zarr"
+    write_dataset(out, sources, OPTIONS)
+    with open_dataset(out) as dataset:
+        whose = [{*dataset["subject"][:][dataset.of_split(split)].tolist()} for split in SPLITS]
+        assert sum(map(len, whose)) == 7 == len(set.union(*whose))
+        assert all(whose)
+        named = dataset.header.splits
+        assert [{people.index(name) for name in named[split]} for split in SPLITS] == whose
+    chosen = replace(OPTIONS, validation=("s2",), test=("s0", "s5"))
+    assert write_dataset(out, sources, chosen).added == 0
+    with open_dataset(out) as dataset:
+        assert {*dataset["subject"][:][dataset.of_split("test")].tolist()} == {0, 5}
+        assert {*dataset["subject"][:][dataset.of_split("validation")].tolist()} == {2}
+    with pytest.raises(Sd2Error, match="'nobody' is to be a test subject"):
+        write_dataset(out, sources, replace(OPTIONS, test=("nobody",)))
+
+
+def test_one_bad_source_does_not_stop_the_others(tmp_path: Path) -> None:
+    def broken(progress: Progress) -> Source:
+        raise Sd2Error("b.npz is damaged", "a mesh")
+
+    wide = source("r4", rate_hz=200.0)
+    sources = [
+        source("r1"),
+        LazySource(SourceKey("ben", "b", 0), broken),
+        source("r3", null_bins=(3, 4)),
+        wide,
+        source("r2"),
+    ]
+    written = write_dataset(tmp_path / "set.npz", sources, OPTIONS)
+    assert (written.sources, written.added) == (2, 2)
+    assert [one.key.recording for one in written.failed] == ["b", "r3", "r4"]
+    assert ["damaged" in one.reason for one in written.failed] == [True, False, False]
+    assert "bins 3, 4" in written.failed[1].reason
+    assert "200 frames/s" in written.failed[2].reason
+    with pytest.raises(Sd2Error, match="damaged"):
+        write_dataset(tmp_path / "none.zarr", [sources[1]], OPTIONS)
+    assert not (tmp_path / "none.zarr").exists()
+
+
+def test_null_bins_are_empty_in_all_kinds(tmp_path: Path) -> None:
+    out = tmp_path / "set.zarr"
+    options = replace(OPTIONS, null_bins=(2, 3))
+    write_dataset(out, [source(kinds=("synthetic", "real"))], options)
+    with open_dataset(out) as dataset:
+        for kind in ("synthetic", "real"):
+            values = dataset[kind][:]
+            assert not values[..., 2:4].any()
+            assert values[..., [0, 1, 4, 5, 6, 7]].all()
+
+
+def test_what_cannot_be_is_refused_in_words(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "set.zarr"
+    write_dataset(out, several()[:1], OPTIONS)
+    for change, message in (
+        ({"length": 30}, "begun with segments of 24"),
+        ({"overlap": 3}, "an overlap of 4"),
+        ({"kinds": ("real",)}, "begun with kinds"),
+        ({"label_rule": "majority"}, "label rule foreground"),
+    ):
+        with pytest.raises(Sd2Error, match=message):
+            write_dataset(out, several(), replace(OPTIONS, **change))  # type: ignore[arg-type]
+    changed = replace(several()[0], label=np.zeros(100, np.int16))
+    with pytest.raises(Sd2Error, match="made of something else"):
+        write_dataset(out, [changed], OPTIONS)
+    with pytest.raises(Sd2Error, match=r"Two sources are r1 of anna\. "):
+        write_dataset(tmp_path / "twice.zarr", [source(), source()], OPTIONS)
+    with pytest.raises(Sd2Error, match="no sources"):
+        write_dataset(tmp_path / "empty.zarr", [], OPTIONS)
+    with pytest.raises(Sd2Error, match="No source has 24 frames"):
+        write_dataset(tmp_path / "short.h5", [source(frames=20)], OPTIONS)
+    with pytest.raises(Sd2Error, match=r"ending in \.zarr, \.h5"):
+        write_dataset(tmp_path / "set.csv", several(), OPTIONS)
+    (tmp_path / "mine.zarr").mkdir()
+    (tmp_path / "mine.zarr" / "notes.txt").write_text("mine")
+    with pytest.raises(Sd2Error, match="holds no data set"):
+        write_dataset(tmp_path / "mine.zarr", several(), OPTIONS)
+    (tmp_path / "mine.npz").write_bytes(b"mine")
+    with pytest.raises(Sd2Error, match="cannot be read"):
+        write_dataset(tmp_path / "mine.npz", several(), OPTIONS)
+    assert (tmp_path / "mine.npz").read_bytes() == b"mine"
+    monkeypatch.setattr(formats, "NPZ_LIMIT_BYTES", 50_000)
+    with pytest.raises(Sd2Error, match=r"Write it as \.zarr or \.h5"):
+        write_dataset(tmp_path / "large.npz", several(), OPTIONS)
+
+
+def test_memory_does_not_grow_with_the_number_of_sources(tmp_path: Path) -> None:
+    def many(count: int) -> Iterator[Source]:
+        for number in range(count):
+            yield source(f"r{number}", f"s{number % 4}", frames=1500)
+
+    def peak(count: int, ending: str) -> int:
+        tracemalloc.start()
+        write_dataset(tmp_path / f"{count}{ending}", many(count), OPTIONS)
+        _, most = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        return most
+
+    peak(2, ".zarr")  # what is imported counts no more
+    few, lots = peak(4, ".zarr"), peak(16, ".zarr")
+    segments = 16 * 75 * 24 * AXIS.bins * 4 * 2
+    assert lots - few < segments / 10
