@@ -97,10 +97,9 @@ def describe(path: Path, options: argparse.Namespace) -> Description:
 
         return describe_pairs(path, read_pairs(path))
     if kind == "model":
-        from sd2core.cli.info_model import describe_card
-        from sd2core.denoise.files import describe_model
+        from sd2core.cli.info_model import describe_model_file
 
-        return describe_card(path, describe_model(path))
+        return describe_model_file(path)
     from sd2core.spectrum import DopplerMap
 
     return describe_map(path, DopplerMap.load(path))

@@ -1,4 +1,4 @@
-"""``sd2 info`` of a trained denoiser."""
+"""``sd2 info`` of a trained denoiser or classifier."""
 
 from __future__ import annotations
 
@@ -6,20 +6,45 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from sd2core.classify.card import FORMAT as CLASSIFIER
+from sd2core.classify.card import ClassifierCard
+from sd2core.classify.files import describe_classifier
 from sd2core.cli.info import Description, bins_in_words
 from sd2core.denoise.card import ModelCard
+from sd2core.denoise.files import describe_model
 from sd2core.denoise.registry import MODELS, summary
+from sd2core.denoise.weights import format_of
+
+
+def describe_model_file(path: Path) -> Description:
+    """Describe a model file without its weights."""
+    if format_of(path) == CLASSIFIER:
+        return describe_classifier_card(path, describe_classifier(path))
+    return describe_card(path, describe_model(path))
+
+
+def describe_classifier_card(path: Path, card: ClassifierCard) -> Description:
+    """Describe a classifier without its weights."""
+    data = {"kind": "classifier", "path": str(path), **card.to_json()}
+    shown = "whole columns" if card.features.kind == "columns" else "the strongest bin"
+    facts = {
+        "model": f"{card.model}, shown {shown}; learnt from {' and '.join(card.trained_on)} maps",
+        "classes": ", ".join(card.classes),
+        **_axis_facts(card),
+        "parameters": f"{card.parameters:,}",
+        **dict(_about(card.about)),
+    }
+    return Description(
+        f"Classifier {path}" + (f": {card.title}" if card.title else ""), data, facts
+    )
 
 
 def describe_card(path: Path, card: ModelCard) -> Description:
-    """Describe a model file without its weights."""
+    """Describe a denoiser without its weights."""
     data = {"kind": "model", "path": str(path), **card.to_json()}
     facts = {
         "model": model_words(card),
-        "velocity": f"{card.axis.bins} bins of {card.axis.bin_width_mps:g} m/s over"
-        f" ±{card.axis.v_max_mps:g} m/s",
-        "nulled bins": bins_in_words(card.axis, card.null_bins),
-        "frame rate": f"{card.frame_rate_hz:g} frames/s",
+        **_axis_facts(card),
         "parameters": f"{card.parameters:,}",
         **dict(_about(card.about)),
     }
@@ -32,6 +57,15 @@ def model_words(card: ModelCard) -> str:
     words = f"{card.model}, {summary(card.model)}" if card.model in MODELS else card.model
     source = "a simulated radar" if card.trained_on == "simulated" else "a real radar"
     return f"{words}; learnt from {source}"
+
+
+def _axis_facts(card: ModelCard | ClassifierCard) -> dict[str, str]:
+    return {
+        "velocity": f"{card.axis.bins} bins of {card.axis.bin_width_mps:g} m/s over"
+        f" ±{card.axis.v_max_mps:g} m/s",
+        "nulled bins": bins_in_words(card.axis, card.null_bins),
+        "frame rate": f"{card.frame_rate_hz:.4g} frames/s",
+    }
 
 
 def _about(about: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:

@@ -78,7 +78,7 @@ def _suggest(options: argparse.Namespace) -> None:
             if getattr(options, field.name) is not None
         }
     )
-    doppler, clock = _map_and_clock(options)
+    doppler, clock = map_and_clock(options)
     spans = suggest_spans(doppler, chosen, label=options.label)
     energy_db = motion_energy_db(doppler)
     loudest_db = float(max((value for value in energy_db.tolist() if value == value), default=0.0))
@@ -132,7 +132,8 @@ def _suggest(options: argparse.Namespace) -> None:
         print(f"  not kept: {sentence}")
 
 
-def _map_and_clock(options: argparse.Namespace) -> tuple[DopplerMap, Timebase]:
+def map_and_clock(options: argparse.Namespace) -> tuple[DopplerMap, Timebase]:
+    """The map that ``options.map`` and ``options.of`` name, and the clock of its labels."""
     from sd2core.io.kinds import kind_of
     from sd2core.io.radar import holds_map, load_recorded_map
     from sd2core.recording import open_recording

@@ -6,6 +6,7 @@ import argparse
 
 from sd2core import __version__
 from sd2core.cli import (
+    classify,
     compare_meshes,
     denoise,
     eval,
@@ -44,6 +45,7 @@ examples:
   sd2 denoise map.npz --out denoised.npz      what a radar would show
   sd2 labels suggest walk.sd2                 where something moves
   sd2 train pairs.zarr --out runs/s4          teach a denoiser from pairs
+  sd2 classify train pairs.zarr --out g.safetensors    teach a classifier of gestures
   sd2 ladder walk.npz --quick                 what accuracy this scene requires
 
 `sd2 COMMAND --help` explains one command.
@@ -67,6 +69,7 @@ def build_parser() -> tuple[argparse.ArgumentParser, argparse._SubParsersAction]
         synth,
         radar,
         denoise,
+        classify,
         labels,
         pairs,
         ladder,

@@ -79,7 +79,7 @@ class TrainedDenoiser:
         def work(values: NDArray[np.float32]) -> NDArray[np.float32]:
             return self.denoise_values(values, lambda frames, _: progress(done + frames, total))
 
-        for start, stop in matching.stretches(doppler, self.card):
+        for start, stop in matching.stretches(doppler, self.card.frame_rate_hz):
             values, times_s = energies[start:stop], doppler.times_s[start:stop]
             done = start
             if matching.is_regular(times_s, self.card.frame_rate_hz):

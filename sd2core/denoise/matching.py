@@ -4,15 +4,41 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.denoise.card import ModelCard
 from sd2core.errors import Sd2Error
 from sd2core.presence import Presence, runs
+from sd2core.sensor import VelocityAxis
 from sd2core.spectrum import DopplerMap
 from sd2core.timebase import Timebase
+
+
+class Card(Protocol):
+    """What a model says of the maps that it knows; see :class:`~sd2core.denoise.card.ModelCard`."""
+
+    @property
+    def name(self) -> str:
+        """What to call it in a message."""
+
+    @property
+    def title(self) -> str:
+        """The same in words, or nothing."""
+
+    @property
+    def axis(self) -> VelocityAxis:
+        """Velocity axis."""
+
+    @property
+    def null_bins(self) -> tuple[int, ...]:
+        """Bins that are zero on purpose."""
+
+    @property
+    def frame_rate_hz(self) -> float:
+        """Frames per second."""
+
 
 Stretch = NDArray[np.float32]
 """Energies without a gap, (frames, bins)."""
@@ -30,8 +56,8 @@ _BREAK_FRAMES = 5.0
 """Where frames are farther apart than this many, a new clip begins."""
 
 
-def check_map(doppler: DopplerMap, card: ModelCard) -> None:
-    """Refuse a map that the model cannot make sense of, in words.
+def check_map(doppler: DopplerMap, card: Card) -> None:
+    """Refuse a map that a denoiser cannot make sense of, in words.
 
     Raises
     ------
@@ -44,6 +70,17 @@ def check_map(doppler: DopplerMap, card: ModelCard) -> None:
             f"a synthetic map, which {model} turns into what a radar would show",
             "Make one with `sd2 synth`",
         )
+    check_bins(doppler, card)
+
+
+def check_bins(doppler: DopplerMap, card: Card) -> None:
+    """Refuse a map of another axis, other emptied bins or too different a frame rate.
+
+    Raises
+    ------
+    Sd2Error
+    """
+    model = f"the model {card.title or card.name}"
     if doppler.axis != card.axis:
         raise Sd2Error(
             f"The map has {doppler.axis.bins} bins up to ±{doppler.axis.v_max_mps:g} m/s",
@@ -69,10 +106,17 @@ def check_map(doppler: DopplerMap, card: ModelCard) -> None:
         )
 
 
-def stretches(doppler: DopplerMap, card: ModelCard) -> list[tuple[int, int]]:
-    """Half-open runs of frames that are clips of their own: without gaps, with a person."""
+def stretches(doppler: DopplerMap, frame_rate_hz: float) -> list[tuple[int, int]]:
+    """Half-open runs of frames that are clips of their own: without gaps, with a person.
+
+    Parameters
+    ----------
+    doppler : DopplerMap
+    frame_rate_hz : float
+        Of the model that is to be asked about them.
+    """
     there = Presence.of(doppler.present, len(doppler.timebase)).there
-    return clips(doppler.times_s, there, card.frame_rate_hz)
+    return clips(doppler.times_s, there, frame_rate_hz)
 
 
 def clips(
@@ -121,11 +165,15 @@ def at_rate(
     times_s : float64 array, shape (frames,)
     frame_rate_hz : float
     """
-    duration_s = float(times_s[-1] - times_s[0])
-    # Up to the first even time at or after the last frame.
-    count = int(np.ceil(duration_s * frame_rate_hz - 1e-6)) + 1
-    even_s = times_s[0] + np.arange(count) / frame_rate_hz
+    even_s = even_times(times_s, frame_rate_hz)
     return interpolated(work(interpolated(values, times_s, even_s)), even_s, times_s)
+
+
+def even_times(times_s: NDArray[np.float64], frame_rate_hz: float) -> NDArray[np.float64]:
+    """Times at an even rate, from the first frame to the first at or after the last one."""
+    duration_s = float(times_s[-1] - times_s[0])
+    count = int(np.ceil(duration_s * frame_rate_hz - 1e-6)) + 1
+    return np.asarray(times_s[0] + np.arange(count) / frame_rate_hz)
 
 
 def interpolated(

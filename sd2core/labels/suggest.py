@@ -149,8 +149,8 @@ def suggest_spans(
     """
     options = options or SuggestOptions()
     energy_db = motion_energy_db(doppler)
-    first, last = _stretches(doppler.timebase, ~np.isnan(energy_db))
-    ends_s = _ends_s(doppler.timebase, last)
+    first, last = stretches(doppler.timebase, ~np.isnan(energy_db))
+    ends_s = frame_ends_s(doppler.timebase, last)
     starts_s = doppler.times_s
     found: list[tuple[int, int]] = []
     for start, stop in _loud(energy_db, options.low_db, first):
@@ -190,7 +190,7 @@ def _confidence(peak_db: float, high_db: float) -> float:
     return (peak_db - high_db) / (SURE_DB - high_db)
 
 
-def _stretches(
+def stretches(
     timebase: Timebase, there: NDArray[np.bool_]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """First and last frame of the stretch of each frame: pauses part as absence does."""
@@ -203,7 +203,7 @@ def _stretches(
     return starts[stretch], np.append(starts[1:], len(timebase))[stretch] - 1
 
 
-def _ends_s(timebase: Timebase, last: NDArray[np.int64]) -> NDArray[np.float64]:
+def frame_ends_s(timebase: Timebase, last: NDArray[np.int64]) -> NDArray[np.float64]:
     """When each frame ends, (T,): at the next one, or after its usual time before a pause."""
     ends_s = np.append(timebase.times_s[1:], timebase.end_s)
     usual_s = timebase.times_s + timebase.frame_duration_s
@@ -215,7 +215,7 @@ def _smoothed(
     values: NDArray[np.float64], timebase: Timebase, there: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
     """Mean over a tenth of a second within the same stretch, (bins, T)."""
-    first, last = _stretches(timebase, there)
+    first, last = stretches(timebase, there)
     times_s, half_s = timebase.times_s, 0.5 * _SMOOTHING_S + _ROUNDING_S
     start = np.maximum(np.searchsorted(times_s, times_s - half_s), first)
     stop = np.minimum(np.searchsorted(times_s, times_s + half_s, side="right"), last + 1)

@@ -1,0 +1,1 @@
+"""Gesture classifiers: Doppler maps to a probability of every class in every frame."""

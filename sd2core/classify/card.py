@@ -1,0 +1,151 @@
+"""What a classifier's file says about it; reading it needs no torch."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from sd2core.classify.features import Features
+from sd2core.errors import Sd2Error
+from sd2core.labels.label_set import check_name
+from sd2core.sensor import VelocityAxis
+
+FORMAT = "sd2-classifier"
+VERSION = 1
+
+BACKGROUND = "background"
+"""The class of frames in which there is none of the gestures."""
+
+
+@dataclass(frozen=True)
+class ClassifierCard:
+    """A trained classifier, but for its weights.
+
+    Parameters
+    ----------
+    model : str
+        A name of :data:`sd2core.classify.models.MODELS`.
+    options : mapping
+        What it was built with.
+    features : Features
+        What it is shown, of which maps.
+    classes : tuple of str
+        In the order of its answers; at least two.
+    trained_on : tuple of str
+        Kinds of maps that it learnt from, as :data:`sd2core.spectrum.MapKind` calls them.
+    title : str
+        To call it in a list; the file's name where it is empty.
+    about : mapping
+        ``data``, ``command``, ``metrics`` and what else fits into JSON.
+    parameters : int
+        Numbers that were learnt; known when the card comes from a file.
+    path : Path, optional
+        The file.
+    """
+
+    model: str
+    options: Mapping[str, Any]
+    features: Features
+    classes: tuple[str, ...]
+    trained_on: tuple[str, ...]
+    title: str = ""
+    about: Mapping[str, Any] = field(default_factory=dict)
+    parameters: int = 0
+    path: Path | None = None
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.frame_rate_hz) and self.frame_rate_hz > 0):
+            raise Sd2Error(f"The classifier's frame rate is {self.frame_rate_hz}", "above 0")
+        if len(self.classes) < 2 or len(set(self.classes)) < len(self.classes):
+            raise Sd2Error(
+                f"The classes are {', '.join(self.classes) or 'none'}", "two or more, each once"
+            )
+        for name in self.classes:
+            check_name(name, "class")
+
+    @property
+    def name(self) -> str:
+        """Name of the file, without its ending; the kind of model before there is a file."""
+        return self.path.stem if self.path is not None else self.model
+
+    @property
+    def axis(self) -> VelocityAxis:
+        """Of the maps that it knows."""
+        return self.features.axis
+
+    @property
+    def null_bins(self) -> tuple[int, ...]:
+        """Bins that are zero on purpose."""
+        return self.features.null_bins
+
+    @property
+    def frame_rate_hz(self) -> float:
+        """Of the maps that it knows."""
+        return self.features.frame_rate_hz
+
+    @property
+    def background(self) -> int | None:
+        """Which of the classes is the background, if one is."""
+        return self.classes.index(BACKGROUND) if BACKGROUND in self.classes else None
+
+    def to_json(self) -> dict[str, Any]:
+        """As kept in the header of a model file."""
+        return {
+            "format": FORMAT,
+            "version": VERSION,
+            "model": self.model,
+            "options": dict(self.options),
+            "features": self.features.kind,
+            "axis": {"bins": self.axis.bins, "v_max_mps": self.axis.v_max_mps},
+            "null_bins": list(self.null_bins),
+            "frame_rate_hz": self.frame_rate_hz,
+            "classes": list(self.classes),
+            "trained_on": list(self.trained_on),
+            "title": self.title,
+            "about": dict(self.about),
+            "parameters": self.parameters,
+        }
+
+    @classmethod
+    def from_json(cls, content: dict[str, Any], path: Path | None = None) -> ClassifierCard:
+        """Read what :meth:`to_json` gave.
+
+        Raises
+        ------
+        Sd2Error
+            When it is something else, or of a newer version.
+        """
+        where = "The classifier" if path is None else str(path)
+        try:
+            if content["format"] != FORMAT or not isinstance(content["version"], int):
+                raise ValueError(f"format {content['format']!r}")
+            if content["version"] > VERSION:
+                raise Sd2Error(
+                    f"{where} is of version {content['version']}",
+                    f"a classifier up to version {VERSION}",
+                    "Use the version of SD² Studio that made it, or a newer one",
+                )
+            return cls(
+                model=str(content["model"]),
+                options=dict(content["options"]),
+                features=Features(
+                    content["features"],
+                    VelocityAxis(int(content["axis"]["bins"]), float(content["axis"]["v_max_mps"])),
+                    tuple(map(int, content["null_bins"])),
+                    float(content["frame_rate_hz"]),
+                ),
+                classes=tuple(map(str, content["classes"])),
+                trained_on=tuple(map(str, content["trained_on"])),
+                title=str(content["title"]),
+                about=dict(content["about"]),
+                parameters=int(content["parameters"]),
+                path=path,
+            )
+        except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
+            raise Sd2Error(
+                f"{where}: its description is damaged ({error!r})",
+                "a classifier written by `sd2 classify train`",
+            ) from error

@@ -1,0 +1,308 @@
+"""What classifiers learn from: maps with a class per frame, of whom and of which kind."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.classify.card import BACKGROUND
+from sd2core.denoise import matching
+from sd2core.denoise.live import TrainedDenoiser
+from sd2core.errors import Sd2Error
+from sd2core.labels.label_set import GESTURES, LabelSet
+from sd2core.labels.spans import Labels
+from sd2core.pairs import PairSet
+from sd2core.sensor import VelocityAxis
+from sd2core.spectrum import DopplerMap, MapKind
+from sd2core.timebase import Timebase
+
+UNKNOWN = -1
+"""Of a frame that is neither learnt from nor judged."""
+
+
+@dataclass(frozen=True, eq=False)
+class Clip:
+    """One uninterrupted stretch of a map with the class of every frame.
+
+    Parameters
+    ----------
+    subject : str
+    movement : str
+        The same for all maps of one movement: kinds, and places of the sensor.
+    kind : {"synthetic", "denoised", "simulated", "real"}
+    energies : float32 array, shape (frames, bins)
+    label : int8 array, shape (frames,)
+        Index into the classes, or :data:`UNKNOWN`.
+    placement : int
+        0 for the movement's own sensor; 1 and up are others (range synthesis).
+    """
+
+    subject: str
+    movement: str
+    kind: MapKind
+    energies: NDArray[np.float32]
+    label: NDArray[np.int8]
+    placement: int = 0
+
+    def __post_init__(self) -> None:
+        if self.energies.ndim != 2 or len(self.energies) != len(self.label):
+            raise Sd2Error(
+                f"{self.title}: the map is of shape {self.energies.shape}, with"
+                f" {len(self.label)} labels",
+                "(frames, bins), and a label for every frame",
+            )
+
+    def __len__(self) -> int:
+        return len(self.label)
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """Whose movement it is: what training and test must not share."""
+        return self.subject, self.movement
+
+    @property
+    def title(self) -> str:
+        """To name it in a message."""
+        return f"{self.subject}/{self.movement}"
+
+    def until(self, frames: int) -> Clip:
+        """Its first frames."""
+        return replace(self, energies=self.energies[:frames], label=self.label[:frames])
+
+
+@dataclass(frozen=True, eq=False)
+class ClipSet:
+    """Clips that share an axis, a frame rate and classes.
+
+    Parameters
+    ----------
+    axis : VelocityAxis
+    null_bins : tuple of int
+    frame_rate_hz : float
+    classes : tuple of str
+        The background first, where there is one.
+    clips : tuple of Clip
+    provenance : dict
+        Where they are from; fits into JSON.
+    """
+
+    axis: VelocityAxis
+    null_bins: tuple[int, ...]
+    frame_rate_hz: float
+    classes: tuple[str, ...]
+    clips: tuple[Clip, ...]
+    provenance: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def subjects(self) -> tuple[str, ...]:
+        """In the order of their first clips."""
+        return tuple(dict.fromkeys(clip.subject for clip in self.clips))
+
+    @property
+    def kinds(self) -> tuple[MapKind, ...]:
+        """In the order of their first clips."""
+        return tuple(dict.fromkeys(clip.kind for clip in self.clips))
+
+    def of(self, subjects: Iterable[str]) -> tuple[Clip, ...]:
+        """Clips of these subjects."""
+        wanted = set(subjects)
+        return tuple(clip for clip in self.clips if clip.subject in wanted)
+
+
+def frame_counts(clips: Iterable[Clip], classes: int) -> NDArray[np.int64]:
+    """Frames of each class, (classes,)."""
+    counts = np.zeros(classes, np.int64)
+    for clip in clips:
+        counts += np.bincount(clip.label[clip.label >= 0], minlength=classes)
+    return counts
+
+
+def gesture_classes(labels: Sequence[str]) -> tuple[str, ...]:
+    """Class of every label: the paper's swipes by their direction, others by their own name.
+
+    Background, however it is written, is the background.
+    """
+    return tuple(_class_of(label, GESTURES) for label in labels)
+
+
+def clips_of_pairs(
+    pairs: PairSet, kind: MapKind, denoiser: TrainedDenoiser | None = None
+) -> ClipSet:
+    """One kind of maps of a store of pairs.
+
+    Parameters
+    ----------
+    pairs : PairSet
+    kind : {"simulated", "real", "synthetic", "denoised"}
+        The radar's are simulated or real, as the pairs say.
+    denoiser : TrainedDenoiser, optional
+        For denoised ones.
+
+    Raises
+    ------
+    Sd2Error
+        When the pairs hold no such maps, or the denoiser does not fit.
+    """
+    if kind in ("simulated", "real") and kind != pairs.kind:
+        raise Sd2Error(f"The pairs hold a {pairs.kind} radar", f"a {kind} one")
+    if kind == "denoised":
+        _check_denoiser(pairs, denoiser)
+    names = gesture_classes(pairs.labels)
+    classes = _in_order(names)
+    table = np.array([classes.index(name) for name in names], np.int8)
+    clips = []
+    for take in pairs.takes:
+        energies = take.synthetic if kind in ("synthetic", "denoised") else take.radar
+        if denoiser is not None and kind == "denoised":
+            energies = denoiser.denoise_values(energies)
+        clips.append(
+            Clip(take.subject, take.name, kind, energies, table[take.label], take.placement)
+        )
+    return ClipSet(
+        pairs.axis,
+        pairs.null_bins,
+        pairs.frame_rate_hz,
+        classes,
+        tuple(clips),
+        {"pairs": pairs.provenance, "kind": kind},
+    )
+
+
+def clips_of_map(
+    doppler: DopplerMap,
+    labels: Labels,
+    *,
+    subject: str,
+    movement: str,
+    frame_rate_hz: float | None = None,
+) -> ClipSet:
+    """One labelled map, such as of a recording or of a radar's own file.
+
+    A frame has the class of the label that it stands in (``gesture_class`` of the label
+    set); frames without a label are background. Labels without a class, and frames on
+    which two labels of different classes stand, are unknown: neither learnt from nor
+    judged. Gaps and stretches without a person part a map into several clips.
+
+    Parameters
+    ----------
+    doppler : DopplerMap
+        On the clock of the labels.
+    labels : Labels
+        Suggestions do not count.
+    subject, movement : str
+    frame_rate_hz : float, optional
+        Brought to that rate where it is another; its own by default.
+    """
+    rate_hz = frame_rate_hz or doppler.timebase.frames_per_s
+    label, classes = frame_labels(doppler.timebase, labels)
+    clips = []
+    for start, stop in matching.stretches(doppler, rate_hz):
+        energies, times_s = doppler.values.T[start:stop], doppler.times_s[start:stop]
+        own = label[start:stop]
+        if not matching.is_regular(times_s, rate_hz):
+            even_s = matching.even_times(times_s, rate_hz)
+            energies = matching.interpolated(energies, times_s, even_s)
+            own = own[np.abs(times_s[:, None] - even_s).argmin(axis=0)]
+        clips.append(Clip(subject, movement, doppler.kind, np.array(energies), own))
+    return ClipSet(
+        doppler.axis,
+        doppler.null_bins,
+        rate_hz,
+        classes,
+        tuple(clips),
+        {"movement": movement, "subject": subject, "kind": doppler.kind},
+    )
+
+
+def frame_labels(timebase: Timebase, labels: Labels) -> tuple[NDArray[np.int8], tuple[str, ...]]:
+    """Class of every frame, and the classes; see :func:`clips_of_map`."""
+    spans = [span for span in labels.spans if span.origin != "suggestion"]
+    names = {span.label: _class_of(span.label, labels.label_set) for span in spans}
+    classes = _in_order([BACKGROUND, *(name for name in names.values() if name)])
+    found = np.zeros(len(timebase), np.int8)
+    taken = np.zeros(len(timebase), bool)
+    for span in spans:
+        name = names[span.label]
+        number = classes.index(name) if name else UNKNOWN
+        frames = slice(*timebase.frames_between(span.start_s, span.end_s))
+        clash = taken[frames] & (found[frames] != number)
+        found[frames] = np.where(clash, UNKNOWN, number)
+        taken[frames] = True
+    return found, classes
+
+
+def merged(sets: Sequence[ClipSet]) -> ClipSet:
+    """Several sets as one.
+
+    Raises
+    ------
+    Sd2Error
+        When axes, emptied bins or frame rates differ, or there is none.
+    """
+    if not sets:
+        raise Sd2Error("Nothing to learn from is given", "pairs, recordings or radar files")
+    first = sets[0]
+    for other in sets[1:]:
+        for what, mine, theirs in (
+            ("velocity axis", first.axis, other.axis),
+            ("emptied bins", first.null_bins, other.null_bins),
+        ):
+            if mine != theirs:
+                raise Sd2Error(
+                    f"The data cannot be mixed: the {what} is {mine} and {theirs}",
+                    "the same in all of them",
+                )
+        if abs(other.frame_rate_hz / first.frame_rate_hz - 1.0) > matching.SAME_RATE:
+            raise Sd2Error(
+                f"The data cannot be mixed: {first.frame_rate_hz:.4g} and"
+                f" {other.frame_rate_hz:.4g} frames/s",
+                "the same frame rate",
+            )
+    classes = _in_order([name for one in sets for name in one.classes])
+    clips = tuple(
+        replace(clip, label=_renumbered(clip.label, one.classes, classes))
+        for one in sets
+        for clip in one.clips
+    )
+    provenance = first.provenance if len(sets) == 1 else {"mixed": [s.provenance for s in sets]}
+    return replace(first, classes=classes, clips=clips, provenance=provenance)
+
+
+def _renumbered(
+    label: NDArray[np.int8], own: tuple[str, ...], classes: tuple[str, ...]
+) -> NDArray[np.int8]:
+    # The last place is that of UNKNOWN.
+    table = np.array([*(classes.index(name) for name in own), UNKNOWN], np.int8)
+    return table[label]
+
+
+def _class_of(label: str, label_set: LabelSet) -> str:
+    known = label_set.find(label)
+    name = known.gesture_class if known is not None else label
+    return BACKGROUND if name.casefold() == BACKGROUND else name
+
+
+def _in_order(names: Iterable[str]) -> tuple[str, ...]:
+    """Each once: the background first, the others by name."""
+    return tuple(sorted(set(names), key=lambda name: (name != BACKGROUND, name)))
+
+
+def _check_denoiser(pairs: PairSet, denoiser: TrainedDenoiser | None) -> None:
+    if denoiser is None:
+        raise Sd2Error("No denoiser is given", "one, for denoised maps")
+    card = denoiser.card
+    if card.axis != pairs.axis or set(card.null_bins) != set(pairs.null_bins):
+        raise Sd2Error(
+            f"The denoiser {card.name} knows {card.axis.bins} bins up to"
+            f" ±{card.axis.v_max_mps:g} m/s",
+            f"the {pairs.axis.bins} bins up to ±{pairs.axis.v_max_mps:g} m/s of the pairs",
+        )
+    if abs(pairs.frame_rate_hz / card.frame_rate_hz - 1.0) > matching.SAME_RATE:
+        raise Sd2Error(
+            f"The denoiser {card.name} knows {card.frame_rate_hz:g} frames/s",
+            f"the pairs' {pairs.frame_rate_hz:g} frames/s",
+        )

@@ -1,0 +1,169 @@
+"""What a classifier is shown of every frame of a Doppler map.
+
+All is causal and free of gain: a frame's features depend on it and on earlier frames,
+and a map times any number gives the same ones. So live equals batch, and a classifier
+that learnt from one radar's maps can be asked about a denoised map.
+
+**Noise level.** The median over the last 5 s of the frames' own medians, over the bins that
+are not nulled; but at least 40 dB below the loudest cell so far, which is forgotten with a
+time constant of 20 s. A radar's noise fills most cells, so this is the noise; a synthetic
+map is empty but for the movement, and there the second part is. (The median over a whole
+take, as :func:`sd2core.denoise.metrics.stands_out` has it, is not known while live.)
+
+**Target.** A frame has one where its strongest cell is more than 10 dB above that level.
+
+``peak``
+    The paper's feature, the Doppler bin of maximum intensity: its velocity as a share of
+    the axis' end, and 1 where the frame has a target. Both are 0 where it has none.
+``columns``
+    The whole column: log10(1 + x / (10 noise)) / 3 of every bin. What is at the noise level
+    is about 0, and 40 dB above it is 1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+from sd2core.sensor import VelocityAxis
+
+Kind = Literal["peak", "columns"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+
+STANDS_OUT = 10.0
+"""How far above the noise a target is, as a ratio of energies."""
+NOISE_S = 5.0
+"""For so long the noise level is remembered."""
+LOUDEST_S = 20.0
+"""Time constant with which the loudest cell is forgotten."""
+RANGE = 1e4
+"""The noise level is no further below the loudest cell than this ratio of energies."""
+
+_BLOCK = 4096
+
+
+class Heard(NamedTuple):
+    """What is remembered of the frames before.
+
+    Parameters
+    ----------
+    medians : float64 array, shape (up to the frames of 5 s,)
+        Of the last frames, the newest at the end.
+    loudest_log : float
+        Logarithm of the loudest cell so far; minus infinity where there was no energy.
+    """
+
+    medians: NDArray[np.float64]
+    loudest_log: float
+
+
+SILENCE = Heard(np.zeros(0), -np.inf)
+"""Before the first frame."""
+
+
+@dataclass(frozen=True)
+class Features:
+    """How frames become what a classifier is shown.
+
+    Parameters
+    ----------
+    kind : {"peak", "columns"}
+    axis : VelocityAxis
+    null_bins : tuple of int
+        Bins that do not count.
+    frame_rate_hz : float
+    """
+
+    kind: Kind
+    axis: VelocityAxis
+    null_bins: tuple[int, ...]
+    frame_rate_hz: float
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise Sd2Error(f"The features are {self.kind!r}", f"one of {', '.join(KINDS)}")
+        if len(set(self.null_bins)) >= self.axis.bins:
+            raise Sd2Error(
+                f"All {self.axis.bins} bins are nulled", "bins in which a movement can be seen"
+            )
+
+    @property
+    def size(self) -> int:
+        """Numbers per frame."""
+        return 2 if self.kind == "peak" else self.axis.bins
+
+    def of(
+        self, energies: NDArray[np.floating], heard: Heard = SILENCE
+    ) -> tuple[NDArray[np.float32], Heard]:
+        """Features of the next frames.
+
+        Parameters
+        ----------
+        energies : float array, shape (frames, bins)
+            Not negative.
+        heard : Heard
+            What the call before gave; nothing at the beginning of a clip.
+
+        Returns
+        -------
+        float32 array, shape (frames, :attr:`size`), and what to remember
+        """
+        if energies.ndim != 2 or energies.shape[1] != self.axis.bins:
+            raise Sd2Error(
+                f"The values are of shape {energies.shape}", f"(frames, {self.axis.bins})"
+            )
+        values = np.array(energies, np.float64)
+        values[:, list(self.null_bins)] = 0.0
+        noise, heard = self._noise(values, heard)
+        if self.kind == "peak":
+            return self._peak(values, noise), heard
+        scale = np.where(noise > 0, STANDS_OUT * noise, 1.0)[:, None]
+        shown = np.log10(1.0 + values / scale) / np.log10(RANGE / STANDS_OUT)
+        return shown.astype(np.float32), heard
+
+    def _peak(self, values: NDArray[np.float64], noise: NDArray[np.float64]) -> NDArray[np.float32]:
+        target = values.max(axis=1) > STANDS_OUT * noise
+        velocity = self.axis.centres_mps[values.argmax(axis=1)] / self.axis.v_max_mps
+        return np.stack([np.where(target, velocity, 0.0), target], axis=1).astype(np.float32)
+
+    def _noise(
+        self, values: NDArray[np.float64], heard: Heard
+    ) -> tuple[NDArray[np.float64], Heard]:
+        """Noise level of every frame, (frames,), and what to remember."""
+        if not len(values):
+            return np.zeros(0), heard
+        window = max(round(NOISE_S * self.frame_rate_hz), 1)
+        medians = np.median(np.delete(values, list(self.null_bins), axis=1), axis=1)
+        known = np.concatenate([heard.medians, medians])
+        loudest_log = self._loudest_log(values.max(axis=1), heard.loudest_log)
+        noise = np.maximum(
+            _running_median(known, window)[len(heard.medians) :], np.exp(loudest_log) / RANGE
+        )
+        return noise, Heard(known[-window:], float(loudest_log[-1]))
+
+    def _loudest_log(self, loudest: NDArray[np.float64], before: float) -> NDArray[np.float64]:
+        """Running maximum that decays, as logarithms, (frames,)."""
+        with np.errstate(divide="ignore"):
+            level = np.log(loudest)
+        fallen = np.arange(1, len(level) + 1) / (LOUDEST_S * self.frame_rate_hz)
+        highest = np.maximum.accumulate(np.append(before, level + fallen))[1:]
+        return np.asarray(highest - fallen)
+
+
+def _running_median(values: NDArray[np.float64], window: int) -> NDArray[np.float64]:
+    """Median of every value and those up to a window before it, as far as there are any."""
+    found = np.empty(len(values))
+    early = min(window - 1, len(values))
+    for last in range(early):
+        found[last] = np.median(values[: last + 1])
+    if len(values) >= window:
+        rows = np.lib.stride_tricks.sliding_window_view(values, window)
+        # In blocks: a long recording's windows would not fit into memory at once.
+        for start in range(0, len(rows), _BLOCK):
+            block = rows[start : start + _BLOCK]
+            found[early + start : early + start + len(block)] = np.median(block, axis=1)
+    return found

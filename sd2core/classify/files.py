@@ -1,0 +1,83 @@
+"""Model files of classifiers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sd2core.classify.card import ClassifierCard
+from sd2core.denoise.weights import Shapes, read_header, read_weights, write_weights
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    from sd2core.classify.live import TrainedClassifier
+
+_EXPECTED = "a classifier (.safetensors) written by `sd2 classify train`"
+
+
+def save_classifier(path: Path, trained: TrainedClassifier) -> ClassifierCard:
+    """Write a classifier to one file, in one step.
+
+    Returns
+    -------
+    ClassifierCard
+        As it is in the file.
+
+    Raises
+    ------
+    Sd2Error
+        When the name does not end in ``.safetensors``, or the card holds what JSON cannot.
+    """
+    from sd2core.denoise.model import parameter_count
+
+    path = Path(path)
+    card = replace(trained.card, path=path, parameters=parameter_count(trained.network))
+    write_weights(path, trained.network, card.to_json())
+    return card
+
+
+def describe_classifier(path: Path) -> ClassifierCard:
+    """What a file says about its classifier; the weights stay on disk, without torch.
+
+    Raises
+    ------
+    Sd2Error
+        When it is missing, damaged, of a newer version, or something else.
+    """
+    return _read_header(Path(path))[0]
+
+
+def load_classifier(path: Path) -> TrainedClassifier:
+    """Load a classifier, ready to be used.
+
+    Raises
+    ------
+    Sd2Error
+        When there is none, or it is damaged or does not fit together.
+    """
+    path = Path(path)
+    card, shapes = _read_header(path)
+
+    from sd2core.classify.live import TrainedClassifier
+    from sd2core.classify.models import build
+
+    try:
+        network = build(card.model, card.features.size, len(card.classes), **card.options)
+    except Sd2Error as error:
+        raise Sd2Error(
+            f"{path}: {error.found}", error.expected, "The file may be of another version"
+        ) from error
+    read_weights(path, network, card.model, shapes, _EXPECTED)
+    return TrainedClassifier(network, card)
+
+
+def _read_header(path: Path) -> tuple[ClassifierCard, Shapes]:
+    told, shapes = read_header(path, _EXPECTED)
+    if told.get("format") == "sd2-denoiser":
+        raise Sd2Error(
+            f"{path} is a denoiser",
+            "a classifier",
+            "Train one with `sd2 classify train`",
+        )
+    return ClassifierCard.from_json(told, path), shapes

@@ -1,0 +1,156 @@
+"""A trained classifier at work: on whole maps, and on frames as they come."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from sd2core.classify.card import ClassifierCard
+from sd2core.classify.features import SILENCE, Heard
+from sd2core.classify.models import Classifier, State, probabilities_of
+from sd2core.denoise import matching
+from sd2core.progress import Progress, silent
+from sd2core.spectrum import DopplerMap
+
+CHUNK = 512
+"""Frames of a long map that are worked out at once, with the state from before."""
+
+Probabilities = NDArray[np.float32]
+
+
+class Memory(NamedTuple):
+    """What is remembered between frames; it is never changed, only replaced."""
+
+    heard: Heard
+    network: State
+
+
+class TrainedClassifier:
+    """A network and all that is needed to use it.
+
+    Parameters
+    ----------
+    network : Classifier
+        Put into evaluation mode.
+    card : ClassifierCard
+    """
+
+    def __init__(self, network: Classifier, card: ClassifierCard) -> None:
+        self.network = network.eval()
+        self.card = card
+
+    @property
+    def classes(self) -> tuple[str, ...]:
+        """In the order of the answers."""
+        return self.card.classes
+
+    def probabilities(self, doppler: DopplerMap, progress: Progress = silent) -> Probabilities:
+        """What every frame of a map shows.
+
+        Frames without a person are background for certain, and what was before them is
+        forgotten: every stretch is a clip of its own (docs/decisions/0021). A map of
+        another frame rate, or of uneven frames, is brought to the model's rate and its
+        answers back.
+
+        Parameters
+        ----------
+        doppler : DopplerMap
+            Of any kind, on the model's axis, of any length.
+        progress : callable
+            Called with frames; may raise ``Cancelled``.
+
+        Returns
+        -------
+        float32 array, shape (frames, classes)
+            Rows add up to 1.
+
+        Raises
+        ------
+        Sd2Error
+            When the map is not on the axis that the model knows.
+        """
+        matching.check_bins(doppler, self.card)
+        energies = np.ascontiguousarray(doppler.values.T)  # (frames, bins)
+        found = np.tile(self.nobody(), (len(energies), 1))
+        done, total = 0, len(energies)
+
+        def work(values: NDArray[np.float32]) -> Probabilities:
+            return self.probabilities_of(values, lambda frames, _: progress(done + frames, total))
+
+        rate_hz = self.card.frame_rate_hz
+        for start, stop in matching.stretches(doppler, rate_hz):
+            values, times_s = energies[start:stop], doppler.times_s[start:stop]
+            done = start
+            if matching.is_regular(times_s, rate_hz):
+                found[start:stop] = work(values)
+            else:
+                found[start:stop] = matching.at_rate(work, values, times_s, rate_hz)
+        progress(total, total)
+        return found
+
+    def probabilities_of(
+        self, energies: NDArray[np.float32], progress: Progress = silent
+    ) -> Probabilities:
+        """One stretch at the model's frame rate, (frames, bins) → (frames, classes)."""
+        found = np.empty((len(energies), len(self.classes)), np.float32)
+        memory = self.initial_memory()
+        for start in range(0, len(energies), CHUNK):
+            progress(start, len(energies))
+            found[start : start + CHUNK], memory = self.advance(
+                energies[start : start + CHUNK], memory
+            )
+        return found
+
+    def initial_memory(self) -> Memory:
+        """Before the first frame of a clip."""
+        with torch.no_grad():
+            return Memory(SILENCE, self.network.initial_state(1))
+
+    def step(
+        self, frame: NDArray[np.float32], memory: Memory, present: bool = True
+    ) -> tuple[Probabilities, Memory]:
+        """Answer to the next frame, as :meth:`probabilities` gives it, and what to remember.
+
+        Parameters
+        ----------
+        frame : float32 array, shape (bins,)
+            At the model's frame rate.
+        memory : Memory
+            Of the frame before, or :meth:`initial_memory`.
+        present : bool
+            False where there is no person: that is background, and a new clip begins.
+
+        Returns
+        -------
+        float32 array, shape (classes,), and Memory
+        """
+        if not present:
+            return self.nobody(), self.initial_memory()
+        found, memory = self.advance(np.asarray(frame)[None], memory)
+        return found[0], memory
+
+    def advance(
+        self, energies: NDArray[np.float32], memory: Memory
+    ) -> tuple[Probabilities, Memory]:
+        """The same for some frames at once, (frames, bins) → (frames, classes)."""
+        if not len(energies):
+            return np.zeros((0, len(self.classes)), np.float32), memory
+        shown, heard = self.card.features.of(energies, memory.heard)
+        with torch.no_grad():
+            answer, state = self.network.chunk(torch.from_numpy(shown)[None], memory.network)
+            found: Probabilities = probabilities_of(answer[0]).numpy()
+        return found, Memory(heard, state)
+
+    def nobody(self) -> Probabilities:
+        """Answer to a frame without a person, (classes,).
+
+        Background, or where that is none of the classes nothing is known: all the same.
+        """
+        found = np.full(len(self.classes), 1.0 / len(self.classes), np.float32)
+        if self.card.background is not None:
+            found[:] = 0.0
+            found[self.card.background] = 1.0
+        return found

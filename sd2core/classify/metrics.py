@@ -1,0 +1,156 @@
+"""How good predicted classes are: per frame, per gesture, and how soon."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.classify.data import UNKNOWN
+from sd2core.errors import Sd2Error
+
+Confusion = NDArray[np.int64]
+"""(true classes, found classes) of frames or gestures."""
+
+
+def confusion_of(truth: NDArray[np.integer], found: NDArray[np.integer], classes: int) -> Confusion:
+    """How often each class was taken for each; unknown frames do not count.
+
+    Raises
+    ------
+    Sd2Error
+        When there are not as many answers as frames.
+    """
+    if truth.shape != found.shape:
+        raise Sd2Error(f"{len(found)} answers for {len(truth)} frames", "one for each")
+    counted = truth != UNKNOWN
+    counts = np.zeros((classes, classes), np.int64)
+    np.add.at(counts, (truth[counted], found[counted]), 1)
+    return counts
+
+
+def recalls(confusion: Confusion) -> NDArray[np.float64]:
+    """Share of each class that was found, (classes,); NaN for one that does not occur."""
+    totals = confusion.sum(axis=1)
+    return np.divide(
+        np.diag(confusion)[: len(totals)],
+        totals,
+        out=np.full(len(totals), np.nan),
+        where=totals > 0,
+    )
+
+
+def mean_recall(confusion: Confusion) -> float:
+    """Over the classes that occur; NaN where none does."""
+    known = recalls(confusion)
+    known = known[~np.isnan(known)]
+    return float(known.mean()) if known.size else float("nan")
+
+
+@dataclass(frozen=True, eq=False)
+class Score:
+    """Of a classifier on some clips.
+
+    Parameters
+    ----------
+    classes : tuple of str
+    frames : int64 array, shape (classes, classes)
+        Confusion matrix of frames.
+    gestures : int64 array, shape (classes, classes)
+        Of gestures: what most frames of a labelled gesture were taken for.
+    latencies_s : float64 array, shape (gestures that were recognised,)
+        From a gesture's beginning to the end of its first frame that is right.
+    missed : int
+        Gestures without any frame that is right.
+    """
+
+    classes: tuple[str, ...]
+    frames: Confusion
+    gestures: Confusion
+    latencies_s: NDArray[np.float64]
+    missed: int
+
+    @property
+    def mean_recall(self) -> float:
+        """Over classes, of frames."""
+        return mean_recall(self.frames)
+
+    @property
+    def latency_s(self) -> float:
+        """Median; NaN where no gesture was recognised."""
+        return float(np.median(self.latencies_s)) if len(self.latencies_s) else float("nan")
+
+    def __add__(self, other: Score) -> Score:
+        if other.classes != self.classes:
+            raise Sd2Error("Scores of other classes are to be added", ", ".join(self.classes))
+        return Score(
+            self.classes,
+            self.frames + other.frames,
+            self.gestures + other.gestures,
+            np.concatenate([self.latencies_s, other.latencies_s]),
+            self.missed + other.missed,
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Matrices, and what is read off them."""
+        return {
+            "classes": list(self.classes),
+            "frames": self.frames.tolist(),
+            "gestures": self.gestures.tolist(),
+            "recall_frames": recalls(self.frames).tolist(),
+            "recall_gestures": recalls(self.gestures).tolist(),
+            "mean_recall_frames": self.mean_recall,
+            "mean_recall_gestures": mean_recall(self.gestures),
+            "latency_s": self.latency_s,
+            "missed": self.missed,
+        }
+
+
+def score(
+    truths: Sequence[NDArray[np.integer]],
+    answers: Sequence[NDArray[np.integer]],
+    classes: tuple[str, ...],
+    frame_rate_hz: float,
+    background: int | None,
+) -> Score:
+    """Compare classes frame by frame and gesture by gesture.
+
+    Parameters
+    ----------
+    truths, answers : sequence of int array, shape (frames,)
+        Of one clip each.
+    classes : tuple of str
+    frame_rate_hz : float
+    background : int or None
+        The class that is no gesture.
+    """
+    number = len(classes)
+    frames = np.zeros((number, number), np.int64)
+    gestures = np.zeros((number, number), np.int64)
+    latencies, missed = [], 0
+    for truth, found in zip(truths, answers, strict=True):
+        frames += confusion_of(truth, found, number)
+        for start, stop, true in gesture_runs(truth, background):
+            own = found[start:stop]
+            # Of several equally frequent ones the first: background before a gesture.
+            gestures[true, np.bincount(own, minlength=number).argmax()] += 1
+            right = np.flatnonzero(own == true)
+            if right.size:
+                latencies.append((right[0] + 1) / frame_rate_hz)
+            else:
+                missed += 1
+    return Score(classes, frames, gestures, np.array(latencies), missed)
+
+
+def gesture_runs(truth: NDArray[np.integer], background: int | None) -> list[tuple[int, int, int]]:
+    """Half-open runs of frames of one class that is a gesture, with the class."""
+    begins = np.flatnonzero(np.diff(truth, prepend=truth[:1] - 1))
+    stops = np.append(begins[1:], len(truth))
+    return [
+        (int(start), int(stop), int(truth[start]))
+        for start, stop in zip(begins, stops, strict=True)
+        if truth[start] not in (UNKNOWN, background)
+    ]

@@ -1,0 +1,228 @@
+"""The networks: features of frames in, one number per class and frame out; all causal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+from sd2core.denoise.s4 import S4Layer
+from sd2core.errors import Sd2Error
+
+State = Any
+"""What a network remembers of the frames before."""
+
+
+class Classifier(nn.Module):
+    """Base of all: layers along time, then the same head for each.
+
+    The head is the paper's: layer norm, dense, dropout, dense (softmax is left to the loss
+    and to whoever asks for probabilities).
+
+    Parameters
+    ----------
+    width : int
+        Numbers per frame that the layers along time give.
+    classes : int
+    dropout : float
+    """
+
+    whole: bool = False
+    """Whether it learns from whole stretches at once instead of piece by piece."""
+
+    def __init__(self, width: int, classes: int, dropout: float) -> None:
+        super().__init__()
+        self.head = nn.Sequential(
+            nn.LayerNorm(width),
+            nn.Linear(width, width),
+            nn.ReLU(),
+            nn.Dropout(dropout),
+            nn.Linear(width, classes),
+        )
+
+    def chunk(self, features: Tensor, state: State) -> tuple[Tensor, State]:
+        """Go on with the next frames: (batch, frames, size) → (batch, frames, classes)."""
+        raise NotImplementedError
+
+    def initial_state(self, batch: int = 1) -> State:
+        """Before the first frame."""
+        raise NotImplementedError
+
+    def forward(self, features: Tensor) -> Tensor:
+        """Whole stretches, each a clip of its own."""
+        return self.chunk(features, self.initial_state(len(features)))[0]
+
+    def ssm_parameters(self) -> Iterator[nn.Parameter]:
+        """Those of state spaces, which learn more slowly."""
+        return iter(())
+
+
+class LstmClassifier(Classifier):
+    """The paper's: two stateful LSTM layers.
+
+    Parameters
+    ----------
+    size : int
+        Features per frame.
+    classes : int
+    width : int
+        Units of each layer.
+    depth : int
+    dropout : float
+    """
+
+    def __init__(
+        self, size: int, classes: int, *, width: int = 16, depth: int = 2, dropout: float = 0.2
+    ) -> None:
+        super().__init__(width, classes, dropout)
+        self.layers = nn.LSTM(size, width, depth, batch_first=True)
+
+    def initial_state(self, batch: int = 1) -> State:
+        """Zeros, twice (layers, batch, width)."""
+        zeros = self.head[1].weight.new_zeros(
+            self.layers.num_layers, batch, self.layers.hidden_size
+        )
+        return zeros, zeros
+
+    def chunk(self, features: Tensor, state: State) -> tuple[Tensor, State]:
+        """Continue with the layers' cells."""
+        hidden, state = self.layers(features, state)
+        return self.head(hidden), state
+
+
+class S4Classifier(Classifier):
+    """S4 layers of the denoiser between a linear layer and the head.
+
+    Parameters
+    ----------
+    size : int
+        Features per frame.
+    classes : int
+    width : int
+        Channels of the layers.
+    depth : int
+    state_size : int
+        Numbers that each channel remembers.
+    dropout : float
+        Also within the layers.
+    """
+
+    whole = True
+
+    def __init__(
+        self,
+        size: int,
+        classes: int,
+        *,
+        width: int = 16,
+        depth: int = 2,
+        state_size: int = 16,
+        dropout: float = 0.2,
+    ) -> None:
+        super().__init__(width, classes, dropout)
+        self.lift = nn.Linear(size, width)
+        # Memories from one frame to about two seconds, the length of a gesture.
+        self.layers = nn.ModuleList(
+            S4Layer(width, state_size, dropout=dropout, dt_min=0.02, dt_max=1.0)
+            for _ in range(depth)
+        )
+
+    def initial_state(self, batch: int = 1) -> State:
+        """One state per layer."""
+        return [layer.initial_state(batch) for layer in self.layers]
+
+    def forward(self, features: Tensor) -> Tensor:
+        """By convolution."""
+        hidden = self.lift(features)
+        for layer in self.layers:
+            hidden = layer(hidden)
+        return self.head(hidden)
+
+    def chunk(self, features: Tensor, state: State) -> tuple[Tensor, State]:
+        """By recurrence."""
+        hidden, after = self.lift(features), []
+        for layer, one in zip(self.layers, state, strict=True):
+            hidden, one = layer.chunk(hidden, one)
+            after.append(one)
+        return self.head(hidden), after
+
+    def ssm_parameters(self) -> Iterator[nn.Parameter]:
+        """Those of all layers."""
+        for layer in self.layers:
+            yield from layer.ssm_parameters()
+
+
+_MODELS: Mapping[str, type[Classifier]] = {"lstm": LstmClassifier, "s4": S4Classifier}
+_OPTIONS: Mapping[str, Mapping[str, Any]] = {
+    "lstm": {"width": 16, "depth": 2, "dropout": 0.2},
+    "s4": {"width": 16, "depth": 2, "state_size": 16, "dropout": 0.2},
+}
+MODELS = tuple(_MODELS)
+
+_LARGEST = 1024
+"""No option is a larger number: a damaged file must not ask for all the memory."""
+
+
+def options(name: str) -> dict[str, Any]:
+    """Options of a model with their defaults.
+
+    Raises
+    ------
+    Sd2Error
+        When there is no such model.
+    """
+    if name not in _MODELS:
+        raise Sd2Error(f"There is no classifier {name!r}", f"one of {', '.join(MODELS)}")
+    return dict(_OPTIONS[name])
+
+
+def build(name: str, size: int, classes: int, **given: Any) -> Classifier:
+    """A network with fresh weights, drawn from torch's generator.
+
+    Parameters
+    ----------
+    name : str
+        One of :data:`MODELS`.
+    size : int
+        Features per frame.
+    classes : int
+    **given
+        Options in place of :func:`options`.
+
+    Raises
+    ------
+    Sd2Error
+        When there is no such model or option, or an option is not of its kind.
+    """
+    known = options(name)
+    for option, value in given.items():
+        if option not in known:
+            raise Sd2Error(
+                f"The classifier {name} has no option {option!r}", f"one of {', '.join(known)}"
+            )
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise Sd2Error(f"{name}: {option} is {value!r}", "a number")
+        if isinstance(known[option], int):
+            if not isinstance(value, int) or not 1 <= value <= _LARGEST:
+                raise Sd2Error(f"{name}: {option} is {value!r}", f"a whole number, 1 to {_LARGEST}")
+        elif not 0 <= value < 1:
+            raise Sd2Error(f"{name}: {option} is {value!r}", "a share from 0 to below 1")
+    return _MODELS[name](size, classes, **{**known, **given})
+
+
+def parameter_groups(network: Classifier, rate: float, ssm_rate: float) -> list[dict[str, Any]]:
+    """Parameters with their learning rates; state spaces are not decayed."""
+    slow = list(network.ssm_parameters())
+    ids = {id(one) for one in slow}
+    rest = [one for one in network.parameters() if id(one) not in ids]
+    groups: list[dict[str, Any]] = [{"params": rest, "lr": rate}]
+    if slow:
+        groups.append({"params": slow, "lr": ssm_rate, "weight_decay": 0.0})
+    return groups
+
+
+def probabilities_of(logits: Tensor) -> Tensor:
+    """Softmax over classes."""
+    return torch.softmax(logits, dim=-1)

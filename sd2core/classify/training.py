@@ -1,0 +1,316 @@
+"""Training a classifier: small networks, one thread, the same result for the same seed."""
+
+from __future__ import annotations
+
+import copy
+import math
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch.nn import functional
+
+from sd2core.classify.card import ClassifierCard
+from sd2core.classify.data import UNKNOWN, Clip, ClipSet, frame_counts
+from sd2core.classify.features import Features, Kind
+from sd2core.classify.live import TrainedClassifier
+from sd2core.classify.metrics import mean_recall
+from sd2core.classify.models import Classifier, build, options, parameter_groups
+from sd2core.errors import Sd2Error
+
+Watch = Callable[[dict[str, Any]], None]
+"""Told every event; may raise ``KeyboardInterrupt`` to stop with the best so far."""
+
+
+@dataclass(frozen=True)
+class TrainOptions:
+    """How a classifier is trained.
+
+    Parameters
+    ----------
+    model : {"lstm", "s4"}
+    features : {"peak", "columns"}
+    options : mapping
+        Of the model, in place of its own.
+    steps : int
+        Batches that are learnt from.
+    batch : int
+        Stretches per batch.
+    window_frames : int
+        Length of a stretch; clips that are longer are cut at random places.
+    piece_frames : int
+        A model that carries its state learns from pieces of this length, one after
+        another (truncated backpropagation); the state is kept between them.
+    learning_rate, ssm_learning_rate : float
+        At their highest; they rise for a tenth of the steps and fall along a cosine.
+    weight_decay : float
+    check_steps : int
+        Between looks at the validation subjects.
+    patience : int
+        Looks without a better one after which it ends; the best is kept.
+    seed : int
+    """
+
+    model: str = "lstm"
+    features: Kind = "columns"
+    options: Mapping[str, Any] = field(default_factory=dict)
+    steps: int = 300
+    batch: int = 32
+    window_frames: int = 450
+    piece_frames: int = 75
+    learning_rate: float = 0.01
+    ssm_learning_rate: float = 0.003
+    weight_decay: float = 0.01
+    check_steps: int = 20
+    patience: int = 5
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("steps", "batch", "window_frames", "piece_frames", "check_steps", "patience"):
+            if getattr(self, name) < 1:
+                raise Sd2Error(f"{name} is {getattr(self, name)}", "at least 1")
+        for name in ("learning_rate", "ssm_learning_rate"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise Sd2Error(f"{name} is {value}", "a finite number above 0")
+
+    def to_json(self) -> dict[str, Any]:
+        """By name; options in full."""
+        return {**asdict(self), "options": {**options(self.model), **self.options}}
+
+
+class Trained(NamedTuple):
+    """What came of a training.
+
+    Parameters
+    ----------
+    classifier : TrainedClassifier
+        The best one on validation, or the last where nothing validates.
+    events : list of dict
+        What was told while training.
+    interrupted : bool
+    """
+
+    classifier: TrainedClassifier
+    events: list[dict[str, Any]]
+    interrupted: bool
+
+
+class Material(NamedTuple):
+    """Features and labels of clips.
+
+    Parameters
+    ----------
+    features : list of float32 array, shape (frames, size)
+        Of whole clips, so what was before a window is known.
+    labels : list of int64 array, shape (frames,)
+    """
+
+    features: list[NDArray[np.float32]]
+    labels: list[NDArray[np.int64]]
+
+    @classmethod
+    def of(cls, clips: Sequence[Clip], features: Features) -> Material:
+        """Of some clips."""
+        return cls(
+            [features.of(clip.energies)[0] for clip in clips],
+            [clip.label.astype(np.int64) for clip in clips],
+        )
+
+
+def train(
+    training: Sequence[Clip],
+    validation: Sequence[Clip],
+    known: ClipSet,
+    chosen: TrainOptions | None = None,
+    *,
+    about: Mapping[str, Any] | None = None,
+    watch: Watch = lambda event: None,
+) -> Trained:
+    """Learn from clips.
+
+    The loss is the cross entropy, every class weighted by the inverse of its number of
+    frames, so that all of them count the same. A batch is drawn anew when all clips have
+    been seen. The best on validation is the one with the highest mean recall of frames.
+
+    Parameters
+    ----------
+    training, validation : sequence of Clip
+        Without validation the last one is taken.
+    known : ClipSet
+        Axis, frame rate and classes of the clips.
+    chosen : TrainOptions, optional
+    about : mapping, optional
+        For the card.
+    watch : callable
+
+    Raises
+    ------
+    Sd2Error
+        When there is nothing to learn from, or a class has no frame.
+    """
+    chosen = chosen or TrainOptions()
+    weights = _class_weights(training, known.classes)
+    features = Features(chosen.features, known.axis, known.null_bins, known.frame_rate_hz)
+    events: list[dict[str, Any]] = []
+
+    def say(event: str, **content: Any) -> None:
+        events.append({"event": event, **content})
+        watch(events[-1])
+
+    with _one_thread(), torch.random.fork_rng(devices=[]):
+        torch.manual_seed(chosen.seed)
+        network = build(chosen.model, features.size, len(known.classes), **chosen.options)
+        learning = _Learning(network, Material.of(training, features), weights, chosen)
+        chosen_by = Material.of(validation, features)
+        say("start", steps=chosen.steps, clips=len(training), frames=sum(map(len, training)))
+        interrupted = False
+        best, best_at, looks = -1.0, 0, 0
+        kept = copy.deepcopy(network.state_dict())
+        begun_s = time.monotonic()
+        try:
+            for step, loss in enumerate(learning.run(), start=1):
+                say("step", step=step, loss=loss, elapsed_s=time.monotonic() - begun_s)
+                if step % chosen.check_steps and step < chosen.steps:
+                    continue
+                if not validation:
+                    kept, best_at = copy.deepcopy(network.state_dict()), step
+                    continue
+                score = _score(network, chosen_by, len(known.classes))
+                say("check", step=step, validation_mean_recall=score)
+                looks += 1
+                if score > best:
+                    best, best_at, looks = score, step, 0
+                    kept = copy.deepcopy(network.state_dict())
+                elif looks >= chosen.patience:
+                    break
+        except KeyboardInterrupt:
+            interrupted = True
+        say("end", best_step=best_at, interrupted=interrupted)
+        network.load_state_dict(kept)
+    card = ClassifierCard(
+        chosen.model,
+        dict(chosen.options),
+        features,
+        known.classes,
+        tuple(dict.fromkeys(clip.kind for clip in training)),
+        about={**(about or {}), "best_step": best_at, "training": chosen.to_json()},
+    )
+    return Trained(TrainedClassifier(network, card), events, interrupted)
+
+
+class _Learning:
+    """Batches, one after another."""
+
+    def __init__(
+        self,
+        network: Classifier,
+        material: Material,
+        weights: torch.Tensor,
+        chosen: TrainOptions,
+    ) -> None:
+        self._network, self._material, self._weights = network, material, weights
+        self._chosen = chosen
+        self._rng = np.random.default_rng([chosen.seed, 1])
+        groups = parameter_groups(network, chosen.learning_rate, chosen.ssm_learning_rate)
+        self._optimiser = torch.optim.AdamW(groups, weight_decay=chosen.weight_decay)
+        self._highest = [group["lr"] for group in self._optimiser.param_groups]
+
+    def run(self) -> Iterator[float]:
+        """The loss of every step."""
+        waiting: list[int] = []
+        for step in range(self._chosen.steps):
+            share = _schedule(step / self._chosen.steps)
+            for group, rate in zip(self._optimiser.param_groups, self._highest, strict=True):
+                group["lr"] = share * rate
+            drawn: list[int] = []
+            while len(drawn) < self._chosen.batch:
+                if not waiting:
+                    waiting = self._rng.permutation(len(self._material.labels)).tolist()
+                drawn.append(waiting.pop())
+            yield self._learn(*self._windows(drawn))
+
+    def _windows(self, clips: Sequence[int]) -> tuple[torch.Tensor, torch.Tensor]:
+        """A stretch of each clip: (batch, frames, size) and (batch, frames)."""
+        length = min(
+            self._chosen.window_frames, max(len(self._material.labels[one]) for one in clips)
+        )
+        size = self._material.features[0].shape[1]
+        shown = np.zeros((len(clips), length, size), np.float32)
+        label = np.full((len(clips), length), UNKNOWN, np.int64)
+        for row, one in enumerate(clips):
+            frames = len(self._material.labels[one])
+            start = int(self._rng.integers(max(frames - length, 0) + 1))
+            part = slice(start, start + length)
+            count = min(frames, length)
+            shown[row, :count] = self._material.features[one][part]
+            label[row, :count] = self._material.labels[one][part]
+        return torch.from_numpy(shown), torch.from_numpy(label)
+
+    def _learn(self, shown: torch.Tensor, label: torch.Tensor) -> float:
+        network = self._network.train()
+        if network.whole:
+            return self._update(network(shown), label)
+        state = network.initial_state(len(shown))
+        losses = []
+        for start in range(0, shown.shape[1], self._chosen.piece_frames):
+            part = slice(start, start + self._chosen.piece_frames)
+            answer, state = network.chunk(shown[:, part], state)
+            if (label[:, part] != UNKNOWN).any():
+                losses.append(self._update(answer, label[:, part]))
+            state = tuple(one.detach() for one in state)
+        return sum(losses) / max(len(losses), 1)
+
+    def _update(self, answer: torch.Tensor, label: torch.Tensor) -> float:
+        loss = functional.cross_entropy(
+            answer.flatten(0, 1), label.flatten(), self._weights, ignore_index=UNKNOWN
+        )
+        self._optimiser.zero_grad()
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(self._network.parameters(), 1.0)
+        self._optimiser.step()
+        return float(loss.detach())
+
+
+def _schedule(share: float) -> float:
+    """Learning rate as a share of its highest, after this share of the steps."""
+    rise = 0.1
+    if share < rise:
+        return (share + 0.01) / (rise + 0.01)
+    return 0.02 + 0.98 * 0.5 * (1.0 + math.cos(math.pi * (share - rise) / (1.0 - rise)))
+
+
+def _score(network: Classifier, material: Material, classes: int) -> float:
+    """Mean recall over classes of all frames."""
+    network.eval()
+    confusion = np.zeros((classes, classes), np.int64)
+    with torch.no_grad():
+        for shown, label in zip(material.features, material.labels, strict=True):
+            found = network(torch.from_numpy(shown)[None])[0].argmax(1).numpy()
+            counted = label != UNKNOWN
+            np.add.at(confusion, (label[counted], found[counted]), 1)
+    return mean_recall(confusion)
+
+
+def _class_weights(clips: Sequence[Clip], classes: tuple[str, ...]) -> torch.Tensor:
+    counts = frame_counts(clips, len(classes))
+    if not counts.sum():
+        raise Sd2Error("There is no labelled frame to learn from", "clips with labels")
+    # A class without a frame is never in the loss.
+    weights = np.where(counts > 0, counts.sum() / np.maximum(counts, 1), 0.0)
+    return torch.from_numpy((weights / weights[counts > 0].mean()).astype(np.float32))
+
+
+class _one_thread:
+    """Small matrices are slower on several threads, and differ between machines."""
+
+    def __enter__(self) -> None:
+        self._before = torch.get_num_threads()
+        torch.set_num_threads(1)
+
+    def __exit__(self, *_: object) -> None:
+        torch.set_num_threads(self._before)

@@ -1,0 +1,172 @@
+"""Weights and a description of them in one safetensors file, read without executing anything."""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sd2core.atomic import atomic_write
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    from torch import nn
+
+SUFFIX = ".safetensors"
+
+Shapes = Mapping[str, list[int]]
+"""Of every tensor of a file."""
+
+_KEY = "sd2"
+_LONGEST_HEADER = 4 << 20
+
+
+def write_weights(path: Path, network: nn.Module, description: Mapping[str, Any]) -> None:
+    """Write one file, in one step.
+
+    Raises
+    ------
+    Sd2Error
+        When the name does not end in ``.safetensors``, or the description holds what JSON
+        cannot.
+    """
+    from safetensors.torch import save
+
+    if path.suffix != SUFFIX:
+        raise Sd2Error(f"The model file is {path}", f"a name that ends in {SUFFIX}")
+    try:
+        header = json.dumps(description, allow_nan=False, ensure_ascii=False)
+    except (TypeError, ValueError) as error:
+        raise Sd2Error(
+            f"What is to be said about the model cannot be written ({error})",
+            "text, finite numbers, lists and mappings",
+        ) from error
+    tensors = {
+        name: tensor.detach().cpu().contiguous() for name, tensor in network.state_dict().items()
+    }
+    with atomic_write(path) as stream:
+        stream.write(save(tensors, {_KEY: header}))
+
+
+def read_header(path: Path, expected: str) -> tuple[dict[str, Any], Shapes]:
+    """Description and shapes; the weights stay on disk, and torch is not needed.
+
+    Parameters
+    ----------
+    path : Path
+    expected : str
+        What the file should be, for messages.
+
+    Raises
+    ------
+    Sd2Error
+        When it is missing, damaged, cut short or of another program.
+    """
+    try:
+        with path.open("rb") as stream:
+            size = stream.seek(0, 2)
+            stream.seek(0)
+            start = stream.read(8)
+            length = struct.unpack("<Q", start)[0] if len(start) == 8 else 0
+            if not 2 <= length <= _LONGEST_HEADER:
+                raise Sd2Error(f"{path} is no model file", expected)
+            header = stream.read(length)
+    except FileNotFoundError as error:
+        raise Sd2Error(f"{path} does not exist", expected, "Check the path") from error
+    except IsADirectoryError as error:
+        raise Sd2Error(f"{path} is a folder", expected) from error
+    if not header.startswith(b"{"):
+        raise Sd2Error(f"{path} is no model file", expected)
+    if len(header) < length:
+        raise _cut_short(path, size, 8 + length)
+    try:
+        content = json.loads(header)
+        told = content.pop("__metadata__", {})
+        if not isinstance(told, Mapping) or _KEY not in told:
+            raise Sd2Error(
+                f"{path} is a safetensors file of another program: it does not say how its"
+                " weights are to be used",
+                expected,
+            )
+        shapes = {name: list(map(int, entry["shape"])) for name, entry in content.items()}
+        end = max((int(entry["data_offsets"][1]) for entry in content.values()), default=0)
+        told = json.loads(told[_KEY])
+        if not isinstance(told, dict):
+            raise ValueError("not an object")
+    except (ValueError, KeyError, TypeError, AttributeError, IndexError, RecursionError) as error:
+        raise Sd2Error(f"{path}: its header is damaged ({error!r})", expected) from error
+    if size < 8 + length + end:
+        raise _cut_short(path, size, 8 + length + end)
+    return told, shapes
+
+
+def format_of(path: Path) -> str:
+    """What a model file says that it is; empty where it does not say.
+
+    Raises
+    ------
+    Sd2Error
+        When it is no model file.
+    """
+    return str(read_header(path, "a model file (.safetensors)")[0].get("format", ""))
+
+
+def read_weights(path: Path, network: nn.Module, name: str, shapes: Shapes, expected: str) -> None:
+    """Put the weights of a file into a network that was built as its description says.
+
+    Parameters
+    ----------
+    path : Path
+    network : Module
+    name : str
+        What the file calls its model.
+    shapes : mapping
+        As :func:`read_header` found them.
+    expected : str
+
+    Raises
+    ------
+    Sd2Error
+        When they are of another network, or are no finite numbers.
+    """
+    import torch
+    from safetensors import SafetensorError
+    from safetensors.torch import load
+
+    wanted = {key: list(tensor.shape) for key, tensor in network.state_dict().items()}
+    _compare_shapes(path, name, shapes, wanted, expected)
+    try:
+        weights = load(path.read_bytes())
+    except (SafetensorError, ValueError, KeyError, RuntimeError) as error:
+        raise Sd2Error(f"{path}: its weights cannot be read ({error})", expected) from error
+    if not all(torch.isfinite(tensor).all() for tensor in weights.values()):
+        raise Sd2Error(
+            f"{path}: its weights hold NaN or infinity", "finite numbers", "Train the model again"
+        )
+    network.load_state_dict(weights)
+
+
+def _cut_short(path: Path, size: int, expected: int) -> Sd2Error:
+    return Sd2Error(
+        f"{path} is cut short: {size:,} bytes", f"{expected:,} bytes", "Copy or train it again"
+    )
+
+
+def _compare_shapes(path: Path, name: str, found: Shapes, wanted: Shapes, expected: str) -> None:
+    missing = [key for key in wanted if key not in found]
+    unknown = [key for key in found if key not in wanted]
+    if missing or unknown:
+        which = f"lacks {missing[0]}" if missing else f"has {unknown[0]} in addition"
+        raise Sd2Error(
+            f"{path}: the weights are not those of the model {name} that it names; it {which}"
+            f" ({len(missing)} missing, {len(unknown)} too many)",
+            expected,
+        )
+    for key, shape in wanted.items():
+        if found[key] != shape:
+            raise Sd2Error(
+                f"{path}: {key} is of shape {tuple(found[key])}",
+                f"{tuple(shape)}, as its options say",
+            )

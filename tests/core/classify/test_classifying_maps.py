@@ -1,0 +1,114 @@
+"""A classifier at work: live equals batch, however the frames come."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from classifiers import CLASSES, classifier, doppler, energies
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sd2core.classify.models import MODELS
+from sd2core.errors import Sd2Error
+from sd2core.sensor import VelocityAxis
+from sd2core.spectrum import DopplerMap
+from sd2core.timebase import Timebase
+
+SAME = 2e-5
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("kind", ["peak", "columns"])
+def test_frame_by_frame_equals_the_whole_map(model: str, kind: str) -> None:
+    trained = classifier(model, kind)
+    values = energies(700)
+    whole = trained.probabilities(doppler(values))
+    memory, found = trained.initial_memory(), []
+    for frame in values:
+        answer, memory = trained.step(frame, memory)
+        found.append(answer)
+    np.testing.assert_allclose(np.stack(found), whole, atol=SAME)
+    np.testing.assert_allclose(whole.sum(axis=1), 1.0, atol=1e-5)
+    assert whole.dtype == np.float32
+    assert whole.shape == (700, len(CLASSES))
+
+
+@pytest.mark.parametrize("model", MODELS)
+@settings(max_examples=8, deadline=None)
+@given(sizes=st.lists(st.integers(0, 90), min_size=1, max_size=6))
+def test_pieces_of_any_length_equal_the_whole(model: str, sizes: list[int]) -> None:
+    trained = classifier(model)
+    values = energies(max(sum(sizes), 1))
+    memory, found = trained.initial_memory(), []
+    for start, size in zip(np.cumsum([0, *sizes]), [*sizes, len(values)], strict=False):
+        answer, memory = trained.advance(values[start : start + size], memory)
+        found.append(answer)
+    np.testing.assert_allclose(np.concatenate(found), trained.probabilities_of(values), atol=SAME)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_what_comes_later_changes_nothing(model: str) -> None:
+    trained = classifier(model)
+    values = energies(200)
+    other = values.copy()
+    other[120:] = energies(80, seed=9) * 50
+    before = trained.probabilities(doppler(values))[:120]
+    np.testing.assert_allclose(trained.probabilities(doppler(other))[:120], before, atol=SAME)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_without_a_person_it_is_background_and_begins_anew(model: str) -> None:
+    trained = classifier(model)
+    values = energies(150)
+    present = np.ones(150, bool)
+    present[60:70] = False
+    found = trained.probabilities(doppler(values, present=present))
+    np.testing.assert_array_equal(found[60:70], np.tile([1.0, 0.0, 0.0], (10, 1)))
+    np.testing.assert_allclose(found[:60], trained.probabilities_of(values[:60]), atol=SAME)
+    np.testing.assert_allclose(found[70:], trained.probabilities_of(values[70:]), atol=SAME)
+    memory = trained.initial_memory()
+    for frame, there, wanted in zip(values, present, found, strict=True):
+        answer, memory = trained.step(frame, memory, bool(there))
+        np.testing.assert_allclose(answer, wanted, atol=SAME)
+
+
+def test_gain_changes_nothing() -> None:
+    trained = classifier()
+    values = energies(120)
+    quiet = trained.probabilities(doppler(values * np.float32(1e-6)))
+    np.testing.assert_allclose(trained.probabilities(doppler(values)), quiet, atol=1e-4)
+
+
+def test_another_frame_rate_is_brought_to_the_models() -> None:
+    """A slow target is told alike at 30 and at 45 frames/s."""
+    trained = classifier()
+    frames = np.arange(240) / 30.0
+    times_s = np.arange(360) / 45.0
+
+    def column(at_s: np.ndarray) -> np.ndarray:
+        values = np.full((len(at_s), 32), 1.0, np.float32)
+        values[:, 20] += 100.0 * np.exp(-((at_s - 4.0) ** 2))
+        values[:, 14:17] = 0.0
+        return values
+
+    own = trained.probabilities(doppler(column(frames)))
+    other = trained.probabilities(doppler(column(times_s), rate_hz=45.0))
+    for number in range(len(CLASSES)):
+        seen = np.interp(frames, times_s, other[:, number])
+        np.testing.assert_allclose(seen, own[:, number], atol=0.02)
+    np.testing.assert_allclose(other.sum(axis=1), 1.0, atol=1e-5)
+
+
+def test_a_map_on_another_axis_is_refused() -> None:
+    other = DopplerMap(
+        np.zeros((16, 4), np.float32), VelocityAxis(16, 2.0), Timebase.regular(4, 30.0), "real"
+    )
+    with pytest.raises(Sd2Error, match="16 bins"):
+        classifier().probabilities(other)
+
+
+def test_one_frame_and_an_empty_map_are_answered() -> None:
+    trained = classifier()
+    assert trained.probabilities(doppler(energies(1))).shape == (1, 3)
+    silent = trained.probabilities(doppler(np.zeros((40, 32), np.float32)))
+    assert np.isfinite(silent).all()
