@@ -12,7 +12,7 @@ COMPILED := .venv/.compiled
 # Among them every module in KERNEL_MODULES of sd2core/compiled.py.
 KERNELS := $(wildcard sd2core/compiled.py sd2core/raster.py sd2core/body/*.py sd2core/scattering/*.py sd2core/doppler/*.py sd2core/fmcw/*.py sd2core/simulate/people/*.py)
 
-.PHONY: help setup demo test test-slow lint format bench wheel screenshots accuracy fitting denoiser range-synthesis clean
+.PHONY: help setup demo test test-slow lint format bench wheel screenshots accuracy fitting denoiser denoiser-comparison range-synthesis clean
 
 help:
 	@echo "make demo         set up, and open the sample recording in the window"
@@ -26,7 +26,8 @@ help:
 	@echo "make screenshots  the pictures in docs/"
 	@echo "make accuracy     docs/accuracy-and-speed.md, measured (some five minutes)"
 	@echo "make fitting      docs/fitting.md, measured (some ten minutes)"
-	@echo "make denoiser     docs/denoiser.md, trained and measured (hours)"
+	@echo "make denoiser     docs/denoiser.md, measured (half an hour)"
+	@echo "make denoiser-comparison  docs/denoiser-comparison.md, trained and measured (hours)"
 	@echo "make range-synthesis  docs/range-synthesis.md, trained (half an hour)"
 	@echo "make clean        remove what the above made, .venv included"
 
@@ -89,6 +90,9 @@ fitting: setup
 
 denoiser: setup
 	$(BIN)/python docs/denoiser.py
+
+denoiser-comparison: setup
+	$(BIN)/python docs/denoiser_comparison.py
 
 range-synthesis: setup
 	$(BIN)/python docs/range_synthesis.py

@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from runs import Job, sd2, settings, tables, train
+from runs import Job, campaign_of, settings, tables, train
 
 from sd2core.atomic import atomic_write_text
 from sd2core.ladder.scene import this_machine
@@ -67,12 +67,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=2)
     options = parser.parse_args()
     folder: Path = options.folder
-    folder.mkdir(parents=True, exist_ok=True)
-    campaign = folder / "campaign.zarr"
-    sd2(
-        *("simulate", "campaign", campaign, "--subjects", 6, "--seed", 3),
-        *("--minutes", options.minutes, "--placements", PLACES),
-    )
+    campaign = campaign_of(folder, options.minutes, "--seed", 3, "--placements", PLACES)
     jobs = {
         which: [
             Job(

@@ -7,10 +7,14 @@ import subprocess
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 from sd2core.train.folder import RunFolder
+from sd2core.train.progress import read_events, standing
+
+PILOT_EPOCHS = 4
 
 
 @dataclass(frozen=True)
@@ -20,6 +24,20 @@ class Job:
     name: str
     data: Path
     options: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class TimedJob:
+    """A run, and how many epochs it has time for."""
+
+    job: Job
+    epoch_s: float
+    epochs: int
+
+    def seeded(self, seed: int) -> Job:
+        """The run with this seed."""
+        length = ("--epochs", str(self.epochs), "--seed", str(seed))
+        return replace(self.job, name=f"{self.job.name}-{seed}", options=self.job.options + length)
 
 
 def settings(given: Mapping[str, object]) -> list[str]:
@@ -34,8 +52,28 @@ def sd2(*arguments: object) -> None:
         sys.exit(code)
 
 
+def campaign_of(folder: Path, minutes: float, *options: object) -> Path:
+    """A simulated campaign of six people; what is there of it is not made again."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / "campaign.zarr"
+    sd2("simulate", "campaign", path, "--subjects", 6, "--minutes", minutes, *options)
+    return path
+
+
+def timed(folder: Path, job: Job, minutes: float) -> TimedJob:
+    """As many epochs as take these minutes of processor time, by a short run."""
+    pilots = folder / "pilots"
+    train(pilots, [replace(job, options=(*job.options, "--epochs", str(PILOT_EPOCHS)))])
+    events = standing(read_events(RunFolder(pilots / job.name).progress))
+    ends_s = [event["processor_s"] for event in events if event["event"] == "epoch"]
+    # The first epoch has the start in it; the shortest has least of what else went on.
+    epoch_s = min(after - before for before, after in pairwise(ends_s))
+    return TimedJob(job, epoch_s, max(1, round(60.0 * minutes / epoch_s)))
+
+
 def train(folder: Path, jobs: Iterable[Job]) -> None:
     """Train what is not trained yet, as many at once as there are cores, one thread each."""
+    folder.mkdir(parents=True, exist_ok=True)
     pending = [job for job in jobs if not _finished(folder / job.name)]
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         codes = pool.map(lambda job: _run(folder, job), pending)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -225,6 +226,7 @@ class Course:
             validation_rmse=found.rmse,
             validation_mae_mps=found.mae_mps,
             best=best,
+            processor_s=time.process_time(),
             **self._times(),
         )
         position.epoch, position.step = position.epoch + 1, 0
