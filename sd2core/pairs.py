@@ -277,21 +277,10 @@ def read_pairs(path: Path) -> PairSet:
     Sd2Error
         When it is none, of a newer version, empty or damaged.
     """
-    import zarr
-
     path = Path(path)
-    header, index = read_description(path)
-    group = zarr.open_group(str(path), mode="r")
-    arrays: dict[str, Any] = {}
+    header, index, lazily = open_takes(path)
     frames = max(entry["stop"] for entry in index)
-    for name in ("synthetic", "radar", "times_s", "label"):
-        if name not in group or group[name].shape[0] < frames:
-            raise Sd2Error(
-                f"{path}: the array {name} is missing or shorter than {INDEX_NAME} says",
-                f"{frames} frames",
-                _REMAKE,
-            )
-        arrays[name] = group[name][:frames]
+    arrays = {name: array[:frames] for name, array in lazily.items()}
     takes = tuple(
         Take(
             subject=entry["subject"],
@@ -316,6 +305,32 @@ def read_pairs(path: Path) -> PairSet:
         raise Sd2Error(
             f"{path}: its header lacks {error}", f"{FORMAT} {VERSION}", _REMAKE
         ) from None
+
+
+def open_takes(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]], dict[str, Any]]:
+    """Header, lines of takes, and the arrays, of which nothing is read yet.
+
+    Raises
+    ------
+    Sd2Error
+        When it holds no pairs, of a newer version, empty or damaged.
+    """
+    import zarr
+
+    path = Path(path)
+    header, index = read_description(path)
+    group = zarr.open_group(str(path), mode="r")
+    arrays: dict[str, Any] = {}
+    frames = max(entry["stop"] for entry in index)
+    for name in ("synthetic", "radar", "times_s", "label"):
+        if name not in group or group[name].shape[0] < frames:
+            raise Sd2Error(
+                f"{path}: the array {name} is missing or shorter than {INDEX_NAME} says",
+                f"{frames} frames",
+                _REMAKE,
+            )
+        arrays[name] = group[name]
+    return header, index, arrays
 
 
 def read_description(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:

@@ -128,25 +128,6 @@ def hdf5_sources(file: Any, path: Path) -> Iterator[dict[str, Any]]:
         yield _json(lines[number].decode("utf-8"), path)
 
 
-def is_dataset_file(path: Path) -> bool:
-    """Whether an ``.h5`` or ``.npz`` is a data set; reads its directory only."""
-    import zipfile
-
-    if path.suffix.lower() == ".npz":
-        try:
-            with zipfile.ZipFile(path) as archive:
-                return {f"{META}.npy", "segment_label.npy"} <= {*archive.namelist()}
-        except (OSError, zipfile.BadZipFile):
-            return False
-    import h5py
-
-    try:
-        with h5py.File(path, "r") as file:
-            return bool(file.attrs.get("format", "") == FORMAT)
-    except OSError:
-        return False
-
-
 def _write_npz(
     out: Path, header: Header, arrays: dict[str, Any], sources: Iterable[dict[str, Any]]
 ) -> None:

@@ -118,10 +118,3 @@ def open_dataset(path: Path) -> Dataset:
         return Dataset(path, form, header, arrays, file=file)
     header, arrays, sources = formats.open_npz(path)
     return Dataset(path, form, header, arrays, sources)
-
-
-def is_dataset(path: Path) -> bool:
-    """Whether a path looks like a data set; reads little."""
-    if path.is_dir():
-        return store.is_segment_store(path)
-    return path.suffix.lower() in (".h5", ".hdf5", ".npz") and formats.is_dataset_file(path)

@@ -179,6 +179,8 @@ class Source:
             kind: {"unit": one.unit, "null_bins": list(one.null_bins)} | _short(one.meta)
             for kind, one in self.maps.items()
         }
+        if {"synthetic", "denoised"} <= maps.keys():
+            maps["denoised"].pop("input", None)  # said of the synthetic map itself
         return _short(self.provenance) | {"maps": maps}
 
     def fingerprint(self) -> str:

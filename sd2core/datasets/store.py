@@ -19,7 +19,6 @@ import numpy as np
 from sd2core.atomic import atomic_write
 from sd2core.datasets.cutting import Arrays
 from sd2core.datasets.layout import (
-    FORMAT,
     Header,
     check_format,
     chunk_of,
@@ -27,6 +26,7 @@ from sd2core.datasets.layout import (
 )
 from sd2core.datasets.source import KINDS
 from sd2core.errors import Sd2Error
+from sd2core.io.kinds import is_dataset
 
 SOURCES_NAME = "sources.jsonl"
 LOCK_NAME = ".sd2-lock"
@@ -164,15 +164,6 @@ class SegmentStore:
         array[start:stop] = np.broadcast_to(np.asarray(values, array.dtype), shape)
 
 
-def is_segment_store(path: Path) -> bool:
-    """Whether a folder looks like a data set, complete or not; reads one small file."""
-    try:
-        header = json.loads((path / "zarr.json").read_text(encoding="utf-8"))
-        return bool(header["attributes"]["format"] == FORMAT)
-    except (OSError, ValueError, KeyError, TypeError):
-        return False
-
-
 def open_arrays(path: Path) -> tuple[Header, dict[str, Any]]:
     """Header and arrays of a finished store; nothing is read but descriptions.
 
@@ -183,7 +174,7 @@ def open_arrays(path: Path) -> tuple[Header, dict[str, Any]]:
     """
     import zarr
 
-    if not is_segment_store(path):
+    if not is_dataset(path):
         raise Sd2Error(f"{path} holds no data set", "one that `sd2 export` made")
     group: Any = zarr.open_group(str(path), mode="r")
     attributes = dict(group.attrs)

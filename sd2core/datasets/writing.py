@@ -12,16 +12,18 @@ from typing import Any
 import numpy as np
 
 from sd2core import __version__
+from sd2core.datasets.card import write_card
 from sd2core.datasets.cutting import cut_source
 from sd2core.datasets.formats import refuse_large_npz, write_packed
 from sd2core.datasets.layout import SPLITS, FileFormat, Header, format_of
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.source import BACKGROUND, KINDS, LazySource, Source, SourceKey
-from sd2core.datasets.store import LOCK_NAME, SegmentStore, is_segment_store, open_arrays
+from sd2core.datasets.store import LOCK_NAME, SegmentStore, open_arrays
 from sd2core.denoise.matching import MOST_RESAMPLED
 from sd2core.errors import Sd2Error
 from sd2core.file_lock import FileLock
+from sd2core.io.kinds import is_dataset
 from sd2core.progress import Progress, silent
 from sd2core.spectrum import DopplerMap
 from sd2core.train.data import Split, split_subjects
@@ -70,7 +72,8 @@ def write_dataset(
     One source is in memory at a time. A source that is there already is left alone and a
     :class:`~sd2core.datasets.source.LazySource` not even loaded, so a writer that was
     killed, or that gets more sources later, does only what is missing. Zarr grows in place;
-    HDF5 and NPZ grow in the folder ``OUT.partial`` and appear complete.
+    HDF5 and NPZ grow in the folder ``OUT.partial`` and appear complete. The card is written
+    beside it.
 
     Parameters
     ----------
@@ -108,10 +111,11 @@ def write_dataset(
         written = writer.write(sources, progress)
     finally:
         lock.release()
-        if not is_segment_store(work):
+        if not is_dataset(work):
             shutil.rmtree(work, ignore_errors=True)
     if form != "zarr":
         shutil.rmtree(work, ignore_errors=True)
+    write_card(out)
     return written
 
 
@@ -151,7 +155,7 @@ class _Writer:
         self._names = _Names()
         self._there: dict[bytes, str] = {}
         self._store: SegmentStore | None = None
-        begun = SegmentStore(work) if is_segment_store(work) else None
+        begun = SegmentStore(work) if is_dataset(work) else None
         if begun is not None and (begun.sources or work == out or not out.exists()):
             self._store = begun
             for entry in begun.entries():
@@ -396,7 +400,7 @@ def _entry(source: Source, header: Header, fingerprint: str) -> dict[str, Any]:
 def _refuse_other(out: Path, form: FileFormat) -> None:
     """Refuse to write over what is no data set."""
     if form == "zarr":
-        if out.exists() and not is_segment_store(out) and (
+        if out.exists() and not is_dataset(out) and (
             not out.is_dir() or any(entry.name != LOCK_NAME for entry in out.iterdir())
         ):  # fmt: skip
             raise Sd2Error(f"{out} is there and holds no data set", "a new name")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import zipfile
 from pathlib import Path
 from typing import Literal
@@ -10,7 +11,9 @@ from sd2core.errors import Sd2Error
 from sd2core.pairs import is_pair_store
 from sd2core.relative_paths import is_pattern
 
-Kind = Literal["recording", "video", "mesh", "radar", "map", "pairs", "model"]
+Kind = Literal["recording", "video", "mesh", "radar", "map", "pairs", "model", "dataset"]
+
+DATASET_FORMAT = "sd2-dataset"
 
 VIDEO_SUFFIXES = frozenset({".mp4", ".mkv", ".mov", ".avi", ".webm", ".m4v", ".mpg", ".ts", ".wmv"})
 RADAR_MAP_SUFFIXES = frozenset({".h5", ".hdf5"})
@@ -18,7 +21,7 @@ MESH_SUFFIXES = frozenset({".obj", ".ply", ".glb", ".pkl", ".pickle", ".joblib"}
 
 
 def kind_of(path: Path) -> Kind:
-    """Recognise a recording, video, mesh, radar capture, Doppler map, pairs or trained denoiser.
+    """Recognise what a path is.
 
     Raises
     ------
@@ -33,6 +36,8 @@ def kind_of(path: Path) -> Kind:
     if path.is_dir():
         return _kind_of_folder(path)
     suffix = path.suffix.lower()
+    if is_dataset(path):
+        return "dataset"
     if path.name == "recording.json":
         return "recording"
     if suffix in VIDEO_SUFFIXES:
@@ -52,11 +57,33 @@ def kind_of(path: Path) -> Kind:
     )
 
 
+def is_dataset(path: Path) -> bool:
+    """Whether a path looks like a data set of ``sd2 export``, finished or not; reads little."""
+    suffix = path.suffix.lower()
+    try:
+        if path.is_dir():
+            header = json.loads((path / "zarr.json").read_text(encoding="utf-8"))
+            return bool(header["attributes"]["format"] == DATASET_FORMAT)
+        if suffix == ".npz":
+            with zipfile.ZipFile(path) as archive:
+                return "segment_label.npy" in archive.namelist()
+        if suffix in RADAR_MAP_SUFFIXES:
+            import h5py
+
+            with h5py.File(path, "r") as file:
+                return bool(file.attrs.get("format", "") == DATASET_FORMAT)
+    except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile):
+        return False
+    return False
+
+
 def _kind_of_folder(folder: Path) -> Kind:
     if (folder / "recording.json").exists():
         return "recording"
     if is_pair_store(folder):
         return "pairs"
+    if is_dataset(folder):
+        return "dataset"
     if (folder / "zarr.json").exists() or folder.suffix == ".zarr":
         return "mesh"
     if (folder / "radar.npy").exists() or any(folder.glob("*/radar.npy")):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -16,10 +16,11 @@ from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.processing import doppler_map
 from sd2core.pairs import PairWriter, Take, TakeKey
-from sd2core.presence import runs
+from sd2core.presence import Presence, runs
 from sd2core.progress import Progress, silent
 from sd2core.recording import Recording, open_recording
 from sd2core.spectrum import DopplerMap
+from sd2core.timebase import Timebase
 
 TAKE_S = 15.0
 """Longer stretches are cut: takes can be kept apart even where there is one person."""
@@ -181,10 +182,11 @@ def _takes(
 ) -> tuple[list[Take], float]:
     """Stretches with a person and a radar frame, cut into takes; and the time left out."""
     times_s = synthetic.timebase.times_s
-    nearest, seen = _nearest(times_s, radar.timebase.times_s + recording.radar_offset_s)
+    there = on_clock(radar.shifted(recording.radar_offset_s), synthetic.timebase)
+    seen = Presence.of(there.present, len(times_s)).there
     if synthetic.present is not None:
         seen &= synthetic.present
-    target = radar.values.T[nearest].copy()  # (frames, bins)
+    target = there.values.T.copy()  # (frames, bins)
     target[:, list(synthetic.null_bins)] = 0.0
     label = np.zeros(len(times_s), np.int8)
     for span in recording.labelled.spans:
@@ -212,6 +214,28 @@ def _takes(
                 )
             )
     return takes, float((len(times_s) - kept) / rate_hz)
+
+
+def on_clock(radar: DopplerMap, timebase: Timebase) -> DopplerMap:
+    """A radar's map at the frames of another clock: those nearest to them.
+
+    Parameters
+    ----------
+    radar : DopplerMap
+        At its times on that clock.
+    timebase : Timebase
+
+    Returns
+    -------
+    DopplerMap
+        ``present`` is False where the radar recorded no frame near enough, or says itself
+        that its frame shows nobody.
+    """
+    nearest, seen = _nearest(timebase.times_s, radar.times_s)
+    if radar.present is not None:
+        seen &= radar.present[nearest]
+    values = radar.values[:, nearest]
+    return replace(radar, values=values, timebase=timebase, present=seen, uncertainty=None)
 
 
 def _nearest(

@@ -18,10 +18,11 @@ from made_sources import AXIS, CLASSES, LABELS, source
 from sd2core.datasets import formats
 from sd2core.datasets.layout import SPLITS, row_shapes
 from sd2core.datasets.options import DatasetOptions
-from sd2core.datasets.reading import is_dataset, open_dataset
+from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.source import KINDS, LazySource, Source, SourceKey
 from sd2core.datasets.writing import write_dataset
 from sd2core.errors import Sd2Error
+from sd2core.io.kinds import kind_of
 from sd2core.progress import Cancelled, Progress
 
 OPTIONS = DatasetOptions(length=24, overlap=4)
@@ -57,8 +58,7 @@ def test_what_is_written_is_read(tmp_path: Path, ending: str) -> None:
     sources = several()
     written = write_dataset(out, sources, OPTIONS)
     assert (written.sources, written.added, written.failed) == (5, 5, ())
-    assert is_dataset(out)
-    assert not is_dataset(tmp_path)
+    assert kind_of(out) == "dataset"
     with open_dataset(out) as dataset:
         header = dataset.header
         assert len(dataset) == written.segments == 17

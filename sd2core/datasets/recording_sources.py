@@ -1,0 +1,331 @@
+"""Sources from recordings: maps of the mesh from every placement, and of the radar."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.datasets.denoising import Denoising
+from sd2core.datasets.source import (
+    BACKGROUND,
+    KINDS,
+    LazySource,
+    Outline,
+    Source,
+    SourceKey,
+    label_per_frame,
+)
+from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
+from sd2core.errors import Sd2Error
+from sd2core.labels.spans import Labels
+from sd2core.mesh import MeshSequence
+from sd2core.mocap.recording_pairs import on_clock
+from sd2core.placements import Placements
+from sd2core.progress import Progress
+from sd2core.recording import Recording, open_recording
+from sd2core.sensor import Vector, VirtualSensor
+from sd2core.spectrum import DopplerMap, MapKind
+from sd2core.timebase import Timebase
+from sd2core.whereabouts import Whereabouts
+
+
+@dataclass(frozen=True)
+class Making:
+    """How maps of recordings are made.
+
+    Parameters
+    ----------
+    kinds : tuple of str
+        Wanted, where a recording has what they are made of.
+    synthesis : SynthesisOptions
+        Its axis is that of the radar's map, too.
+    tolerance : float, optional
+        Error of a synthetic map that is allowed, as a share; the cheapest plan within it is
+        chosen once per recording. None: as ``synthesis`` says.
+    placements : Placements, optional
+        Where else sensors stand around the body, besides the recording's own; each gives
+        synthetic and denoised maps.
+    model : str, optional
+        Denoiser, by file or name; None: that of the recording, or the bundled one where
+        nobody has chosen. A recording that is set to be shown without has no denoised map.
+    """
+
+    kinds: tuple[MapKind, ...] = KINDS
+    synthesis: SynthesisOptions = PRESETS["paper"]
+    tolerance: float | None = None
+    placements: Placements | None = None
+    model: str | None = None
+
+
+def recording_sources(
+    paths: Sequence[Path], subjects: Sequence[str], making: Making
+) -> list[LazySource]:
+    """One source per recording and placement; nothing is computed yet.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+    subjects : sequence of str
+        Who each recording is of.
+    making : Making
+
+    Raises
+    ------
+    Sd2Error
+        When one is no recording, or holds neither a mesh nor a radar file.
+    """
+    shared = _Shared(making)
+    found = []
+    for path, subject in zip(paths, subjects, strict=True):
+        recording = open_recording(path)
+        if recording.mesh is None and recording.radar is None:
+            raise Sd2Error(
+                f"{recording.folder} holds no mesh and no radar file",
+                "one of them",
+                "Fit a mesh with `sd2 fit`",
+            )
+        count = 0
+        if making.placements is not None and recording.mesh is not None:
+            count = len(making.placements.places())
+        for placement in range(1 + count):
+            key = SourceKey(subject, recording.folder.stem, placement)
+            found.append(_lazy(shared, recording, key))
+    return found
+
+
+def labels_and_classes(labels: Labels) -> tuple[tuple[str, ...], dict[str, str]]:
+    """Names of all labels, background first, and what a classifier calls them."""
+    known = [one.name for one in labels.label_set.labels]
+    used = sorted({span.label for span in labels.spans} - {*known})
+    names = tuple(dict.fromkeys([BACKGROUND, *known, *used]))
+    classes = {one.name: one.gesture_class for one in labels.label_set.labels if one.gesture_class}
+    return names, classes
+
+
+def _lazy(shared: _Shared, recording: Recording, key: SourceKey) -> LazySource:
+    def load(progress: Progress) -> Source:
+        return shared.opened(recording).source(key, progress)
+
+    def outline() -> Outline:
+        return shared.opened(recording).outline(key.placement)
+
+    return LazySource(key, load, _fingerprint(recording, key, shared.making), outline)
+
+
+class _Shared:
+    """The recording that was used last, open; others are let go of."""
+
+    def __init__(self, making: Making) -> None:
+        self.making = making
+        self._denoising = Denoising()
+        self._opened: _Opened | None = None
+
+    def opened(self, recording: Recording) -> _Opened:
+        if self._opened is None or self._opened.recording is not recording:
+            self._opened = None  # before the next one takes memory
+            self._opened = _Opened(recording, self.making, self._denoising)
+        return self._opened
+
+
+class _Opened:
+    """A recording being made into sources: what its placements share is made once."""
+
+    def __init__(self, recording: Recording, making: Making, denoising: Denoising) -> None:
+        self.recording = recording
+        self._making = making
+        self._denoising = denoising
+        self._mesh: MeshSequence | None = None
+        if recording.mesh is not None:
+            self._mesh = recording.load_mesh()
+        self._synthesizer: Synthesizer | None = None
+        self._plan: dict[str, Any] = {}
+        self._target_m: Vector | None = None
+        self._radar: DopplerMap | None = None
+        labels = recording.labelled
+        if recording.unlabelled and recording.holds_radar_map:
+            labels = recording.load_radar_map().labels.shifted(recording.radar_offset_s)
+        self._names, self._classes = labels_and_classes(labels)
+        self._spans = [span for span in labels.spans if span.origin != "suggestion"]
+
+    def outline(self, placement: int) -> Outline:
+        timebase, present, radar_kind = self._clock()
+        kinds: list[MapKind] = []
+        if self._mesh is not None:
+            kinds += ["synthetic"]
+            kinds += ["denoised"] if self._model() is not None else []
+        if radar_kind is not None and placement == 0:
+            kinds.append(radar_kind)
+        return Outline(
+            tuple(kind for kind in kinds if kind in self._making.kinds),
+            timebase.times_s,
+            present,
+            self._label(timebase.times_s),
+            self._names,
+        )
+
+    def source(self, key: SourceKey, progress: Progress) -> Source:
+        wanted = self._making.kinds
+        maps: dict[MapKind, DopplerMap] = {}
+        sensor = self._sensor(key.placement)
+        if self._mesh is not None and {"synthetic", "denoised"} & {*wanted}:
+            synthetic = self._counted(sensor, progress)
+            maps["synthetic"] = synthetic
+            model = self._model()
+            if "denoised" in wanted and model is not None:
+                maps["denoised"] = self._denoising.denoised(synthetic, model)
+        if key.placement == 0 and self.recording.radar is not None and {
+            "simulated", "real"
+        } & {*wanted}:  # fmt: skip
+            radar = self._of_radar()
+            there = self._mesh.timebase if self._mesh is not None else radar.timebase
+            maps[radar.kind] = on_clock(radar, there)
+        maps = {kind: one for kind, one in maps.items() if kind in wanted}
+        if not maps:
+            raise Sd2Error(
+                f"{self.recording.folder} has no map that is wanted",
+                f"one of {', '.join(wanted)}",
+            )
+        times_s = next(iter(maps.values())).times_s
+        return Source(
+            key.subject,
+            key.recording,
+            key.placement,
+            sensor,
+            maps,
+            self._label(times_s),
+            self._names,
+            self._classes,
+            self._target(),
+            {
+                "recording": self.recording.title,
+                "simulated": self.recording.simulated,
+                "radar_offset_s": self.recording.radar_offset_s,
+                **self._plan,
+            },
+        )
+
+    def _clock(self) -> tuple[Timebase, NDArray[np.bool_] | None, MapKind | None]:
+        """Times, frames with a person, and the kind of the radar's map: cheaply."""
+        recording = self.recording
+        kind: MapKind | None = None
+        own: Timebase | None = None
+        if recording.radar is not None:
+            if recording.holds_radar_map:
+                kind, own = "real", recording.load_radar_map().timebase
+            else:
+                capture = recording.load_capture()
+                kind, own = ("simulated" if capture.simulated else "real"), capture.timebase
+        if self._mesh is not None:
+            return self._mesh.timebase, self._mesh.present, kind
+        assert own is not None
+        return own.shifted(recording.radar_offset_s), None, kind
+
+    def _model(self) -> Path | None:
+        """The denoiser's file; None where the recording is to be shown without."""
+        from sd2core.denoise.files import DEFAULT_NAME, find_model
+
+        recording = self.recording
+        if self._making.model is not None:
+            return find_model(self._making.model)
+        if recording.denoiser is not None:
+            return find_model(recording.denoiser)
+        if recording.bundled_denoiser == "":
+            return None
+        return find_model(recording.bundled_denoiser or DEFAULT_NAME)
+
+    def _sensor(self, placement: int) -> VirtualSensor:
+        if placement == 0:
+            return self.recording.sensor
+        assert self._making.placements is not None
+        target_m = self._target()
+        assert target_m is not None
+        return self._making.placements.places()[placement - 1].sensor(target_m)
+
+    def _target(self) -> Vector | None:
+        if self._target_m is None and self._mesh is not None:
+            self._target_m = Whereabouts.of(self._mesh).target_m
+        return self._target_m
+
+    def _counted(self, sensor: VirtualSensor, progress: Progress) -> DopplerMap:
+        if self._synthesizer is None:
+            assert self._mesh is not None
+            self._synthesizer, self._plan = _synthesizer(
+                self._mesh, self.recording.sensor, self._making
+            )
+        return self._synthesizer.map(sensor, progress=progress)
+
+    def _of_radar(self) -> DopplerMap:
+        from sd2core.fmcw.processing import doppler_map
+
+        if self._radar is None:
+            recording = self.recording
+            if recording.holds_radar_map:
+                radar = recording.load_radar_map().doppler
+            else:
+                radar = doppler_map(recording.load_capture(), axis=self._making.synthesis.axis)
+            self._radar = radar.shifted(recording.radar_offset_s)
+        return self._radar
+
+    def _label(self, times_s: NDArray[np.float64]) -> NDArray[np.int16]:
+        return label_per_frame(self._spans, self._names, times_s)
+
+
+def _synthesizer(
+    mesh: MeshSequence, sensor: VirtualSensor, making: Making
+) -> tuple[Synthesizer, dict[str, Any]]:
+    """What counts the mesh, and the plan that was chosen, for provenance."""
+    if making.tolerance is None:
+        return Synthesizer(mesh, making.synthesis), {}
+    from sd2core.ladder.carry_out import synthesizer_for
+    from sd2core.ladder.choosing import choose
+
+    choice = choose(
+        mesh, sensor, tolerance=making.tolerance, dragging=False, options=making.synthesis
+    )
+    if not choice.holds:
+        raise Sd2Error(choice.summary, "a tolerance that can be held", "Allow more of it")
+    made = synthesizer_for(choice.plan, mesh, making.synthesis)
+    return made, choice.plan.provenance(choice.errors.l1)
+
+
+def _fingerprint(recording: Recording, key: SourceKey, making: Making) -> str:
+    """Of what the source is made of: labels and settings as they are, files by their sizes."""
+    place = None
+    if key.placement:
+        assert making.placements is not None
+        place = asdict(making.placements.places()[key.placement - 1])
+    content = {
+        "sensor": asdict(recording.sensor),
+        "place": place,
+        "radar_offset_s": recording.radar_offset_s,
+        "mesh_reading": recording.mesh_reading.model_dump(mode="json"),
+        "spans": [
+            (span.track, span.start_s, span.end_s, span.label)
+            for span in recording.labelled.spans
+            if span.origin != "suggestion"
+        ],
+        "synthesis": asdict(making.synthesis),
+        "tolerance": making.tolerance,
+        "model": making.model or [str(recording.denoiser or ""), recording.bundled_denoiser],
+        "kinds": making.kinds,
+        "files": [
+            _size(path)
+            for path in (recording.mesh, recording.faces, recording.radar)
+            if path is not None
+        ],
+    }
+    text = json.dumps(content, sort_keys=True, default=str)
+    return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
+
+
+def _size(path: Path) -> int:
+    if path.is_dir():
+        return sum(one.stat().st_size for one in path.rglob("*") if one.is_file())
+    return path.stat().st_size if path.exists() else -1
