@@ -64,8 +64,8 @@ square on at 2.2 m; the mean noise is taken off, and what does not rise above it
 
 The errors are not invented: `sd2 simulate fit-errors` measured them on the sixteen clips of
 [fitting.md](fitting.md). Bodies that are disturbed by them, scored as those fits are, give: hands
-along the line of sight 0.32 m/s RMS (fits 0.22), correlation 0.91 (0.96), Doppler maps of gestures
-L1 0.51 (0.48). What is simulated and what is not (reflections in the room, glints, clothes, other
+along the line of sight 0.31 m/s RMS (fits 0.22), correlation 0.91 (0.96), Doppler maps of gestures
+L1 0.50 (0.48). What is simulated and what is not (reflections in the room, glints, clothes, other
 people, fits that lose the person) is [decision 26](decisions/0026-the-simulated-campaign.md).
 
 ## The bundled model
