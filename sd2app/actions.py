@@ -26,6 +26,7 @@ MOUSE = (
     ("Drag the title of the radar's heatmap", "Align the capture in time"),
     ("Drag the frame or its edges in the overview", "Pan or zoom in time"),
     ("Drag the sensor in the scene", "Move it in the plane of the screen"),
+    ("Click a planned place in the scene", "Put the sensor there"),
     ("Shift+drag, Ctrl+drag the sensor", "Move it vertically, or along the line to the body"),
     ("Drop a model file (.safetensors)", "Denoise this recording with it"),
     ("Drop a file of labels", "Import them"),
@@ -135,6 +136,11 @@ ACTIONS: tuple[Action, ...] = (
         lambda c: c.synthesis.torso_m is not None,
     ),
     Action(
+        "placements", "Edit", "Placements…", ("Shift+S",),
+        "Plan a grid or a cloud of sensors around the body, for a map from each",
+        lambda w: w.show_placements(),
+    ),
+    Action(
         "colour_velocity", "View", "Colour by radial velocity", ("Alt+1",),
         "Blue recedes, red approaches, grey is hidden or still",
         lambda w: w.context.display.set_mesh_colour("velocity"), has_mesh,
@@ -171,6 +177,13 @@ ACTIONS: tuple[Action, ...] = (
         "Draw vertices over the video instead of the surface",
         lambda w: w.context.overlay.set_style(as_dots=not w.context.overlay.style.as_dots),
         has_mesh, lambda c: c.overlay.style.as_dots,
+    ),
+    Action(
+        "draw_placements", "View", "Placements in the scene", (),
+        "Draw the places that are planned for sensors",
+        lambda w: w.context.placements.set_shown(not w.context.placements.shown),
+        lambda c: c.placements.plan is not None,
+        lambda c: c.placements.shown,
     ),
     Action(
         "view_three_quarter", "View", "Scene: overview", ("Ctrl+1",),
@@ -222,7 +235,7 @@ ACTIONS: tuple[Action, ...] = (
     ),
     Action(
         "show_sensor", "View", "Sensor panel", ("S",), "Where the sensor is and what it sees",
-        lambda w: w.side.bring_up("Sensor"), separator_before=True,
+        lambda w: w.show_sensor(), separator_before=True,
     ),
     Action(
         "show_trade", "View", "Trade panel", ("T",),

@@ -43,6 +43,7 @@ class Edits:
         self._document = document
         self._sensor = sensor
         self._before: Any = None
+        self._planned_before: tuple[Placements | None] | None = None
 
     # --- sensor ---------------------------------------------------------------------------
 
@@ -84,11 +85,29 @@ class Edits:
 
     def plan_placements(self, placements: Placements | None) -> None:
         """Plan other places for sensors around the body, or none."""
+        self.type_placements(placements)
+        self.end_typing_placements()
+
+    def type_placements(self, placements: Placements | None) -> None:
+        """The same while it is typed: all until the end is one step."""
         recording = self._document.recording
-        if recording is not None:
-            before = recording.placements
-            self._document.set_placements(placements)
-            self._push("Plan placements", self._document.set_placements, before, placements)
+        if recording is None:
+            return
+        if self._planned_before is None:
+            self._planned_before = (recording.placements,)
+        self._document.set_placements(placements)
+
+    def end_typing_placements(self) -> None:
+        """It has been typed."""
+        recording, before = self._document.recording, self._planned_before
+        self._planned_before = None
+        if recording is not None and before is not None:
+            self._push(
+                "Plan placements",
+                self._document.set_placements,
+                before[0],
+                recording.placements,
+            )
 
     # --- alignment of the real capture ----------------------------------------------------
 

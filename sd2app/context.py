@@ -33,6 +33,7 @@ from sd2app.models.label_session import LabelSession
 from sd2app.models.labels import LabelsModel
 from sd2app.models.ladder import CORE, Ladder
 from sd2app.models.overlay import OverlayModel
+from sd2app.models.placements import PlacementsModel
 from sd2app.models.playback import PlaybackModel
 from sd2app.models.reaction import ReactionModel
 from sd2app.models.sensor import SensorModel
@@ -72,6 +73,7 @@ class Context:
     real: TrackModel
     trade: TradeModel
     synthesis: SynthesisModel
+    placements: PlacementsModel
     uncertainty: UncertaintyModel
     denoise: DenoiseModel
     live: LiveDenoiseModel
@@ -110,6 +112,7 @@ class Context:
     def close(self) -> None:
         """Stop every thread and let go of the files."""
         self.playback.pause()
+        self.placements.close()
         self.suggestions.close()
         self.agreement.close()
         self.cut_out.close()
@@ -187,6 +190,7 @@ def build_context(
         real=real,
         trade=trade,
         synthesis=synthesis,
+        placements=PlacementsModel(document, sensor, trade, edits, parent),
         uncertainty=UncertaintyModel(document, synthesis, trade, synthetic, jobs, settings, parent),
         denoise=denoise,
         live=LiveDenoiseModel(playback, synthetic, denoise, settings, parent),

@@ -5,19 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import (
-    QButtonGroup,
-    QHBoxLayout,
-    QStackedWidget,
-    QToolButton,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from sd2app.models.label_set_table import LabelSetModel
 from sd2app.models.span_table import SpanTableModel
 from sd2app.models.statistics_table import StatisticsTableModel
 from sd2app.views.elided import ElidedLabel
+from sd2app.views.inner_pages import InnerPage, InnerPages
 from sd2app.views.label_set_page import Asks, LabelSetPage
 from sd2app.views.span_page import SpanPage
 from sd2app.views.span_table import SpanTable
@@ -56,64 +50,41 @@ class LabelsPanel(QWidget):
         statistics = StatisticsPage(StatisticsTableModel(c.labels, c.playback, self), self)
         set_model = LabelSetModel(c.labels, c.keys, c.label_edits.apply, self)
         self._label_set = LabelSetPage(set_model, asks, self)
-        self._pages = QStackedWidget(self)
         self._count = ElidedLabel(self)
         self._count.setObjectName("muted")
         self._count.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        row = QHBoxLayout()
-        row.setSpacing(6)
-        self._buttons = QButtonGroup(self)
-        for place, page in enumerate((self.spans, statistics, self._label_set)):
-            self._pages.addWidget(page)
-            button = self._button(place)
-            self._buttons.addButton(button, place)
-            row.addWidget(button)
-        self._buttons.idClicked.connect(self._pages.setCurrentIndex)
-        row.addWidget(self._count, 1)
+        pages = (self.spans, statistics, self._label_set)
+        self._pages = InnerPages(
+            [InnerPage(*words, page) for words, page in zip(_PAGES, pages, strict=True)],
+            self._count,
+            self,
+        )
         layout = QVBoxLayout(self)
         layout.setContentsMargins(8, 6, 8, 6)
-        layout.setSpacing(6)
-        layout.addLayout(row)
-        layout.addWidget(self._pages, 1)
+        layout.addWidget(self._pages)
         for signal in (
             model.rowsInserted,
             model.rowsRemoved,
             c.labels.changed,
-            self._pages.currentChanged,
+            self._pages.turned,
         ):
             signal.connect(self._show_count)
         self._show_count()
 
     def show_spans(self) -> None:
         """Show the spans, with the keyboard in their table."""
-        self._turn_to(0)
+        self._pages.turn_to(0)
         self.spans.table.setFocus(Qt.FocusReason.ShortcutFocusReason)
 
     def find(self) -> None:
         """Show the spans, with the keyboard in the search."""
-        self._turn_to(0)
+        self._pages.turn_to(0)
         self.spans.find()
 
     def show_label_set(self) -> None:
         """Show the label set, with the keyboard in its table."""
-        self._turn_to(2)
+        self._pages.turn_to(2)
         self._label_set.table.setFocus(Qt.FocusReason.ShortcutFocusReason)
 
-    def _turn_to(self, place: int) -> None:
-        self._buttons.button(place).setChecked(True)
-        self._pages.setCurrentIndex(place)
-
-    def _button(self, place: int) -> QToolButton:
-        name, tip = _PAGES[place]
-        button = QToolButton(self)
-        button.setText(name)
-        button.setToolTip(tip)
-        button.setAccessibleName(name)
-        button.setAccessibleDescription(tip)
-        button.setCheckable(True)
-        button.setChecked(place == 0)
-        button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        return button
-
     def _show_count(self) -> None:
-        self._count.setText(self.model.words if self._pages.currentIndex() == 0 else "")
+        self._count.setText(self.model.words if self._pages.shown == 0 else "")

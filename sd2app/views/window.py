@@ -31,11 +31,13 @@ if TYPE_CHECKING:
     from sd2app.dialogs.dialogs import Dialogs
     from sd2app.dialogs.label_files import LabelFileDialogs
     from sd2app.dialogs.label_tracks import TrackDialogs
+    from sd2app.dialogs.placements import PlacementDialogs
     from sd2app.dialogs.training import TrainingDialogs
     from sd2app.models.denoise_library import DenoiserLibrary
     from sd2app.models.ladder import Ladder
     from sd2app.views.labels_panel import LabelsPanel
     from sd2app.views.scene3d import SceneView
+    from sd2app.views.sensor_pages import SensorPages
     from sd2app.views.side_panel import SidePanel
 
 _SHARED_KEYS = ("play", "previous_frame", "next_frame", "back_second", "on_second", "zoom_fit")
@@ -57,6 +59,8 @@ class MainWindow(QMainWindow):
     train_dialogs: TrainingDialogs
     side: SidePanel
     labels_panel: LabelsPanel
+    sensor_pages: SensorPages
+    placement_dialogs: PlacementDialogs
 
     def __init__(
         self,
@@ -98,6 +102,7 @@ class MainWindow(QMainWindow):
             self._scene is not None
             and not self.context.jobs.jobs
             and not self.context.synthesis.busy
+            and not self.context.placements.busy
             and not self.context.denoise.busy
             and not self.context.video.busy
         )
@@ -186,11 +191,14 @@ class MainWindow(QMainWindow):
 
     def _fill_panels(self) -> None:
         from sd2app.dialogs.label_set import LabelSetDialogs
+        from sd2app.dialogs.placements import PlacementDialogs
         from sd2app.dialogs.training import TrainingDialogs
         from sd2app.views.agreement_panel import AgreementPanel
         from sd2app.views.labels_panel import LabelsPanel
         from sd2app.views.page_widths import PageWidths
         from sd2app.views.panes import spectrum_pane, video_pane
+        from sd2app.views.placements_page import PlacementsPage
+        from sd2app.views.sensor_pages import SensorPages
         from sd2app.views.sensor_panel import SensorPanel
         from sd2app.views.side_panel import SidePanel
         from sd2app.views.tracks import Tracks
@@ -201,13 +209,17 @@ class MainWindow(QMainWindow):
         fill(self._panels["video"], video_pane(c, self._actions))
         to_camera, aim = self._actions["sensor_to_camera"], self._actions["aim_sensor"]
         sensor = SensorPanel(c.sensor, c.document, c.synthesis, c.edits, to_camera, aim)
+        asks_places = PlacementDialogs(self, c.placements, self.messages.warn, self.messages.note)
+        self.placement_dialogs = asks_places
+        places = PlacementsPage(c.placements, c.trade, asks_places.take, asks_places.export)
+        self.sensor_pages = SensorPages(sensor, places)
         trade = TradePanel(c.trade, c.display, self._actions["measure"])
         self.train_dialogs = TrainingDialogs(self, c.training, c.training_use, self.messages.warn)
         train = TrainingPanel(c.training, c.training_use, c.display, self.train_dialogs)
         asks = LabelSetDialogs(self, c.labels, c.label_edits.apply, self.messages.warn)
         self.labels_panel = LabelsPanel(c, self._actions, asks)
         agree = AgreementPanel(c.agreement, c.playback, self._actions)
-        pages = {"Sensor": sensor, "Trade": trade, "Train": train}
+        pages = {"Sensor": self.sensor_pages, "Trade": trade, "Train": train}
         self.side = SidePanel({**pages, "Labels": self.labels_panel, "Agree": agree})
         fill(self._panels["sensor"], self.side)
         self._widths = PageWidths(self._top, self.side, {"Labels": _LABELS_PX}, self._settings)
@@ -248,6 +260,7 @@ class MainWindow(QMainWindow):
             c.sensor,
             c.display,
             c.synthesis,
+            c.placements,
             begin_drag=c.edits.begin_sensor_drag,
             drag=c.edits.drag_sensor,
             end_drag=c.edits.end_sensor_drag,
@@ -326,6 +339,16 @@ class MainWindow(QMainWindow):
         """Ask for another mesh, and show both."""
         keys = [self._actions[name] for name in _SHARED_KEYS]
         self.dialogs.compare_with_mesh(keys, path)
+
+    def show_sensor(self) -> None:
+        """Bring up the one sensor."""
+        self.side.bring_up("Sensor")
+        self.sensor_pages.show_sensor()
+
+    def show_placements(self) -> None:
+        """Bring up the places where sensors are planned."""
+        self.side.bring_up("Sensor")
+        self.sensor_pages.show_placements()
 
     def measure_scene(self) -> None:
         """Measure every plan, where one can watch it."""

@@ -1,4 +1,4 @@
-"""Colours of radial velocities, the same in every figure and in the window."""
+"""Colours of radial velocities and of ranges, the same in every figure and in the window."""
 
 from __future__ import annotations
 
@@ -21,6 +21,18 @@ _DIVERGING = (
     (0.85, "#c0391f"),
     (1.00, "#84170d"),
 )
+# Near is bright, far is dark, as seen from the sensor; viridis (CC0), its ends cut.
+_SEQUENTIAL = (
+    (0.000, "#f2e51d"),
+    (0.125, "#b5de2b"),
+    (0.250, "#6ece58"),
+    (0.375, "#35b779"),
+    (0.500, "#1f9e89"),
+    (0.625, "#26828e"),
+    (0.750, "#31688e"),
+    (0.875, "#3e4989"),
+    (1.000, "#443a83"),
+)
 
 
 def rgb(colour: str) -> Rgb:
@@ -37,6 +49,8 @@ def colour_table(anchors: tuple[tuple[float, str], ...]) -> Rgb:
     return np.rint(np.stack(channels, axis=1)).astype(np.uint8)
 
 
+SEQUENTIAL = colour_table(_SEQUENTIAL)
+"""Near to far, shape (256, 3)."""
 DIVERGING = colour_table(_DIVERGING)
 """Receding to approaching, shape (256, 3)."""
 

@@ -10,21 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2app.palette import Palette
-from sd2core.figures.colours import Rgb, colour_table, looked_up, rgb, velocity_colours
+from sd2core.figures.colours import SEQUENTIAL, Rgb, looked_up, rgb, velocity_colours
 
 MeshColour = Literal["velocity", "range", "visibility", "plain"]
-# Near is bright, far is dark, as seen from the sensor; viridis (CC0), its ends cut.
-_SEQUENTIAL = (
-    (0.000, "#f2e51d"),
-    (0.125, "#b5de2b"),
-    (0.250, "#6ece58"),
-    (0.375, "#35b779"),
-    (0.500, "#1f9e89"),
-    (0.625, "#26828e"),
-    (0.750, "#31688e"),
-    (0.875, "#3e4989"),
-    (1.000, "#443a83"),
-)
 
 
 def fractions(colour: str) -> tuple[float, float, float]:
@@ -37,10 +25,6 @@ def mixed(colour: str, other: str, share: float) -> str:
     """``colour`` with ``share`` of ``other`` in it."""
     blend = (1.0 - share) * rgb(colour) + share * rgb(other)
     return "#" + np.rint(blend).astype(np.uint8).tobytes().hex()
-
-
-SEQUENTIAL = colour_table(_SEQUENTIAL)
-"""Near to far, shape (256, 3)."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +42,7 @@ class SceneColours:
     camera: str
     text: str
     muted: str
+    warning: str
 
     @classmethod
     def of(cls, palette: Palette, dark: bool) -> SceneColours:
@@ -75,12 +60,27 @@ class SceneColours:
             camera=palette.muted,
             text=palette.text,
             muted=palette.muted,
+            warning=palette.warning,
         )
 
 
 def range_colours(range_m: NDArray[np.floating], limits_m: tuple[float, float]) -> Rgb:
     """Sequential colours of ranges between two limits; (V, 3)."""
     return looked_up(SEQUENTIAL, range_m, *limits_m)
+
+
+def marker_colours(
+    range_m: NDArray[np.floating], beyond: NDArray[np.bool_] | None, colours: SceneColours
+) -> Rgb:
+    """Colours of places by their range, nearest to farthest; (N, 3).
+
+    Those beyond what a radar can tell have the colour of warnings.
+    """
+    nearest_m, farthest_m = float(range_m.min()), float(range_m.max())
+    result = range_colours(range_m, (nearest_m, max(farthest_m, nearest_m + 1e-3)))
+    if beyond is None:
+        return result
+    return np.where(beyond[:, None], rgb(colours.warning), result)
 
 
 def range_limits(nearest_m: float, farthest_m: float) -> tuple[float, float]:

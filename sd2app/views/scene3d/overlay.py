@@ -9,12 +9,13 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QImage, QPainter, QPaintEvent, QPen, QPixmap
 from PySide6.QtWidgets import QWidget
 
-from sd2app.views.scene3d.colours import SEQUENTIAL, SceneColours, nice_step
+from sd2app.views.scene3d.colours import SceneColours, nice_step
 from sd2app.views.scene3d.navigation import Navigator
 from sd2app.views.scene3d.scene import Scene
-from sd2core.figures.colours import DIVERGING
+from sd2core.figures.colours import DIVERGING, SEQUENTIAL
 
 HINT = "Drag moves the sensor  ·  Shift: up and down  ·  Ctrl: nearer and farther"
+MARKER_HINT = "Click puts the sensor there"
 _VELOCITY_TITLE = "Radial velocity, m/s"
 _BAR_WIDTH = 10.0
 _PAD = 10.0
@@ -29,6 +30,7 @@ class Overlay(QWidget):
         self._scene = scene
         self._navigator = navigator
         self.message = ""
+        self.marker_words: list[str] = []
         self._legend = QRectF()
         self._state: tuple[object, ...] | None = None
         self._picture = QPixmap()
@@ -60,6 +62,7 @@ class Overlay(QWidget):
             scene.metre_labels,
             self._navigator.hovers_sensor,
             self._navigator.holds_sensor,
+            self._navigator.marker,
         )
         if state != self._state:
             self._state = state
@@ -88,7 +91,9 @@ class Overlay(QWidget):
         if self._navigator.holds_sensor:
             self._paint_coordinates(painter)
         elif self._navigator.hovers_sensor:
-            self._paint_hint(painter)
+            self._paint_hint(painter, HINT)
+        elif self._navigator.marker is not None:
+            self._paint_marker(painter, self._navigator.marker)
 
     def _font(self) -> QFont:
         font = QFont(self.font())
@@ -300,7 +305,18 @@ class Overlay(QWidget):
     def _paint_coordinates(self, painter: QPainter) -> None:
         x, y, z = self._scene.sensor.position_m
         text = f"x {x:+.2f}   y {y:+.2f}   z {z:+.2f} m".replace("-", "−")
-        px, py, _ = self._scene.pose.project(self._scene.sensor.position_m, self._size())[0]
+        self._paint_beside(painter, text, self._scene.sensor.position_m)
+
+    def _paint_marker(self, painter: QPainter, marker: int) -> None:
+        text = self.marker_words[marker].replace("-", "−")
+        self._paint_beside(painter, text, tuple(self._scene.markers.positions_m[marker]))
+        self._paint_hint(painter, MARKER_HINT)
+
+    def _paint_beside(
+        self, painter: QPainter, text: str, point_m: tuple[float, float, float]
+    ) -> None:
+        """Words right above a point."""
+        px, py, _ = self._scene.pose.project(point_m, self._size())[0]
         metrics = QFontMetricsF(painter.font())
         box = QRectF(0.0, 0.0, metrics.horizontalAdvance(text) + 16.0, metrics.height() + 8.0)
         box.moveTo(px + 18.0, py - box.height() - 12.0)
@@ -310,13 +326,13 @@ class Overlay(QWidget):
         painter.setPen(QColor(self._colours.text))
         painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)
 
-    def _paint_hint(self, painter: QPainter) -> None:
+    def _paint_hint(self, painter: QPainter, text: str) -> None:
         metrics = QFontMetricsF(painter.font())
-        box = QRectF(0.0, 0.0, metrics.horizontalAdvance(HINT) + 16.0, metrics.height() + 8.0)
+        box = QRectF(0.0, 0.0, metrics.horizontalAdvance(text) + 16.0, metrics.height() + 8.0)
         if box.width() > self.width() - 16.0:
             return
         box.moveCenter(QPointF(self.width() / 2, 0.0))
         box.moveBottom(self.height() - 8.0)
         self._chip(painter, box)
         painter.setPen(QColor(self._colours.text))
-        painter.drawText(box, Qt.AlignmentFlag.AlignCenter, HINT)
+        painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)

@@ -19,6 +19,7 @@ from sd2app.views.scene3d.colours import (
     range_limits,
 )
 from sd2app.views.scene3d.extent import Extent
+from sd2app.views.scene3d.markers import Markers
 from sd2app.views.scene3d.parts import Body, CameraGlyph, GroundGrid, SensorGlyph
 from sd2core.mesh import MeshSequence
 from sd2core.sensor import VirtualSensor
@@ -67,6 +68,7 @@ class Scene:
         self.body = Body(renderer)
         self.camera_glyph = CameraGlyph(renderer)
         self.sensor_glyph = SensorGlyph(renderer)
+        self.markers = Markers(renderer, self.colours)
         self._set_floor()
         self.set_sensor(self.sensor)
         self.set_colours(self.colours)
@@ -159,6 +161,16 @@ class Scene:
         self._lay_ground()
         self._stale_colours = True
 
+    def set_markers(
+        self,
+        sensors: tuple[VirtualSensor, ...],
+        range_m: NDArray[np.floating],
+        beyond: NDArray[np.bool_] | None,
+    ) -> None:
+        """Show planned places; see :meth:`Markers.set_sensors`."""
+        self.markers.set_sensors(sensors, range_m, beyond)
+        self._lay_ground()
+
     def set_hot(self, hot: bool) -> None:
         """Show that the sensor is under the pointer or in the hand."""
         if hot != self._hot:
@@ -172,6 +184,7 @@ class Scene:
         self.ground.set_colours(colours)
         self.camera_glyph.set_colours(colours)
         self.sensor_glyph.set_colours(colours, self._hot)
+        self.markers.set_colours(colours)
         self.body.shadow.GetProperty().SetColor(*fractions(colours.shadow))
         self._stale_colours = True
 
@@ -191,6 +204,7 @@ class Scene:
         if np.linalg.norm(body.centre_m - sensor) < _FAR_OFF_M:
             points.append(_box(sensor, 0.25))
             points.append(np.array([[sensor[0], body.floor_m, sensor[2]]]))
+        points.append(self._near_markers_m())
         azimuth, elevation = {
             "overview": (-52.0, -16.0),
             "side": (-90.0, 0.0),
@@ -250,6 +264,8 @@ class Scene:
         if self._has_mesh and self.body.drawn_as_dots:
             self.body.set_dot_size(self._dot_px(size_px) * pixel_scale)
         eye = self.pose.position
+        pixel = self.pose.metres_per_pixel(tuple(self.extent.centre_m), size_px[1])
+        self.markers.set_pixel(pixel if np.isfinite(pixel) else 0.0, pixel_scale)
         self.sensor_glyph.set_radius(self.sensor_radius_m(size_px))
         self.sensor_glyph.show(self.sensor_shown)
         self.camera_glyph.show(self.camera_shown)
@@ -337,6 +353,11 @@ class Scene:
         fits = values is not None and self._has_mesh and len(values) == len(self.vertices_m)
         return values if fits else None
 
+    def _near_markers_m(self) -> NDArray[np.float64]:
+        """Planned places that are not far off, (n, 3)."""
+        places = self.markers.positions_m
+        return places[np.linalg.norm(places - self.extent.centre_m, axis=1) < _FAR_OFF_M]
+
     def _set_floor(self) -> None:
         self.body.set_floor(self.extent.floor_m)
         self._covered = None
@@ -348,6 +369,8 @@ class Scene:
         for place in (np.zeros(3), np.asarray(self.sensor.position_m)):
             if np.linalg.norm(self.extent.centre_m - place) < _FAR_OFF_M:
                 low, high = np.minimum(low, place), np.maximum(high, place)
+        if len(planned := self._near_markers_m()):
+            low, high = np.minimum(low, planned.min(axis=0)), np.maximum(high, planned.max(axis=0))
         covered = shapes.grid_rectangle(low[[0, 2]], high[[0, 2]])
         if covered == self._covered:
             return

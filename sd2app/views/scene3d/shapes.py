@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 _LONGEST_GRID_M = 24.0
+PYRAMID_POINTS = 5
+_PYRAMID_WIDTH = 0.72
 
 
 GridRectangle = tuple[float, float, float, float, float]
@@ -104,6 +106,32 @@ def frustum(width: float = 4.0, height: float = 3.0, depth: float = 3.4) -> tupl
         np.int32,
     )  # fmt: skip
     return points / depth, segments
+
+
+def pyramids(
+    positions: NDArray[np.floating], directions: NDArray[np.floating], length: float
+) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    """Pyramids at N places whose tips point along N unit vectors.
+
+    Returns
+    -------
+    points (5 N, 3), triangles (6 N, 3)
+        Of each its tip first, then its base, in the middle of which the place is.
+    """
+    half = _PYRAMID_WIDTH * length / 2
+    # As rotation_to, for all at once.
+    level = np.stack([directions[:, 2], np.zeros(len(directions)), -directions[:, 0]], axis=1)
+    steepness = np.linalg.norm(level, axis=1, keepdims=True)
+    right = np.where(steepness > 1e-9, level / np.maximum(steepness, 1e-9), (1.0, 0.0, 0.0))
+    down = np.cross(directions, right)
+    points = np.empty((len(positions), PYRAMID_POINTS, 3), np.float32)
+    points[:, 0] = positions + length * directions
+    for corner, (across, downward) in enumerate(((-1, -1), (1, -1), (1, 1), (-1, 1)), start=1):
+        points[:, corner] = positions + half * (across * right + downward * down)
+    sides = np.array([(0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 1), (1, 3, 2), (1, 4, 3)], np.int32)
+    first = PYRAMID_POINTS * np.arange(len(positions), dtype=np.int32)
+    triangles = (first[:, None, None] + sides).reshape(-1, 3)
+    return points.reshape(-1, 3), triangles
 
 
 def rotation_to(direction: tuple[float, float, float]) -> NDArray[np.float64]:

@@ -7,6 +7,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, get_args
 
+import numpy as np
 from PySide6.QtCore import QEvent, QObject, QSize, Qt
 from PySide6.QtGui import QCloseEvent, QMouseEvent, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import QLabel, QWidget
@@ -22,6 +23,7 @@ from sd2core.errors import Sd2Error
 if TYPE_CHECKING:
     from sd2app.models.display import DisplayModel
     from sd2app.models.document import DocumentModel
+    from sd2app.models.placements import PlacementsModel
     from sd2app.models.playback import PlaybackModel
     from sd2app.models.sensor import SensorModel
     from sd2app.models.synthesis import SynthesisModel
@@ -43,11 +45,11 @@ _NOTCH = 120.0
 
 
 class SceneView(QWidget):
-    """Mesh, sensor and camera; the sensor can be dragged.
+    """Mesh, sensor, camera and planned places; the sensor can be dragged, a place picked.
 
-    It changes no model: a drag goes to the three callables, and what is on
-    screen follows the models' signals. Vertices and colours are fetched when
-    the picture is drawn, so a hidden view costs nothing.
+    It changes no model: a drag goes to the three callables, a click on a place to the model of
+    placements, which makes it an edit, and what is on screen follows the models' signals.
+    Vertices and colours are fetched when the picture is drawn, so a hidden view costs nothing.
 
     Parameters
     ----------
@@ -62,6 +64,7 @@ class SceneView(QWidget):
         sensor: SensorModel,
         display: DisplayModel,
         synthesis: SynthesisModel,
+        placements: PlacementsModel,
         *,
         begin_drag: Callable[[], None],
         drag: Callable[[Position], None],
@@ -74,6 +77,7 @@ class SceneView(QWidget):
         self._sensor = sensor
         self._display = display
         self._synthesis = synthesis
+        self._placements = placements
         self._backend: Backend | None = None
         self.setMinimumSize(200, 150)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -84,13 +88,20 @@ class SceneView(QWidget):
             return
         self.scene = Scene(self._backend.renderer)
         self.navigator = Navigator(
-            self.scene, begin_drag, drag, end_drag, size_px=self._size_px, changed=self._moved
+            self.scene,
+            begin_drag,
+            drag,
+            end_drag,
+            placements.use,
+            size_px=self._size_px,
+            changed=self._moved,
         )
         self.overlay = Overlay(self.scene, self.navigator, self)
         self._preset: Preset | None = "overview"
         self._framed: tuple[object, ...] | None = None
         self._frame: int | None = None
         self._stale_scattering = True
+        self._planned: object = None
         self._backend.widget.installEventFilter(self)
         self._followed = (
             (document.opened, self._take_over),
@@ -99,12 +110,14 @@ class SceneView(QWidget):
             (display.mesh_changed, self._follow_colour),
             (display.theme_changed, self._follow_theme),
             (synthesis.frame_changed, self._follow_scattering),
+            (placements.changed, self._follow_placements),
         )
         for signal, slot in self._followed:
             signal.connect(slot)
         self._follow_theme()
         self._follow_colour()
         self._take_over()
+        self._follow_placements()
         self._lay_out()
         self._backend.start(self._prepare)
 
@@ -176,11 +189,15 @@ class SceneView(QWidget):
             return
         if kind == QEvent.Type.MouseButtonRelease:
             self.navigator.release(*place, button)
-        elif kind == QEvent.Type.MouseButtonDblClick and not self.navigator.sensor_at(*place):
+        elif kind == QEvent.Type.MouseButtonDblClick and not self._at_something(place):
             self.reset_view()
         else:
             # Also the second press of a double click: a hurried hand takes the sensor.
             self.navigator.press(*place, button, *_modifiers(event))
+
+    def _at_something(self, place: tuple[float, float]) -> bool:
+        at_marker = self.navigator.marker_at(*place) is not None
+        return at_marker or self.navigator.sensor_at(*place)
 
     # What changed
 
@@ -220,6 +237,21 @@ class SceneView(QWidget):
 
     def _follow_theme(self) -> None:
         self.scene.set_colours(SceneColours.of(self._display.palette, self._display.dark))
+        self.request_render()
+
+    def _follow_placements(self) -> None:
+        model, radar = self._placements, self._placements.radar
+        planned = (model.planned, model.shown, radar)
+        if planned == self._planned:
+            return
+        self._planned = planned
+        sensors = model.planned.sensors if model.shown else ()
+        range_m = np.array([place.range_m for place in model.planned.places])
+        sight = model.planned.sight
+        self.scene.set_markers(sensors, range_m, None if sight is None else sight.beyond(radar))
+        self.overlay.marker_words = [place.words for place in model.planned.places]
+        self._framed = None
+        self.navigator.look_again()
         self.request_render()
 
     def _moved(self) -> None:
@@ -291,6 +323,8 @@ class SceneView(QWidget):
             shape = Qt.CursorShape.ClosedHandCursor
         elif self.navigator.hovers_sensor:
             shape = Qt.CursorShape.OpenHandCursor
+        elif self.navigator.marker is not None:
+            shape = Qt.CursorShape.PointingHandCursor
         else:
             shape = Qt.CursorShape.ArrowCursor
         if self._backend.widget.cursor().shape() != shape:

@@ -9,14 +9,14 @@ from hypothesis import strategies as st
 
 from sd2app.palette import palette_for
 from sd2app.views.scene3d.colours import (
-    SEQUENTIAL,
     SceneColours,
+    marker_colours,
     mesh_colours,
     nice_step,
     range_colours,
     range_limits,
 )
-from sd2core.figures.colours import DIVERGING, rgb, velocity_colours
+from sd2core.figures.colours import DIVERGING, SEQUENTIAL, rgb, velocity_colours
 
 LIGHT = SceneColours.of(palette_for(False), False)
 
@@ -111,3 +111,15 @@ def test_hidden_dots_step_back_towards_the_background() -> None:
 def test_what_is_not_known_yet_is_plain(mode: str) -> None:
     colours = mesh_colours(mode, LIGHT, 4)
     np.testing.assert_array_equal(colours, np.tile(rgb(LIGHT.plain), (4, 1)))
+
+
+def test_places_are_coloured_from_near_to_far_and_those_beyond_the_radar_as_a_warning() -> None:
+    ranges = np.array([1.0, 2.5, 4.0])
+    near, middle, far = marker_colours(ranges, None, LIGHT)
+    np.testing.assert_array_equal(near, SEQUENTIAL[0])
+    np.testing.assert_array_equal(far, SEQUENTIAL[-1])
+    np.testing.assert_array_equal(middle, SEQUENTIAL[128])
+    marked = marker_colours(ranges, np.array([False, True, False]), LIGHT)
+    np.testing.assert_array_equal(marked[1], rgb(LIGHT.warning))
+    np.testing.assert_array_equal(marked[[0, 2]], [near, far])
+    assert (marker_colours(np.array([2.0, 2.0]), None, LIGHT) == SEQUENTIAL[0]).all()

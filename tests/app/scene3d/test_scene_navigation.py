@@ -11,6 +11,7 @@ from vtkmodules.vtkRenderingCore import vtkRenderer
 from sd2app.views.scene3d.navigation import LEAST_GRAB_PX, Navigator
 from sd2app.views.scene3d.scene import Scene
 from sd2core.mesh import MeshSequence
+from sd2core.placements import Place
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 
@@ -28,11 +29,13 @@ class Hand:
         self.scene.set_sensor(VirtualSensor((0.4, -0.2, 0.3)))
         self.scene.pose = self.scene.preset_pose("overview", SIZE)
         self.log: list[str] = []
+        self.picked: list[int] = []
         self.navigator = Navigator(
             self.scene,
             lambda: self.log.append("begin"),
             self.place,
             lambda: self.log.append("end"),
+            self.picked.append,
             size_px=lambda: SIZE,
             changed=lambda: None,
         )
@@ -176,3 +179,62 @@ def test_another_button_does_not_end_a_drag(hand: Hand) -> None:
     hand.navigator.let_go()
     hand.navigator.release(*start, "left")
     assert hand.log == ["begin", "drag", "end"]
+
+
+@pytest.fixture
+def planned(hand: Hand) -> Hand:
+    """Three places around the body; the second 0.02 m behind the first."""
+    places = (Place(2.0, 60.0), Place(2.02, 60.0), Place(1.5, -40.0, 30.0))
+    sensors = tuple(place.sensor((0.0, 0.2, 2.1)) for place in places)
+    hand.scene.set_markers(sensors, np.array([one.range_m for one in places]), None)
+    hand.scene.pose = hand.scene.preset_pose("overview", SIZE)
+    return hand
+
+
+def marker_px(hand: Hand, number: int) -> np.ndarray:
+    return hand.scene.pose.project(hand.scene.markers.positions_m[number], SIZE)[0][:2]
+
+
+def test_every_place_is_in_the_overview(planned: Hand) -> None:
+    for number in range(3):
+        assert (marker_px(planned, number) > 0).all()
+        assert (marker_px(planned, number) < SIZE).all()
+
+
+def test_a_click_picks_the_nearest_place_and_turns_nothing(planned: Hand) -> None:
+    pose = planned.scene.pose
+    for number in (2, 1, 0):
+        x, y = marker_px(planned, number)
+        planned.navigator.move(x, y, False, False)
+        assert planned.navigator.marker == number
+        planned.navigator.press(x, y, "left", False, False)
+        planned.navigator.move(x + 2, y - 1, False, False)
+        planned.navigator.release(x + 2, y - 1, "left")
+    assert planned.picked == [2, 1, 0]
+    assert planned.scene.pose == pose
+    assert planned.log == []
+
+
+def test_a_drag_that_begins_on_a_place_turns_the_view_and_picks_nothing(planned: Hand) -> None:
+    pose = planned.scene.pose
+    x, y = marker_px(planned, 2)
+    planned.navigator.press(x, y, "left", False, False)
+    planned.navigator.move(x + 30, y, False, False)
+    planned.navigator.release(x + 30, y, "left")
+    assert planned.picked == []
+    assert planned.scene.pose != pose
+
+
+def test_a_place_under_the_sensor_leaves_the_sensor_to_the_hand(planned: Hand) -> None:
+    planned.scene.set_sensor(VirtualSensor(tuple(planned.scene.markers.positions_m[2])))
+    x, y = marker_px(planned, 2)
+    assert planned.navigator.marker_at(x, y) is None
+    planned.navigator.press(x, y, "left", False, False)
+    assert planned.navigator.holds_sensor
+
+
+def test_places_that_go_away_are_not_under_the_pointer(planned: Hand) -> None:
+    planned.navigator.move(*marker_px(planned, 2), False, False)
+    planned.scene.set_markers((), np.zeros(0), None)
+    planned.navigator.look_again()
+    assert planned.navigator.marker is None

@@ -7,8 +7,16 @@ import math
 import numpy as np
 import pytest
 
-from sd2app.views.scene3d.shapes import cone, grid_rectangle, ground, rotation_to
+from sd2app.views.scene3d.shapes import (
+    PYRAMID_POINTS,
+    cone,
+    grid_rectangle,
+    ground,
+    pyramids,
+    rotation_to,
+)
 from sd2app.views.scene3d.surface import coarse_faces, is_closed_outward
+from sd2core.placements import Place
 from sd2core.sensor import VirtualSensor, direction_from_angles
 
 TETRAHEDRON = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], float)
@@ -80,3 +88,24 @@ def test_a_coarse_surface_has_few_faces_and_the_same_outline() -> None:
     )
     assert 0.9 < 0.5 * abs(cross[:, 2]).sum() < 1.1  # covers the unit square once
     assert math.isclose(len(coarse_faces(vertices, faces[:100])), 100)
+
+
+def test_pyramids_point_where_their_sensors_look() -> None:
+    sensors = [
+        Place(2.0, azimuth, elevation).sensor((0.3, 0.1, 2.0))
+        for azimuth, elevation in ((0, 0), (40, 20), (-170, -60), (0, 90), (0, -90))
+    ]
+    positions = np.array([one.position_m for one in sensors])
+    directions = np.array([one.boresight for one in sensors])
+    points, triangles = pyramids(positions, directions, 0.1)
+    each = points.reshape(-1, PYRAMID_POINTS, 3)
+    np.testing.assert_allclose(each[:, 0], positions + 0.1 * directions, atol=1e-6)
+    np.testing.assert_allclose(each[:, 1:].mean(axis=1), positions, atol=1e-6)
+    across = (each[:, 1:] - positions[:, None]) @ directions[:, :, None]
+    np.testing.assert_allclose(across, 0.0, atol=1e-6)
+    # Closed and seen from outside: the signed volume is that of a pyramid, for each.
+    corners = points[triangles].reshape(len(sensors), 6, 3, 3).astype(float)
+    corners = corners - positions[:, None, None]
+    volume = np.linalg.det(corners).sum(axis=1) / 6
+    edge = np.linalg.norm(each[0, 1] - each[0, 2])
+    np.testing.assert_allclose(np.abs(volume), edge**2 * 0.1 / 3, rtol=1e-4)

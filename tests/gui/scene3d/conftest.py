@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from PySide6.QtGui import QGuiApplication
-from scene_stage import Document, Stage, Synthesis, two_plates
+from scene_stage import Document, Placements, Stage, Synthesis, two_plates
 
 from sd2app.models.display import DisplayModel
 from sd2app.models.playback import PlaybackModel
@@ -26,7 +26,7 @@ def make_stage(qtbot: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable
         from sd2app.views.scene3d import SceneView
 
         monkeypatch.setenv("SD2_SCENE", backend)
-        document, synthesis = Document(), Synthesis()
+        document, synthesis, placements = Document(), Synthesis(), Placements()
         playback, sensor, display = PlaybackModel(), SensorModel(), DisplayModel()
         log: list[str] = []
 
@@ -40,6 +40,7 @@ def make_stage(qtbot: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable
             sensor,
             display,
             synthesis,
+            placements,
             begin_drag=lambda: log.append("begin"),
             drag=drag,
             end_drag=lambda: log.append("end"),
@@ -48,7 +49,8 @@ def make_stage(qtbot: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable
         view.resize(*SIZE)
         view.show()
         QGuiApplication.processEvents()
-        made.append(Stage(view, document, playback, sensor, display, synthesis, log))
+        models = (document, playback, sensor, display, synthesis, placements)
+        made.append(Stage(view, *models, log))
         return made[-1]
 
     yield make

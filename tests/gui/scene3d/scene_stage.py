@@ -11,10 +11,14 @@ from PySide6.QtCore import QObject, QPoint, Signal
 from PySide6.QtGui import QColor
 
 from sd2app.models.display import DisplayModel
+from sd2app.models.placements import Planned
 from sd2app.models.playback import PlaybackModel
 from sd2app.models.sensor import SensorModel
 from sd2core.mesh import MeshSequence
+from sd2core.placements import Place
+from sd2core.sensor import PAPER_RADAR
 from sd2core.timebase import Timebase
+from sd2core.whereabouts import Sight
 
 
 class Document(QObject):
@@ -44,6 +48,22 @@ class Synthesis(QObject):
         return super().__getattribute__(name)
 
 
+class Placements(QObject):
+    """Planned places as the test wants them, and which was picked."""
+
+    changed = Signal()
+    radar = PAPER_RADAR
+    shown = True
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.planned = Planned()
+        self.picked: list[int] = []
+
+    def use(self, number: int) -> None:
+        self.picked.append(number)
+
+
 @dataclass
 class Stage:
     """The view with everything it follows."""
@@ -54,6 +74,7 @@ class Stage:
     sensor: SensorModel
     display: DisplayModel
     synthesis: Synthesis
+    placements: Placements
     log: list[str]
 
     def open(self, mesh: MeshSequence | None) -> None:
@@ -70,6 +91,23 @@ class Stage:
             visible=np.asarray(visible, bool),
         )
         self.synthesis.frame_changed.emit()
+
+    def plan(self, places: tuple[Place, ...], beyond: tuple[bool, ...] | None = None) -> None:
+        """Plan places around (0, 0, 2)."""
+        sensors = tuple(place.sensor((0.0, 0.0, 2.0)) for place in places)
+        sight = None
+        if beyond is not None:
+            nothing = np.zeros(len(places))
+            sight = Sight(np.array(beyond), nothing, nothing)
+        self.placements.planned = Planned(places, sensors, sight)
+        self.placements.changed.emit()
+
+    def marker_middles_m(self) -> list[tuple[float, float, float]]:
+        """Inside every marker, away from its edges."""
+        return [
+            tuple(np.add(sensor.position_m, np.multiply(0.03, sensor.boresight)).tolist())
+            for sensor in self.placements.planned.sensors
+        ]
 
     def pixel_of(self, point_m: tuple[float, float, float]) -> QPoint:
         """Where in the view a point is."""

@@ -11,6 +11,8 @@ from PySide6.QtGui import QColor, QGuiApplication
 from PySide6.QtTest import QTest
 from scene_stage import LEFT, RIGHT, Stage, two_plates
 
+from sd2core.placements import Place
+
 pytestmark = pytest.mark.gl
 
 
@@ -72,3 +74,12 @@ def test_closing_and_opening_again_is_safe(gl_stage: Stage, make_stage: Any, qtb
     again.view.set_view("camera")
     again.scatter(np.full(8, 1.5), np.ones(8, bool))
     assert again.colour_at(LEFT).red() > again.colour_at(LEFT).blue() + 60
+
+
+def test_planned_places_have_the_colours_of_their_ranges(gl_stage: Stage) -> None:
+    gl_stage.view.set_view("side")
+    gl_stage.plan((Place(0.9), Place(1.9, 0.0, 30.0)))
+    gl_stage.view.grab()
+    near, far = (gl_stage.colour_at(point_m) for point_m in gl_stage.marker_middles_m())
+    assert near.green() > near.blue() + 60
+    assert far.blue() > far.green() + 10

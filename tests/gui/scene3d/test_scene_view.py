@@ -19,6 +19,7 @@ from scene_stage import LEFT, RIGHT, Stage, two_plates
 from sd2app.views.scene3d import choose, image_backend
 from sd2app.views.scene3d.colours import SceneColours
 from sd2core.mesh import MeshSequence
+from sd2core.placements import Place, PlacementCloud
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 
@@ -516,3 +517,54 @@ def test_a_gpu_that_draws_gets_the_window(
     monkeypatch.setattr(choose, "_has_gpu_device", lambda: gpu)
     monkeypatch.setattr(choose, "opengl_renderer", lambda: renderer)
     assert choose.chosen_backend() == expected
+
+
+# Planned places
+
+
+def test_planned_places_are_drawn_in_the_colour_of_their_range(stage: Stage) -> None:
+    stage.view.set_view("side")
+    stage.plan((Place(0.9), Place(1.9, 0.0, 30.0)))
+    stage.view.grab()
+    near, far = (stage.colour_at(point_m) for point_m in stage.marker_middles_m())
+    # Bright yellow and dark violet, both shaded.
+    assert near.green() > near.blue() + 60
+    assert far.blue() > far.green() + 10
+    stage.placements.shown = False
+    stage.placements.changed.emit()
+    ground = stage.view.scene.colours.background
+    assert greyness(stage.colour_at(stage.marker_middles_m()[1])) <= greyness(QColor(ground)) + 6
+
+
+def test_a_place_beyond_the_radar_has_the_colour_of_a_warning(stage: Stage) -> None:
+    stage.view.set_view("side")
+    stage.plan((Place(0.9), Place(1.9, 0.0, 30.0)), (False, True))
+    stage.view.grab()
+    colour = stage.colour_at(stage.marker_middles_m()[1])
+    assert colour.red() > colour.blue() + 40
+
+
+def test_a_click_on_a_place_picks_it_and_its_words_are_shown(stage: Stage) -> None:
+    stage.view.set_view("side")
+    stage.plan((Place(0.9), Place(1.9, 0.0, 30.0)))
+    stage.view.grab()
+    place = stage.pixel_of(tuple(stage.view.scene.markers.positions_m[1]))
+    widget = stage.view.childAt(place)
+    QTest.mouseMove(widget, place + QPoint(60, 60))
+    before = as_array(stage.view.grab().toImage())
+    QTest.mouseMove(widget, place)
+    assert stage.view.navigator.marker == 1
+    assert widget.cursor().shape() == Qt.CursorShape.PointingHandCursor
+    assert (as_array(stage.view.grab().toImage()) != before).any()
+    QTest.mouseClick(widget, Qt.MouseButton.LeftButton, pos=place)
+    assert stage.placements.picked == [1]
+    assert stage.log == []
+
+
+def test_a_thousand_places_are_one_actor(stage: Stage) -> None:
+    renderer = stage.view.scene.renderer
+    count = renderer.GetActors().GetNumberOfItems()
+    stage.plan(PlacementCloud(1000, (1.0, 4.0), (-180.0, 180.0), (-90.0, 90.0)).places())
+    stage.view.grab()
+    assert len(stage.view.scene.markers.positions_m) == 1000
+    assert renderer.GetActors().GetNumberOfItems() == count

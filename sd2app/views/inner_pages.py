@@ -1,0 +1,101 @@
+"""Several pages inside a panel: one at a time, a button for each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import (
+    QButtonGroup,
+    QHBoxLayout,
+    QSizePolicy,
+    QStackedWidget,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+
+class InnerPage(NamedTuple):
+    """What is on its button, what that says, and the page."""
+
+    name: str
+    tip: str
+    page: QWidget
+
+
+class InnerPages(QWidget):
+    """Buttons on top, the page below.
+
+    Parameters
+    ----------
+    pages : sequence of InnerPage
+    beside : QWidget, optional
+        Put to the right of the buttons.
+
+    Signals
+    -------
+    turned : int
+        Number of the page that is shown now.
+    """
+
+    turned = Signal(int)
+
+    def __init__(
+        self,
+        pages: Sequence[InnerPage],
+        beside: QWidget | None = None,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._pages = QStackedWidget(self)
+        self._pages.currentChanged.connect(self.turned)
+        self._buttons = QButtonGroup(self)
+        row = QHBoxLayout()
+        row.setSpacing(6)
+        for place, page in enumerate(pages):
+            self._pages.addWidget(page.page)
+            button = self._button(page)
+            button.setChecked(place == 0)
+            self._buttons.addButton(button, place)
+            row.addWidget(button)
+        self._buttons.idClicked.connect(self._pages.setCurrentIndex)
+        self._pages.currentChanged.connect(self._give_room)
+        self._give_room(0)
+        if beside is None:
+            row.addStretch(1)
+        else:
+            row.addWidget(beside, 1)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(6)
+        layout.addLayout(row)
+        layout.addWidget(self._pages, 1)
+
+    @property
+    def shown(self) -> int:
+        """Number of the page that is shown."""
+        return self._pages.currentIndex()
+
+    def turn_to(self, place: int) -> None:
+        """Show a page."""
+        self._buttons.button(place).setChecked(True)
+        self._pages.setCurrentIndex(place)
+
+    def _give_room(self, shown: int) -> None:
+        """The page that is shown says how much room is needed, and no other."""
+        policy = QSizePolicy.Policy
+        for place in range(self._pages.count()):
+            kept = policy.Preferred if place == shown else policy.Ignored
+            self._pages.widget(place).setSizePolicy(policy.Preferred, kept)
+
+    def _button(self, page: InnerPage) -> QToolButton:
+        button = QToolButton(self)
+        button.setText(page.name)
+        button.setToolTip(page.tip)
+        button.setAccessibleName(page.name)
+        button.setAccessibleDescription(page.tip)
+        button.setCheckable(True)
+        button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        return button
