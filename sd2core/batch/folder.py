@@ -175,18 +175,25 @@ class BatchFolder:
         Sd2Error
             When there is no batch, or its description is damaged.
         """
-        about = self._read_about()
+        about = self.read_about()
         state: State = about["state"]
         if state == "running" and not self.live:
             # It may have come to its end between the two looks.
-            again: State = self._read_about()["state"]
+            again: State = self.read_about()["state"]
             state = "died" if again == "running" else again
         return status_of(state, about, read_events(self.progress))
 
     def _about_if_any(self) -> dict[str, Any]:
-        return self._read_about() if self.exists else {}
+        return self.read_about() if self.exists else {}
 
-    def _read_about(self) -> dict[str, Any]:
+    def read_about(self) -> dict[str, Any]:
+        """What its description says; of a run that died still that it runs.
+
+        Raises
+        ------
+        Sd2Error
+            When there is no batch, or the description is damaged.
+        """
         try:
             about = json.loads(self.about.read_text(encoding="utf-8"))
         except FileNotFoundError:
