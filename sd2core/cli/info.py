@@ -1,4 +1,4 @@
-"""``sd2 info``: what is in a recording, video, mesh, capture, map, pairs or denoiser."""
+"""``sd2 info``: what is in a recording, video, mesh, capture, map, pairs, data set or model."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser = add_command(
         commands,
         "info",
-        "what is in a recording, video, mesh, radar capture, Doppler map, pairs or denoiser",
+        "what is in a recording, video, mesh, radar capture, Doppler map, pairs, data set or model",
         handler=_info,
         examples="  sd2 info walk.sd2\n  sd2 info walk.npz --json",
     )
@@ -100,6 +100,10 @@ def describe(path: Path, options: argparse.Namespace) -> Description:
         from sd2core.cli.info_model import describe_model_file
 
         return describe_model_file(path)
+    if kind == "dataset":
+        from sd2core.cli.info_dataset import describe_dataset_at
+
+        return describe_dataset_at(path)
     from sd2core.spectrum import DopplerMap
 
     return describe_map(path, DopplerMap.load(path))

@@ -37,7 +37,7 @@ def add_json(parser: argparse._ActionsContainer) -> None:
     parser.add_argument("--json", action="store_true", help="print JSON, for other programs")
 
 
-def add_axis(parser: argparse.ArgumentParser) -> None:
+def add_axis(parser: argparse._ActionsContainer) -> None:
     """Add the velocity axis."""
     parser.add_argument(
         "--bins",

@@ -10,6 +10,7 @@ from sd2core.cli import (
     compare_meshes,
     denoise,
     eval,
+    export,
     fetch_models,
     fit,
     importing,
@@ -46,6 +47,7 @@ examples:
   sd2 labels suggest walk.sd2                 where something moves
   sd2 train pairs.zarr --out runs/s4          teach a denoiser from pairs
   sd2 classify train pairs.zarr --out g.safetensors    teach a classifier of gestures
+  sd2 export walk.sd2 --out walk.zarr         a data set of segments to learn from
   sd2 ladder walk.npz --quick                 what accuracy this scene requires
 
 `sd2 COMMAND --help` explains one command.
@@ -72,6 +74,7 @@ def build_parser() -> tuple[argparse.ArgumentParser, argparse._SubParsersAction]
         classify,
         labels,
         pairs,
+        export,
         ladder,
         placements,
         compare_meshes,

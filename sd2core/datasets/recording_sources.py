@@ -269,7 +269,8 @@ class _Opened:
             if recording.holds_radar_map:
                 radar = recording.load_radar_map().doppler
             else:
-                radar = doppler_map(recording.load_capture(), axis=self._making.synthesis.axis)
+                axis = self._making.synthesis.axis
+                radar = doppler_map(recording.load_capture(), axis=axis, clutter="mean")
             self._radar = radar.shifted(recording.radar_offset_s)
         return self._radar
 

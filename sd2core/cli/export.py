@@ -1,0 +1,337 @@
+"""``sd2 export``: a data set to learn from."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shlex
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sd2core.cli.options import (
+    add_axis,
+    add_command,
+    add_json,
+    bin_list,
+    positive_float,
+    positive_int,
+    share,
+)
+from sd2core.cli.output import counted, print_facts, print_json, progress_bar
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    from sd2core.datasets.options import DatasetOptions
+    from sd2core.datasets.planning import Forecast
+    from sd2core.datasets.recording_sources import Making
+    from sd2core.datasets.source import LazySource
+    from sd2core.datasets.writing import Written
+
+_KINDS = "synthetic,denoised,simulated,real"
+_LINE_EVERY_S = 0.1
+
+
+def add_commands(commands: argparse._SubParsersAction) -> None:
+    """Add ``export``."""
+    parser = add_command(
+        commands,
+        "export",
+        "write a data set to learn from: segments with labels, sensors and provenance",
+        handler=_export,
+        description=(
+            "Cuts maps into segments of 72 frames and writes them with a label per frame and per\n"
+            "segment, subject, sensor, provenance, and a split by subject. Beside the data set\n"
+            "come a card (.card.md, .card.json) and a preview sheet (.png). Inputs are recordings\n"
+            "or folders of them, pairs, and Doppler maps. What is there already is left alone:\n"
+            "stopped, or with more inputs, the same command goes on."
+        ),
+        examples=(
+            "  sd2 export walk.sd2 --out walk.zarr\n"
+            "  sd2 export anna.sd2 ben.sd2 --placements grid.json --out gestures.h5\n"
+            "  sd2 export campaign.zarr --kinds denoised,simulated --out campaign-set.zarr\n"
+            "  sd2 export recordings/ --out set.zarr --dry-run"
+        ),
+    )
+    parser.add_argument(
+        "inputs", type=Path, nargs="+", metavar="INPUT", help="recordings, pairs, maps, folders"
+    )
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="FILE", help="ends in .zarr, .h5 or .npz"
+    )
+    _add_content(parser)
+    _add_making(parser)
+    parser.add_argument(
+        "--dry-run", action="store_true", help="say how much it would be, and write nothing"
+    )
+    told = parser.add_mutually_exclusive_group()
+    add_json(told)
+    told.add_argument(
+        "--progress-json", action="store_true", help="print a JSON line per step, for programs"
+    )
+
+
+def _add_content(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("segments")
+    group.add_argument(
+        "--kinds", default=_KINDS, metavar="LIST", help=f"some of {_KINDS} (default: all)"
+    )
+    group.add_argument(
+        "--length", type=positive_int, default=72, metavar="N", help="frames (default: 72)"
+    )
+    group.add_argument(
+        "--overlap",
+        type=int,
+        default=10,
+        metavar="N",
+        help="frames that neighbours share (default: 10)",
+    )
+    group.add_argument(
+        "--rate",
+        type=positive_float,
+        metavar="F",
+        help="frames per second; other sources are brought to it (default: the first one's)",
+    )
+    group.add_argument(
+        "--label-rule",
+        choices=("foreground", "majority"),
+        default="foreground",
+        help="a segment is called as the gesture that most of its frames have, if they are"
+        " enough, or as most frames are, background included (default: foreground)",
+    )
+    group.add_argument(
+        "--min-share",
+        type=share,
+        default=0.2,
+        metavar="P",
+        help="how much of a segment is enough for foreground (default: 20%%)",
+    )
+    group.add_argument("--title", default="", metavar="TEXT", help="of the card and the sheet")
+    people = parser.add_argument_group("people")
+    people.add_argument(
+        "--subjects",
+        type=_names,
+        metavar="NAMES",
+        help="who each recording and map is of, separated by commas, in their order (default:"
+        " everyone another person)",
+    )
+    people.add_argument(
+        "--validation", type=_names, metavar="NAMES", help="subjects to validate with"
+    )
+    people.add_argument(
+        "--test",
+        type=_names,
+        metavar="NAMES",
+        help="subjects to test with (default: a sixth of all, and as many to validate)",
+    )
+    people.add_argument(
+        "--labels",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="labels of a Doppler map; once for each map, in their order",
+    )
+
+
+def _add_making(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("maps of recordings")
+    group.add_argument(
+        "--placements",
+        type=Path,
+        metavar="FILE",
+        help="sensors around the body besides the recording's own, as `sd2 placements` writes",
+    )
+    group.add_argument(
+        "--tolerance",
+        type=share,
+        metavar="P",
+        help="make synthetic maps as quickly as this error allows, 2%% say (default: exactly)",
+    )
+    group.add_argument(
+        "--model",
+        metavar="FILE|NAME",
+        help="the denoiser (default: that of each recording, or the bundled one)",
+    )
+    add_axis(group)
+    group.add_argument(
+        "--null-bins",
+        type=bin_list,
+        metavar="LIST",
+        help="bins to empty in all kinds (default: those of the synthetic maps)",
+    )
+
+
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(name.strip() for name in text.split(",") if name.strip())
+
+
+def _export(options: argparse.Namespace) -> int:
+    lines = _Lines() if options.progress_json else None
+    try:
+        return _exported(options, lines)
+    except Sd2Error as error:
+        if lines is None:
+            raise
+        lines.say("error", text=str(error))
+        return 1
+
+
+def _exported(options: argparse.Namespace, lines: _Lines | None) -> int:
+    from sd2core.datasets.inputs import gather
+    from sd2core.datasets.layout import format_of
+
+    format_of(options.out)
+    wanted = _dataset_options(options)
+    making = _making(options)
+    sources = gather(options.inputs, making, subjects=options.subjects, label_files=options.labels)
+    if options.dry_run:
+        return _dry_run(options, sources, wanted, making)
+    from sd2core.datasets.preview import write_preview
+    from sd2core.datasets.writing import write_dataset
+
+    if lines is not None:
+        lines.say("start", format="sd2-export-progress", version=1, sources=len(sources))
+        written = write_dataset(options.out, sources, wanted, lines.progress)
+        lines.say("progress", done=0, total=0, stage="sheet")
+    else:
+        with progress_bar("Exporting", "step") as progress:
+            written = write_dataset(options.out, sources, wanted, progress)
+    sheet = write_preview(options.out)
+    if lines is not None:
+        lines.say("done", **_said(written, sheet))
+    elif options.json:
+        print_json(_said(written, sheet))
+    else:
+        _print(written, sheet)
+    return 1 if written.failed else 0
+
+
+def _dataset_options(options: argparse.Namespace) -> DatasetOptions:
+    from sd2core.datasets.options import DatasetOptions
+
+    return DatasetOptions(
+        kinds=tuple(options.kinds.replace(" ", "").split(",")),
+        length=options.length,
+        overlap=options.overlap,
+        frame_rate_hz=options.rate,
+        null_bins=options.null_bins,
+        label_rule=options.label_rule,
+        min_share=options.min_share,
+        validation=options.validation,
+        test=options.test,
+        title=options.title,
+        provenance={"command": shlex.join(["sd2", *sys.argv[1:]])},
+    )
+
+
+def _making(options: argparse.Namespace) -> Making:
+    from sd2core.datasets.recording_sources import Making
+    from sd2core.doppler.options import chosen_options
+    from sd2core.placements import read_placements
+
+    nulled = {} if options.null_bins is None else {"null_bins": options.null_bins}
+    return Making(
+        kinds=_dataset_options(options).kinds,
+        synthesis=chosen_options("paper", options.bins, options.v_max, nulled),
+        tolerance=options.tolerance,
+        placements=None if options.placements is None else read_placements(options.placements),
+        model=options.model,
+    )
+
+
+def _dry_run(
+    options: argparse.Namespace, sources: list[LazySource], wanted: DatasetOptions, making: Making
+) -> int:
+    from sd2core.datasets.planning import Counting
+
+    with progress_bar("Counting", "source") as progress:
+        counting = Counting.of(sources, progress)
+    forecast = counting.forecast(wanted, making.synthesis.axis.bins)
+    if options.json:
+        print_json(
+            {
+                "dataset": str(options.out),
+                "sources": forecast.sources,
+                "segments": forecast.segments,
+                "segments_of_subject": forecast.of_subject,
+                "segments_of_label": forecast.of_label,
+                "segments_of_kind": forecast.of_kind,
+                "segments_of_split": forecast.of_split(),
+                "frame_rate_hz": forecast.frame_rate_hz,
+                "total_bytes": forecast.total_bytes,
+                "failed": list(forecast.failed),
+            }
+        )
+    else:
+        print_facts(f"{options.out} would hold", _forecast_facts(forecast))
+    _complain(forecast.failed)
+    return 1 if forecast.failed else 0
+
+
+def _forecast_facts(forecast: Forecast) -> dict[str, str]:
+    return {
+        "segments": f"{forecast.segments:,} of {counted(forecast.sources, 'source')}",
+        "size": f"{forecast.total_bytes / 1e6:,.1f} MB before compression",
+        "kinds": _listed(forecast.of_kind),
+        "labels": _listed(forecast.of_label),
+        "splits": _listed(forecast.of_split()),
+        "frame rate": f"{forecast.frame_rate_hz:g} frames/s",
+    }
+
+
+def _said(written: Written, sheet: Path) -> dict[str, Any]:
+    from sd2core.datasets.card import card_paths
+
+    markdown, as_json, _ = card_paths(written.path)
+    return {
+        "dataset": str(written.path),
+        "segments": written.segments,
+        "sources": written.sources,
+        "added": written.added,
+        "card": str(markdown),
+        "card_json": str(as_json),
+        "sheet": str(sheet),
+        "failed": [f"{one.key.title}: {one.reason}" for one in written.failed],
+    }
+
+
+def _print(written: Written, sheet: Path) -> None:
+    said = _said(written, sheet)
+    before = written.sources - written.added
+    print_facts(
+        str(written.path),
+        {
+            "segments": f"{written.segments:,} of {counted(written.sources, 'source')}"
+            + (f", of which {before:,} were there already" if before else ""),
+            "card": said["card"],
+            "sheet": said["sheet"],
+        },
+    )
+    _complain(said["failed"])
+
+
+def _complain(failed: tuple[str, ...] | list[str]) -> None:
+    for one in failed:
+        print(f"sd2: left out {one}", file=sys.stderr)
+
+
+def _listed(counts: dict[Any, int]) -> str:
+    return ", ".join(f"{name} {count:,}" for name, count in counts.items())
+
+
+class _Lines:
+    """Prints one JSON object per line, at once."""
+
+    def __init__(self) -> None:
+        self._last_s = -1.0
+
+    def say(self, event: str, **content: Any) -> None:
+        print(json.dumps({"event": event, **content}, ensure_ascii=False), flush=True)
+
+    def progress(self, done: int, total: int) -> None:
+        now_s = time.monotonic()
+        if now_s - self._last_s >= _LINE_EVERY_S or done == total:
+            self._last_s = now_s
+            self.say("progress", done=done, total=total, stage="segments")

@@ -1,0 +1,284 @@
+"""The preview sheet of a data set: some segments of every label, as pictures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.datasets.card import card_paths
+from sd2core.datasets.layout import Header
+from sd2core.datasets.reading import Dataset, open_dataset
+from sd2core.datasets.source import KINDS
+from sd2core.figure_files import save_figure
+from sd2core.labels.label_set import GESTURES
+from sd2core.spectrum import MapKind
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+EXAMPLES = 3
+"""Segments per label."""
+
+_LOW_DB = -30.0
+_MOST_SEGMENTS = 1_000_000
+"""Are looked at when examples are chosen; of more, the first ones."""
+_IN_A_BAND = 12
+_CELL_IN = (1.02, 0.86)
+_LEFT_IN = 0.8
+_PIXELS_PER_INCH = 150
+_INK, _MUTED, _NOTHING = "#1d232b", "#5a6370", "#eef0f3"
+_NO_COLOUR = "#8a8f98"
+_TITLES: dict[MapKind, str] = {
+    "synthetic": "Synthetic",
+    "denoised": "Denoised",
+    "simulated": "Radar\n(simulated)",
+    "real": "Radar (real)",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Example:
+    """One column of the sheet.
+
+    Parameters
+    ----------
+    label : int
+        Place in the header's labels.
+    levels : dict of kind to float64 array, shape (bins, frames)
+        In dB below the strongest cell of the segment in that kind; empty where it is zero.
+    marked : bool array, shape (frames,)
+        Frames that have the label.
+    words : tuple of str
+        Who, and from where.
+    """
+
+    label: int
+    levels: dict[MapKind, NDArray[np.float64]]
+    marked: NDArray[np.bool_]
+    words: tuple[str, str]
+
+
+def write_preview(path: Path) -> Path:
+    """Draw the sheet of a finished data set beside it; where it is.
+
+    Raises
+    ------
+    Sd2Error
+        When the path holds no finished data set.
+    """
+    with open_dataset(path) as dataset:
+        name = dataset.path.name
+        title = dataset.header.title or name
+        figure = draw_preview(title, dataset.header, examples_of(dataset), len(dataset))
+    out = card_paths(path)[2]
+    save_figure(figure, out, {"dataset": name, "what": "preview sheet"}, _PIXELS_PER_INCH)
+    return out
+
+
+def examples_of(dataset: Dataset, each: int = EXAMPLES) -> list[Example]:
+    """Segments that show their label well, of different people and places where there are."""
+    header = dataset.header
+    columns = {
+        name: np.asarray(dataset[name][:_MOST_SEGMENTS])
+        for name in ("segment_label", "purity", "available", "subject", "placement", "range_m")
+    }
+    found = []
+    for label in range(len(header.labels)):
+        rows = np.flatnonzero(columns["segment_label"] == label)
+        kinds = columns["available"][rows].sum(axis=1)
+        # Those of most kinds first, then those that hold most of their label.
+        order = rows[np.lexsort((rows, -columns["purity"][rows], -kinds))]
+        found += [
+            _example(dataset, columns, label, row) for row in _different(order, columns, each)
+        ]
+    return found
+
+
+def draw_preview(title: str, header: Header, examples: list[Example], segments: int) -> Figure:
+    """Draw the sheet: a column per segment, a row per kind."""
+    from matplotlib.figure import Figure
+
+    kinds = [kind for kind in KINDS if any(kind in one.levels for one in examples)]
+    bands = _bands(examples)
+    columns = max(map(len, bands))
+    wide, high = _CELL_IN
+    band_in = len(kinds) * high + 0.95
+    width, height = _LEFT_IN + columns * wide + 0.8, len(bands) * band_in + 0.95
+    figure = Figure(figsize=(width, height), dpi=_PIXELS_PER_INCH)
+    figure.set_facecolor("white")
+    shown: Any = None
+    for number, band in enumerate(bands):
+        top = height - 0.85 - number * band_in
+        for column, example in enumerate(band):
+            left = _LEFT_IN + column * wide
+            first_of_label = column == 0 or band[column - 1].label != example.label
+            if first_of_label:
+                _heading(figure, header, example.label, left / width, top / height)
+            _words(figure, example, (left + 0.45 * wide) / width, (top - 0.33) / height)
+            for row, kind in enumerate(kinds):
+                bottom = top - 0.62 - (row + 1) * high + 0.08
+                axes = figure.add_axes(
+                    (left / width, bottom / height, 0.92 * wide / width, 0.90 * high / height)
+                )
+                shown = _cell(axes, header, example, kind) or shown
+                if row == 0:
+                    _mark(axes, header, example)
+                axes.tick_params(labelbottom=row == len(kinds) - 1, labelleft=column == 0)
+                if column == 0:
+                    figure.text(0.32 / width, (bottom + 0.45 * high) / height, _TITLES[kind],
+                                fontsize=7.5, color=_INK, rotation=90, ha="center",
+                                va="center", weight="bold")  # fmt: skip
+    _frame(figure, title, header, segments, shown, (width, height))
+    return figure
+
+
+def _bands(examples: list[Example]) -> list[list[Example]]:
+    """Columns in rows of the sheet; the examples of a label stay together."""
+    groups = [
+        [one for one in examples if one.label == label]
+        for label in dict.fromkeys(one.label for one in examples)
+    ]
+    count = -(-len(examples) // _IN_A_BAND)
+    each = -(-len(groups) // count)
+    return [
+        [one for group in groups[start : start + each] for one in group]
+        for start in range(0, len(groups), each)
+    ]
+
+
+def _different(order: NDArray[np.int64], columns: dict[str, NDArray], each: int) -> list[int]:
+    """The first rows of an order, of other people and places as long as there are some."""
+    chosen: list[int] = []
+    # First other people, then other places, then what there is.
+    for same in (("subject",), ("subject", "placement"), ()):
+        seen = {tuple(int(columns[name][row]) for name in same) for row in chosen}
+        for row in order[: 1000 * each].tolist():
+            if len(chosen) == each:
+                return chosen
+            whose = tuple(int(columns[name][row]) for name in same)
+            if row not in chosen and (not same or whose not in seen):
+                seen.add(whose)
+                chosen.append(row)
+    return chosen
+
+
+def _example(dataset: Dataset, columns: dict[str, NDArray], label: int, row: int) -> Example:
+    header = dataset.header
+    levels = {}
+    for kind in header.kinds:
+        if columns["available"][row, KINDS.index(kind)]:
+            values = np.asarray(dataset[kind][row], np.float64).T
+            most = values.max()
+            with np.errstate(divide="ignore", invalid="ignore"):
+                level = 10.0 * np.log10(values / most)
+            level[list(header.null_bins)] = np.nan
+            levels[kind] = level if most > 0 else np.full_like(level, -np.inf)
+    range_m = float(columns["range_m"][row])
+    azimuth_deg = float(dataset["azimuth_deg"][row])
+    where = f"{range_m:.1f} m, {azimuth_deg + 0.0:.0f}°" if np.isfinite(range_m) else ""
+    if not where:
+        x, y, z = np.round(dataset["sensor_position_m"][row], 1) + 0.0
+        where = f"at {x:g}, {y:g}, {z:g} m"
+    who = header.subjects[int(columns["subject"][row])]
+    marked = np.asarray(dataset["label"][row]) == label
+    return Example(label, levels, marked, (who, where))
+
+
+def _cell(axes: Axes, header: Header, example: Example, kind: MapKind) -> Any:
+    """One segment in one kind."""
+    length_s = header.length / header.frame_rate_hz
+    limit = header.axis.v_max_mps
+    axes.set_facecolor(_NOTHING)
+    shown = None
+    if kind in example.levels:
+        shown = axes.imshow(
+            np.ma.masked_invalid(np.maximum(example.levels[kind], _LOW_DB)),
+            origin="lower",
+            aspect="auto",
+            interpolation="nearest",
+            extent=(0.0, length_s, -limit, limit),
+            cmap="viridis",
+            vmin=_LOW_DB,
+            vmax=0.0,
+        )
+    else:
+        axes.text(0.5, 0.5, "none", transform=axes.transAxes, fontsize=7, color=_MUTED,
+                  ha="center", va="center")  # fmt: skip
+    axes.set_xlim(0.0, length_s)
+    axes.set_ylim(-limit, limit)
+    axes.set_yticks([-limit / 2, 0.0, limit / 2])
+    axes.set_xticks([0.0, round(length_s / 2, 1)])
+    axes.tick_params(labelsize=6, length=2, pad=1.5, colors=_MUTED)
+    for spine in axes.spines.values():
+        spine.set_linewidth(0.4)
+        spine.set_edgecolor(_MUTED)
+    return shown
+
+
+def _mark(axes: Axes, header: Header, example: Example) -> None:
+    """A bar over the frames that have the label."""
+    limit = header.axis.v_max_mps
+    edges_s = np.arange(header.length + 1) / header.frame_rate_hz
+    axes.fill_between(
+        edges_s, limit * 1.05, limit * 1.16, where=np.append(example.marked, False), step="post",
+        color=_colour(header.labels[example.label]), linewidth=0, clip_on=False,
+    )  # fmt: skip
+
+
+def _heading(figure: Figure, header: Header, label: int, x: float, y: float) -> None:
+    name = header.labels[label]
+    of_class = header.classes.get(name)
+    figure.text(x, y, name, fontsize=9.5, weight="bold", color=_INK, va="top", parse_math=False)
+    if of_class and of_class != name:
+        figure.text(x, y - 0.145 / figure.get_figheight(), of_class, fontsize=7, color=_MUTED,
+                    va="top", parse_math=False)  # fmt: skip
+
+
+def _words(figure: Figure, example: Example, x: float, y: float) -> None:
+    who, where = example.words
+    short = who if len(who) <= 16 else who[:15] + "…"
+    figure.text(x, y, f"{short}\n{where}", fontsize=6.3, color=_MUTED, ha="center", va="top",
+                parse_math=False, linespacing=1.15)  # fmt: skip
+
+
+def _frame(
+    figure: Figure,
+    title: str,
+    header: Header,
+    segments: int,
+    shown: Any,
+    size: tuple[float, float],
+) -> None:
+    """Title, what is simulated, and what the colours mean."""
+    width, height = size
+    figure.text(0.3 / width, 1 - 0.2 / height, title, fontsize=12, weight="bold", color=_INK,
+                va="top", parse_math=False)  # fmt: skip
+    said = (
+        f"{segments:,} segments of {header.length} frames"
+        f" ({header.length / header.frame_rate_hz:.1f} s). Coloured bars: frames with the label."
+        + (" The radar is simulated." if header.simulated else "")
+    )
+    figure.text(0.3 / width, 1 - 0.46 / height, said, fontsize=7.5, color=_MUTED, va="top")
+    figure.text(_LEFT_IN / width, 0.1 / height,
+                "across: time in the segment (s); upwards: velocity (m/s, approaching +)",
+                fontsize=7, color=_MUTED, va="bottom")  # fmt: skip
+    if shown is not None:
+        bar = figure.add_axes(
+            ((width - 0.6) / width, 0.55 / height, 0.12 / width, (height - 1.9) / height)
+        )
+        scale = figure.colorbar(shown, cax=bar)
+        scale.set_label(
+            "dB relative to each segment's own strongest cell", fontsize=7, color=_MUTED
+        )
+        scale.ax.tick_params(labelsize=6.5, colors=_MUTED)
+        scale.outline.set_linewidth(0.4)
+
+
+def _colour(label: str) -> str:
+    known = GESTURES.find(label)
+    return _NO_COLOUR if known is None else known.colour
