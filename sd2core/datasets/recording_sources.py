@@ -25,6 +25,8 @@ from sd2core.datasets.source import (
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.labels.spans import Labels
+from sd2core.ladder.carry_out import synthesizer_for
+from sd2core.ladder.choosing import choose
 from sd2core.mesh import MeshSequence
 from sd2core.mocap.recording_pairs import on_clock
 from sd2core.placements import Placements
@@ -284,9 +286,6 @@ def _synthesizer(
     """What counts the mesh, and the plan that was chosen, for provenance."""
     if making.tolerance is None:
         return Synthesizer(mesh, making.synthesis), {}
-    from sd2core.ladder.carry_out import synthesizer_for
-    from sd2core.ladder.choosing import choose
-
     choice = choose(
         mesh, sensor, tolerance=making.tolerance, dragging=False, options=making.synthesis
     )

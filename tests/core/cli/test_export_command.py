@@ -1,0 +1,115 @@
+"""``sd2 export``: from recordings to a data set with its card and its preview sheet."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cli_outcome import Sd2
+from matplotlib.image import imread
+from swinging_recordings import recording
+
+from sd2core.datasets.reading import open_dataset
+
+SMALL = ("--kinds", "synthetic,simulated", "--length", 30, "--overlap", 5)
+
+
+@pytest.fixture
+def people(tmp_path: Path) -> Path:
+    (tmp_path / "people").mkdir()
+    for name in ("anna", "ben", "carla"):
+        recording(tmp_path / "people" / f"{name}.sd2")
+    return tmp_path / "people"
+
+
+def test_a_folder_of_recordings_becomes_a_data_set_with_card_and_sheet(
+    sd2: Sd2, people: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "swings.h5"
+    told = sd2("export", people, "--out", out, *SMALL, "--title", "Swings", "--json")
+    assert told.code == 0, told.err
+    said = json.loads(told.out)
+    assert (said["sources"], said["segments"], said["failed"]) == (3, 15, [])
+    card = json.loads(Path(said["card_json"]).read_text(encoding="utf-8"))
+    with open_dataset(out) as dataset:
+        for name, array in (("label", "segment_label"), ("subject", "subject"), ("split", "split")):
+            counts = np.bincount(dataset[array][:], minlength=len(card[f"segments_of_{name}"]))
+            assert list(card[f"segments_of_{name}"].values()) == counts.tolist()
+        frames = np.bincount(dataset["label"][:].ravel(), minlength=len(dataset.header.labels))
+        assert list(card["frames_of_label"].values()) == frames.tolist()
+        assert card["range_m"] == pytest.approx([dataset["range_m"][:].min()] * 2, abs=1e-3)
+    assert card["segments_of_kind"] == {"synthetic": 15, "simulated": 15}
+    assert card["splits"] == {"train": ["anna"], "validation": ["ben"], "test": ["carla"]}
+    words = Path(said["card"]).read_text(encoding="utf-8")
+    assert words.startswith("# Swings\n\n15 segments of 30 frames")
+    assert "of a radar whose signal was computed; no radar was there" in words
+    assert "No real radar is in it." in words
+    sheet = imread(said["sheet"])
+    assert sheet.shape[0] > 200
+    assert len(np.unique(sheet.reshape(-1, sheet.shape[2]), axis=0)) > 100
+
+    info = sd2("info", out)
+    assert info.code == 0
+    assert info.out.startswith(f"Data set {out}")
+    assert "note: No real radar is in it." in info.out
+    assert json.loads(sd2("info", out, "--json").out)["segments"] == 15
+
+
+def test_a_dry_run_says_what_would_be_written_and_writes_nothing(
+    sd2: Sd2, people: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "swings.zarr"
+    before = sorted(tmp_path.iterdir())
+    told = sd2("export", people, "--out", out, *SMALL, "--dry-run", "--json")
+    assert told.code == 0, told.err
+    assert sorted(tmp_path.iterdir()) == before
+    said = json.loads(told.out)
+    assert said["segments"] == 15
+    assert said["segments_of_split"] == {"train": 5, "validation": 5, "test": 5}
+    assert "would hold" in sd2("export", people, "--out", out, *SMALL, "--dry-run").out
+    assert sd2("export", people, "--out", out, *SMALL).code == 0
+    again = sd2("export", people, "--out", out, *SMALL)
+    assert "of which 3 were there already" in again.out
+
+
+def test_programs_are_told_line_by_line(sd2: Sd2, people: Path, tmp_path: Path) -> None:
+    told = sd2("export", people, "--out", tmp_path / "s.npz", *SMALL, "--progress-json")
+    lines = [json.loads(line) for line in told.out.splitlines()]
+    assert [line["event"] for line in lines[:1] + lines[-1:]] == ["start", "done"]
+    steps = [line for line in lines if line["event"] == "progress" and line["stage"] == "segments"]
+    assert steps[-1]["done"] == steps[-1]["total"] > 0
+    refused = sd2("export", people, "--out", tmp_path / "s.csv", *SMALL, "--progress-json")
+    assert refused.code == 1
+    assert "ending in .zarr" in json.loads(refused.out)["text"]
+
+
+def test_one_damaged_recording_is_reported_and_the_rest_is_written(
+    sd2: Sd2, people: Path, tmp_path: Path
+) -> None:
+    (people / "ben.sd2" / "mesh.npz").write_bytes(b"damaged")
+    told = sd2("export", people, "--out", tmp_path / "s.zarr", *SMALL)
+    assert told.code == 1
+    assert "left out ben of ben: " in told.err
+    assert "mesh.npz" in told.err
+    with open_dataset(tmp_path / "s.zarr") as dataset:
+        assert dataset.header.subjects == ("anna", "carla")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--kinds", "radar"), "some of synthetic, denoised, simulated, real"),
+        (("--overlap", "72"), "an overlap of 0 to 71"),
+        (("--subjects", "a,b"), "2 people are named for 3 recordings"),
+        (("--test", "dora"), "'dora' is to be a test subject"),
+        (("--model", "nobody"), "There is no model called 'nobody'"),
+    ],
+)
+def test_what_cannot_be_is_explained(
+    sd2: Sd2, people: Path, tmp_path: Path, arguments: tuple[str, ...], message: str
+) -> None:
+    told = sd2("export", people, "--out", tmp_path / "s.zarr", "--dry-run", *arguments)
+    assert told.code == 1
+    assert message in told.err

@@ -1,0 +1,216 @@
+"""Recordings, pairs and maps become sources: the very maps, on one clock, with their labels."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from small_pairs import write_pairs
+from swinging_recordings import FRAMES, RATE_HZ, recording
+
+from sd2core.datasets.inputs import gather
+from sd2core.datasets.options import DatasetOptions
+from sd2core.datasets.planning import Counting
+from sd2core.datasets.reading import open_dataset
+from sd2core.datasets.recording_sources import Making
+from sd2core.datasets.source import Source
+from sd2core.datasets.writing import write_dataset
+from sd2core.denoise.files import load_model
+from sd2core.doppler import PRESETS, Synthesizer
+from sd2core.errors import Sd2Error
+from sd2core.fmcw.processing import doppler_map
+from sd2core.labels.files import write_labels
+from sd2core.labels.label_set import Label, LabelSet
+from sd2core.labels.spans import Labels, Span, Track
+from sd2core.ladder import Choice, choosing
+from sd2core.ladder.carry_out import synthesizer_for
+from sd2core.pairs import read_pairs
+from sd2core.placements import PlacementGrid
+from sd2core.progress import silent
+from sd2core.whereabouts import Whereabouts
+
+GRID = PlacementGrid((1.0, 2.5), (0.0, 30.0))
+SWINGS = LabelSet("Swings", (Label("swing", "#0072b2", "1", "vertical"),))
+
+
+def made(*paths: Path, making: Making | None = None, **others: object) -> list[Source]:
+    lazily = gather(paths, making or Making(), **others)  # type: ignore[arg-type]
+    return [one.load(silent) for one in lazily]
+
+
+def test_a_recording_is_its_own_maps_on_the_clock_of_its_mesh(tmp_path: Path) -> None:
+    one = recording(tmp_path / "anna.sd2", offset_s=1.0, radar_frames=60, simulated=False)
+    (source,) = made(one.folder)
+    assert source.key == ("anna", "anna", 0)
+    assert tuple(source.maps) == ("synthetic", "denoised", "real")
+    synthetic = Synthesizer(one.load_mesh(), PRESETS["paper"]).map(one.sensor)
+    assert np.array_equal(source.maps["synthetic"].values, synthetic.values)
+    denoised = load_model("denoiser").denoise(synthetic)
+    assert np.array_equal(source.maps["denoised"].values, denoised.values)
+    # The radar is there from 1 s to 3 s of the mesh.
+    radar = doppler_map(one.load_capture(), axis=synthetic.axis, clutter="mean")
+    real = source.maps["real"]
+    assert np.array_equal(real.values[:, 30:90], radar.values)
+    assert real.present is not None
+    assert np.flatnonzero(real.present).tolist() == list(range(30, 90))
+    swings = (synthetic.times_s >= 1.0) & (synthetic.times_s < 2.0)
+    assert [source.labels[number] for number in source.label] == [
+        "swing" if there else "background" for there in swings
+    ]
+    assert source.spherical[0] == pytest.approx(2.0, abs=0.05)
+
+
+def test_every_placement_is_seen_from_there(tmp_path: Path) -> None:
+    one = recording(tmp_path / "anna.sd2")
+    making = Making(kinds=("synthetic", "simulated"), placements=GRID)
+    sources = made(one.folder, making=making)
+    assert [source.placement for source in sources] == [0, 1, 2, 3, 4]
+    assert ["simulated" in source.maps for source in sources] == [True] + [False] * 4
+    mesh = one.load_mesh()
+    maps = Synthesizer(mesh, PRESETS["paper"])
+    target_m = Whereabouts.of(mesh).target_m
+    for source, place in zip(sources[1:], GRID.places(), strict=True):
+        assert source.sensor == place.sensor(target_m)
+        assert source.spherical == pytest.approx(
+            (place.range_m, place.azimuth_deg, place.elevation_deg), abs=1e-9
+        )
+        expected = maps.map(place.sensor(target_m)).values
+        assert np.array_equal(source.maps["synthetic"].values, expected)
+
+
+def test_a_tolerance_chooses_a_plan_and_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one = recording(tmp_path / "anna.sd2", radar=False)
+    chosen = []
+
+    def choose(*scene: Any, **wish: Any) -> Choice:
+        chosen.append(choosing.choose(*scene, **wish))
+        return chosen[-1]
+
+    monkeypatch.setattr("sd2core.datasets.recording_sources.choose", choose)
+    making = Making(kinds=("synthetic",), tolerance=0.05, placements=GRID)
+    sources = made(one.folder, making=making)
+    (choice,) = chosen  # once per recording, however many placements
+    assert choice.tolerance == 0.05
+    for source in sources:
+        assert source.made_of()["plan"]["text"] == choice.plan.provenance(0.0)["plan"]["text"]
+        planned = synthesizer_for(choice.plan, one.load_mesh(), PRESETS["paper"])
+        expected = planned.map(source.sensor).values
+        assert np.array_equal(source.maps["synthetic"].values, expected)
+
+
+def test_suggestions_are_no_labels_and_classes_come_from_the_label_set(tmp_path: Path) -> None:
+    one = recording(tmp_path / "anna.sd2", radar=False)
+    one.labels = Labels(
+        (Track("Gestures"),),
+        (
+            Span(1, "Gestures", 0.5, 1.0, "swing"),
+            Span(2, "Gestures", 2.0, 2.5, "swing", origin="suggestion"),
+            Span(3, "Gestures", 3.0, 3.5, "pause"),
+        ),
+        SWINGS,
+    )
+    one.save()
+    (source,) = made(one.folder, making=Making(kinds=("synthetic",)))
+    assert source.labels == ("background", "swing", "pause")
+    assert source.classes == {"swing": "vertical"}
+    assert np.bincount(source.label).tolist() == [90, 15, 15]
+
+
+def test_a_recording_that_is_shown_without_a_denoiser_has_no_denoised_map(tmp_path: Path) -> None:
+    one = recording(tmp_path / "anna.sd2", radar=False)
+    one.bundled_denoiser = ""
+    one.save()
+    (source,) = made(one.folder)
+    assert tuple(source.maps) == ("synthetic",)
+    (lazily,) = gather([one.folder], Making())
+    assert lazily.outline is not None
+    assert lazily.outline().kinds == ("synthetic",)
+
+
+@pytest.mark.parametrize("kind", ["simulated", "real"])
+def test_pairs_are_taken_take_by_take(tmp_path: Path, kind: str) -> None:
+    path = write_pairs(tmp_path / "p.zarr", ("s1", "s2"), kind=kind, placements=2)
+    sources = made(path, making=Making(kinds=("synthetic", "simulated", "real")))
+    pairs = read_pairs(path)
+    for source, take in zip(sources, pairs.takes, strict=True):
+        assert source.key == (take.subject, take.name, take.placement)
+        assert np.array_equal(source.maps["synthetic"].values.T, take.synthetic)
+        assert np.array_equal(source.maps[kind].values.T, take.radar)  # type: ignore[index]
+        assert np.array_equal(source.label, take.label)
+        assert source.sensor.position_m == tuple(take.sensor_position_m)
+
+
+def test_people_of_two_stores_are_different_people(tmp_path: Path) -> None:
+    paths = [write_pairs(tmp_path / f"{name}.zarr", ("s1", name), takes=1) for name in "ab"]
+    sources = gather(paths, Making(kinds=("synthetic",)))
+    assert [one.key.subject for one in sources] == ["a:s1", "a", "b:s1", "b"]
+
+
+def test_a_map_is_labelled_by_a_file(tmp_path: Path) -> None:
+    one = recording(tmp_path / "anna.sd2", radar=False)
+    Synthesizer(one.load_mesh(), PRESETS["paper"]).map(one.sensor).save(tmp_path / "map.npz")
+    labels = Labels((Track("Gestures"),), (Span(1, "Gestures", 1.0, 2.0, "swing"),), SWINGS)
+    write_labels(tmp_path / "labels.json", labels)
+    (source,) = made(tmp_path / "map.npz", label_files=[tmp_path / "labels.json"])
+    assert source.labels == ("background", "swing")
+    assert np.flatnonzero(source.label).tolist() == list(range(30, 60))
+    assert source.sensor == one.sensor
+    (unlabelled,) = made(tmp_path / "map.npz")
+    assert not unlabelled.label.any()
+
+
+def test_what_was_counted_is_what_is_written(tmp_path: Path) -> None:
+    (tmp_path / "all").mkdir()
+    for name in ("anna", "ben"):
+        recording(tmp_path / "all" / f"{name}.sd2", offset_s=0.0)
+    making = Making(kinds=("synthetic", "simulated"), placements=PlacementGrid((1.0,)))
+    options = DatasetOptions(kinds=making.kinds, length=30, overlap=5)
+    sources = gather([tmp_path / "all"], making)
+    forecast = Counting.of(sources).forecast(options, 32)
+    out = tmp_path / "set.zarr"
+    written = write_dataset(out, sources, options)
+    with open_dataset(out) as dataset:
+        assert forecast.segments == written.segments == len(dataset)
+        named = np.bincount(dataset["segment_label"][:], minlength=len(dataset.header.labels))
+        counts = dict(zip(dataset.header.labels, named.tolist(), strict=True))
+        assert forecast.of_label == {name: count for name, count in counts.items() if count}
+        available = dataset["available"][:].sum(axis=0).tolist()
+        assert forecast.of_kind == {"synthetic": available[0], "simulated": available[2]}
+        assert forecast.split.validation == dataset.header.splits["validation"] == ("ben",)
+        assert sum(forecast.of_split().values()) == forecast.segments
+    assert forecast.total_bytes >= sum(
+        array.size * array.dtype.itemsize for array in dataset.arrays.values()
+    )
+
+
+def test_a_changed_recording_is_noticed(tmp_path: Path) -> None:
+    one = recording(tmp_path / "anna.sd2", radar=False)
+    options = DatasetOptions(kinds=("synthetic",), length=30, overlap=5)
+    making = Making(kinds=("synthetic",))
+    out = tmp_path / "set.zarr"
+    write_dataset(out, gather([one.folder], making), options)
+    assert write_dataset(out, gather([one.folder], making), options).added == 0
+    one.sensor = replace(one.sensor, position_m=(0.5, 0.0, 0.0))
+    one.save()
+    with pytest.raises(Sd2Error, match="made of something else"):
+        write_dataset(out, gather([one.folder], making), options)
+
+
+def test_what_cannot_be_exported_is_named(tmp_path: Path) -> None:
+    one = recording(tmp_path / "anna.sd2", radar=False)
+    with pytest.raises(Sd2Error, match="2 people are named for 1 recordings"):
+        gather([one.folder], Making(), subjects=["a", "b"])
+    with pytest.raises(Sd2Error, match="1 label files are given for 0 maps"):
+        gather([one.folder], Making(), label_files=[tmp_path / "labels.json"])
+    with pytest.raises(Sd2Error, match="is of kind mesh"):
+        gather([one.folder / "mesh.npz"], Making())
+    (source,) = gather([one.folder], Making(kinds=("real",)))
+    with pytest.raises(Sd2Error, match="has no map that is wanted"):
+        source.load(silent)
+    assert len(one.load_mesh().timebase) == FRAMES
+    assert one.load_mesh().timebase.frames_per_s == pytest.approx(RATE_HZ)
