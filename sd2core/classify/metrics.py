@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -105,8 +105,20 @@ class Score:
             "mean_recall_frames": self.mean_recall,
             "mean_recall_gestures": mean_recall(self.gestures),
             "latency_s": self.latency_s,
+            "latencies_s": self.latencies_s.tolist(),
             "missed": self.missed,
         }
+
+    @classmethod
+    def from_json(cls, content: Mapping[str, Any]) -> Score:
+        """Read what :meth:`to_json` gave; raises KeyError, TypeError or ValueError."""
+        return cls(
+            tuple(content["classes"]),
+            np.array(content["frames"], np.int64),
+            np.array(content["gestures"], np.int64),
+            np.array(content["latencies_s"], np.float64),
+            int(content["missed"]),
+        )
 
 
 def score(

@@ -6,9 +6,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sd2core.classify.data import Clip, ClipSet
+import numpy as np
+
+from sd2core.classify.data import Clip, ClipSet, frame_counts
 from sd2core.errors import Sd2Error
 from sd2core.train.data import split_subjects
+
+Movement = tuple[str, str]
+"""Subject and name of a movement, see :attr:`~sd2core.classify.data.Clip.key`."""
+
+_LEAST_SUBJECTS = 3
+"""To learn, to choose and to judge."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,48 +73,82 @@ def split_clips(
     split = split_subjects(known.subjects, validation, test)
     parts = {name: known.of(getattr(split, name)) for name in ("training", "validation", "test")}
     if split.by_take:
-        parts["training"], parts["validation"] = _by_movement(known, parts["training"])
+        kept = _kept_movements(known, parts["training"], fold=0, share=0.2)
+        parts["training"], parts["validation"] = _apart(parts["training"], kept)
     for name, clips in parts.items():
         if first_only or name != "training":
             parts[name] = tuple(clip for clip in clips if clip.placement == 0)
     return Parts(**parts, by_movement=split.by_take)
 
 
-def _by_movement(
-    known: ClipSet, clips: tuple[Clip, ...]
-) -> tuple[tuple[Clip, ...], tuple[Clip, ...]]:
-    """The last fifth of the movements of every class apart, where a class has two or more.
+def fold(known: ClipSet, number: int) -> Parts:
+    """One of several ways to split, so that everybody is judged in turn.
 
-    A movement counts as one of the rarest class that it holds.
+    With three subjects or more the list of subjects is turned by ``number``, and split as
+    by default. With two, one is learnt from and one judged. With one, every class gives
+    every second of its movements to the test, or the others in the next fold.
+
+    Raises
+    ------
+    Sd2Error
+        When one subject has no class with two movements.
     """
-    groups: dict[int, list[tuple[str, str]]] = {}
-    for key, label in _rarest(known, clips).items():
-        groups.setdefault(label, []).append(key)
-    kept = {
-        key for keys in groups.values() if len(keys) > 1 for key in keys[-max(1, len(keys) // 5) :]
-    }
-    if not kept:
-        raise Sd2Error(
-            "There is no class of which there are two movements",
-            "one movement of a class to learn from and one to choose the best moment by",
+    subjects = list(known.subjects)
+    turned = number % len(subjects)
+    subjects = [*subjects[turned:], *subjects[:turned]]
+    if len(subjects) >= _LEAST_SUBJECTS:
+        split = split_subjects(subjects)
+        return Parts(
+            known.of(split.training), known.of(split.validation), known.of(split.test), False
         )
+    if len(subjects) > 1:
+        return Parts(known.of(subjects[:1]), (), known.of(subjects[1:]), False)
+    training, test = _apart(known.clips, _kept_movements(known, known.clips, number, share=0.5))
+    return Parts(training, (), test, True)
+
+
+def movements(clips: Sequence[Clip]) -> list[Movement]:
+    """Each once, in order."""
+    return list(dict.fromkeys(clip.key for clip in clips))
+
+
+def _apart(clips: Sequence[Clip], kept: set[Movement]) -> tuple[tuple[Clip, ...], tuple[Clip, ...]]:
     return (
         tuple(clip for clip in clips if clip.key not in kept),
         tuple(clip for clip in clips if clip.key in kept),
     )
 
 
-def _rarest(known: ClipSet, clips: Sequence[Clip]) -> dict[tuple[str, str], int]:
-    """Of every movement the class that has the fewest frames in all, of those it holds."""
-    from sd2core.classify.data import frame_counts
+def _kept_movements(
+    known: ClipSet, clips: Sequence[Clip], fold: int, share: float
+) -> set[Movement]:
+    """That share of the movements of every class that has two or more, at least one.
 
-    counts = frame_counts(clips, len(known.classes))
-    found: dict[tuple[str, str], int] = {}
-    for clip in clips:
-        own = frame_counts([clip], len(known.classes))
-        rarest = min(
-            (one for one in range(len(own)) if own[one]), key=counts.__getitem__, default=-1
+    A movement counts as one of the rarest class that it holds.
+    """
+    groups: dict[int, list[Movement]] = {}
+    for key, label in _rarest(known, clips).items():
+        groups.setdefault(label, []).append(key)
+    kept: set[Movement] = set()
+    for keys in groups.values():
+        if len(keys) > 1:
+            count = max(1, int(share * len(keys)))
+            kept |= {keys[(fold + step * len(keys) // count) % len(keys)] for step in range(count)}
+    if not kept:
+        raise Sd2Error(
+            "There is one subject, and no class of which there are two movements",
+            "two subjects, or two movements of a class",
         )
-        before = found.get(clip.key, rarest)
-        found[clip.key] = min(before, rarest, key=lambda one: counts[one] if one >= 0 else 1 << 60)
-    return found
+    return kept
+
+
+def _rarest(known: ClipSet, clips: Sequence[Clip]) -> dict[Movement, int]:
+    """Of every movement the class that has the fewest frames in all, of those it holds."""
+    total = frame_counts(clips, len(known.classes))
+    own: dict[Movement, Any] = {}
+    for clip in clips:
+        own[clip.key] = own.get(clip.key, 0) + frame_counts([clip], len(known.classes))
+    return {
+        key: int(np.where(counts > 0, total, np.iinfo(np.int64).max).argmin())
+        for key, counts in own.items()
+    }

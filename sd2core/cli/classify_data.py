@@ -7,12 +7,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from sd2core.cli.recording_maps import MAP_NAMES, MapName, maps_of, parsed_maps
+from sd2core.cli.recording_maps import MAP_NAMES, MapName, maps_of, parsed_maps, usual_maps
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
     from sd2core.classify.data import ClipSet
     from sd2core.denoise.live import TrainedDenoiser
+    from sd2core.spectrum import MapKind
 
 DATA_HELP = (
     "DATA is one or several of: a store of pairs (`sd2 simulate campaign`, `sd2 pairs`), a\n"
@@ -49,15 +50,20 @@ def source(text: str) -> Source:
 
 
 def add_data(parser: argparse.ArgumentParser) -> None:
-    """Add what there is to learn from or to judge on."""
-    parser.add_argument(
-        "data", nargs="+", type=source, metavar="DATA", help="labelled data, see above"
-    )
+    """Add what there is to learn from or to judge on, and which of its maps."""
+    add_sources(parser)
     parser.add_argument(
         "--maps",
         default="radar",
         metavar="NAMES",
         help=f"some of {', '.join(MAP_NAMES)}, separated by commas (default: radar)",
+    )
+
+
+def add_sources(parser: argparse.ArgumentParser) -> None:
+    """Add what there is to learn from or to judge on, and the denoiser."""
+    parser.add_argument(
+        "data", nargs="+", type=source, metavar="DATA", help="labelled data, see above"
     )
     parser.add_argument(
         "--denoiser",
@@ -67,9 +73,19 @@ def add_data(parser: argparse.ArgumentParser) -> None:
 
 
 def clips_of(
-    sources: Sequence[Source], maps: Sequence[MapName], denoiser: TrainedDenoiser | None = None
+    sources: Sequence[Source],
+    maps: Sequence[MapName] | None,
+    denoiser: TrainedDenoiser | None = None,
 ) -> ClipSet:
     """All clips of the sources, as one set.
+
+    Parameters
+    ----------
+    sources : sequence of Source
+    maps : sequence of str, optional
+        None: the radar's and, where there are some, synthetic ones.
+    denoiser : TrainedDenoiser, optional
+        For denoised maps of pairs.
 
     Raises
     ------
@@ -94,8 +110,8 @@ def clips_of(
             stores.append(one.path)
     if stores:
         pairs = read_mixed(stores)
-        for name in maps:
-            kind = pairs.kind if name == "radar" else name
+        for name in maps or ("synthetic", "radar"):
+            kind: MapKind = pairs.kind if name == "radar" else name
             sets.append(clips_of_pairs(pairs, kind, denoiser))
     return merged(sets)
 
@@ -135,14 +151,14 @@ def _inside(folder: Path) -> list[Path]:
     )
 
 
-def _single(one: Source, maps: Sequence[MapName]) -> list[ClipSet]:
+def _single(one: Source, maps: Sequence[MapName] | None) -> list[ClipSet]:
     """Of a recording, or of a radar's own file."""
     from sd2core.classify.data import clips_of_map
     from sd2core.io.radar import holds_map, load_recorded_map
     from sd2core.recording import is_recording, open_recording
 
     if holds_map(one.path):
-        if tuple(maps) != ("radar",):
+        if maps is not None and tuple(maps) != ("radar",):
             raise Sd2Error(f"{one.path} holds a radar's map only", "--maps radar")
         recorded = load_recorded_map(one.path)
         return [
@@ -159,8 +175,11 @@ def _single(one: Source, maps: Sequence[MapName]) -> list[ClipSet]:
             "pairs, a labelled recording, or a labelled radar file",
         )
     from sd2core.cli.label_reading import labels_at
+    from sd2core.doppler import PRESETS
 
     recording, labels = open_recording(one.path), labels_at(one.path)
+    # Beside maps of a mesh the radar's is on their axis, so that they can be mixed.
+    axis = None if recording.mesh is None else PRESETS["paper"].axis
     if not any(span.origin != "suggestion" for span in labels.spans):
         raise Sd2Error(
             f"{one.path} has no labels",
@@ -171,5 +190,5 @@ def _single(one: Source, maps: Sequence[MapName]) -> list[ClipSet]:
         clips_of_map(
             doppler, labels, subject=one.subject or recording.title, movement=one.path.stem
         )
-        for doppler in maps_of(recording, tuple(maps)).values()
+        for doppler in maps_of(recording, tuple(maps or usual_maps(recording)), axis=axis).values()
     ]

@@ -1,0 +1,207 @@
+"""What a table of trainings compares: how much real data, what is added, which network.
+
+Of the people who are learnt from, movements are put in a random order and parted in two.
+The larger part is there as the radar saw it; of it a share is taken, whole movements, the
+last one cut short. The smaller part is 0.4 times as many frames (the paper's 12,000 beside
+30,000), and is there as video only: it may be added as synthetic maps. So what is added are
+always other movements than the real ones, as when video is plenty and radar is scarce.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from sd2core.classify.data import Clip, ClipSet, frame_counts
+from sd2core.classify.features import Kind
+from sd2core.classify.splitting import Parts, fold, movements
+from sd2core.errors import Sd2Error
+
+Added = Literal["nothing", "synthetic", "denoised", "radar"]
+ADDED: tuple[Added, ...] = get_args(Added)
+
+AMOUNT = 0.4
+"""Added frames for each real one, where all real ones are taken."""
+
+RADAR = ("simulated", "real")
+"""Kinds of maps that stand for the radar's."""
+
+Denoise = Callable[[Clip], Clip]
+"""A synthetic clip as a denoiser gives it."""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """One way to train.
+
+    Parameters
+    ----------
+    share : float
+        Of the real frames, 0 to 1.
+    added : {"nothing", "synthetic", "denoised", "radar"}
+        What of the other movements is added: ``radar`` is what the radar saw of them, which
+        is what synthetic maps are at best.
+    moved : bool
+        Range synthesis: the added ones also as other placements of the sensor see them.
+    model : {"lstm", "s4"}
+    features : {"peak", "columns"}
+    """
+
+    share: float = 1.0
+    added: Added = "nothing"
+    moved: bool = False
+    model: str = "lstm"
+    features: Kind = "columns"
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.share <= 1.0 or (self.share == 0.0 and self.added == "nothing"):
+            raise Sd2Error(
+                f"{self.share:g} of the real data, with {self.added} added",
+                "0 to 1, with something added where it is 0",
+            )
+        if self.added not in ADDED:
+            raise Sd2Error(f"{self.added!r} is to be added", f"one of {', '.join(ADDED)}")
+
+    def to_json(self) -> dict[str, Any]:
+        """By name."""
+        return asdict(self)
+
+
+@dataclass(frozen=True, eq=False)
+class Chosen:
+    """What one run learns from and is judged on.
+
+    Parameters
+    ----------
+    real, added : tuple of Clip
+        Both are learnt from.
+    validation, test : tuple of Clip
+        As the radar saw them, each movement's own sensor.
+    moved : tuple of Clip
+        The test movements as the radar saw them from elsewhere.
+    by_movement : bool
+        See :class:`~sd2core.classify.splitting.Parts`.
+    """
+
+    real: tuple[Clip, ...]
+    added: tuple[Clip, ...]
+    validation: tuple[Clip, ...]
+    test: tuple[Clip, ...]
+    moved: tuple[Clip, ...]
+    by_movement: bool
+
+
+def choose(known: ClipSet, condition: Condition, seed: int, denoise: Denoise) -> Chosen:
+    """Pick the clips of one run; the same for the same seed, and the more real the more of them.
+
+    Parameters
+    ----------
+    known : ClipSet
+        Radar's and synthetic maps of the same movements.
+    condition : Condition
+    seed : int
+        Also says who is judged.
+    denoise : callable
+
+    Raises
+    ------
+    Sd2Error
+        When there is nothing of what is to be added.
+    """
+    parts = fold(known, seed)
+    real_pool, added_pool = _pools(known, parts, seed)
+    seen = [clip for clip in parts.training if clip.kind in RADAR and clip.placement == 0]
+    by_key: dict[tuple[str, str], list[Clip]] = {}
+    for clip in seen:
+        by_key.setdefault(clip.key, []).append(clip)
+    real = _first([clip for key in real_pool for clip in by_key.get(key, [])], condition.share)
+    validation = [c for c in parts.validation if c.kind in RADAR and c.placement == 0]
+    test = [clip for clip in parts.test if clip.kind in RADAR]
+    return Chosen(
+        real=real,
+        added=_added(parts.training, set(added_pool), condition, denoise),
+        validation=_whole(validation, condition.share),
+        test=tuple(clip for clip in test if clip.placement == 0),
+        moved=tuple(clip for clip in test if clip.placement > 0),
+        by_movement=parts.by_movement,
+    )
+
+
+def has_synthetic(known: ClipSet) -> bool:
+    """Whether there are synthetic maps that could be added."""
+    return "synthetic" in known.kinds
+
+
+def digest(known: ClipSet) -> str:
+    """The same for the same clips, whatever their files are called."""
+    sums = hashlib.blake2b(digest_size=16)
+    head = [known.classes, known.axis.bins, known.axis.v_max_mps, known.null_bins]
+    sums.update(json.dumps([*head, known.frame_rate_hz]).encode())
+    for clip in known.clips:
+        sums.update(
+            json.dumps([clip.title, clip.kind, clip.placement, clip.energies.shape]).encode()
+        )
+        sums.update(np.ascontiguousarray(clip.energies).data)
+        sums.update(np.ascontiguousarray(clip.label).data)
+    return sums.hexdigest()
+
+
+def counts_of(clips: Sequence[Clip], known: ClipSet) -> dict[str, int]:
+    """Frames per class, by name."""
+    counts = frame_counts(clips, len(known.classes)).tolist()
+    return dict(zip(known.classes, counts, strict=True))
+
+
+def _pools(
+    known: ClipSet, parts: Parts, seed: int
+) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
+    """Movements that are real, and those that may be added, each in random order."""
+    keys = movements([clip for clip in parts.training if clip.kind in RADAR])
+    if not keys:
+        raise Sd2Error("There is no map of a radar to learn from", "labelled maps of a radar")
+    order = np.random.default_rng([seed, 0]).permutation(len(keys))
+    keys = [keys[number] for number in order]
+    if not has_synthetic(known):
+        return keys, []
+    count = min(max(round(len(keys) * AMOUNT / (1.0 + AMOUNT)), 1), len(keys) - 1)
+    return keys[: len(keys) - count], keys[len(keys) - count :]
+
+
+def _added(
+    clips: Sequence[Clip], pool: set[tuple[str, str]], condition: Condition, denoise: Denoise
+) -> tuple[Clip, ...]:
+    if condition.added == "nothing":
+        return ()
+    kinds = RADAR if condition.added == "radar" else ("synthetic",)
+    found = [
+        clip
+        for clip in clips
+        if clip.key in pool and clip.kind in kinds and (condition.moved or clip.placement == 0)
+    ]
+    if not found:
+        raise Sd2Error(
+            f"The data hold no {condition.added} maps to add", "pairs, or recordings with a mesh"
+        )
+    return tuple(map(denoise, found)) if condition.added == "denoised" else tuple(found)
+
+
+def _first(clips: Sequence[Clip], share: float) -> tuple[Clip, ...]:
+    """A share of the frames from the beginning; the last clip is cut short."""
+    left = round(share * sum(map(len, clips)))
+    found = []
+    for clip in clips:
+        if left <= 0:
+            break
+        found.append(clip if len(clip) <= left else clip.until(left))
+        left -= len(clip)
+    return tuple(found)
+
+
+def _whole(clips: Sequence[Clip], share: float) -> tuple[Clip, ...]:
+    """That share of the clips, at least one: with little to learn from, little to choose by."""
+    return tuple(clips[: max(1, round(share * len(clips)))])
