@@ -32,15 +32,16 @@ def confusion_of(truth: NDArray[np.integer], found: NDArray[np.integer], classes
     return counts
 
 
+def shares(confusion: Confusion) -> NDArray[np.float64]:
+    """Every row as shares of its sum, (classes, classes); NaN in a row of nothing."""
+    totals = confusion.sum(axis=1, keepdims=True)
+    found = np.full(confusion.shape, np.nan)
+    return np.divide(confusion, totals, out=found, where=totals > 0)
+
+
 def recalls(confusion: Confusion) -> NDArray[np.float64]:
     """Share of each class that was found, (classes,); NaN for one that does not occur."""
-    totals = confusion.sum(axis=1)
-    return np.divide(
-        np.diag(confusion)[: len(totals)],
-        totals,
-        out=np.full(len(totals), np.nan),
-        where=totals > 0,
-    )
+    return np.diag(shares(confusion))
 
 
 def mean_recall(confusion: Confusion) -> float:
@@ -95,18 +96,23 @@ class Score:
         )
 
     def to_json(self) -> dict[str, Any]:
-        """Matrices, and what is read off them."""
+        """What was counted, for files."""
         return {
             "classes": list(self.classes),
             "frames": self.frames.tolist(),
             "gestures": self.gestures.tolist(),
+            "latencies_s": self.latencies_s.tolist(),
+            "missed": self.missed,
+        }
+
+    def summary(self) -> dict[str, Any]:
+        """What is read off that; NaN where there is nothing to read."""
+        return {
             "recall_frames": recalls(self.frames).tolist(),
             "recall_gestures": recalls(self.gestures).tolist(),
             "mean_recall_frames": self.mean_recall,
             "mean_recall_gestures": mean_recall(self.gestures),
             "latency_s": self.latency_s,
-            "latencies_s": self.latencies_s.tolist(),
-            "missed": self.missed,
         }
 
     @classmethod
@@ -160,7 +166,7 @@ def score(
 def gesture_runs(truth: NDArray[np.integer], background: int | None) -> list[tuple[int, int, int]]:
     """Half-open runs of frames of one class that is a gesture, with the class."""
     begins = np.flatnonzero(np.diff(truth, prepend=truth[:1] - 1))
-    stops = np.append(begins[1:], len(truth))
+    stops = np.append(begins, len(truth))[1:]
     return [
         (int(start), int(stop), int(truth[start]))
         for start, stop in zip(begins, stops, strict=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -26,8 +26,8 @@ from sd2core.classify.experiment import (
     has_synthetic,
 )
 from sd2core.classify.features import Kind
-from sd2core.classify.live import TrainedClassifier
-from sd2core.classify.metrics import Score, score
+from sd2core.classify.judging import judge
+from sd2core.classify.metrics import Score
 from sd2core.classify.training import TrainOptions, train
 from sd2core.denoise import matching
 from sd2core.denoise.live import TrainedDenoiser
@@ -243,7 +243,7 @@ def make_table(
         run = _read(path)
         if run is None:
             run = run_one(known, condition, seed, options.training, denoise)
-            atomic_write_text(path, json.dumps(_finite(run.to_json())) + "\n")
+            atomic_write_text(path, json.dumps(run.to_json()) + "\n")
         runs.append(run)
     progress(len(wanted), len(wanted))
     kinds = [kind for kind in known.kinds if kind in RADAR]
@@ -277,31 +277,6 @@ def run_one(
         judge(made.classifier, chosen.moved, known) if chosen.moved else None,
         parameter_count(made.classifier.network),
         cpu_s,
-    )
-
-
-def judge(classifier: TrainedClassifier, clips: Sequence[Clip], known: ClipSet) -> Score:
-    """Score a classifier on clips whose classes are those of ``known``.
-
-    Raises
-    ------
-    Sd2Error
-        When the classes differ, or there is no clip.
-    """
-    if set(known.classes) - set(classifier.classes):
-        raise Sd2Error(
-            f"The data hold the classes {', '.join(known.classes)}",
-            f"classes that the classifier knows: {', '.join(classifier.classes)}",
-        )
-    if not clips:
-        raise Sd2Error("There is no clip to judge on", "at least one")
-    table = np.array([classifier.classes.index(name) for name in known.classes] + [-1])
-    return score(
-        [table[clip.label] for clip in clips],
-        [classifier.probabilities_of(clip.energies).argmax(axis=1) for clip in clips],
-        classifier.classes,
-        known.frame_rate_hz,
-        classifier.card.background,
     )
 
 
@@ -365,11 +340,3 @@ def _read(path: Path) -> Run | None:
         return Run.from_json(json.loads(path.read_text("utf-8")))
     except (OSError, ValueError, KeyError, TypeError, Sd2Error):
         return None
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _finite(inner) for key, inner in value.items()}
-    if isinstance(value, list):
-        return [_finite(inner) for inner in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value

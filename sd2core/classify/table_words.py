@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.classify.experiment import Condition
-from sd2core.classify.metrics import Score, mean_recall, recalls
+from sd2core.classify.metrics import mean_recall, recalls, shares
 from sd2core.classify.table import Run, Table, gains
 
 Rows = list[list[str]]
@@ -209,18 +209,12 @@ def _values(table: Table, condition: Condition, of: Callable[[Run], float]) -> N
 
 
 def _confusions(table: Table, condition: Condition) -> NDArray[np.float64]:
-    return np.array([_shares(run.score) for run in table.of(condition)])
+    return np.array([shares(run.score.frames) for run in table.of(condition)])
 
 
 def _confusion_sd(table: Table, condition: Condition) -> NDArray[np.float64]:
     each = _confusions(table, condition)
     return np.asarray(each.std(axis=0, ddof=1) if len(each) > 1 else np.zeros(each.shape[1:]))
-
-
-def _shares(score: Score) -> NDArray[np.float64]:
-    totals = score.frames.sum(axis=1, keepdims=True)
-    shares = np.full(score.frames.shape, np.nan)
-    return np.divide(score.frames, totals, out=shares, where=totals > 0)
 
 
 def _spread(values: NDArray[np.float64]) -> dict[str, float]:

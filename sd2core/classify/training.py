@@ -39,7 +39,7 @@ class TrainOptions:
     steps : int
         Batches that are learnt from.
     batch : int
-        Stretches per batch.
+        Stretches per batch, of as many clips; fewer where there are not so many.
     window_frames : int
         Length of a stretch; clips that are longer are cut at random places.
     piece_frames : int
@@ -228,7 +228,7 @@ class _Learning:
             for group, rate in zip(self._optimiser.param_groups, self._highest, strict=True):
                 group["lr"] = share * rate
             drawn: list[int] = []
-            while len(drawn) < self._chosen.batch:
+            while len(drawn) < min(self._chosen.batch, len(self._material.labels)):
                 if not waiting:
                     waiting = self._rng.permutation(len(self._material.labels)).tolist()
                 drawn.append(waiting.pop())
@@ -252,20 +252,32 @@ class _Learning:
         return torch.from_numpy(shown), torch.from_numpy(label)
 
     def _learn(self, shown: torch.Tensor, label: torch.Tensor) -> float:
-        network = self._network.train()
-        if network.whole:
-            return self._update(network(shown), label)
-        state = network.initial_state(len(shown))
-        losses = []
-        for start in range(0, shown.shape[1], self._chosen.piece_frames):
-            part = slice(start, start + self._chosen.piece_frames)
-            answer, state = network.chunk(shown[:, part], state)
-            if (label[:, part] != UNKNOWN).any():
-                losses.append(self._update(answer, label[:, part]))
-            state = tuple(one.detach() for one in state)
-        return sum(losses) / max(len(losses), 1)
+        """Learn from a batch in parts, each an update, for every network the same number.
 
-    def _update(self, answer: torch.Tensor, label: torch.Tensor) -> float:
+        A network that carries its state gets the frames piece after piece, one that looks at
+        whole stretches some of the stretches after others.
+        """
+        network = self._network.train()
+        pieces = -(-shown.shape[1] // self._chosen.piece_frames)
+        if network.whole:
+            parts = torch.arange(len(shown)).tensor_split(min(pieces, len(shown)))
+            losses = [self._update(network(shown[rows]), label[rows]) for rows in parts]
+        else:
+            losses = []
+            state = network.initial_state(len(shown))
+            for number in range(pieces):
+                begin = number * self._chosen.piece_frames
+                part = slice(begin, begin + self._chosen.piece_frames)
+                answer, state = network.chunk(shown[:, part], state)
+                losses.append(self._update(answer, label[:, part]))
+                state = tuple(one.detach() for one in state)
+        known = [loss for loss in losses if loss is not None]
+        return sum(known) / max(len(known), 1)
+
+    def _update(self, answer: torch.Tensor, label: torch.Tensor) -> float | None:
+        """One step of the optimiser; the loss, or None where no frame is known."""
+        if (label == UNKNOWN).all():
+            return None
         loss = functional.cross_entropy(
             answer.flatten(0, 1), label.flatten(), self._weights, ignore_index=UNKNOWN
         )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 
 from sd2core.cli.classify_apply import add_apply
+from sd2core.cli.classify_eval import add_eval
 from sd2core.cli.classify_table import add_table
 from sd2core.cli.classify_train import add_train
 from sd2core.cli.options import add_command
@@ -27,5 +28,6 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     )
     kinds = parser.add_subparsers(title="what to do", metavar="WHAT", required=True)
     add_train(kinds)
+    add_eval(kinds)
     add_apply(kinds)
     add_table(kinds)

@@ -1,0 +1,196 @@
+"""Labelled clips, of pairs and of maps, and how they are split."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from classifiers import AXIS, NULLED, RATE_HZ, doppler, energies
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from labelled_clips import clip_set
+
+from sd2core.classify.data import (
+    UNKNOWN,
+    clips_of_map,
+    clips_of_pairs,
+    frame_counts,
+    frame_labels,
+    gesture_classes,
+    merged,
+)
+from sd2core.classify.splitting import fold, movements, split_clips
+from sd2core.errors import Sd2Error
+from sd2core.labels.label_set import Label, LabelSet
+from sd2core.labels.spans import Labels, Span, Track
+from sd2core.pairs import PairSet, Take
+from sd2core.timebase import Timebase
+
+SWIPES = ("background", "left-to-right", "right-to-left", "up-to-down", "down-to-up")
+
+
+def pairs(kind="simulated") -> PairSet:
+    takes = tuple(
+        Take(
+            subject,
+            "take-0001",
+            energies(20, seed),
+            energies(20, seed + 10) * 3,
+            np.arange(20) / RATE_HZ,
+            np.repeat(np.arange(5), 4).astype(np.int8),
+            np.zeros(3),
+            placement,
+        )
+        for seed, (subject, placement) in enumerate([("s01", 0), ("s01", 1), ("s02", 0)])
+    )
+    return PairSet(kind, AXIS, NULLED, RATE_HZ, SWIPES, takes)
+
+
+def test_four_swipes_are_three_classes() -> None:
+    assert gesture_classes(SWIPES) == (
+        "background",
+        "horizontal",
+        "horizontal",
+        "vertical",
+        "vertical",
+    )
+    assert gesture_classes(("Background", "FirstGesture")) == ("background", "FirstGesture")
+
+
+def test_clips_of_pairs_hold_what_was_asked_for() -> None:
+    held = pairs()
+    radar, synthetic = clips_of_pairs(held, "simulated"), clips_of_pairs(held, "synthetic")
+    assert radar.classes == ("background", "horizontal", "vertical")
+    for take, one, other in zip(held.takes, radar.clips, synthetic.clips, strict=True):
+        np.testing.assert_array_equal(one.energies, take.radar)
+        np.testing.assert_array_equal(other.energies, take.synthetic)
+        np.testing.assert_array_equal(one.label, np.repeat([0, 1, 2], [4, 8, 8]))
+        assert (one.key, one.placement) == ((take.subject, take.name), take.placement)
+    np.testing.assert_array_equal(frame_counts(radar.clips, 3), [12, 24, 24])
+    with pytest.raises(Sd2Error, match="simulated radar"):
+        clips_of_pairs(held, "real")
+    with pytest.raises(Sd2Error, match="No denoiser"):
+        clips_of_pairs(held, "denoised")
+
+
+def labels(*spans: tuple[str, float, float], origin="person", classes=True) -> Labels:
+    known = LabelSet(
+        "own",
+        (
+            Label("wave", "#112233", "", "wave" if classes else ""),
+            Label("left-to-right", "#445566", "", "horizontal"),
+            Label("nothing", "#778899"),
+        ),
+    )
+    return Labels(
+        (Track("one", "free"),),
+        tuple(
+            Span(number, "one", start_s, end_s, name, origin=origin)
+            for number, (name, start_s, end_s) in enumerate(spans, start=1)
+        ),
+        known,
+    )
+
+
+def test_frames_have_the_class_of_their_label() -> None:
+    clock = Timebase.regular(10, 10.0)
+    found, classes = frame_labels(
+        clock, labels(("wave", 0.1, 0.3), ("left-to-right", 0.5, 0.7), ("nothing", 0.8, 0.9))
+    )
+    assert classes == ("background", "horizontal", "wave")
+    np.testing.assert_array_equal(found, [0, 2, 2, 0, 0, 1, 1, 0, UNKNOWN, 0])
+
+
+def test_frames_on_which_classes_disagree_are_unknown() -> None:
+    clock = Timebase.regular(6, 10.0)
+    found, _ = frame_labels(
+        clock, labels(("wave", 0.0, 0.3), ("left-to-right", 0.2, 0.4), ("wave", 0.1, 0.2))
+    )
+    np.testing.assert_array_equal(found, [2, 2, UNKNOWN, 1, 0, 0])
+
+
+def test_suggestions_are_no_labels() -> None:
+    found, classes = frame_labels(
+        Timebase.regular(6, 10.0), labels(("wave", 0.0, 0.3), origin="suggestion")
+    )
+    assert classes == ("background",)
+    np.testing.assert_array_equal(found, 0)
+
+
+def test_a_map_is_parted_by_absence_and_brought_to_another_rate() -> None:
+    values = energies(60)
+    present = np.ones(60, bool)
+    present[20:25] = False
+    shown = doppler(values, present=present)
+    own = clips_of_map(shown, labels(("wave", 1.0, 2.0)), subject="anna", movement="m")
+    assert [len(one) for one in own.clips] == [20, 35]
+    np.testing.assert_array_equal(own.clips[1].energies, values[25:])
+    np.testing.assert_array_equal(own.clips[1].label, np.isin(np.arange(25, 60), np.arange(30, 60)))
+    half = clips_of_map(
+        doppler(values), labels(("wave", 1.0, 2.0)), subject="a", movement="m", frame_rate_hz=15.0
+    )
+    np.testing.assert_allclose(half.clips[0].energies[:30], values[::2], atol=1e-3)
+    np.testing.assert_array_equal(half.clips[0].label[:30], np.arange(30) >= 15)
+    assert half.frame_rate_hz == 15.0
+
+
+def test_sets_of_other_classes_are_put_together() -> None:
+    one = clips_of_pairs(pairs(), "simulated")
+    other = clips_of_map(
+        doppler(energies(40)), labels(("wave", 0.0, 0.5)), subject="anna", movement="m"
+    )
+    both = merged([other, one])
+    assert both.classes == ("background", "horizontal", "vertical", "wave")
+    assert both.subjects == ("anna", "s01", "s02")
+    assert both.clips[0].label.max() == 3
+    np.testing.assert_array_equal(both.clips[1].label, one.clips[0].label)
+    with pytest.raises(Sd2Error, match="emptied bins"):
+        merged([one, replace(other, null_bins=())])
+    with pytest.raises(Sd2Error, match="frames/s"):
+        merged([one, replace(other, frame_rate_hz=10.0)])
+    with pytest.raises(Sd2Error, match="Nothing to learn from"):
+        merged([])
+
+
+@settings(max_examples=30, deadline=None)
+@given(subjects=st.integers(3, 9), each=st.integers(1, 4), number=st.integers(0, 20))
+def test_nobody_and_no_movement_is_in_two_parts(subjects: int, each: int, number: int) -> None:
+    known = clip_set(subjects, each, frames=2)
+    for parts in (fold(known, number), split_clips(known)):
+        groups = [parts.training, parts.validation, parts.test]
+        names = [{clip.subject for clip in group} for group in groups]
+        assert all(names)
+        assert sum(map(len, names)) == len(set.union(*names)) == len(known.subjects)
+        assert not parts.by_movement
+
+
+def test_in_turn_everybody_is_judged() -> None:
+    known = clip_set(5, 2, frames=2)
+    judged = [fold(known, number).test[0].subject for number in range(5)]
+    assert sorted(judged) == sorted(known.subjects)
+
+
+def test_two_people_judge_one_another() -> None:
+    known = clip_set(2, 2, frames=2)
+    for number in range(2):
+        parts = fold(known, number)
+        assert {one.subject for one in parts.training} != {one.subject for one in parts.test}
+        assert parts.validation == ()
+
+
+@settings(max_examples=30, deadline=None)
+@given(each=st.integers(2, 9), number=st.integers(0, 5))
+def test_of_one_person_movements_are_kept_apart(each: int, number: int) -> None:
+    known = clip_set(1, 3 * each, frames=6, one_class=True)
+    parts = fold(known, number)
+    assert parts.by_movement
+    assert not set(movements(parts.training)) & set(movements(parts.test))
+    assert len(parts.training) + len(parts.test) == 3 * each
+    for group in (parts.training, parts.test):
+        assert (frame_counts(group, 3) > 0).all()
+
+
+def test_one_movement_of_each_class_cannot_be_split() -> None:
+    with pytest.raises(Sd2Error, match="one subject"):
+        fold(clip_set(1, 3, frames=6, one_class=True), 0)
