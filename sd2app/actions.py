@@ -106,6 +106,11 @@ ACTIONS: tuple[Action, ...] = (
         lambda c: c.document.video is not None or has_mesh(c),
     ),
     Action(
+        "batch", "File", "Batch…", ("Ctrl+B",),
+        "Fit, synthesise, denoise and export many recordings from many places, beside the window",
+        lambda w: w.batch_dialogs.show(), separator_before=True,
+    ),
+    Action(
         "recover_labels", "File", "Recover labels…", (),
         "Labels that were not saved when the program ended, or that were not wanted back then",
         lambda w: w.dialogs.recover_labels(), separator_before=True,

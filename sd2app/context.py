@@ -15,6 +15,8 @@ from sd2app.label_edits import LabelEdits
 from sd2app.label_marking import LabelMarking
 from sd2app.label_tracks import LabelTracks
 from sd2app.models.agreement import AgreementModel
+from sd2app.models.batch import BatchModel
+from sd2app.models.batch_estimate import COMMAND as BATCH_COMMAND
 from sd2app.models.content import reference_of
 from sd2app.models.cut_out import CutOutModel
 from sd2app.models.denoise import DenoiseModel
@@ -95,6 +97,7 @@ class Context:
     fit_follower: FitFollower
     fit_offer: FitOffer
     fit_taker: FitTaker
+    batch: BatchModel
     training: TrainingModel
     training_use: TrainingUse
 
@@ -117,6 +120,7 @@ class Context:
         self.agreement.close()
         self.cut_out.close()
         self.fit.close()
+        self.batch.close()
         self.training_use.close()
         self.training.close()
         self.uncertainty.close()
@@ -137,11 +141,12 @@ def build_context(
     denoisers: DenoiserLibrary | None = None,
     train_command: Sequence[str] | None = None,
     recovery: Path | None = None,
+    batch_command: Sequence[str] | None = None,
 ) -> Context:
     """Make the models and let them follow the document.
 
-    Ladder and denoisers are the library's, the commands that fit and train ``sd2``
-    itself, and the recovery folder of labels is the user's by default.
+    Ladder and denoisers are the library's, the commands that fit, train and work in batches
+    ``sd2`` itself, and the recovery folder of labels is the user's by default.
     """
     jobs = JobsModel(parent)
     document = DocumentModel(jobs, parent)
@@ -221,6 +226,7 @@ def build_context(
         fit_follower=follower,
         fit_offer=FitOffer(document, fit, parent),
         fit_taker=FitTaker(fit, follower, document, settings, parent),
+        batch=BatchModel(settings, parent, batch_command or BATCH_COMMAND),
         training=training,
         training_use=TrainingUse(
             training, denoise, synthetic, before, denoised, real, user_models_folder, parent

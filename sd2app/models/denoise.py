@@ -156,6 +156,10 @@ class DenoiseModel(QObject):
         known = {card.path for card in cards}
         return [*cards, *(one for one in (self.before, self.card) if one and one.path not in known)]
 
+    def installed(self) -> list[str]:
+        """Names by which models are found everywhere."""
+        return [card.name for card in self._library.available()]
+
     def describe(self, path: Path) -> ModelCard:
         """Card of a model file; raises where it is none."""
         return self._library.describe(path)

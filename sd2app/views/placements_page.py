@@ -60,8 +60,8 @@ class PlacementsPage(QWidget):
     ----------
     placements : PlacementsModel
     trade : TradeModel
-    take, export : callable
-        Ask for a file with a plan; ask where to write one.
+    take, export, batch : callable
+        Ask for a file with a plan; ask where to write one; set up a batch with it.
     """
 
     def __init__(
@@ -70,6 +70,7 @@ class PlacementsPage(QWidget):
         trade: TradeModel,
         take: Callable[[], None],
         export: Callable[[], None],
+        batch: Callable[[], None],
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
@@ -89,13 +90,14 @@ class PlacementsPage(QWidget):
         self._lay_out_plan(QVBoxLayout(self._planned))
         self._take = outlined("Import…", "Take a plan from a file", take, self)
         self._export = outlined("Export…", "Write the plan, as for sd2 placements", export, self)
+        self._batch = outlined("Batch…", "Make the maps, of many recordings", batch, self)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(8, 4, 8, 4)
         layout.setSpacing(6)
         layout.addLayout(head)
         layout.addWidget(self._nothing)
         layout.addWidget(self._planned)
-        layout.addLayout(side_by_side(self._take, self._export, spacing_px=6))
+        layout.addLayout(side_by_side(self._take, self._export, self._batch, spacing_px=6))
         layout.addStretch(1)
         for signal in (placements.changed, trade.changed, self._fields.changed):
             signal.connect(self._refresh)

@@ -28,10 +28,10 @@ from sd2app.views.frames import fill, panel, splitter
 
 if TYPE_CHECKING:
     from sd2app.context import Context
+    from sd2app.dialogs.batch import BatchDialogs
     from sd2app.dialogs.dialogs import Dialogs
     from sd2app.dialogs.label_files import LabelFileDialogs
     from sd2app.dialogs.label_tracks import TrackDialogs
-    from sd2app.dialogs.placements import PlacementDialogs
     from sd2app.dialogs.training import TrainingDialogs
     from sd2app.models.denoise_library import DenoiserLibrary
     from sd2app.models.ladder import Ladder
@@ -60,7 +60,7 @@ class MainWindow(QMainWindow):
     side: SidePanel
     labels_panel: LabelsPanel
     sensor_pages: SensorPages
-    placement_dialogs: PlacementDialogs
+    batch_dialogs: BatchDialogs
 
     def __init__(
         self,
@@ -70,6 +70,7 @@ class MainWindow(QMainWindow):
         denoisers: DenoiserLibrary | None = None,
         train_command: Sequence[str] | None = None,
         recovery: Path | None = None,
+        batch_command: Sequence[str] | None = None,
     ) -> None:
         super().__init__()
         self._settings = settings
@@ -78,6 +79,7 @@ class MainWindow(QMainWindow):
         self._denoisers = denoisers
         self._train_command = train_command
         self._recovery = recovery
+        self._batch_command = batch_command
         self._scene: SceneView | None = None
         self._ready = False
         self._painted = False
@@ -135,6 +137,7 @@ class MainWindow(QMainWindow):
         # numba and VTK are loaded.
         from sd2app.action_set import ActionSet
         from sd2app.context import build_context
+        from sd2app.dialogs.batch import BatchDialogs
         from sd2app.dialogs.dialogs import Dialogs
         from sd2app.dialogs.label_files import LabelFileDialogs
         from sd2app.dialogs.label_tracks import TrackDialogs
@@ -151,6 +154,7 @@ class MainWindow(QMainWindow):
             self._denoisers,
             self._train_command,
             self._recovery,
+            self._batch_command,
         )
         context = self.context
         context.display.set_dark(is_dark(self._settings))
@@ -159,6 +163,7 @@ class MainWindow(QMainWindow):
         self.label_files = LabelFileDialogs(
             self, context, self.messages, lambda: self.side.bring_up("Agree")
         )
+        self.batch_dialogs = BatchDialogs(self, context, self.messages.warn, self.open_others)
         self.track_dialogs = TrackDialogs(self, context, self.messages)
         self._actions = ActionSet(self)
         below = [self._actions[name] for name in ("open_model", "model_card")]
@@ -184,6 +189,7 @@ class MainWindow(QMainWindow):
         self._ready = True
         context.fit.look_for_unfinished()
         context.training.look_for_runs()
+        context.batch.look_for_batch()
         # VTK last, imported in a thread: everything else is usable while it loads.
         self._importer = LatestRunner("import", self)
         self._importer.finished.connect(self._add_scene)
@@ -210,8 +216,13 @@ class MainWindow(QMainWindow):
         to_camera, aim = self._actions["sensor_to_camera"], self._actions["aim_sensor"]
         sensor = SensorPanel(c.sensor, c.document, c.synthesis, c.edits, to_camera, aim)
         asks_places = PlacementDialogs(self, c.placements, self.messages.warn, self.messages.note)
-        self.placement_dialogs = asks_places
-        places = PlacementsPage(c.placements, c.trade, asks_places.take, asks_places.export)
+        places = PlacementsPage(
+            c.placements,
+            c.trade,
+            asks_places.take,
+            asks_places.export,
+            self.batch_dialogs.show_with_placements,
+        )
         self.sensor_pages = SensorPages(sensor, places)
         trade = TradePanel(c.trade, c.display, self._actions["measure"])
         self.train_dialogs = TrainingDialogs(self, c.training, c.training_use, self.messages.warn)
@@ -318,6 +329,13 @@ class MainWindow(QMainWindow):
         if len(paths) == 1:
             self._settings.add_recent(paths[0].resolve())
 
+    def open_others(self, paths: list[Path]) -> bool:
+        """Open in place of what is open; False where the user wants to keep that."""
+        if not self.dialogs.may_discard():
+            return False
+        self.open_paths(paths)
+        return True
+
     def open_sample(self) -> None:
         """Open the recording that comes with the program."""
         from sd2core.resources import resource_path
@@ -423,6 +441,7 @@ class MainWindow(QMainWindow):
             self._settings.set_layout(name, getattr(self, f"_{name}").saveState())
         self._ready = False
         self.dialogs.close_comparison()
+        self.batch_dialogs.close()
         self._importer.close()
         self.context.close()
         if self._scene is not None:

@@ -26,6 +26,7 @@ def connect_sentences(context: Context, messages: MessageBar) -> None:
         c.label_edits,
         c.training,
         c.training_use,
+        c.batch,
     ):
         model.failed.connect(messages.warn)
     for model in (
@@ -36,6 +37,7 @@ def connect_sentences(context: Context, messages: MessageBar) -> None:
         c.label_session,
         c.training,
         c.training_use,
+        c.batch,
     ):
         model.noted.connect(messages.note)
 

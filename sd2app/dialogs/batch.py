@@ -1,0 +1,318 @@
+"""The window of a batch, and what it asks: files, folders, placements."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QTimer, QUrl
+from PySide6.QtGui import QDesktopServices, QHideEvent, QShowEvent
+from PySide6.QtWidgets import (
+    QDialog,
+    QFileDialog,
+    QHBoxLayout,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from sd2app.models.batch import BatchModel
+from sd2app.models.batch_results import Result
+from sd2app.models.placement_words import counted
+from sd2app.views.batch_run_view import BatchRunView
+from sd2app.views.batch_setup_view import BatchSetupView
+from sd2app.views.panel_parts import outlined, title
+from sd2core.batch.plan_file import write_plan
+from sd2core.errors import Sd2Error
+from sd2core.io.kinds import VIDEO_SUFFIXES
+from sd2core.placements import Placements, read_placements
+from sd2core.recording import is_recording, open_recording
+
+if TYPE_CHECKING:
+    from sd2app.context import Context
+
+_FILES = (
+    "Recordings, videos, meshes (*.mp4 *.mkv *.mov *.avi *.webm *.npz *.zip *.obj *.ply *.glb"
+    " *.pkl recording.json zarr.json);;All files (*)"
+)
+_PLACEMENTS = "Placements (*.json *.toml);;All files (*)"
+_ESTIMATE_MS = 600
+_OWN, _PLANNED, _FILE = range(3)
+
+
+class BatchDialogs:
+    """Asks, then calls the models; a failure is handed to ``report`` as a sentence.
+
+    Parameters
+    ----------
+    parent : QWidget
+    context : Context
+    report : callable
+    open_paths : callable
+        Opens files in the window; False where the user wants to keep what is open.
+    """
+
+    def __init__(
+        self,
+        parent: QWidget,
+        context: Context,
+        report: Callable[[str], None],
+        open_paths: Callable[[list[Path]], bool],
+    ) -> None:
+        self._parent, self._context = parent, context
+        self._batch = context.batch
+        self._report, self._open_paths = report, open_paths
+        self._window: BatchWindow | None = None
+        self._opening: Result | None = None
+        context.document.opened.connect(self._place_sensor)
+        context.document.failed.connect(lambda _: self._forget_result())
+
+    # --- the window -----------------------------------------------------------------------
+
+    def show(self) -> None:
+        """Bring up the batch in view, or set up another."""
+        if self._window is None:
+            self._window = BatchWindow(self._batch, self, self._parent)
+        if self._batch.batch is None and not self._batch.setup.entries:
+            self._add_what_is_open()
+        self._window.show()
+        self._window.raise_()
+        self._window.activateWindow()
+
+    def show_with_placements(self) -> None:
+        """The same, with the places that are planned in the recording that is open."""
+        placements = self._context.placements.plan
+        if placements is not None and self._batch.batch is None:
+            self._batch.setup.set_placements(placements, _PLAN_HERE)
+        self.show()
+
+    def close(self) -> None:
+        """Close the window; what is at work goes on."""
+        if self._window is not None:
+            self._window.close()
+
+    def _add_what_is_open(self) -> None:
+        content = self._context.document.content
+        if content is not None and content.saved:
+            self._batch.setup.add([content.recording.folder])
+
+    # --- setting up -----------------------------------------------------------------------
+
+    def add_files(self) -> None:
+        """Let the user choose recordings, videos or meshes."""
+        names, _ = QFileDialog.getOpenFileNames(self._over, "Recordings to work on", "", _FILES)
+        self._batch.setup.add([_meant(Path(name)) for name in names])
+
+    def add_folder(self) -> None:
+        """Let the user choose a folder of some."""
+        name = QFileDialog.getExistingDirectory(self._over, "A recording, or a folder of some")
+        if name:
+            self._batch.setup.add([Path(name)])
+
+    def placement_choices(self) -> Sequence[str]:
+        """Where sensors may be put, in words."""
+        placements, setup = self._context.placements.plan, self._batch.setup
+        here = "As planned in the open recording"
+        if placements is not None:
+            here += f" ({counted(len(placements.places()), 'placement')})"
+        chosen = setup.placements
+        file = "Of a file…"
+        if chosen is not None and setup.placed != _PLAN_HERE:
+            file = f"Of {setup.placed} ({counted(len(chosen.places()), 'placement')})"
+        return ("Where each recording has its own", here, file)
+
+    def placement_index(self) -> int:
+        """Which of them holds."""
+        if self._batch.setup.placements is None:
+            return _OWN
+        return _PLANNED if self._batch.setup.placed == _PLAN_HERE else _FILE
+
+    def choose_placements(self, index: int) -> None:
+        """Put sensors where one of the choices says."""
+        setup = self._batch.setup
+        if index == _OWN:
+            setup.set_placements(None)
+        elif index == _PLANNED:
+            placements = self._context.placements.plan
+            if placements is None:
+                self._report("The open recording plans no placements: Edit → Placements… does.")
+            setup.set_placements(placements, _PLAN_HERE)
+        else:
+            self._ask_placements()
+        self._batch.changed.emit()  # the choice goes back where nothing was chosen
+
+    def _ask_placements(self) -> None:
+        name, _ = QFileDialog.getOpenFileName(self._over, "Placements", "", _PLACEMENTS)
+        if name:
+            found: list[Placements] = []
+            self._attempt(lambda: found.append(read_placements(Path(name))))
+            if found:
+                self._batch.setup.set_placements(found[0], Path(name).name)
+
+    def model_names(self) -> Sequence[str]:
+        """Models that are installed."""
+        return self._context.denoise.installed()
+
+    def choose_out(self) -> None:
+        """Let the user choose the folder of the results."""
+        start = str(self._batch.setup.out or "")
+        name, _ = QFileDialog.getSaveFileName(self._over, "Folder of the results", start)
+        if name:
+            self._batch.setup.set_out(Path(name))
+
+    def save_plan(self) -> None:
+        """Let the user choose a file for the plan."""
+        name, _ = QFileDialog.getSaveFileName(
+            self._over, "Save plan", "plan.toml", "Plan of a batch (*.toml)"
+        )
+        if name:
+            path = Path(name)
+            path = path if path.suffix == ".toml" else path.with_name(path.name + ".toml")
+            self._attempt(lambda: write_plan(path, self._batch.setup.plan()))
+
+    def start(self) -> None:
+        """Begin as it is set up."""
+        self._attempt(self._batch.start)
+
+    # --- a batch that is there ------------------------------------------------------------
+
+    def open_batch(self) -> None:
+        """Let the user choose a batch that lies elsewhere, as of a command in a terminal."""
+        name = QFileDialog.getExistingDirectory(self._over, "Folder of a batch")
+        if name:
+            self._attempt(lambda: self._batch.open_batch(Path(name)))
+
+    def resume(self) -> None:
+        """Go on with the batch in view."""
+        self._attempt(self._batch.resume)
+
+    def open_folder(self) -> None:
+        """Show the folder of the results."""
+        if self._batch.batch is not None:
+            _show_in_files(self._batch.batch.folder.path)
+
+    def open_dataset(self) -> None:
+        """Show the data set among the files."""
+        if (dataset := self._batch.results.dataset) is not None:
+            _show_in_files(dataset if dataset.is_dir() else dataset.parent)
+
+    def open_result(self, row: int) -> None:
+        """Open a recording in the window, with the sensor where a result says."""
+        result = self._batch.results.rows[row]
+        found: list[list[Path]] = []
+        self._attempt(lambda: found.append(paths_of(result)))
+        if found and self._open_paths(found[0]):
+            self._opening = result
+
+    def _place_sensor(self) -> None:
+        if (result := self._opening) is not None:
+            self._opening = None
+            self._context.edits.place_sensor(result.sensor, "Sensor to placement")
+
+    def _forget_result(self) -> None:
+        self._opening = None
+
+    @property
+    def _over(self) -> QWidget:
+        """What choosers are put over."""
+        return self._window or self._parent
+
+    def _attempt(self, work: Callable[[], object]) -> None:
+        try:
+            work()
+        except (Sd2Error, OSError) as error:
+            self._report(str(error))
+
+
+_PLAN_HERE = "the open recording"
+
+
+class BatchWindow(QDialog):
+    """A new batch, or the one in view; the rest of the program can be used meanwhile."""
+
+    def __init__(self, batch: BatchModel, asks: BatchDialogs, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Batch")
+        self._batch, self._asks = batch, asks
+        self._title = title("New batch")
+        another = outlined("Open batch…", "One that lies elsewhere", asks.open_batch, self)
+        head = QHBoxLayout()
+        head.addWidget(self._title, 1)
+        head.addWidget(another)
+        self._setup = BatchSetupView(batch, asks, self)
+        self._run = BatchRunView(batch, asks, self)
+        self._pages = QStackedWidget(self)
+        self._pages.addWidget(self._setup)
+        self._pages.addWidget(self._run)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(16, 12, 16, 16)
+        layout.setSpacing(10)
+        layout.addLayout(head)
+        layout.addWidget(self._pages, 1)
+        # Not while somebody still turns a number.
+        self._patience = QTimer(self)
+        self._patience.setSingleShot(True)
+        self._patience.setInterval(_ESTIMATE_MS)
+        self._patience.timeout.connect(self._estimate)
+        batch.changed.connect(self._refresh)
+        batch.setup.changed.connect(self._patience.start)
+        self.resize(620, 640)
+        self._refresh()
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Somebody looks: say what it would take."""
+        super().showEvent(event)
+        self._batch.set_watched(True)
+        self._setup.refresh()
+        self._patience.start()
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        """Nobody looks."""
+        super().hideEvent(event)
+        self._batch.set_watched(False)
+
+    def _refresh(self) -> None:
+        run = self._batch.batch
+        self._title.setText("New batch" if run is None else run.folder.path.name)
+        page = self._setup if run is None else self._run
+        if self._pages.currentWidget() is not page:
+            self._pages.setCurrentWidget(page)
+            self._patience.start()
+
+    def _estimate(self) -> None:
+        if self.isVisible() and self._batch.batch is None:
+            self._batch.ask_estimate()
+
+
+def paths_of(result: Result) -> list[Path]:
+    """What is opened in the window for a result: the recording, or a video with its mesh.
+
+    Raises
+    ------
+    Sd2Error
+        When the batch does not say, or the recording is damaged.
+    """
+    if result.path is None:
+        raise Sd2Error(
+            f"The results do not say where {result.recording} is",
+            "results of this version of the program",
+            "Run the batch again: what is there stays",
+        )
+    path = Path(result.path)
+    video = path if path.suffix.lower() in VIDEO_SUFFIXES else None
+    if is_recording(path):
+        recording = open_recording(path)
+        video = recording.video if recording.mesh is None else None
+    if video is None or result.mesh is None:
+        return [path]
+    return [video, Path(result.mesh)]
+
+
+def _meant(path: Path) -> Path:
+    """The folder that a file inside of a recording or of a Zarr group stands for."""
+    return path.parent if path.name in ("recording.json", "zarr.json") else path
+
+
+def _show_in_files(folder: Path) -> None:
+    QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder)))
