@@ -152,7 +152,7 @@ def clips_of_pairs(
     if kind == "denoised":
         _check_denoiser(pairs, denoiser)
     names = gesture_classes(pairs.labels)
-    classes = _in_order(names)
+    classes = in_order(names)
     table = np.array([classes.index(name) for name in names], np.int8)
     clips = []
     for take in pairs.takes:
@@ -222,7 +222,7 @@ def frame_labels(timebase: Timebase, labels: Labels) -> tuple[NDArray[np.int8], 
     """Class of every frame, and the classes; see :func:`clips_of_map`."""
     spans = [span for span in labels.spans if span.origin != "suggestion"]
     names = {span.label: _class_of(span.label, labels.label_set) for span in spans}
-    classes = _in_order([BACKGROUND, *(name for name in names.values() if name)])
+    classes = in_order([BACKGROUND, *(name for name in names.values() if name)])
     found = np.zeros(len(timebase), np.int8)
     taken = np.zeros(len(timebase), bool)
     for span in spans:
@@ -262,7 +262,7 @@ def merged(sets: Sequence[ClipSet]) -> ClipSet:
                 f" {other.frame_rate_hz:.4g} frames/s",
                 "the same frame rate",
             )
-    classes = _in_order([name for one in sets for name in one.classes])
+    classes = in_order([name for one in sets for name in one.classes])
     clips = tuple(
         replace(clip, label=_renumbered(clip.label, one.classes, classes))
         for one in sets
@@ -286,8 +286,8 @@ def _class_of(label: str, label_set: LabelSet) -> str:
     return BACKGROUND if name.casefold() == BACKGROUND else name
 
 
-def _in_order(names: Iterable[str]) -> tuple[str, ...]:
-    """Each once: the background first, the others by name."""
+def in_order(names: Iterable[str]) -> tuple[str, ...]:
+    """Names of classes, each once: the background first, the others by name."""
     return tuple(sorted(set(names), key=lambda name: (name != BACKGROUND, name)))
 
 

@@ -1,11 +1,11 @@
-"""What ``sd2 classify`` learns from and is judged on: pairs, recordings, files of a radar."""
+"""What ``sd2 classify`` learns from: data sets, pairs, recordings, files of a radar."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from sd2core.cli.recording_maps import MAP_NAMES, MapName, maps_of, parsed_maps, usual_maps
 from sd2core.errors import Sd2Error
@@ -16,15 +16,18 @@ if TYPE_CHECKING:
     from sd2core.spectrum import MapKind
 
 DATA_HELP = (
-    "DATA is one or several of: a store of pairs (`sd2 simulate campaign`, `sd2 pairs`), a\n"
-    "recording (.sd2) with labels, a labelled radar file (.h5 of a K60168A), or a folder of\n"
-    "recordings or radar files. A recording is taken for a person of its own; who it is can be\n"
-    "said as PERSON=PATH. Radar files without a person are taken for one and the same person.\n"
-    "The four swipes count as horizontal and vertical, other labels by the class that the label\n"
-    "set gives them; frames of a labelled recording without a label are background."
+    "DATA is one or several of: a data set (`sd2 export`), a store of pairs (`sd2 simulate\n"
+    "campaign`, `sd2 pairs`), a recording (.sd2) with labels, a labelled radar file (.h5 of a\n"
+    "K60168A), or a folder of recordings or radar files. A recording is taken for a person of\n"
+    "its own; who it is can be said as PERSON=PATH. Radar files without a person are taken for\n"
+    "one and the same person. The four swipes count as horizontal and vertical, other labels by\n"
+    "the class that the label set gives them; frames of a labelled recording without a label\n"
+    "are background."
 )
 
 _ONE = "one person"
+_WITH_SUBJECTS = ("pairs", "dataset")
+_RADARS = ("simulated", "real")
 
 
 class Source(NamedTuple):
@@ -99,20 +102,23 @@ def clips_of(
     stores: list[Path] = []
     sets: list[ClipSet] = []
     for one in _unfolded(sources):
-        if not one.path.is_dir() or kind_of(one.path) != "pairs":
+        kind = kind_of(one.path)
+        if kind not in _WITH_SUBJECTS:
             sets += _single(one, maps)
         elif one.subject:
             raise Sd2Error(
                 f"{one.subject} is named for {one.path}",
-                "a person for recordings and radar files only; pairs say whose they are",
+                "a person for recordings and radar files only; pairs and data sets say whose"
+                " they are",
             )
+        elif kind == "dataset":
+            sets += _of_dataset(one.path, maps)
         else:
             stores.append(one.path)
     if stores:
         pairs = read_mixed(stores)
         for name in maps or ("synthetic", "radar"):
-            kind: MapKind = pairs.kind if name == "radar" else name
-            sets.append(clips_of_pairs(pairs, kind, denoiser))
+            sets.append(clips_of_pairs(pairs, pairs.kind if name == "radar" else name, denoiser))
     return merged(sets)
 
 
@@ -126,6 +132,35 @@ def denoiser_for(maps: Sequence[MapName], name: str | None) -> TrainedDenoiser |
 def asked_maps(options: argparse.Namespace) -> tuple[MapName, ...]:
     """What ``--maps`` says."""
     return parsed_maps(options.maps)
+
+
+def split_of(sources: Sequence[Source], part: Literal["validation", "test"]) -> list[str] | None:
+    """Who validates or tests, where all sources are data sets: they say so themselves."""
+    from sd2core.datasets.reading import open_dataset
+    from sd2core.io.kinds import is_dataset
+
+    if not all(is_dataset(one.path) for one in sources):
+        return None
+    names: list[str] = []
+    for one in sources:
+        with open_dataset(one.path) as dataset:
+            names += dataset.header.splits.get(part, ())
+    return list(dict.fromkeys(names)) or None
+
+
+def _of_dataset(path: Path, maps: Sequence[MapName] | None) -> list[ClipSet]:
+    from sd2core.datasets.clips import clips_of_dataset
+    from sd2core.datasets.reading import open_dataset
+
+    with open_dataset(path) as dataset:
+        there = dataset.header.kinds
+        wanted: list[MapKind] = []
+        for name in maps or ("synthetic", "radar"):
+            found = [kind for kind in there if name == ("radar" if kind in _RADARS else kind)]
+            if not found and maps is not None:
+                raise Sd2Error(f"{path} holds no {name} maps", f"one of {', '.join(there)}")
+            wanted += found
+        return [clips_of_dataset(dataset, kind) for kind in wanted]
 
 
 def _unfolded(sources: Sequence[Source]) -> list[Source]:

@@ -17,6 +17,7 @@ from sd2core.cli.classify_data import (
     asked_maps,
     clips_of,
     denoiser_for,
+    split_of,
 )
 from sd2core.cli.options import add_command, add_json, positive_float, positive_int
 from sd2core.cli.output import finite, print_facts, print_json
@@ -42,7 +43,7 @@ def add_train(kinds: argparse._SubParsersAction) -> None:
         ),
         examples=(
             "  sd2 classify train campaign.zarr --out gestures.safetensors\n"
-            "  sd2 classify train campaign.zarr --maps radar,denoised --out both.safetensors\n"
+            "  sd2 classify train set.zarr --maps radar,denoised --out both.safetensors\n"
             "  sd2 classify train anna=a.sd2 anna=b.sd2 ben=c.sd2 --model s4 --out own.safetensors"
         ),
     )
@@ -73,7 +74,8 @@ def add_train(kinds: argparse._SubParsersAction) -> None:
         parser.add_argument(
             f"--{name}-subjects",
             metavar="NAMES",
-            help=f"kept out for the {name}, separated by commas (default: a sixth of all)",
+            help=f"kept out for the {name}, separated by commas (default: as the data set says,"
+            " or a sixth of all)",
         )
     parser.add_argument("--steps", type=positive_int, metavar="N", help="batches to learn from")
     parser.add_argument("--learning-rate", type=positive_float, metavar="R", help="at its highest")
@@ -99,8 +101,8 @@ def _train(options: argparse.Namespace) -> int:
     known = clips_of(options.data, maps, denoiser_for(maps, options.denoiser))
     parts = split_clips(
         known,
-        _names(options.validation_subjects),
-        _names(options.test_subjects),
+        _names(options.validation_subjects) or split_of(options.data, "validation"),
+        _names(options.test_subjects) or split_of(options.data, "test"),
         first_only=options.placements == "first",
     )
     about = {

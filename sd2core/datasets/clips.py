@@ -1,0 +1,96 @@
+"""What a classifier learns from, read from a data set: its segments put together again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.classify.data import Clip, ClipSet, in_order
+from sd2core.datasets.layout import Header
+from sd2core.datasets.reading import Dataset
+from sd2core.datasets.source import KINDS
+from sd2core.errors import Sd2Error
+from sd2core.spectrum import MapKind
+
+_SLACK_FRAMES = 0.01
+"""How far from a whole number of frames two segments of one clip may begin."""
+
+
+def clips_of_dataset(dataset: Dataset, kind: MapKind) -> ClipSet:
+    """One kind of maps of a data set.
+
+    Segments of a source that overlap or touch become one clip again, so that a frame
+    counts once and a classifier that remembers sees whole movements.
+
+    Parameters
+    ----------
+    dataset : Dataset
+    kind : {"synthetic", "denoised", "simulated", "real"}
+
+    Raises
+    ------
+    Sd2Error
+        When no segment has such a map.
+    """
+    header = dataset.header
+    if kind not in header.kinds:
+        raise Sd2Error(f"{dataset.path} holds no {kind} maps", f"one of {', '.join(header.kinds)}")
+    names = [header.classes.get(label, label) for label in header.labels]
+    classes = in_order(names)
+    table = np.array([classes.index(name) for name in names], np.int8)
+    rows = np.flatnonzero(dataset["available"][:][:, KINDS.index(kind)])
+    source, start_s = dataset["source"][:][rows], dataset["start_s"][:][rows]
+    subject, placement = dataset["subject"][:][rows], dataset["placement"][:][rows]
+    recordings = [one["recording"] for one in dataset.sources()]
+    clips = []
+    for run, starts in _runs(source, start_s, header):
+        energies = _joined(dataset[kind][rows[run]], starts)
+        label = _joined(dataset["label"][rows[run]], starts)
+        first = run.start
+        clips.append(
+            Clip(
+                header.subjects[subject[first]],
+                recordings[source[first]],
+                kind,
+                energies,
+                table[label],
+                int(placement[first]),
+            )
+        )
+    return ClipSet(
+        header.axis,
+        header.null_bins,
+        header.frame_rate_hz,
+        classes,
+        tuple(clips),
+        {"dataset": header.title, "kind": kind, "made": header.provenance},
+    )
+
+
+def _runs(
+    source: NDArray[np.integer], start_s: NDArray[np.float64], header: Header
+) -> Iterator[tuple[slice, NDArray[np.int64]]]:
+    """Rows of one clip each, and at which of its frames each of its segments begins."""
+    apart = np.diff(start_s) * header.frame_rate_hz  # frames from one segment to the next
+    steps = np.rint(apart)
+    goes_on = (
+        (np.diff(source) == 0)
+        & (np.abs(apart - steps) <= _SLACK_FRAMES)
+        & (steps > 0)
+        & (steps <= header.length)
+    )
+    edges = np.concatenate([[0], np.flatnonzero(~goes_on) + 1, [len(source)]])
+    for begun, ended in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+        starts = np.concatenate([[0], np.cumsum(steps[begun : ended - 1])]).astype(np.int64)
+        yield slice(begun, ended), starts
+
+
+def _joined(segments: NDArray, starts: NDArray[np.int64]) -> NDArray:
+    """(segments, length, …) → (frames, …); where they overlap they are the same."""
+    length = segments.shape[1]
+    whole = np.empty((int(starts[-1]) + length, *segments.shape[2:]), segments.dtype)
+    for start, segment in zip(starts, segments, strict=True):
+        whole[start : start + length] = segment
+    return whole

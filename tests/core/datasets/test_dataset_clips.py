@@ -1,0 +1,81 @@
+"""What a classifier gets of a data set is what went in, every frame once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from made_sources import AXIS, source
+
+from sd2core.cli.classify_data import Source, clips_of, split_of
+from sd2core.datasets.clips import clips_of_dataset
+from sd2core.datasets.options import DatasetOptions
+from sd2core.datasets.reading import open_dataset
+from sd2core.datasets.writing import write_dataset
+from sd2core.errors import Sd2Error
+
+ENDINGS = (".zarr", ".h5", ".npz")
+CLASSES = ("background", "horizontal", "vertical")
+
+
+@settings(max_examples=8, deadline=None)
+@given(st.sampled_from(ENDINGS), st.integers(24, 150), st.integers(0, 23))
+def test_segments_are_put_together_again(
+    tmp_path_factory: pytest.TempPathFactory, ending: str, frames: int, overlap: int
+) -> None:
+    out = tmp_path_factory.mktemp("set") / f"set{ending}"
+    sources = [
+        source("r1", "anna", frames=frames),
+        source("r1", "anna", frames=frames, placement=1),
+        source("r1", "ben", frames=100),
+    ]
+    write_dataset(out, sources, DatasetOptions(length=24, overlap=overlap))
+    with open_dataset(out) as dataset:
+        known = clips_of_dataset(dataset, "denoised")
+    assert (known.axis, known.frame_rate_hz, known.classes) == (AXIS, 30.0, CLASSES)
+    for clip, one in zip(known.clips, sources, strict=True):
+        assert clip.key == (one.subject, one.recording)
+        assert (clip.kind, clip.placement) == ("denoised", one.placement)
+        np.testing.assert_array_equal(clip.energies, one.maps["denoised"].values.T)
+        np.testing.assert_array_equal(clip.label, one.label)
+
+
+def test_who_leaves_the_picture_parts_a_clip(tmp_path: Path) -> None:
+    present = np.ones(120, bool)
+    present[50:60] = False
+    out = tmp_path / "set.zarr"
+    one = source(frames=120, present=present)
+    write_dataset(out, [one], DatasetOptions(length=24, overlap=4))
+    with open_dataset(out) as dataset:
+        first, second = clips_of_dataset(dataset, "synthetic").clips
+    np.testing.assert_array_equal(first.energies, one.maps["synthetic"].values.T[:50])
+    np.testing.assert_array_equal(second.energies, one.maps["synthetic"].values.T[60:])
+
+
+def test_only_sources_that_have_the_map_count(tmp_path: Path) -> None:
+    out = tmp_path / "set.zarr"
+    sources = [source("r1"), source("r2", kinds=("synthetic", "real")), source("r3")]
+    write_dataset(out, sources, DatasetOptions(length=24, overlap=4))
+    with open_dataset(out) as dataset:
+        assert [clip.movement for clip in clips_of_dataset(dataset, "real").clips] == ["r2"]
+        with pytest.raises(Sd2Error, match="holds no simulated maps"):
+            clips_of_dataset(dataset, "simulated")
+
+
+def test_classifiers_take_the_split_of_data_sets(tmp_path: Path) -> None:
+    out = tmp_path / "set.zarr"
+    people = [source(subject=name, kinds=("synthetic", "simulated")) for name in "abcd"]
+    options = DatasetOptions(length=24, overlap=4, validation=("b",), test=("a",))
+    write_dataset(out, people, options)
+    given = [Source(out, "")]
+    assert (split_of(given, "validation"), split_of(given, "test")) == (["b"], ["a"])
+    assert split_of([*given, Source(tmp_path / "other", "")], "test") is None
+    assert {clip.kind for clip in clips_of(given, ("radar",)).clips} == {"simulated"}
+    assert {clip.kind for clip in clips_of(given, None).clips} == {"synthetic", "simulated"}
+    with pytest.raises(Sd2Error, match="holds no denoised maps"):
+        clips_of(given, ("denoised",))
+    with pytest.raises(Sd2Error, match="data sets say whose they are"):
+        clips_of([Source(out, "anna")], ("radar",))
