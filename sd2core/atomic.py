@@ -11,7 +11,9 @@ from pathlib import Path
 from typing import IO
 
 _PREFIX, _SUFFIX = ".sd2-", ".tmp"
-_DISK_FULL = frozenset({errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)})
+
+DISK_FULL = frozenset({errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)})
+"""Errors of the system that another write would meet as well."""
 
 
 @contextmanager
@@ -40,7 +42,7 @@ def atomic_write(path: Path) -> Iterator[IO[bytes]]:
     except BaseException as error:
         temporary.unlink(missing_ok=True)
         # A write to an open file fails without saying which file it is.
-        if isinstance(error, OSError) and error.errno in _DISK_FULL and not error.filename:
+        if isinstance(error, OSError) and error.errno in DISK_FULL and not error.filename:
             raise OSError(error.errno, error.strerror, str(path)) from error
         raise
 

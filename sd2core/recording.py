@@ -13,7 +13,7 @@ import shutil
 import tempfile
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from sd2core.atomic import atomic_write_text
 from sd2core.errors import Sd2Error
@@ -318,6 +318,10 @@ class Recording:
         """Load the mesh as :attr:`mesh_reading` says, placed by the video where that helps."""
         from sd2core.io.mesh import load_mesh
 
+        return load_mesh(self._present("mesh"), **self.mesh_options(), progress=progress)
+
+    def mesh_options(self) -> dict[str, Any]:
+        """Arguments with which ``load_mesh`` reads the mesh."""
         path = self._present("mesh")
         options = self.mesh_reading.options()
         if self.faces is not None:
@@ -326,7 +330,7 @@ class Recording:
         if by_video and "image_size" not in options:
             with self.open_video() as video:
                 options["image_size"] = (video.width, video.height)
-        return load_mesh(path, **options, progress=progress)
+        return options
 
     def load_capture(self) -> RadarCapture:
         """Load the radar capture on its own clock; the recording's is ``radar_offset_s`` later."""

@@ -87,7 +87,6 @@ class BatchFolder:
     log = property(lambda self: self.path / "log.txt")
     report = property(lambda self: self.path / "report.json")
     results = property(lambda self: self.path / "results.jsonl")
-    dataset = property(lambda self: self.path / "dataset")
     _lock = property(lambda self: self.path / "lock")
 
     @property

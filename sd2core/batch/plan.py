@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, get_args
 
 from pydantic import (
@@ -17,6 +17,7 @@ from pydantic import (
 )
 
 from sd2core.body.model import Resolution
+from sd2core.datasets.source import KINDS
 from sd2core.doppler.options import (
     PRESETS,
     Beyond,
@@ -31,6 +32,7 @@ from sd2core.errors import Sd2Error
 from sd2core.placements import Placements, placements_from_dict
 from sd2core.segments import LENGTH, OVERLAP
 from sd2core.sensor import Vector, VirtualSensor
+from sd2core.spectrum import MapKind
 
 FORMAT: Literal["sd2-batch-plan"] = "sd2-batch-plan"
 VERSION: Literal[1] = 1
@@ -182,13 +184,25 @@ class Export(_Section):
 
     Parameters
     ----------
-    format : {"zarr", "hdf5", "npz"}
+    format : {"zarr", "h5", "npz"}
+    kinds : tuple of str
+        Maps to take, where a recording has them; a radar's own with the recording's sensor.
     segment_frames, overlap_frames : int
+    frame_rate_hz : float, optional
+        Of all segments; otherwise that of the first source.
+    validation_subjects, test_subjects : tuple of str, optional
+        Otherwise they are chosen.
+    title : str
     """
 
-    format: Literal["zarr", "hdf5", "npz"] = "zarr"
+    format: Literal["zarr", "h5", "npz"] = "zarr"
+    kinds: Annotated[tuple[MapKind, ...], Field(min_length=1)] = KINDS
     segment_frames: Annotated[int, Field(ge=2, le=10_000)] = LENGTH
     overlap_frames: Annotated[int, Field(ge=0)] = OVERLAP
+    frame_rate_hz: Positive | None = None
+    validation_subjects: tuple[Text, ...] | None = None
+    test_subjects: tuple[Text, ...] | None = None
+    title: str = ""
 
     @model_validator(mode="after")
     def _ordered(self) -> Export:
@@ -209,7 +223,7 @@ class BatchPlan(_Section):
         Where the sensor is put: ``kind = "recording"`` (each recording's own sensor, the
         camera where it has none), ``kind = "positions"`` with ``positions_m``, or what
         :func:`sd2core.placements.placements_from_dict` reads (``"grid"``, ``"cloud"``), around
-        the body of each recording.
+        the body of each recording. With ``own = true`` the recording's own sensor besides.
     fit, synthesise, denoise, export : optional
     """
 
@@ -243,27 +257,25 @@ class BatchPlan(_Section):
         """Placements per recording."""
         if self.synthesise is None:
             return 0
-        where = _placements(self.placements)
-        if where is None:
-            return 1
-        return len(where) if isinstance(where, tuple) else len(where.places())
+        own, places = _placements(self.placements)
+        return own + len(places if isinstance(places, tuple) else places.places())
 
-    def sensors(self, own: VirtualSensor, target_m: Vector) -> tuple[VirtualSensor, ...]:
-        """The sensors that look at one recording.
+    def sensors(self, own: VirtualSensor, target_m: Vector) -> dict[int, VirtualSensor]:
+        """The sensors that look at one recording, by the number of the placement.
 
         Parameters
         ----------
         own : VirtualSensor
-            The recording's own one.
+            The recording's own one, whose number is 0.
         target_m : tuple of 3 floats
             Where its body is.
         """
-        where = _placements(self.placements)
-        if where is None:
-            return (own,)
-        if isinstance(where, tuple):
-            return tuple(VirtualSensor(position_m=place) for place in where)
-        return where.sensors(target_m)
+        with_own, places = _placements(self.placements)
+        if isinstance(places, tuple):
+            others: Sequence[VirtualSensor] = [VirtualSensor(position_m=one) for one in places]
+        else:
+            others = places.sensors(target_m)
+        return ({0: own} if with_own else {}) | dict(enumerate(others, start=1))
 
 
 class _Positions(_Section):
@@ -273,20 +285,21 @@ class _Positions(_Section):
     ]
 
 
-def _placements(content: Mapping[str, Any]) -> Placements | tuple[Vector, ...] | None:
-    """A spec, positions, or None for the recording's own sensor."""
-    kind = content.get("kind")
+def _placements(content: Mapping[str, Any]) -> tuple[bool, Placements | tuple[Vector, ...]]:
+    """Whether the recording's own sensor is among them, and the others: places, or a spec."""
+    given = dict(content)
+    kind, own = given.get("kind"), given.pop("own", False)
     if kind == "recording":
         if len(content) > 1:
             raise ValueError('kind = "recording" takes nothing else')
-        return None
+        return True, ()
+    if not isinstance(own, bool):
+        raise ValueError("own is true or false")
     if kind == "positions":
-        return _Positions.model_validate(content, strict=False).positions_m
+        return own, _Positions.model_validate(given, strict=False).positions_m
+    if kind not in ("grid", "cloud"):
+        raise ValueError(f'kind is {kind!r}; expected "recording", "positions", "grid" or "cloud"')
     try:
-        return placements_from_dict(content)
+        return own, placements_from_dict(given)
     except Sd2Error as error:
-        if kind in ("grid", "cloud"):
-            raise ValueError(str(error)) from None
-        raise ValueError(
-            f'kind is {kind!r}; expected "recording", "positions", "grid" or "cloud"'
-        ) from None
+        raise ValueError(str(error)) from None

@@ -6,6 +6,7 @@ import argparse
 
 from sd2core import __version__
 from sd2core.cli import (
+    batch,
     classify,
     compare_meshes,
     denoise,
@@ -84,6 +85,7 @@ def build_parser() -> tuple[argparse.ArgumentParser, argparse._SubParsersAction]
         train,
         runs,
         eval,
+        batch,
         warm_up,
         fetch_models,
     )

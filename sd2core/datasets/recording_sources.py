@@ -32,7 +32,7 @@ from sd2core.mocap.recording_pairs import on_clock
 from sd2core.placements import Placements
 from sd2core.progress import Progress
 from sd2core.recording import Recording, open_recording
-from sd2core.sensor import Vector, VirtualSensor
+from sd2core.sensor import Vector, VelocityAxis, VirtualSensor
 from sd2core.spectrum import DopplerMap, MapKind
 from sd2core.timebase import Timebase
 from sd2core.whereabouts import Whereabouts
@@ -109,6 +109,22 @@ def labels_and_classes(labels: Labels) -> tuple[tuple[str, ...], dict[str, str]]
     names = tuple(dict.fromkeys([BACKGROUND, *known, *used]))
     classes = {one.name: one.gesture_class for one in labels.label_set.labels if one.gesture_class}
     return names, classes
+
+
+def radar_map(recording: Recording, axis: VelocityAxis) -> DopplerMap:
+    """Map of a recording's radar file, on the recording's clock.
+
+    Parameters
+    ----------
+    recording : Recording
+    axis : VelocityAxis
+        Of a capture's map; a file that holds a map keeps its own.
+    """
+    if recording.holds_radar_map:
+        radar = recording.load_radar_map().doppler
+    else:
+        radar = doppler_map(recording.load_capture(), axis=axis, clutter="mean")
+    return radar.shifted(recording.radar_offset_s)
 
 
 def _lazy(shared: _Shared, recording: Recording, key: SourceKey) -> LazySource:
@@ -264,16 +280,8 @@ class _Opened:
         return self._synthesizer.map(sensor, progress=progress)
 
     def _of_radar(self) -> DopplerMap:
-        from sd2core.fmcw.processing import doppler_map
-
         if self._radar is None:
-            recording = self.recording
-            if recording.holds_radar_map:
-                radar = recording.load_radar_map().doppler
-            else:
-                axis = self._making.synthesis.axis
-                radar = doppler_map(recording.load_capture(), axis=axis, clutter="mean")
-            self._radar = radar.shifted(recording.radar_offset_s)
+            self._radar = radar_map(self.recording, self._making.synthesis.axis)
         return self._radar
 
     def _label(self, times_s: NDArray[np.float64]) -> NDArray[np.int16]:

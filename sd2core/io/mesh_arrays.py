@@ -29,7 +29,7 @@ UNCERTAINTY_NAMES = (
     "limb_velocity_sigma_mps",
     "limb_velocity_sigma_across_mps",
 )
-_SMALL_NAMES = (
+SMALL_NAMES = (
     FACE_NAMES
     + TIME_NAMES
     + RATE_NAMES
@@ -153,7 +153,7 @@ def read_npz(path: Path) -> RawMesh:
     """Read ``vertices`` and, where present, ``faces``, ``times_s`` and ``fps``."""
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-            wanted = VERTEX_NAMES + _SMALL_NAMES
+            wanted = VERTEX_NAMES + SMALL_NAMES
             arrays = {name: archive[name] for name in archive.files if name in wanted}
             names = list(archive.files)
     except PermissionError as error:
@@ -208,7 +208,7 @@ def read_zarr(path: Path) -> RawMesh:
         store = ZipStore(path, mode="r") if path.is_file() else str(path)
         group = zarr.open_group(store, mode="r")
         names = sorted(group.array_keys())
-        arrays: dict[str, Any] = {name: group[name][...] for name in names if name in _SMALL_NAMES}
+        arrays: dict[str, Any] = {name: group[name][...] for name in names if name in SMALL_NAMES}
         arrays.update({name: group[name] for name in names if name in VERTEX_NAMES})
         if "limbs" in group.attrs:
             arrays["limbs"] = group.attrs["limbs"]
@@ -234,7 +234,7 @@ def read_zarr(path: Path) -> RawMesh:
 
 def write_npz(mesh: MeshSequence, path: Path, progress: Progress = silent) -> None:
     """Write a mesh block by block into one compressed ``.npz``, in one step."""
-    step = _frames_per_chunk(mesh)
+    step = frames_per_chunk(mesh.vertices.shape, mesh.vertices.dtype)
     dtype = np.dtype(mesh.vertices.dtype).newbyteorder("<")
     with atomic_write(path) as stream, zipfile.ZipFile(stream, "w") as archive:
         with archive.open(_member("vertices"), "w", force_zip64=True) as member:
@@ -256,24 +256,15 @@ def write_zarr(mesh: MeshSequence, path: Path, progress: Progress = silent) -> N
     A chunk holds about 2 MB: all vertices of a stretch of frames.
     """
     import zarr
-    from zarr.codecs import BloscCodec
 
     zipped = path.suffix.lower() == ".zip"
-    step = _frames_per_chunk(mesh)
+    step = frames_per_chunk(mesh.vertices.shape, mesh.vertices.dtype)
     workspace = Path(tempfile.mkdtemp(prefix=f".{path.name}.", suffix=".tmp", dir=path.parent))
     try:
         folder = workspace / "new"
         group = zarr.open_group(str(folder), mode="w")
         group.attrs.update({"format": _FORMAT, "version": 1, "unit": "m"})
-        vertices = group.create_array(
-            "vertices",
-            shape=mesh.vertices.shape,
-            chunks=(step, mesh.vertex_count, 3),
-            dtype=np.dtype(mesh.vertices.dtype).newbyteorder("<"),
-            compressors=BloscCodec(cname="lz4", clevel=5, shuffle="shuffle"),
-            # A chunk that goes missing is then found, not read as zeros.
-            fill_value=float("nan"),
-        )
+        vertices = create_vertices(group, mesh.vertices.shape, mesh.vertices.dtype)
         for start in range(0, mesh.frame_count, step):
             progress(start, mesh.frame_count)
             block = _block(mesh, start, step)
@@ -317,9 +308,25 @@ def _block(mesh: MeshSequence, start: int, step: int) -> NDArray[Any]:
     return block
 
 
-def _frames_per_chunk(mesh: MeshSequence) -> int:
-    frame_bytes = mesh.vertex_count * 3 * np.dtype(mesh.vertices.dtype).itemsize
-    return int(min(max(_CHUNK_BYTES // frame_bytes, 1), mesh.frame_count))
+def create_vertices(group: Any, shape: tuple[int, ...], dtype: Any) -> Any:
+    """An array for vertices (T, V, 3) in a Zarr group, to be filled chunk by chunk."""
+    from zarr.codecs import BloscCodec
+
+    return group.create_array(
+        "vertices",
+        shape=shape,
+        chunks=(frames_per_chunk(shape, dtype), *shape[1:]),
+        dtype=np.dtype(dtype).newbyteorder("<"),
+        compressors=BloscCodec(cname="lz4", clevel=5, shuffle="shuffle"),
+        # A chunk that goes missing is then found, not read as zeros.
+        fill_value=float("nan"),
+    )
+
+
+def frames_per_chunk(shape: tuple[int, ...], dtype: Any) -> int:
+    """Frames of a chunk of about 2 MB."""
+    frame_bytes = shape[1] * 3 * np.dtype(dtype).itemsize
+    return int(min(max(_CHUNK_BYTES // frame_bytes, 1), shape[0]))
 
 
 def _member(name: str) -> zipfile.ZipInfo:

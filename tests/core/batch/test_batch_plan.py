@@ -136,17 +136,19 @@ def test_options_are_those_of_the_preset_but_for_what_is_given() -> None:
 def test_sensors_of_every_kind_of_placement() -> None:
     own, target = VirtualSensor(position_m=(0.5, 0.0, 0.0)), (0.0, 0.0, 3.0)
 
-    def sensors(text: str) -> tuple[VirtualSensor, ...]:
+    def sensors(text: str) -> dict[int, VirtualSensor]:
         plan = plan_from_text(LEAST + text, FOLDER)
         found = plan.sensors(own, target)
         assert len(found) == plan.placement_count
         return found
 
-    assert sensors("") == (own,)
-    two = sensors("[placements]\nkind = 'positions'\npositions_m = [[0, 0, 1], [1, 0, 0]]\n")
-    assert [one.position_m for one in two] == [(0.0, 0.0, 1.0), (1.0, 0.0, 0.0)]
+    assert sensors("") == {0: own}
+    places = "[placements]\nkind = 'positions'\npositions_m = [[0, 0, 1], [1, 0, 0]]\n"
+    two = {1: VirtualSensor((0.0, 0.0, 1.0)), 2: VirtualSensor((1.0, 0.0, 0.0))}
+    assert sensors(places) == two
+    assert sensors(places + "own = true\n") == {0: own} | two
     ring = sensors("[placements]\nkind = 'grid'\nranges_m = [2.0]\nazimuths_deg = [0, 90, 180]\n")
-    for one in ring:
+    for one in ring.values():
         away = sum((a - b) ** 2 for a, b in zip(one.position_m, target, strict=True)) ** 0.5
         assert away == pytest.approx(2.0)
 

@@ -1,0 +1,345 @@
+"""What a batch would do, how long it would take and how much it would write."""
+
+from __future__ import annotations
+
+import hashlib
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sd2core.batch.flow import Flow
+from sd2core.batch.folder import BatchFolder
+from sd2core.batch.inputs import (
+    Inspection,
+    MeshInput,
+    Origin,
+    find_origins,
+    glance,
+    known_inspection,
+)
+from sd2core.batch.plan import BatchPlan
+from sd2core.batch.rates import known_rates
+from sd2core.batch.tasks import Task
+from sd2core.errors import Sd2Error
+from sd2core.progress import Progress, silent
+
+_LOOKED_AT = 100
+_TIMED_MESHES = 2
+_SHORT_FRAMES, _LONG_FRAMES = 16, 80
+_FIT_S_PER_FRAME = 0.08
+"""Where no batch has fitted anything on this machine: processor time in docs/fitting.md."""
+_EXPORT_S_PER_SOURCE = 0.05
+"""Likewise: one in docs/scale.md."""
+_MESH_BYTES_PER_FRAME = {"low": 11_000, "medium": 42_000, "high": 112_000}
+"""Of fitted meshes, compressed: some three quarters of 12 bytes per vertex."""
+_TASK_S = 0.005
+"""What giving a task out costs at most, besides: docs/scale.md."""
+
+
+@dataclass
+class StepEstimate:
+    """What one step would take.
+
+    Parameters
+    ----------
+    there, to_do : int
+        Tasks that are done already, and that are not.
+    frames : int
+        Of those to do.
+    seconds : float
+        Of one process, for those to do.
+    bytes : int
+        That they would write.
+    basis : str
+        How the seconds are known.
+    """
+
+    there: int = 0
+    to_do: int = 0
+    frames: int = 0
+    seconds: float = 0.0
+    bytes: int = 0
+    basis: str = ""
+
+
+@dataclass
+class BatchEstimate:
+    """What a batch would take.
+
+    Parameters
+    ----------
+    recordings : int
+    looked_at : int
+        Recordings that the figures rest on; the others are taken to be like them.
+    workers : int
+    steps : dict
+    unusable : list of str
+        Why some of those looked at cannot be used.
+    """
+
+    recordings: int
+    looked_at: int
+    workers: int
+    steps: dict[str, StepEstimate]
+    unusable: list[str] = field(default_factory=list)
+
+    @property
+    def hours(self) -> float:
+        """Of work on all processes."""
+        return sum(one.seconds for one in self.steps.values()) / self.workers / 3600
+
+    @property
+    def bytes(self) -> int:
+        """That would be written."""
+        return sum(one.bytes for one in self.steps.values())
+
+    def to_json(self) -> dict[str, Any]:
+        """As JSON can hold it."""
+        return asdict(self) | {"hours": self.hours, "bytes": self.bytes, "estimate": True}
+
+
+@dataclass(frozen=True)
+class _Rate:
+    """Seconds and bytes of a task: so many, and so many per frame."""
+
+    seconds: float
+    frame_s: float
+    bytes: float
+    frame_bytes: float
+
+    def apply(self, step: StepEstimate, frames: int, tasks: int) -> None:
+        step.seconds += tasks * (self.seconds + _TASK_S) + frames * self.frame_s
+        step.bytes += round(tasks * self.bytes + frames * self.frame_bytes)
+
+
+def estimate(plan: BatchPlan, workers: int, progress: Progress = silent) -> BatchEstimate:
+    """Look at some recordings, time what would be done to them, and add up.
+
+    Nothing is written but to temporary files. What is there already is not counted in
+    seconds and bytes.
+
+    Parameters
+    ----------
+    plan : BatchPlan
+    workers : int
+    progress : Progress
+
+    Raises
+    ------
+    Sd2Error
+        When the plan cannot be followed at all.
+    """
+    folder = BatchFolder(Path(plan.out))
+    origins = find_origins(plan.recordings, folder.path)
+    flow = Flow(plan, folder, origins)
+    steps: dict[str, StepEstimate] = {step: StepEstimate() for step in flow.steps}
+    made = BatchEstimate(len(origins), 0, workers, steps)
+    known, new = _sorted(folder, origins, progress)
+    for origin, found in known:
+        steps["inspect"].there += 1
+        _count(flow, steps, origin, found, 1.0)
+    glanced, hashed_s = _glances(new, made)
+    weight = len(new) / max(len(glanced) + len(made.unusable), 1)
+    for origin, found in glanced:
+        _count(flow, steps, origin, found, weight)
+    steps["inspect"].to_do = len(new)
+    steps["inspect"].seconds = hashed_s * weight + len(new) * _TASK_S
+    steps["inspect"].basis = "measured on those looked at"
+    made.looked_at = len(known) + len(glanced) + len(made.unusable)
+    _time(flow, steps, [one for _, one in (*glanced, *known)], plan)
+    if "export" in steps:
+        sources = steps["synthesise"].to_do + steps["synthesise"].there
+        rates = known_rates()
+        steps["export"].to_do = 1
+        steps["export"].seconds = sources * rates.get("export", _EXPORT_S_PER_SOURCE)
+        steps["export"].basis = "as in earlier batches" if "export" in rates else "assumed"
+        frames = steps["synthesise"].frames
+        steps["export"].bytes = round(frames * 32 * 4 * len(_kinds(plan)))
+    return made
+
+
+def _kinds(plan: BatchPlan) -> list[str]:
+    return ["synthetic"] + (["denoised"] if plan.denoise is not None else [])
+
+
+def _sorted(
+    folder: BatchFolder, origins: Sequence[Origin], progress: Progress
+) -> tuple[list[tuple[Origin, Inspection]], list[Origin]]:
+    known, new = [], []
+    for number, origin in enumerate(origins):
+        progress(number, len(origins))
+        found = known_inspection(folder, origin)
+        if found is None:
+            new.append(origin)
+        else:
+            known.append((origin, found))
+    progress(len(origins), len(origins))
+    return known, new
+
+
+def _glances(
+    new: Sequence[Origin], made: BatchEstimate
+) -> tuple[list[tuple[Origin, Inspection]], float]:
+    """What some of the recordings hold, and the seconds that hashing all of theirs takes."""
+    if not new:
+        return [], 0.0
+    chosen = np.unique(np.linspace(0, len(new) - 1, min(_LOOKED_AT, len(new))).astype(int))
+    found, begun_s, size = [], time.perf_counter(), 0
+    for number in chosen:
+        try:
+            found.append((new[number], glance(new[number])))
+            size += _size(found[-1][1])
+        except (Sd2Error, OSError) as error:
+            made.unusable.append(f"{new[number].name}: {error}")
+    looking_s = time.perf_counter() - begun_s
+    return found, looking_s + size / _hash_rate()
+
+
+def _size(found: Inspection) -> int:
+    path = Path(found.mesh.path if found.mesh is not None else found.video.path)  # type: ignore[union-attr]
+    if path.is_dir():
+        return sum(one.stat().st_size for one in path.rglob("*") if one.is_file())
+    return path.stat().st_size if path.exists() else 0
+
+
+def _hash_rate() -> float:
+    """Bytes that are hashed in a second."""
+    block = bytes(8 << 20)
+    begun_s = time.perf_counter()
+    hashlib.sha256(block).digest()
+    return len(block) / (time.perf_counter() - begun_s)
+
+
+def _count(
+    flow: Flow, steps: dict[str, StepEstimate], origin: Origin, found: Inspection, weight: float
+) -> None:
+    """Add the tasks of one recording, which stands for ``weight`` of them."""
+    mesh = found.mesh
+    if mesh is None:
+        assert found.video is not None
+        if flow.plan.fit is None:
+            return
+        task = flow.fit_task(origin, found.video)
+        done = bool(found.video.identity) and flow.is_done(task)
+        _add(steps["fit"], task, done, weight)
+        video = found.video
+        # Its mesh is not there yet: what is made of it is all to be done.
+        mesh = MeshInput("", "", video.frames, 0, video.frames_per_s, (0.0, 0.0, 0.0))
+    if flow.plan.synthesise is None:
+        return
+    for planned in flow.maps_of(origin, mesh, found.sensor):
+        for task in (*planned.synthesis, *planned.denoising):
+            _add(steps[task.step], task, bool(mesh.identity) and flow.is_done(task), weight)
+
+
+def _add(step: StepEstimate, task: Task, done: bool, weight: float) -> None:
+    if done:
+        step.there += 1
+    else:
+        step.to_do += round(weight)
+        step.frames += round(weight * task.frames)
+
+
+def _time(
+    flow: Flow, steps: dict[str, StepEstimate], found: Sequence[Inspection], plan: BatchPlan
+) -> None:
+    if "fit" in steps:
+        rates = known_rates()
+        rate = rates.get("fit", _FIT_S_PER_FRAME)
+        assert plan.fit is not None
+        each = _MESH_BYTES_PER_FRAME[plan.fit.resolution]
+        _Rate(1.0, rate, 0.0, each).apply(steps["fit"], steps["fit"].frames, steps["fit"].to_do)
+        steps["fit"].basis = "as in earlier batches" if "fit" in rates else "assumed"
+    if plan.synthesise is None:
+        return
+    timed = [_timed(flow, one) for one in _sample(found)]
+    for step in ("synthesise", "denoise"):
+        here = [one[step] for one in timed if step in one]
+        if step in steps and here and steps[step].to_do:
+            mean = _Rate(*np.mean([list(asdict(one).values()) for one in here], axis=0).tolist())
+            mean.apply(steps[step], steps[step].frames, steps[step].to_do)
+            steps[step].basis = f"measured on {len(here)} of the meshes"
+        elif step in steps:
+            steps[step].basis = "nothing to measure it on: no mesh is there yet"
+
+
+def _sample(found: Sequence[Inspection]) -> list[Inspection]:
+    """Of those with a mesh that can be opened at once: the middle ones by length."""
+    usable = [one for one in found if one.mesh is not None and one.mesh.target_m != (0.0, 0.0, 0.0)]
+    usable.sort(key=lambda one: one.mesh.frames if one.mesh is not None else 0)
+    middle = max(0, (len(usable) - _TIMED_MESHES) // 2)
+    return usable[middle : middle + _TIMED_MESHES]
+
+
+def _timed(flow: Flow, found: Inspection) -> dict[str, _Rate]:
+    """What a map of this mesh costs, by doing it for a few frames."""
+    from sd2core.batch.denoising import denoise
+    from sd2core.batch.synthesis import synthesise
+
+    mesh, plan = found.mesh, flow.plan
+    assert mesh is not None
+    assert plan.synthesise is not None
+    told = plan.synthesise
+    sensors = list(plan.sensors(found.sensor, mesh.target_m).values())
+    sensor = sensors[len(sensors) // 2]
+    long = min(_LONG_FRAMES, mesh.frames)
+    short = max(1, min(_SHORT_FRAMES, long // 2))
+    middle = (mesh.frames - long) // 2
+    rates: dict[str, _Rate] = {}
+    with tempfile.TemporaryDirectory(prefix="sd2-batch-") as name:
+        folder = Path(name)
+        chosen = folder / "plan.json" if told.tolerance is not None else None
+        outs = {count: folder / f"{count}.npz" for count in (long, short)}
+
+        def make(count: int) -> None:
+            stretch = (middle, middle + count)
+            synthesise(mesh, sensor, told, stretch, chosen, outs[count])
+
+        # The first one reads the mesh, and chooses a plan where there is a tolerance.
+        choosing_s = _seconds(lambda: make(long))
+        fresh_s = _seconds(lambda: make(long))
+        rates["synthesise"] = _rate(make, outs, long, short)
+        if chosen is not None:
+            known = rates["synthesise"]
+            extra_s = max(choosing_s - fresh_s, 0.0)
+            rates["synthesise"] = _Rate(
+                known.seconds + extra_s, known.frame_s, known.bytes, known.frame_bytes
+            )
+        if plan.denoise is not None:
+            model, digest = flow.model
+            cleaned = {count: folder / f"denoised-{count}.npz" for count in outs}
+
+            def clean(count: int) -> None:
+                denoise([outs[count]], 0, model, digest, cleaned[count])
+
+            clean(long)
+            rates["denoise"] = _rate(clean, cleaned, long, short)
+    return rates
+
+
+def _rate(work: Callable[[int], None], outs: dict[int, Path], long: int, short: int) -> _Rate:
+    """From the same done to many frames and to few."""
+    seconds = {count: min(_seconds(lambda: work(count)) for _ in range(2)) for count in outs}  # noqa: B023
+    sizes = {count: outs[count].stat().st_size for count in outs}
+    per_frame_s, fixed_s = _line(seconds, long, short)
+    per_frame, fixed = _line(sizes, long, short)
+    return _Rate(fixed_s, per_frame_s, fixed, per_frame)
+
+
+def _line(values: dict[int, Any], long: int, short: int) -> tuple[float, float]:
+    """Slope and start, neither below 0."""
+    if long == short:
+        return values[long] / long, 0.0
+    slope = max((values[long] - values[short]) / (long - short), 0.0)
+    return slope, max(values[short] - slope * short, 0.0)
+
+
+def _seconds(work: Callable[[], None]) -> float:
+    begun_s = time.perf_counter()
+    work()
+    return time.perf_counter() - begun_s

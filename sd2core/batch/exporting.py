@@ -1,0 +1,254 @@
+"""The task that makes a data set of all maps of a batch."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sd2core.atomic import atomic_write_text
+from sd2core.batch.folder import BatchFolder
+from sd2core.batch.keys import file_digest, key_of
+from sd2core.batch.plan import Export
+from sd2core.batch.stretches import LONGEST_FRAMES, joined
+from sd2core.errors import Sd2Error
+from sd2core.progress import Progress
+from sd2core.sensor import VirtualSensor
+from sd2core.spectrum import DopplerMap, MapKind
+from sd2core.timebase import Timebase
+
+if TYPE_CHECKING:
+    from sd2core.datasets.source import LazySource, Source, SourceKey
+    from sd2core.recording import Recording
+
+Row = dict[str, Any]
+"""A line of ``results.jsonl``: one stretch of one map."""
+
+_NOTE = "dataset.json"
+
+
+def dataset_path(folder: BatchFolder, export: Export) -> Path:
+    """Where the data set is."""
+    return folder.path / f"dataset.{export.format}"
+
+
+def dataset_key(folder: BatchFolder, export: Export) -> str:
+    """Hash of all that the data set depends on; ``results.jsonl`` must be there."""
+    content = {"results": file_digest(folder.results), "export": export.model_dump(mode="json")}
+    return key_of("export", content)
+
+
+def is_exported(folder: BatchFolder, export: Export) -> bool:
+    """Whether the data set is there, made of what is there now."""
+    try:
+        note = json.loads((folder.path / _NOTE).read_text(encoding="utf-8"))
+        return bool(
+            note["key"] == dataset_key(folder, export) and dataset_path(folder, export).exists()
+        )
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
+
+
+def export_dataset(folder: BatchFolder, export: Export, progress: Progress) -> None:
+    """Write the data set with its card; goes on with one that was begun.
+
+    Sources that have been there stay. Where one of them has changed, or the settings have,
+    it is written anew.
+
+    Raises
+    ------
+    Sd2Error
+        When nothing can be exported, or a source does not fit the others.
+    """
+    from sd2core.datasets.card import write_card
+    from sd2core.datasets.options import DatasetOptions
+    from sd2core.datasets.writing import write_dataset
+
+    out = dataset_path(folder, export)
+    note = folder.path / _NOTE
+    options = DatasetOptions(
+        kinds=export.kinds,
+        length=export.segment_frames,
+        overlap=export.overlap_frames,
+        frame_rate_hz=export.frame_rate_hz,
+        validation=export.validation_subjects,
+        test=export.test_subjects,
+        title=export.title,
+    )
+    settings = key_of("export", {"settings": export.model_dump(mode="json")})
+    if _settings_of(note) != settings or _is_stale(out, folder, export):
+        for path in (*folder.path.glob("dataset.*"),):
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+    atomic_write_text(note, json.dumps({"settings": settings}) + "\n")
+    written = write_dataset(out, _Counted(folder, export), options, progress)
+    write_card(out)
+    if written.failed:
+        first = written.failed[0]
+        raise Sd2Error(
+            f"{len(written.failed)} of {written.sources + len(written.failed)} sources cannot be"
+            f" exported, such as {first.key.title}: {first.reason}"
+        )
+    content = {"settings": settings, "key": dataset_key(folder, export)}
+    atomic_write_text(note, json.dumps(content) + "\n")
+
+
+def _settings_of(note: Path) -> str | None:
+    try:
+        return str(json.loads(note.read_text(encoding="utf-8"))["settings"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def _is_stale(out: Path, folder: BatchFolder, export: Export) -> bool:
+    """Whether a source that the data set has is not wanted any more, or is another now."""
+    from sd2core.datasets.reading import open_dataset
+
+    if not out.exists():
+        return False
+    wanted = {(*one.key,): one.fingerprint for one in _sources(folder, export)}
+    try:
+        with open_dataset(out) as dataset:
+            return any(
+                wanted.get((one["subject"], one["recording"], one["placement"]))
+                != one["fingerprint"]
+                for one in dataset.sources()
+            )
+    except Sd2Error:  # begun, and not come to its end
+        return False
+
+
+class _Counted:
+    """Sources whose number is known, made one by one."""
+
+    def __init__(self, folder: BatchFolder, export: Export) -> None:
+        self._folder, self._export = folder, export
+        self._count = sum(1 for _ in _sources(folder, export))
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __iter__(self) -> Iterator[LazySource]:
+        return _sources(self._folder, self._export)
+
+
+def rows_of(folder: BatchFolder) -> Iterator[list[Row]]:
+    """The stretches of one map after the other."""
+    with folder.results.open(encoding="utf-8") as stream:
+        rows = (json.loads(line) for line in stream)
+        for _, group in groupby(rows, lambda row: (row["recording"], row["placement"])):
+            yield list(group)
+
+
+def _sources(folder: BatchFolder, export: Export) -> Iterator[LazySource]:
+    from sd2core.datasets.source import LazySource, SourceKey
+
+    opened = _Opened()
+    for rows in rows_of(folder):
+        parts = _parts(rows[-1]["stop"], export)
+        for number, (start, stop) in enumerate(parts):
+            name = Path(rows[0]["recording"]).with_suffix("").as_posix()
+            if len(parts) > 1:
+                name = f"{name} part {number + 1} of {len(parts)}"
+            key = SourceKey(rows[0]["subject"], name, rows[0]["placement"])
+            load = _loader(folder, rows, key, (start, stop), opened)
+            told = json.dumps([rows, start, stop], sort_keys=True)
+            yield LazySource(key, load, hashlib.sha256(told.encode()).hexdigest()[:32])
+
+
+def _parts(frames: int, export: Export) -> list[tuple[int, int]]:
+    """Frames that are cut into segments together.
+
+    Segments begin every so many frames. Parts begin with one of them and end with another,
+    so that a long recording gives the segments that it would give as a whole.
+    """
+    step = export.segment_frames - export.overlap_frames
+    length = max(LONGEST_FRAMES // step, 1) * step
+    starts = range(0, max(frames - export.overlap_frames, 1), length)
+    return [(start, min(start + length + export.overlap_frames, frames)) for start in starts]
+
+
+def _loader(
+    folder: BatchFolder, rows: Sequence[Row], key: SourceKey, part: tuple[int, int], opened: _Opened
+) -> Any:
+    def load(_: Progress) -> Source:
+        from sd2core.datasets.recording_sources import labels_and_classes
+        from sd2core.datasets.source import Source, label_per_frame
+        from sd2core.labels.spans import Labels
+
+        maps: dict[MapKind, DopplerMap] = {}
+        kinds: tuple[MapKind, ...] = ("synthetic", "denoised")
+        for kind in kinds:
+            if all(row[kind] is not None for row in rows):
+                maps[kind] = _stretch_of(folder, rows, kind, part)
+        recording = opened.recording(Path(rows[0]["source"]))
+        first = next(iter(maps.values()))
+        if recording is not None and recording.radar is not None and key.placement == 0:
+            radar = opened.radar(recording, first, first.timebase)
+            maps[radar.kind] = radar
+        labels = Labels() if recording is None else recording.labelled
+        names, classes = labels_and_classes(labels)
+        spans = [one for one in labels.spans if one.origin != "suggestion"]
+        return Source(
+            *key,
+            VirtualSensor(**rows[0]["sensor"]),
+            maps,
+            label_per_frame(spans, names, first.times_s),
+            names,
+            classes,
+            tuple(rows[0]["target_m"]),
+            {
+                "recording": key.recording if recording is None else recording.title,
+                "simulated": recording is not None and recording.simulated,
+            },
+        )
+
+    return load
+
+
+def _stretch_of(
+    folder: BatchFolder, rows: Sequence[Row], kind: str, part: tuple[int, int]
+) -> DopplerMap:
+    """Frames of a map, from the files of its stretches."""
+    start, stop = part
+    maps = []
+    for row in rows:
+        low, high = max(start, row["start"]), min(stop, row["stop"])
+        if low < high:
+            stretch = DopplerMap.load(folder.path / row[kind])
+            maps.append(stretch.between(low - row["start"], high - row["start"]))
+    whole = joined(maps)
+    # One number per frame: of the first stretch only, and of no use to who learns.
+    kept = {k: v for k, v in whole.meta.items() if k not in ("visible_share", "beyond_share")}
+    return replace(whole, meta=kept)
+
+
+class _Opened:
+    """The recording that was used last, and its radar's map."""
+
+    def __init__(self) -> None:
+        self._path: Path | None = None
+        self._recording: Recording | None = None
+        self._radar: DopplerMap | None = None
+
+    def recording(self, path: Path) -> Recording | None:
+        """None for a mesh or a video by itself."""
+        from sd2core.recording import is_recording, open_recording
+
+        if path != self._path:
+            self._path, self._radar = path, None
+            self._recording = open_recording(path) if is_recording(path) else None
+        return self._recording
+
+    def radar(self, recording: Recording, like: DopplerMap, timebase: Timebase) -> DopplerMap:
+        """What the radar saw at these times."""
+        from sd2core.datasets.recording_sources import radar_map
+        from sd2core.mocap.recording_pairs import on_clock
+
+        if self._radar is None:
+            self._radar = radar_map(recording, like.axis)
+        return on_clock(self._radar, timebase)

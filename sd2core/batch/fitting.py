@@ -1,0 +1,70 @@
+"""The task that makes a mesh of a video."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from sd2core.atomic import atomic_write_text
+from sd2core.batch.inputs import MeshInput, mesh_input, mesh_input_of
+from sd2core.batch.plan import Fit
+from sd2core.progress import silent
+
+
+def fit_choices(fit: Fit, subject: str, focal_px: float | None) -> dict[str, Any]:
+    """What is told of one video, as JSON can hold it.
+
+    Parameters
+    ----------
+    fit : Fit
+    subject : str
+    focal_px : float, optional
+        As the recording knows it; what the plan says goes before.
+    """
+    told = fit.focal_px is not None or fit.field_of_view_deg is not None
+    choices = {
+        "resolution": fit.resolution,
+        "stature_m": fit.stature_of.get(subject, fit.stature_m),
+        "focal_px": fit.focal_px if told else focal_px,
+        "field_of_view_deg": fit.field_of_view_deg,
+        "max_gap_s": fit.max_gap_s,
+    }
+    return {name: value for name, value in choices.items() if value is not None}
+
+
+def fit_to_video(video: str, choices: dict[str, Any], models: str | None, out: str) -> None:
+    """Fit a body and write the mesh, and then what tasks need to know of it.
+
+    A fit that was killed goes on where it was.
+
+    Raises
+    ------
+    Sd2Error
+        When there is nobody in the video, or it cannot be read.
+    """
+    from sd2core.body.fit_video import FitChoices, FitReport, fit_video
+
+    path = Path(out)
+    if not path.exists():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        quiet = FitReport(lambda _: silent, lambda *_: None, lambda *_: None)
+        folder = None if models is None else Path(models)
+        fit_video(Path(video), path, FitChoices(**choices), quiet, models=folder)
+    about = asdict(mesh_input_of(path, path.stem))
+    atomic_write_text(facts_path(path), json.dumps(about) + "\n")
+
+
+def facts_path(mesh: Path) -> Path:
+    """Where it stands what tasks need to know of a fitted mesh; there when it is complete."""
+    return mesh.with_suffix(".json")
+
+
+def fitted(mesh: Path) -> MeshInput | None:
+    """A mesh that has been fitted, if it is complete."""
+    try:
+        content = json.loads(facts_path(mesh).read_text(encoding="utf-8"))
+        return mesh_input(content) if mesh.exists() else None
+    except (OSError, ValueError, KeyError, TypeError):
+        return None

@@ -1,0 +1,433 @@
+"""What a batch works on: found by patterns, and looked at once."""
+
+from __future__ import annotations
+
+import glob
+import json
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path, PurePath
+from typing import TYPE_CHECKING, Any
+
+from sd2core.atomic import atomic_write_text
+from sd2core.batch.folder import BatchFolder
+from sd2core.batch.keys import code_digest, file_digest, key_of
+from sd2core.batch.plan import Recordings
+from sd2core.errors import Sd2Error
+from sd2core.relative_paths import files_of_pattern, is_pattern, is_there
+from sd2core.sensor import Vector, VirtualSensor
+
+if TYPE_CHECKING:
+    from sd2core.mesh import MeshSequence
+    from sd2core.recording import Recording
+
+LARGEST_IN_MEMORY_BYTES = 256 << 20
+"""Of a mesh: what is larger is streamed."""
+
+Signature = list[list[Any]]
+"""Per file or folder: path, size, time of the last change in ns, inode."""
+
+
+@dataclass(frozen=True)
+class Origin:
+    """One recording, video or mesh of a batch.
+
+    Parameters
+    ----------
+    path : str
+    name : str
+        Its path from the folder that holds all of them: unique within the batch.
+    subject : str
+    """
+
+    path: str
+    name: str
+    subject: str
+
+
+@dataclass(frozen=True)
+class MeshInput:
+    """A moving mesh, as far as tasks need to know it.
+
+    Parameters
+    ----------
+    path : str
+    identity : str
+        Hash of its content and of how it is read.
+    frames, vertices : int
+    frames_per_s : float
+    target_m : tuple of 3 floats
+        Where the body is, see :class:`~sd2core.whereabouts.Whereabouts`.
+    faces : str, optional
+    reading : mapping
+        Arguments for ``load_mesh``.
+    """
+
+    path: str
+    identity: str
+    frames: int
+    vertices: int
+    frames_per_s: float
+    target_m: Vector
+    faces: str | None = None
+    reading: Mapping[str, Any] | None = None
+
+
+@dataclass(frozen=True)
+class VideoInput:
+    """A video to fit a body to.
+
+    Parameters
+    ----------
+    path, identity : str
+        The hash is of its content.
+    frames : int
+    frames_per_s : float
+    focal_px : float, optional
+        As far as the recording knows it.
+    """
+
+    path: str
+    identity: str
+    frames: int
+    frames_per_s: float
+    focal_px: float | None = None
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """What one recording holds; a mesh goes before a video.
+
+    Parameters
+    ----------
+    sensor : VirtualSensor
+        Its own one.
+    mesh : MeshInput, optional
+    video : VideoInput, optional
+    about : str
+        Hash of what else a data set takes from it: labels, and what its radar saw.
+    """
+
+    sensor: VirtualSensor
+    mesh: MeshInput | None = None
+    video: VideoInput | None = None
+    about: str = ""
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Inspection:
+        """Inverse of ``dataclasses.asdict``, also after JSON."""
+        mesh, video = content["mesh"], content["video"]
+        return cls(
+            VirtualSensor(**{**content["sensor"]}),
+            None if mesh is None else mesh_input(mesh),
+            None if video is None else VideoInput(**video),
+            content["about"],
+        )
+
+
+def mesh_input(content: Mapping[str, Any]) -> MeshInput:
+    """Inverse of ``dataclasses.asdict``, also after JSON."""
+    return MeshInput(**{**content, "target_m": tuple(content["target_m"])})
+
+
+def find_origins(recordings: Recordings, apart_from: Path) -> list[Origin]:
+    """All files that the patterns name, sorted.
+
+    What lies inside of a recording or of a Zarr store that is found belongs to it.
+
+    Parameters
+    ----------
+    recordings : Recordings
+        With absolute patterns.
+    apart_from : Path
+        The folder of the batch, which is not searched for its own input.
+
+    Raises
+    ------
+    Sd2Error
+        When a pattern matches nothing.
+    """
+    found: set[str] = set()
+    for pattern in recordings.files:
+        matches = [pattern] if os.path.exists(pattern) else glob.glob(pattern, recursive=True)
+        matches = [path for path in matches if not Path(path).is_relative_to(apart_from)]
+        if not matches:
+            raise Sd2Error(
+                f"{pattern} matches nothing",
+                "recordings (.sd2), videos or meshes",
+                "Check `files` of [recordings] in the plan",
+            )
+        found.update(matches)
+    paths = [Path(path) for path in sorted(found)]
+    paths = [path for path in paths if not any(_holds(parent) for parent in path.parents)]
+    root = Path(os.path.commonpath([path.parent for path in paths]))
+    return [
+        Origin(str(path), name, subject_of(recordings, path, name))
+        for path in paths
+        if (name := path.relative_to(root).as_posix())
+    ]
+
+
+def _holds(folder: Path) -> bool:
+    return folder.suffix in (".sd2", ".zarr")
+
+
+def subject_of(recordings: Recordings, path: Path, name: str) -> str:
+    """Who is in a recording."""
+    for pattern, subject in recordings.subject_of.items():
+        if path.match(pattern):
+            return subject
+    own = PurePath(name)
+    if recordings.subjects == "folder":
+        return own.parent.as_posix() if own.parent.name else path.parent.name
+    return own.with_suffix("").as_posix()
+
+
+# -- Looking at a recording, once ---------------------------------------------------------------
+
+
+def known_inspection(folder: BatchFolder, origin: Origin) -> Inspection | None:
+    """What was found, where nothing has changed since; only names and times are looked at."""
+    record = _record(folder, origin)
+    if record is None or _signature(entry[0] for entry in record["files"]) != record["files"]:
+        return None
+    found = Inspection.from_dict(record["inspection"])
+    # A mesh of ours may have been deleted.
+    return found if found.mesh is None or is_there(Path(found.mesh.path)) else None
+
+
+def inspect(folder: BatchFolder, origin: Origin) -> Inspection:
+    """Find out what a recording holds, and keep it.
+
+    Contents are hashed where size, time of change or inode are not those from before.
+
+    Raises
+    ------
+    Sd2Error
+        When it cannot be used.
+    """
+    before = _record(folder, origin) or {"files": [], "digests": {}}
+    look = _Look(folder, {str(entry[0]): entry for entry in before["files"]}, before["digests"])
+    found = look.at(Path(origin.path))
+    content = {
+        "code": code_digest("inspect"),
+        "files": look.files,
+        "digests": look.digests,
+        "inspection": asdict(found),
+    }
+    path = _record_path(folder, origin)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    atomic_write_text(path, json.dumps(content) + "\n")
+    return found
+
+
+def glance(origin: Origin) -> Inspection:
+    """What a recording holds, without hashing it: its identities are empty.
+
+    Raises
+    ------
+    Sd2Error
+        When it cannot be used.
+    """
+    return _Look(None, {}, {}).at(Path(origin.path))
+
+
+class _Look:
+    """One look at a recording; keeps which files it depends on.
+
+    Without a folder nothing is hashed and nothing written.
+    """
+
+    def __init__(
+        self, folder: BatchFolder | None, before: dict[str, list[Any]], digests: dict[str, str]
+    ) -> None:
+        self._folder, self._before, self._known = folder, before, digests
+        self.files: Signature = []
+        self.digests: dict[str, str] = {}
+
+    def at(self, path: Path) -> Inspection:
+        from sd2core.io.kinds import kind_of
+        from sd2core.labels.files import FILE_NAME as LABELS_NAME
+        from sd2core.recording import Recording, open_recording
+        from sd2core.recording_document import FILE_NAME
+
+        kind = kind_of(path)
+        if kind == "recording":
+            recording = open_recording(path)
+            for name in (FILE_NAME, LABELS_NAME):
+                self.files += _signature([recording.folder / name])
+        elif kind == "mesh":
+            recording = Recording(path.parent, mesh=path)
+        elif kind == "video":
+            recording = Recording(path.parent, video=path)
+        else:
+            raise Sd2Error(f"{path} is of kind {kind}", "a recording, a video or a mesh")
+        mesh = self._mesh(recording) if recording.mesh is not None else None
+        # Of the video only its size matters to a mesh that has been made.
+        video = self._video(recording) if mesh is None and recording.video is not None else None
+        if mesh is None and video is None:
+            raise Sd2Error(f"{path} holds neither a mesh nor a video", "one of them")
+        return Inspection(recording.sensor, mesh, video, self._about(recording))
+
+    def _mesh(self, recording: Recording) -> MeshInput:
+        from sd2core.io.unpacking import npz_vertices
+
+        path = recording.mesh
+        assert path is not None
+        reading = recording.mesh_options()
+        faces = reading.pop("faces", None)
+        parts = [self._digest(file) for file in _files_of(path)]
+        identity = [parts, {key: str(value) for key, value in reading.items()}]
+        if faces is not None:
+            identity.append(self._digest(faces))
+        key = key_of("inspect", {"mesh": identity}) if self._folder is not None else ""
+        if is_large_npz(path):
+            if self._folder is None:
+                # Where the body is would take reading it; nobody asks before it is streamed.
+                return MeshInput(str(path), "", *npz_vertices(path), 30.0, (0.0, 0.0, 0.0))
+            path = self._unpacked(path)
+        return mesh_input_of(path, key, None if faces is None else str(faces), reading)
+
+    def _unpacked(self, path: Path) -> Path:
+        from sd2core.io.unpacking import unpack_npz
+
+        assert self._folder is not None
+        out = self._folder.result("meshes", self.digests[str(path)][:32], ".zarr")
+        if not out.exists():
+            out.parent.mkdir(parents=True, exist_ok=True)
+            unpack_npz(path, out)
+        return out
+
+    def _video(self, recording: Recording) -> VideoInput:
+        path = recording.video
+        assert path is not None
+        identity = self._digest(path)
+        with recording.open_video() as video:
+            focal_px = recording.focal_px(video.width, video.height)
+            return VideoInput(
+                str(path), identity, len(video), video.timebase.frames_per_s, focal_px
+            )
+
+    def _about(self, recording: Recording) -> str:
+        if self._folder is None:
+            return ""
+        labels, radar = recording.labelled, recording.radar
+        return key_of(
+            "inspect",
+            {
+                "spans": [repr(span) for span in labels.spans],
+                "set": repr(labels.label_set),
+                "title": recording.title,
+                "simulated": recording.simulated,
+                "radar_offset_s": recording.radar_offset_s,
+                "radar": None if radar is None else self._digest(radar),
+            },
+        )
+
+    def _digest(self, path: Path) -> str:
+        entries = _signature(_tree(path))
+        self.files += entries
+        if self._folder is None:
+            return ""
+        known = self._known.get(str(path))
+        if known is None or any(self._before.get(entry[0]) != entry for entry in entries):
+            known = file_digest(path)
+        self.digests[str(path)] = known
+        return known
+
+
+def open_mesh(path: Path, faces: str | None, reading: Mapping[str, Any]) -> MeshSequence:
+    """Open a mesh that is streamed, or small enough to be in memory as a whole.
+
+    Raises
+    ------
+    Sd2Error
+        When it cannot be read, or would take too much memory.
+    """
+    from sd2core.io.mesh import load_mesh
+
+    files = _files_of(path)
+    size = 0 if ".zarr" in path.name.lower() else sum(map(_bytes_in_memory, files))
+    if size > LARGEST_IN_MEMORY_BYTES:
+        raise Sd2Error(
+            f"The mesh {path} is {size >> 20:,} MiB large and would be in memory as a whole",
+            f"at most {LARGEST_IN_MEMORY_BYTES >> 20} MiB, or a .zarr or .npz mesh, which is not",
+            "Save it as .zarr: sd2core.io.mesh.save_mesh(sd2core.load_mesh(PATH), 'mesh.zarr')",
+        )
+    # JSON knows no tuples.
+    told: dict[str, Any] = {
+        key: tuple(one) if isinstance(one, list) else one for key, one in reading.items()
+    }
+    return load_mesh(path, faces=faces, **told)
+
+
+def _bytes_in_memory(path: Path) -> int:
+    from sd2core.io.unpacking import npz_bytes
+
+    if path.suffix.lower() == ".npz":
+        return npz_bytes(path)
+    if path.is_dir():
+        return sum(one.stat().st_size for one in path.iterdir())
+    return path.stat().st_size
+
+
+def is_large_npz(path: Path) -> bool:
+    """Whether a mesh is an ``.npz`` that is to be unpacked first."""
+    is_npz = path.suffix.lower() == ".npz" and path.is_file()
+    return is_npz and _bytes_in_memory(path) > LARGEST_IN_MEMORY_BYTES
+
+
+def mesh_input_of(
+    path: Path, identity: str, faces: str | None = None, reading: Mapping[str, Any] | None = None
+) -> MeshInput:
+    """What tasks need to know of a mesh.
+
+    Raises
+    ------
+    Sd2Error
+        As :func:`open_mesh`, and when there is nobody in it.
+    """
+    from sd2core.whereabouts import Whereabouts
+
+    mesh = open_mesh(path, faces, reading or {})
+    x, y, z = (round(value, 6) for value in Whereabouts.of(mesh).target_m)
+    rate = mesh.timebase.frames_per_s
+    shape = mesh.frame_count, mesh.vertex_count
+    return MeshInput(str(path), identity, *shape, rate, (x, y, z), faces, reading)
+
+
+def _files_of(path: Path) -> list[Path]:
+    return sorted(files_of_pattern(path)) if is_pattern(path) else [path]
+
+
+def _tree(path: Path) -> Iterable[Path]:
+    """A file; or a folder with all that is in it, whose own time tells when something goes."""
+    yield path
+    if path.is_dir():
+        yield from sorted(path.rglob("*"))
+
+
+def _signature(paths: Iterable[Any]) -> Signature:
+    entries: Signature = []
+    for path in paths:
+        try:
+            facts = os.stat(path)
+        except OSError:
+            entries.append([str(path), -1, 0, 0])
+        else:
+            entries.append([str(path), facts.st_size, facts.st_mtime_ns, facts.st_ino])
+    return entries
+
+
+def _record_path(folder: BatchFolder, origin: Origin) -> Path:
+    return folder.result("inputs", key_of("inspect", {"path": origin.path}), ".json")
+
+
+def _record(folder: BatchFolder, origin: Origin) -> dict[str, Any] | None:
+    try:
+        content = json.loads(_record_path(folder, origin).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    usable = isinstance(content, dict) and content.get("code") == code_digest("inspect")
+    return content if usable else None

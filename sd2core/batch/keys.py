@@ -1,0 +1,96 @@
+"""Names of results: the hash of all that they depend on."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import sd2core
+from sd2core.batch.plan import Step
+from sd2core.resources import resource_path
+
+_CODE: dict[Step, tuple[str, ...]] = {
+    "inspect": ("batch/inputs.py", "io", "recording.py", "recording_document.py", "mesh.py"),
+    "fit": ("batch/fitting.py", "body", "io", "mesh.py", "presence.py", "timebase.py"),
+    "synthesise": (
+        "batch/synthesis.py",
+        "batch/stretches.py",
+        "decimation.py",
+        "doppler",
+        "io",
+        "ladder",
+        "mesh.py",
+        "precision.py",
+        "presence.py",
+        "scattering",
+        "sensor.py",
+        "spectrum.py",
+        "timebase.py",
+    ),
+    "denoise": (
+        "batch/denoising.py",
+        "batch/stretches.py",
+        "denoise",
+        "presence.py",
+        "segments.py",
+        "spectrum.py",
+    ),
+    "export": ("batch/exporting.py", "datasets", "labels", "segments.py", "spectrum.py"),
+}
+"""Modules that a step's results depend on, within sd2core."""
+
+_RESOURCES: dict[Step, tuple[str, ...]] = {"fit": ("body.npz", "lifter.npz")}
+
+
+def key_of(step: Step, content: dict[str, Any]) -> str:
+    """Name of a result: 32 hexadecimal digits, the same in every process and on every machine.
+
+    Parameters
+    ----------
+    step : Step
+    content : dict
+        All that the result depends on besides the code, as JSON can hold it. The order of
+        keys does not matter.
+    """
+    text = json.dumps(
+        [step, code_digest(step), content], sort_keys=True, allow_nan=False, ensure_ascii=True
+    )
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+@cache
+def code_digest(step: Step) -> str:
+    """Changes with the code that makes a step's results, and the data that comes with it."""
+    package = Path(sd2core.__file__).parent
+    digest = hashlib.sha256()
+    for name in _CODE[step]:
+        for file in _sources(package / name):
+            digest.update(file.relative_to(package).as_posix().encode())
+            digest.update(file.read_bytes())
+    for name in _RESOURCES.get(step, ()):
+        digest.update(resource_path(name).read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def all_code_digest() -> str:
+    """Of all steps: the same where the same program is installed."""
+    return hashlib.sha256("".join(map(code_digest, _CODE)).encode()).hexdigest()[:16]
+
+
+def file_digest(path: Path) -> str:
+    """SHA-256 of a file's content; of a folder's, of the names and contents in it."""
+    if not path.is_dir():
+        with path.open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    digest = hashlib.sha256()
+    for file in sorted(one for one in path.rglob("*") if one.is_file()):
+        digest.update(f"{file.relative_to(path).as_posix()}\n{file_digest(file)}\n".encode())
+    return digest.hexdigest()
+
+
+def _sources(path: Path) -> Iterable[Path]:
+    return sorted(path.rglob("*.py")) if path.is_dir() else [path]

@@ -1,0 +1,330 @@
+"""One run of a batch, from the plan to the report."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from sd2core import __version__
+from sd2core.atomic import atomic_write
+from sd2core.batch.driver import Driver, Failure, Stopped, event_of
+from sd2core.batch.exporting import dataset_path
+from sd2core.batch.flow import Flow
+from sd2core.batch.folder import PROGRESS_FORMAT, PROGRESS_VERSION, BatchFolder
+from sd2core.batch.inputs import find_origins
+from sd2core.batch.leftovers import remove_old_leftovers
+from sd2core.batch.plan import BatchPlan
+from sd2core.batch.plan_file import plan_text
+from sd2core.batch.pool import Pool, local_pool, scheduler_pool
+from sd2core.batch.rates import remember_rate
+from sd2core.batch.tasks import BEGUN
+from sd2core.errors import Sd2Error
+from sd2core.train.control import Control, signals_kept, write_control
+from sd2core.train.progress import Event, ProgressWriter
+
+Outcome = Literal["finished", "stopped"]
+Watch = Callable[[Event], None]
+
+_LINE_EVERY_S = 0.5
+
+
+@dataclass(frozen=True)
+class BatchEnd:
+    """How a run ended.
+
+    Parameters
+    ----------
+    outcome : {"finished", "stopped"}
+    failed : int
+        Tasks that cannot be done.
+    interrupted : bool
+        Whether Ctrl-C asked for the end.
+    facts : dict
+        What the line ``end`` says.
+    """
+
+    outcome: Outcome
+    failed: int
+    interrupted: bool
+    facts: dict[str, Any]
+
+
+def run_batch(
+    plan: BatchPlan,
+    *,
+    source: Path | None = None,
+    scheduler: str | None = None,
+    processes: int = 1,
+    watch: Watch | None = None,
+    pool: AbstractContextManager[Pool] | None = None,
+) -> BatchEnd:
+    """Do all that a plan asks for and that is not there yet.
+
+    Parameters
+    ----------
+    plan : BatchPlan
+        With absolute paths.
+    source : Path, optional
+        The file of the plan.
+    scheduler : str, optional
+        Address of a dask-scheduler; otherwise ``processes`` are started here.
+    processes : int
+    watch : callable, optional
+        Told every line of the progress.
+    pool : context manager, optional
+        In place of both: what carries out the tasks.
+
+    Raises
+    ------
+    Sd2Error
+        When the batch cannot begin, or cannot go on at all.
+    """
+    folder = BatchFolder(Path(plan.out))
+    origins = find_origins(plan.recordings, folder.path)
+    flow = Flow(plan, folder, origins)
+    folder.prepare()
+    lock = folder.lock()
+    try:
+        with signals_kept():
+            write_control(folder.control, "run")
+            control = Control(folder.control)
+            control.take_signals()
+            folder.set_state("running", started_unix_s=time.time())
+            _write_plan(folder, plan)
+            _clear(folder)
+            if pool is None:
+                pool = (
+                    local_pool(folder, processes)
+                    if scheduler is None
+                    else scheduler_pool(folder, scheduler)
+                )
+            with ProgressWriter(folder.progress, watch) as lines:
+                run = _Run(flow, lines, control, scheduler)
+                return run.through(pool, source)
+    except BaseException:
+        folder.set_state("failed")
+        raise
+    finally:
+        shutil.rmtree(folder.path / BEGUN, ignore_errors=True)
+        lock.release()
+
+
+class _Run:
+    """What is said while a batch runs, and at its end."""
+
+    def __init__(
+        self, flow: Flow, lines: ProgressWriter, control: Control, scheduler: str | None
+    ) -> None:
+        self._flow, self._lines, self._control = flow, lines, control
+        self._scheduler = scheduler
+        self._folder = flow.folder
+        self._begun_s = time.monotonic()
+        self._said_s = float("-inf")
+        self._workers = -1
+        self._failures = 0
+        self._driver: Driver | None = None
+
+    def through(self, pool: AbstractContextManager[Pool], source: Path | None) -> BatchEnd:
+        """Do it, and say how it ended."""
+        self._start(source)
+        self._folder.report.unlink(missing_ok=True)
+        try:
+            with self._failures_file() as failures, ExitStack() as stack:
+                self._driver = Driver(
+                    self._flow,
+                    lambda: stack.enter_context(pool),
+                    on_failure=lambda one: self._failed(one, failures),
+                    on_note=self._note,
+                    tick=self._tick,
+                )
+                outcome = self._drive(self._driver)
+        except Sd2Error as error:
+            self._end("failed", error)
+            raise
+        except Exception as error:
+            self._end(
+                "failed", Sd2Error(f"This should not happen ({type(error).__name__}: {error})")
+            )
+            raise
+        facts = self._end(outcome, None)
+        return BatchEnd(outcome, facts["failed"], self._control.interrupted, facts)
+
+    def _drive(self, driver: Driver) -> Outcome:
+        try:
+            driver.run(self._flow.first())
+            self._write_results()
+            driver.run(self._flow.last())
+        except Stopped:
+            return "stopped"
+        return "finished"
+
+    def _start(self, source: Path | None) -> None:
+        self._lines.say(
+            "start",
+            format=PROGRESS_FORMAT,
+            version=PROGRESS_VERSION,
+            out=str(self._folder.path),
+            plan=None if source is None else str(source),
+            recordings=len(self._flow.origins),
+            placements=self._flow.plan.placement_count,
+            steps=list(self._flow.steps),
+            scheduler=self._scheduler,
+            unix_s=time.time(),
+        )
+
+    def _tick(self) -> None:
+        if self._control.word() == "stop":
+            raise Stopped
+        assert self._driver is not None
+        workers = self._driver.workers
+        if workers != self._workers:
+            self._workers = workers
+            self._lines.say("workers", workers=workers)
+        now_s = time.monotonic()
+        if now_s - self._said_s >= _LINE_EVERY_S:
+            self._said_s = now_s
+            last = self._driver.last
+            self._lines.say(
+                "progress",
+                **self._counts(),
+                running=len(self._driver.running),
+                workers=workers,
+                left_s=self._driver.left_s(),
+                last=None if last is None else event_of(last, self._folder.path),
+            )
+
+    def _counts(self) -> dict[str, Any]:
+        tally = None if self._driver is None else self._driver.tally
+        steps = self._flow.steps
+
+        def of(counts: Any) -> dict[str, int]:
+            return {step: counts[step] if counts else 0 for step in steps}
+
+        return {
+            "total": of(self._flow.total),
+            "there": of(tally and tally.there),
+            "done": of(tally and tally.done),
+            "failed": sum(tally.failed.values()) if tally else 0,
+            "waiting": sum(tally.waiting.values()) if tally else 0,
+            "elapsed_s": time.monotonic() - self._begun_s,
+        }
+
+    def _note(self, text: str) -> None:
+        self._lines.say("note", text=text)
+        self._log(text)
+
+    def _failed(self, failure: Failure, failures: Any) -> None:
+        about = event_of(failure.task, self._folder.path)
+        del about["out"]
+        about |= {"error": failure.error, "worker_died": failure.worker_died}
+        self._lines.say("failed", **about)
+        self._log(f"{about['recording']}: {about['step']}: {Sd2Error(**failure.error)}")
+        failures.write(json.dumps(about, ensure_ascii=False) + "\n")
+        self._failures += 1
+
+    def _log(self, text: str) -> None:
+        with self._folder.log.open("a", encoding="utf-8") as stream:
+            stream.write(f"{time.strftime('%Y-%m-%d %H:%M:%S')} {text}\n")
+
+    @contextmanager
+    def _failures_file(self) -> Iterator[Any]:
+        with self._failures_path.open("w+", encoding="utf-8") as stream:
+            yield stream
+
+    @property
+    def _failures_path(self) -> Path:
+        return self._folder.path / BEGUN / "failures.jsonl"
+
+    def _write_results(self) -> None:
+        """Every map that is there, recording by recording, in the order of the plan."""
+        root = self._folder.path
+        with atomic_write(self._folder.results) as stream:
+            for number, (origin, about, mesh, planned) in enumerate(self._flow.all_maps()):
+                if number % 256 == 0:
+                    self._tick()
+                for index, task in enumerate(planned.synthesis):
+                    start, stop = planned.stretches[index]
+                    row = {
+                        "source": origin.path,
+                        "recording": origin.name,
+                        "subject": origin.subject,
+                        "placement": planned.placement,
+                        "sensor": asdict(planned.sensor),
+                        "target_m": mesh.target_m,
+                        "about": about,
+                        "start": start,
+                        "stop": stop,
+                        "synthetic": _if_there(task.out, root),
+                        "denoised": _if_there(planned.denoising[index].out, root)
+                        if planned.denoising
+                        else None,
+                    }
+                    if row["synthetic"] is not None:
+                        stream.write((json.dumps(row, ensure_ascii=False) + "\n").encode())
+
+    def _end(self, outcome: str, error: Sd2Error | None) -> dict[str, Any]:
+        told = None
+        if error is not None:
+            told = {"found": error.found, "expected": error.expected, "remedy": error.remedy}
+            self._log(str(error))
+        export = self._flow.plan.export
+        dataset = None if export is None else dataset_path(self._folder, export)
+        facts = {
+            "outcome": outcome,
+            **self._counts(),
+            "report": str(self._folder.report),
+            "dataset": str(dataset) if dataset is not None and dataset.exists() else None,
+            "error": told,
+        }
+        self._remember_rates()
+        self._write_report(facts)
+        self._folder.set_state(outcome)  # type: ignore[arg-type]
+        self._lines.say("end", **facts)
+        return facts
+
+    def _remember_rates(self) -> None:
+        if self._driver is not None:
+            tally = self._driver.tally
+            remember_rate("fit", tally.seconds["fit"], tally.frames["fit"])
+            remember_rate("export", tally.seconds["export"], tally.frames["export"])
+
+    def _write_report(self, facts: dict[str, Any]) -> None:
+        """All facts, then one failure after the other: there may be many."""
+        head = {
+            "format": "sd2-batch-report",
+            "version": 1,
+            "made_by": f"SD² Studio {__version__}",
+            **facts,
+        }
+        text = json.dumps(head, indent=2, ensure_ascii=False)
+        with atomic_write(self._folder.report) as stream:
+            stream.write(text.removesuffix("\n}").encode() + b',\n  "failures": [')
+            if self._failures_path.exists():
+                with self._failures_path.open("rb") as failures:
+                    for number, line in enumerate(failures):
+                        stream.write((b",\n    " if number else b"\n    ") + line.rstrip(b"\n"))
+            stream.write(b"\n  ]\n}\n")
+
+
+def _if_there(out: str, root: Path) -> str | None:
+    path = Path(out)
+    return path.relative_to(root).as_posix() if path.exists() else None
+
+
+def _write_plan(folder: BatchFolder, plan: BatchPlan) -> None:
+    with atomic_write(folder.plan) as stream:
+        stream.write(plan_text(plan, folder.path).encode())
+
+
+def _clear(folder: BatchFolder) -> None:
+    """Remove what killed processes left."""
+    begun = folder.path / BEGUN
+    shutil.rmtree(begun, ignore_errors=True)
+    begun.mkdir()
+    remove_old_leftovers(folder.path)

@@ -1,0 +1,159 @@
+"""The task that makes a synthetic Doppler map of a stretch of a mesh."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sd2core.batch.inputs import MeshInput, open_mesh
+from sd2core.batch.plan import Synthesise
+from sd2core.batch.stretches import Stretch
+from sd2core.errors import Sd2Error
+from sd2core.sensor import VirtualSensor
+
+if TYPE_CHECKING:
+    from sd2core.doppler import Synthesizer
+    from sd2core.mesh import MeshSequence
+    from sd2core.whereabouts import Whereabouts
+
+PREPARED_BYTES = 128 << 20
+"""For what is prepared of a mesh; with less a block would be made twice."""
+
+
+@dataclass
+class _Kept:
+    """What one process keeps from one task to the next of the same mesh."""
+
+    mesh_of: MeshInput | None = None
+    mesh: MeshSequence | None = None
+    body: Whereabouts | None = None
+    made_for: tuple[Any, ...] = ()
+    synthesizer: Synthesizer | None = None
+
+
+_kept = _Kept()
+
+
+def synthesise(
+    mesh: MeshInput,
+    sensor: VirtualSensor,
+    told: Synthesise,
+    stretch: Stretch,
+    chosen: Path | None,
+    out: Path,
+) -> None:
+    """Make the map of some frames and write it.
+
+    Parameters
+    ----------
+    mesh : MeshInput
+    sensor : VirtualSensor
+    told : Synthesise
+    stretch : (int, int)
+        Equal to these columns of the map of the whole clip: smoothing and the reuse of
+        masks look beyond the stretch.
+    chosen : Path, optional
+        Where it is kept which plan holds the tolerance of this mesh and sensor.
+    out : Path
+
+    Raises
+    ------
+    Sd2Error
+        When the mesh cannot be read, the sensor stands in the body, or nothing holds the
+        tolerance.
+    """
+    _refuse_inside(mesh, sensor)
+    plan = None if chosen is None else _plan(mesh, sensor, told, chosen)
+    synthesizer = _synthesizer(mesh, told, plan)
+    doppler = synthesizer.map(sensor, frames=stretch)
+    if plan is not None:
+        doppler = replace(doppler, meta=doppler.meta | plan["provenance"])
+    out.parent.mkdir(parents=True, exist_ok=True)
+    doppler.save(out)
+
+
+def _refuse_inside(mesh: MeshInput, sensor: VirtualSensor) -> None:
+    from sd2core.whereabouts import Whereabouts
+
+    opened = _mesh(mesh)
+    if _kept.body is None:
+        _kept.body = Whereabouts.of(opened)
+    if _kept.body.seen_by((sensor,)).inside[0]:
+        x, y, z = sensor.position_m
+        raise Sd2Error(
+            f"A sensor at {x:g}, {y:g}, {z:g} m stands in the body",
+            "a place outside the box around it, at any time of the clip",
+            "Place it farther away",
+        )
+
+
+def _mesh(wanted: MeshInput) -> MeshSequence:
+    if _kept.mesh is None or _kept.mesh_of != wanted:
+        # Before another one is opened, so that there are never two.
+        _kept.mesh, _kept.body, _kept.synthesizer, _kept.made_for = None, None, None, ()
+        opened = open_mesh(Path(wanted.path), wanted.faces, wanted.reading or {})
+        # How well velocities are known is not asked here, and grows with the clip.
+        _kept.mesh = replace(opened, uncertainty=None)
+        _kept.mesh_of = wanted
+    return _kept.mesh
+
+
+def _synthesizer(mesh: MeshInput, told: Synthesise, plan: dict[str, Any] | None) -> Synthesizer:
+    from sd2core.decimation import decimate
+    from sd2core.doppler import Synthesizer
+    from sd2core.ladder.rungs import Plan
+
+    opened = _mesh(mesh)
+    wanted = (told, None if plan is None else json.dumps(plan["plan"], sort_keys=True))
+    if _kept.synthesizer is None or _kept.made_for != wanted:
+        _kept.synthesizer = None
+        options, share = told.options(), told.vertices_kept or 1.0
+        if plan is not None:
+            rungs = Plan.from_json(plan["plan"])
+            options, share = rungs.options(options), rungs.vertices_kept
+        _kept.synthesizer = Synthesizer(
+            decimate(opened, share), options, memory_budget_bytes=PREPARED_BYTES, threads=1
+        )
+        _kept.made_for = wanted
+    return _kept.synthesizer
+
+
+def _plan(mesh: MeshInput, sensor: VirtualSensor, told: Synthesise, path: Path) -> dict[str, Any]:
+    """The plan that was chosen, by whoever was first: costs are measured, and never twice alike."""
+    if (known := read_plan_of(path)) is not None:
+        return known
+    from sd2core.ladder import choose
+
+    choice = choose(
+        _mesh(mesh), sensor, tolerance=told.tolerance, options=told.options(), dragging=False
+    )
+    if not choice.holds:
+        raise Sd2Error(choice.summary, "a tolerance that can be held", "Allow more of it")
+    origin = choice.plan.provenance(choice.errors.l1)
+    origin["plan_reasons"] = [reason.text for reason in choice.reasons]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(prefix=".sd2-", suffix=".tmp", dir=path.parent)
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as stream:
+            json.dump({"plan": choice.plan.to_json(), "provenance": origin}, stream)
+        os.link(temporary, path)
+    except FileExistsError:
+        pass  # another stretch of the same clip was first
+    finally:
+        os.unlink(temporary)
+    known = read_plan_of(path)
+    assert known is not None
+    return known
+
+
+def read_plan_of(path: Path) -> dict[str, Any] | None:
+    """A plan that was chosen, if there is one."""
+    try:
+        content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return content

@@ -1,0 +1,223 @@
+"""``sd2 batch``: fit, synthesise, denoise and export many recordings from many places."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sd2core.cli.options import add_command, add_json, positive_int
+from sd2core.cli.output import counted, duration, print_facts, print_json
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    from sd2core.batch.folder import BatchStatus
+    from sd2core.batch.plan import BatchPlan
+    from sd2core.batch.run import BatchEnd, Watch
+
+_INTERRUPTED = 130
+_LISTED_FAILURES = 10
+
+
+def add_commands(commands: argparse._SubParsersAction) -> None:
+    """Add ``batch``."""
+    parser = add_command(
+        commands,
+        "batch",
+        "fit, synthesise, denoise and export many recordings from many places",
+        handler=_batch,
+        description=(
+            "Does what a plan says (TOML, see docs/formats.md) on all cores of this machine, or\n"
+            "on the workers of a dask-scheduler, which must see the same files under the same\n"
+            "paths. Every result is kept under the hash of what it depends on: the same command\n"
+            "again does only what is missing, after a change only what depends on that, and\n"
+            "after Ctrl-C or a crash what is left. A recording that cannot be used is reported\n"
+            "at the end and does not stop the others; the exit code is then 1."
+        ),
+        examples=(
+            "  sd2 batch plan.toml --dry-run       (how many tasks, hours and bytes)\n"
+            "  sd2 batch plan.toml\n"
+            "  sd2 batch plan.toml --scheduler tcp://10.0.0.5:8786\n"
+            "  sd2 batch --status made"
+        ),
+    )
+    parser.add_argument(
+        "plan", type=Path, nargs="?", metavar="PLAN.toml", help="what is to be done"
+    )
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument(
+        "--workers",
+        type=positive_int,
+        metavar="N",
+        help="processes on this machine (default: one per core)",
+    )
+    where.add_argument(
+        "--scheduler", metavar="ADDRESS", help="a dask-scheduler, whose workers do the work"
+    )
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument(
+        "--dry-run", action="store_true", help="say what would be done, and do none of it"
+    )
+    what.add_argument(
+        "--status", type=Path, metavar="FOLDER", help="how the batch in this folder stands"
+    )
+    what.add_argument(
+        "--stop", type=Path, metavar="FOLDER", help="stop the batch in this folder; it can go on"
+    )
+    shown = parser.add_mutually_exclusive_group()
+    add_json(shown)
+    shown.add_argument(
+        "--progress-json",
+        action="store_true",
+        help="print what is done as JSON lines, for other programs (docs/formats.md)",
+    )
+
+
+def _batch(options: argparse.Namespace) -> int:
+    from sd2core.batch.folder import BatchFolder
+
+    if options.plan is not None and (options.status or options.stop):
+        raise Sd2Error("A plan is given with --status or --stop", "one of them")
+    if options.status is not None:
+        return _show_status(options.status, options.json)
+    if options.stop is not None:
+        BatchFolder(options.stop).stop()
+        print(f"{options.stop} is told to stop")
+        return 0
+    if options.plan is None:
+        raise Sd2Error("No plan is given", "PLAN.toml, or --status FOLDER")
+    from sd2core.batch.plan_file import read_plan
+
+    plan = read_plan(options.plan)
+    if options.dry_run:
+        return _dry_run(plan, options)
+    return _run(plan, options)
+
+
+def _run(plan: BatchPlan, options: argparse.Namespace) -> int:
+    from sd2core.batch.run import run_batch
+    from sd2core.compiled import worker_count
+
+    with _watching(options) as watch:
+        end = run_batch(
+            plan,
+            source=options.plan,
+            scheduler=options.scheduler,
+            processes=options.workers or worker_count(),
+            watch=watch,
+        )
+    if options.json:
+        print_json({"out": plan.out, **end.facts})
+    elif not options.progress_json:
+        _print_end(plan, end)
+    if end.interrupted:
+        return _INTERRUPTED
+    return 1 if end.failed else 0
+
+
+@contextmanager
+def _watching(options: argparse.Namespace) -> Iterator[Watch]:
+    """Lines on standard output, or a bar on standard error where that is a terminal."""
+    if options.progress_json:
+        yield lambda event: print(json.dumps(event, ensure_ascii=False), flush=True)
+        return
+    from tqdm import tqdm
+
+    with tqdm(desc="Batch", unit="task", file=sys.stderr, disable=None, leave=False) as bar:
+
+        def watch(event: dict[str, Any]) -> None:
+            if event["event"] == "progress":
+                settled = sum(event["there"].values()) + sum(event["done"].values())
+                bar.total = sum(event["total"].values())
+                bar.update(settled + event["failed"] + event["waiting"] - bar.n)
+                left_s = event["left_s"]
+                bar.set_postfix_str(
+                    f"{counted(event['workers'], 'worker')}"
+                    + (f", {duration(left_s)} left" if left_s is not None else "")
+                    + (f", {event['failed']} failed" if event["failed"] else "")
+                )
+            elif event["event"] == "workers" and not event["workers"]:
+                bar.set_postfix_str("waiting for workers")
+            elif event["event"] == "failed":
+                bar.write(_failure_words(event), file=sys.stderr)
+            elif event["event"] == "note":
+                bar.write(f"  {event['text']}", file=sys.stderr)
+
+        yield watch
+
+
+def _failure_words(event: dict[str, Any]) -> str:
+    place = f" from place {event['placement']}" if event["placement"] else ""
+    return f"  {event['recording']}: {event['step']}{place}: {Sd2Error(**event['error'])}"
+
+
+def _print_end(plan: BatchPlan, end: BatchEnd) -> None:
+    facts = end.facts
+    stopped = "" if end.outcome == "finished" else "; the same command goes on"
+    print_facts(
+        f"{plan.out}: {end.outcome} after {duration(facts['elapsed_s'])}{stopped}",
+        _count_facts(facts) | {"data set": facts["dataset"] or ""},
+    )
+    if not end.failed:
+        return
+    print(f"  {counted(end.failed, 'task')} cannot be done:")
+    report = json.loads(Path(facts["report"]).read_text(encoding="utf-8"))
+    for failure in report["failures"][:_LISTED_FAILURES]:
+        print("  " + _failure_words(failure))
+    if end.failed > _LISTED_FAILURES:
+        print(f"    and {end.failed - _LISTED_FAILURES:,} more, in {facts['report']}")
+
+
+def _count_facts(facts: dict[str, Any]) -> dict[str, str]:
+    words = {
+        step: f"{facts['done'][step]:,} done, {facts['there'][step]:,} there already, of {total:,}"
+        for step, total in facts["total"].items()
+        if total
+    }
+    return words | {
+        "failed": f"{facts['failed']:,}" if facts["failed"] else "",
+        "waiting": f"{facts['waiting']:,}, for what failed" if facts["waiting"] else "",
+    }
+
+
+def _show_status(path: Path, as_json: bool) -> int:
+    from dataclasses import asdict
+
+    from sd2core.batch.folder import BatchFolder
+
+    status = BatchFolder(path).status()
+    if as_json:
+        print_json({"out": str(path), **asdict(status)})
+    else:
+        print_facts(f"{path}: {status.state}", _count_facts(asdict(status)) | _times(status))
+    return 0
+
+
+def _times(status: BatchStatus) -> dict[str, str]:
+    elapsed = "" if status.elapsed_s is None else duration(status.elapsed_s)
+    left = "" if status.left_s is None else f", {duration(status.left_s)} left"
+    return {
+        "workers": str(status.workers) if status.state == "running" else "",
+        "time": elapsed + left,
+        "error": status.error or "",
+    }
+
+
+def _dry_run(plan: BatchPlan, options: argparse.Namespace) -> int:
+    from sd2core.batch.estimate import estimate
+    from sd2core.cli.batch_words import print_estimate
+    from sd2core.cli.output import progress_bar
+    from sd2core.compiled import worker_count
+
+    workers = options.workers or worker_count()
+    with progress_bar("Looking", "recording") as progress:
+        made = estimate(plan, workers, progress)
+    if options.json:
+        print_json(made.to_json())
+    else:
+        print_estimate(made, plan)
+    return 0

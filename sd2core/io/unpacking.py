@@ -1,0 +1,141 @@
+"""A large ``.npz`` mesh turned into a Zarr store without ever being in memory as a whole."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+import zipfile
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from sd2core.errors import Sd2Error
+from sd2core.io.mesh_arrays import (
+    SMALL_NAMES,
+    VERTEX_NAMES,
+    create_vertices,
+    frames_per_chunk,
+)
+
+Header = tuple[tuple[int, ...], bool, np.dtype[Any]]
+
+
+def npz_bytes(path: Path) -> int:
+    """Bytes that the arrays of an ``.npz`` take in memory.
+
+    Raises
+    ------
+    Sd2Error
+        When it is no ``.npz``.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return sum(member.file_size for member in archive.infolist())
+    except (OSError, zipfile.BadZipFile) as error:
+        raise _unreadable(path, error) from error
+
+
+def npz_vertices(path: Path) -> tuple[int, int]:
+    """Frames and vertices of the mesh in an ``.npz``; nothing but a header is read.
+
+    Raises
+    ------
+    Sd2Error
+        When there are no vertices in it.
+    """
+    try:
+        with (
+            zipfile.ZipFile(path) as archive,
+            archive.open(_vertex_member(archive, path)) as stream,
+        ):
+            frames, vertices, _ = _header(stream, path)[0]
+            return frames, vertices
+    except (OSError, ValueError, zipfile.BadZipFile) as error:
+        raise _unreadable(path, error) from error
+
+
+def unpack_npz(path: Path, out: Path) -> None:
+    """Write the arrays of an ``.npz`` mesh to a Zarr folder, which takes its name when complete.
+
+    Nothing is checked, completed or placed: that is done when the store is read.
+
+    Raises
+    ------
+    Sd2Error
+        When it cannot be read.
+    """
+    import zarr
+
+    workspace = Path(tempfile.mkdtemp(prefix=f".{out.name}.", suffix=".tmp", dir=out.parent))
+    try:
+        group = zarr.open_group(str(workspace / "new"), mode="w")
+        with zipfile.ZipFile(path) as archive:
+            with archive.open(_vertex_member(archive, path)) as stream:
+                _copy_vertices(stream, group, path)
+            members = {Path(name).stem for name in archive.namelist()}
+        with np.load(path, allow_pickle=False) as arrays:
+            for name in members.intersection(SMALL_NAMES):
+                if name == "limbs":
+                    group.attrs[name] = [str(one) for one in np.atleast_1d(arrays[name])]
+                else:
+                    group.create_array(name, data=np.asarray(arrays[name]))
+        if not out.exists():
+            os.rename(workspace / "new", out)
+    except Sd2Error:
+        raise
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        # What the disk has to say names a file; a damaged archive does not.
+        if isinstance(error, OSError) and error.filename:
+            raise
+        raise _unreadable(path, error) from error
+    finally:
+        shutil.rmtree(workspace, ignore_errors=True)
+
+
+def _copy_vertices(stream: IO[bytes], group: Any, path: Path) -> None:
+    shape, by_column, dtype = _header(stream, path)
+    if by_column:
+        raise Sd2Error(f"{path}: the vertices are stored by columns", "frame after frame (C order)")
+    vertices = create_vertices(group, shape, dtype)
+    step = frames_per_chunk(shape, dtype)
+    frame_bytes = int(np.prod(shape[1:])) * dtype.itemsize
+    for start in range(0, shape[0], step):
+        count = min(step, shape[0] - start)
+        block = stream.read(count * frame_bytes)
+        if len(block) < count * frame_bytes:
+            raise Sd2Error(f"{path} ends in frame {start} of {shape[0]}", "a complete file")
+        vertices[start : start + count] = np.frombuffer(block, dtype).reshape(count, *shape[1:])
+
+
+def _vertex_member(archive: zipfile.ZipFile, path: Path) -> str:
+    for name in VERTEX_NAMES:
+        if f"{name}.npy" in archive.namelist():
+            return f"{name}.npy"
+    raise Sd2Error(
+        f"{path} holds {', '.join(sorted(archive.namelist())) or 'nothing'}",
+        "an array 'vertices' (or 'verts') of shape (frames, vertices, 3)",
+    )
+
+
+def _header(stream: IO[bytes], path: Path) -> Header:
+    version = np.lib.format.read_magic(stream)
+    read: Any = (
+        np.lib.format.read_array_header_1_0
+        if version == (1, 0)
+        else np.lib.format.read_array_header_2_0
+    )
+    shape, by_column, dtype = read(stream)
+    if len(shape) != 3 or shape[2] != 3 or dtype.kind != "f":
+        raise Sd2Error(
+            f"{path}: the vertices have shape {shape} and type {dtype}",
+            "(frames, vertices, 3) of floating-point numbers",
+        )
+    return shape, by_column, dtype
+
+
+def _unreadable(path: Path, error: Exception) -> Sd2Error:
+    return Sd2Error(
+        f"{path} cannot be read as .npz ({error})", "a complete .npz file that holds plain numbers"
+    )

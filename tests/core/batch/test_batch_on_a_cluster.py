@@ -1,0 +1,93 @@
+"""A batch on a real scheduler with two worker processes, one of which is killed."""
+
+from __future__ import annotations
+
+import os
+import platform
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from dask_processes import cluster
+from moving_spheres import maps_in, save_spheres
+from pools import in_this_process
+
+from sd2core.batch.plan import BatchPlan
+from sd2core.batch.plan_file import plan_from_text
+from sd2core.batch.run import run_batch
+from sd2core.batch.tasks import BEGUN
+
+_PLAN = """
+out = "{out}"
+[recordings]
+files = ["meshes/*.npz"]
+[placements]
+kind = "grid"
+ranges_m = [2.2, 3, 4]
+[synthesise]
+"""
+
+
+def _plan(folder: Path, out: str) -> BatchPlan:
+    return plan_from_text(_PLAN.format(out=out), folder)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="stops and kills processes by signals")
+def test_a_killed_worker_loses_its_current_task_only(tmp_path: Path) -> None:
+    save_spheres(tmp_path / "meshes", 6, frames=200)
+    run_batch(_plan(tmp_path, "calm"), pool=in_this_process(tmp_path / "calm"))
+    expected = maps_in(tmp_path / "calm")
+    assert len(expected) == 18
+
+    out = tmp_path / "disturbed"
+    said: list[dict[str, Any]] = []
+    with cluster(tmp_path / "cluster", 2) as both:
+        killer = _Killer(out, both.workers[0])
+        killer.start()
+        end = run_batch(_plan(tmp_path, "disturbed"), scheduler=both.address, watch=said.append)
+        killer.join()
+    assert killer.during is not None, "no worker was killed at work"
+    assert (end.outcome, end.failed) == ("finished", 0)
+    found = maps_in(out)
+    assert found.keys() == expected.keys()
+    for name, values in expected.items():
+        np.testing.assert_array_equal(found[name], values)
+    # What had been done by then is as it was then.
+    assert killer.there
+    for path, changed_ns in killer.there.items():
+        assert path.stat().st_mtime_ns == changed_ns
+    assert end.facts["done"]["synthesise"] == 18
+
+
+class _Killer(threading.Thread):
+    """Kills a worker in the middle of a task, when some have been done."""
+
+    def __init__(self, out: Path, worker: subprocess.Popen[bytes]) -> None:
+        super().__init__(daemon=True)
+        self._out, self._worker = out, worker
+        self.during: str | None = None
+        self.there: dict[Path, int] = {}
+
+    def run(self) -> None:
+        marker = self._out / BEGUN / f"task-{platform.node()}-{self._worker.pid}"
+        until_s = time.monotonic() + 60
+        while time.monotonic() < until_s:
+            if marker.exists() and len(list(self._out.glob("synthetic/*/*.npz"))) >= 4:
+                os.kill(self._worker.pid, signal.SIGSTOP)
+                # It may have come to its end just before it was stopped.
+                if marker.exists():
+                    self.during = marker.read_text()
+                    self.there = {
+                        path: path.stat().st_mtime_ns
+                        for path in self._out.glob("synthetic/*/*.npz")
+                    }
+                    self._worker.kill()
+                    return
+                os.kill(self._worker.pid, signal.SIGCONT)
+            time.sleep(0.002)

@@ -1,0 +1,320 @@
+"""What a batch does and does not do again, and what it makes of things that go wrong."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from contextlib import nullcontext
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from moving_spheres import maps_in, save_spheres, swinging_sphere
+from numbered_videos import write_video
+from pools import SerialPool
+
+from sd2core.batch.driver import AHEAD
+from sd2core.batch.folder import BatchFolder
+from sd2core.batch.plan_file import plan_from_text
+from sd2core.batch.run import BatchEnd, run_batch
+from sd2core.batch.tasks import Task
+from sd2core.denoise.files import find_model
+from sd2core.doppler import Synthesizer
+from sd2core.errors import Sd2Error
+from sd2core.io.mesh import load_mesh, save_mesh
+from sd2core.recording import Recording
+from sd2core.sensor import VirtualSensor
+from sd2core.spectrum import DopplerMap
+
+PLAN = """
+out = "made"
+[recordings]
+files = ["meshes/*"]
+[placements]
+kind = "positions"
+positions_m = [[0, 0, 0], [1, 0, 0]]
+"""
+MAPS = PLAN + "[synthesise]\n"
+BOTH = MAPS + "[denoise]\n"
+
+
+class Runs:
+    """Runs plans in one folder, in this process."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.out = folder / "made"
+        self.pool = SerialPool(self.out)
+
+    def __call__(
+        self, text: str, workers: int = 1, dies: Callable[[Task], bool] | None = None, **more: Any
+    ) -> BatchEnd:
+        self.pool = SerialPool(self.out, workers, dies)
+        plan = plan_from_text(text, self.folder)
+        return run_batch(plan, pool=nullcontext(self.pool), **more)
+
+    @property
+    def report(self) -> dict[str, Any]:
+        content: dict[str, Any] = json.loads(BatchFolder(self.out).report.read_text())
+        return content
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Runs:
+    return Runs(tmp_path)
+
+
+def test_maps_are_those_of_synth_and_denoise(run: Runs) -> None:
+    from sd2core.denoise.files import load_model
+
+    paths = save_spheres(run.folder / "meshes", 2)
+    end = run(BOTH)
+    assert (end.outcome, end.failed) == ("finished", 0)
+    assert end.facts["done"] == {"inspect": 2, "synthesise": 4, "denoise": 4}
+    rows = [json.loads(line) for line in BatchFolder(run.out).results.read_text().splitlines()]
+    assert [(row["recording"], row["placement"]) for row in rows] == [
+        ("m0.npz", 1), ("m0.npz", 2), ("m1.npz", 1), ("m1.npz", 2)
+    ]  # fmt: skip
+    model = load_model(find_model("denoiser"))
+    for row in rows:
+        mesh = load_mesh(paths[int(row["recording"][1])])
+        expected = Synthesizer(mesh).map(VirtualSensor(**row["sensor"]))
+        made = DopplerMap.load(run.out / row["synthetic"])
+        np.testing.assert_array_equal(made.values, expected.values)
+        assert made.meta["sensor"] == expected.meta["sensor"] | {
+            "position_m": list(expected.meta["sensor"]["position_m"])
+        }
+        denoised = DopplerMap.load(run.out / row["denoised"])
+        np.testing.assert_allclose(
+            denoised.values, model.denoise(made).values, rtol=1e-5, atol=1e-7
+        )
+
+
+def test_the_same_again_does_nothing(run: Runs) -> None:
+    save_spheres(run.folder / "meshes", 2)
+    run(MAPS)
+    results = BatchFolder(run.out).results.read_bytes()
+    end = run(MAPS)
+    assert not run.pool.submitted
+    assert end.facts["there"] == {"inspect": 2, "synthesise": 4}
+    assert end.facts["done"] == {"inspect": 0, "synthesise": 0}
+    assert BatchFolder(run.out).results.read_bytes() == results
+
+
+def test_an_option_redoes_what_depends_on_it(run: Runs) -> None:
+    save_spheres(run.folder / "meshes", 1)
+    run(BOTH)
+    run(BOTH.replace("[denoise]\n", "time_sigma_s = 0.1\n[denoise]\n"))
+    assert run.pool.submitted == {"synthesise": 2, "denoise": 2}
+    # What a preset has already, said aloud, changes nothing.
+    run(BOTH.replace("[denoise]\n", "visibility = 'exact'\n[denoise]\n"))
+    assert not run.pool.submitted
+
+
+def test_another_place_is_one_more_map(run: Runs) -> None:
+    save_spheres(run.folder / "meshes", 1)
+    run(BOTH)
+    run(BOTH.replace("[1, 0, 0]]", "[1, 0, 0], [0, -1, 0]]"))
+    assert run.pool.submitted == {"synthesise": 1, "denoise": 1}
+
+
+def test_a_changed_recording_redoes_its_own_maps(run: Runs) -> None:
+    paths = save_spheres(run.folder / "meshes", 2)
+    run(MAPS)
+    save_mesh(swinging_sphere(44), paths[1])
+    run(MAPS)
+    assert run.pool.submitted == {"inspect": 1, "synthesise": 2}
+    # Written anew with the same content, it is looked at and nothing more.
+    content = paths[1].read_bytes()
+    paths[1].unlink()
+    paths[1].write_bytes(content)
+    run(MAPS)
+    assert run.pool.submitted == {"inspect": 1}
+
+
+def test_recordings_of_the_same_content_share_their_maps(run: Runs) -> None:
+    paths = save_spheres(run.folder / "meshes", 1)
+    (run.folder / "meshes" / "twin.npz").write_bytes(paths[0].read_bytes())
+    end = run(MAPS)
+    assert run.pool.submitted == {"inspect": 2, "synthesise": 2}
+    assert end.facts["total"]["synthesise"] == 4
+    assert len(BatchFolder(run.out).results.read_text().splitlines()) == 4
+    assert len(maps_in(run.out)) == 2
+
+
+def test_what_cannot_be_read_is_reported_and_stops_nothing(run: Runs) -> None:
+    save_spheres(run.folder / "meshes", 2)
+    (run.folder / "meshes" / "broken.npz").write_bytes(b"PK\x03\x04 and no more")
+    (run.folder / "meshes" / "film.mp4").write_bytes(b"no film")
+    said: list[dict[str, Any]] = []
+    end = run(BOTH, watch=said.append)
+    assert (end.outcome, end.failed) == ("finished", 2)
+    assert end.facts["done"] == {"inspect": 2, "synthesise": 4, "denoise": 4}
+    # Two recordings from two places, synthetic and denoised.
+    assert end.facts["waiting"] == 8
+    failures = run.report["failures"]
+    assert sorted(one["recording"] for one in failures) == ["broken.npz", "film.mp4"]
+    for one in failures:
+        assert one["step"] == "inspect"
+        assert one["recording"] in one["error"]["found"]
+    assert sum(one["event"] == "failed" for one in said) == 2
+    assert run.report["failed"] == 2
+    status = BatchFolder(run.out).status()
+    assert (status.state, status.failed, status.waiting) == ("finished", 2, 8)
+    # Mended, it is done; nothing else is.
+    save_mesh(swinging_sphere(40, 1.1), run.folder / "meshes" / "broken.npz")
+    assert run(BOTH).failed == 1
+    assert run.pool.submitted == {"inspect": 2, "synthesise": 2, "denoise": 2}
+
+
+def test_a_video_needs_a_fit(run: Runs, tmp_path: Path) -> None:
+    (tmp_path / "meshes").mkdir()
+    write_video(tmp_path / "meshes" / "film.mp4", frames=8)
+    end = run(MAPS)
+    assert end.failed == 1
+    assert "[fit]" in run.report["failures"][0]["error"]["expected"]
+
+
+def test_a_lost_process_costs_its_current_task_only(run: Runs) -> None:
+    save_spheres(run.folder / "meshes", 2)
+    died: list[str] = []
+
+    def dies(task: Task) -> bool:
+        if task.step == "synthesise" and task.placement == 2 and not died:
+            died.append(task.key)
+            return True
+        return False
+
+    said: list[dict[str, Any]] = []
+    end = run(MAPS, dies=dies, watch=said.append)
+    assert (end.outcome, end.failed) == ("finished", 0)
+    assert [one["text"] for one in said if one["event"] == "note"] == [
+        "A worker died during synthesise of m0.npz from place 2"
+    ]
+    assert len(maps_in(run.out)) == 4
+
+
+def test_what_ends_its_process_every_time_is_given_up(run: Runs) -> None:
+    save_spheres(run.folder / "meshes", 2)
+    guilty: list[str] = []
+
+    def dies(task: Task) -> bool:
+        if task.step == "synthesise" and (not guilty or task.key == guilty[0]):
+            guilty[:1] = [task.key]
+            return True
+        return False
+
+    end = run(MAPS, dies=dies)
+    assert (end.outcome, end.failed) == ("finished", 1)
+    assert end.facts["done"]["synthesise"] == 3
+    (failure,) = run.report["failures"]
+    assert failure["worker_died"]
+    assert "died 2 times" in failure["error"]["found"]
+
+
+def test_few_tasks_are_given_out_at_once(run: Runs) -> None:
+    save_spheres(run.folder / "meshes", 3)
+    many = ", ".join(f"[{0.05 * number}, 0, 0]" for number in range(40))
+    text = MAPS.replace("[0, 0, 0], [1, 0, 0]", many).replace("[synthesise]", _CHEAP)
+    end = run(text, workers=2)
+    assert end.facts["done"]["synthesise"] == 120
+    assert run.pool.most_waiting <= 2 * AHEAD
+
+
+_CHEAP = "[synthesise]\nvisibility = 'none'"
+
+
+def test_maps_of_one_recording_are_made_by_few_processes(run: Runs) -> None:
+    save_spheres(run.folder / "meshes", 6)
+    many = ", ".join(f"[{0.05 * number}, 0, 0]" for number in range(4))
+    run(MAPS.replace("[0, 0, 0], [1, 0, 0]", many).replace("[synthesise]", _CHEAP), workers=3)
+    changes = 0
+    for tasks in run.pool.by_worker.values():
+        names = [task.origin.name for task in tasks if task.step == "synthesise"]
+        changes += sum(a != b for a, b in pairwise(names))
+    assert changes <= 12
+
+
+def test_stopped_it_goes_on(run: Runs) -> None:
+    save_spheres(run.folder / "meshes", 2)
+    folder = BatchFolder(run.out)
+
+    def watch(event: dict[str, Any]) -> None:
+        if event["event"] == "workers":
+            folder.stop()
+
+    end = run(MAPS, watch=watch)
+    assert (end.outcome, end.interrupted) == ("stopped", False)
+    assert folder.status().state == "stopped"
+    before = maps_in(run.out)
+    assert len(before) < 4
+    end = run(MAPS)
+    assert end.outcome == "finished"
+    assert end.facts["there"]["synthesise"] == len(before)
+    assert len(maps_in(run.out)) == 4
+
+
+def test_two_batches_in_one_folder_are_refused(run: Runs) -> None:
+    save_spheres(run.folder / "meshes", 1)
+    run(MAPS)
+    lock = BatchFolder(run.out).lock()
+    try:
+        with pytest.raises(Sd2Error, match="at work"):
+            run(MAPS)
+    finally:
+        lock.release()
+    run(MAPS)
+
+
+def test_another_folder_is_not_taken_over(run: Runs) -> None:
+    save_spheres(run.folder / "meshes", 1)
+    run.out.mkdir()
+    (run.out / "thesis.tex").write_text("mine")
+    with pytest.raises(Sd2Error, match="not the folder of a batch"):
+        run(MAPS)
+    assert [one.name for one in run.out.iterdir()] == ["thesis.tex"]
+
+
+def test_a_pattern_that_matches_nothing_is_refused(run: Runs) -> None:
+    with pytest.raises(Sd2Error, match="matches nothing"):
+        run(MAPS)
+
+
+def test_recordings_become_a_data_set(run: Runs) -> None:
+    from sd2core.datasets.reading import open_dataset
+    from sd2core.recording_document import Span
+
+    folder = run.folder / "meshes"
+    folder.mkdir()
+    for number in range(3):
+        mesh = run.folder / f"mesh{number}.npz"
+        save_mesh(swinging_sphere(150, 0.5 + 0.2 * number), mesh)
+        Recording.create(
+            folder / f"take{number}",
+            mesh=mesh,
+            spans=(Span(start_s=1.0, end_s=3.0, label="left-right"),),
+        )
+    text = BOTH + "[export]\n"
+    end = run(text)
+    assert end.failed == 0, run.report["failures"]
+    with open_dataset(Path(end.facts["dataset"])) as dataset:
+        assert {one["recording"] for one in dataset.sources()} == {"take0", "take1", "take2"}
+        assert {one["placement"] for one in dataset.sources()} == {1, 2}
+        assert set(dataset.header.labels) >= {"background", "left-right"}
+        count = len(dataset)
+    run(text)
+    assert not run.pool.submitted
+    # Of one recording more, only what is new.
+    save_mesh(swinging_sphere(150, 1.3), run.folder / "mesh3.npz")
+    Recording.create(folder / "take3", mesh=run.folder / "mesh3.npz")
+    end = run(text)
+    assert run.pool.submitted == {"inspect": 1, "synthesise": 2, "denoise": 2, "export": 1}
+    with open_dataset(Path(end.facts["dataset"])) as dataset:
+        assert len(dataset) == count * 4 // 3
+    # Other labels: its maps stay, the data set is written anew.
+    recording = folder / "take3.sd2" / "recording.json"
+    recording.write_text(recording.read_text().replace('"title": "take3"', '"title": "other"'))
+    run(text)
+    assert run.pool.submitted == {"inspect": 1, "export": 1}
