@@ -24,6 +24,7 @@ from sd2core.datasets.source import (
 )
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
 from sd2core.errors import Sd2Error
+from sd2core.fmcw.processing import doppler_map
 from sd2core.labels.spans import Labels
 from sd2core.ladder.carry_out import synthesizer_for
 from sd2core.ladder.choosing import choose
