@@ -106,6 +106,11 @@ ACTIONS: tuple[Action, ...] = (
         lambda c: c.document.video is not None or has_mesh(c),
     ),
     Action(
+        "export_dataset", "File", "Export data set…", ("Ctrl+Shift+D",),
+        "Write segments with labels to learn from (Zarr, HDF5, NPZ), of this recording or a folder",
+        lambda w: w.dialogs.export_dataset(),
+    ),
+    Action(
         "batch", "File", "Batch…", ("Ctrl+B",),
         "Fit, synthesise, denoise and export many recordings from many places, beside the window",
         lambda w: w.batch_dialogs.show(), separator_before=True,

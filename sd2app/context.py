@@ -25,6 +25,7 @@ from sd2app.models.denoise_live import LiveDenoiseModel
 from sd2app.models.difference import DifferenceModel
 from sd2app.models.display import DisplayModel
 from sd2app.models.document import DocumentModel
+from sd2app.models.export import ExportModel
 from sd2app.models.fit import COMMAND, FitModel
 from sd2app.models.fit_follower import FitFollower
 from sd2app.models.fit_offer import FitOffer
@@ -100,6 +101,7 @@ class Context:
     batch: BatchModel
     training: TrainingModel
     training_use: TrainingUse
+    export: ExportModel
 
     @property
     def tracks(self) -> tuple[TrackModel, ...]:
@@ -119,6 +121,7 @@ class Context:
         self.suggestions.close()
         self.agreement.close()
         self.cut_out.close()
+        self.export.close()
         self.fit.close()
         self.batch.close()
         self.training_use.close()
@@ -231,6 +234,7 @@ def build_context(
         training_use=TrainingUse(
             training, denoise, synthetic, before, denoised, real, user_models_folder, parent
         ),
+        export=ExportModel(jobs, parent),
     )
     context.label_edits.done_at.connect(span.reveal_any)
     document.opened.connect(lambda: _take_over(context))

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
     QDialog,
@@ -17,6 +18,7 @@ from PySide6.QtWidgets import (
 import sd2core
 from sd2app.actions import MOUSE
 from sd2app.dialogs.comparison import ComparisonWindow
+from sd2app.dialogs.export import ExportDialog
 from sd2app.dialogs.keys import KeysDialog
 from sd2app.dialogs.map_figure import MapFigureDialog
 from sd2app.dialogs.model_card import ModelCardDialog
@@ -262,6 +264,30 @@ class Dialogs:
         model.close()
         model.deleteLater()
         dialog.deleteLater()
+
+    def export_dataset(self) -> None:
+        """Choose what a data set holds and have it written; the window can be used meanwhile."""
+        context = self._context
+        recording = context.document.recording
+        if recording is not None and (context.document.modified or not recording.folder.exists()):
+            if not self._may_save("A data set is made of what is saved."):
+                return
+            recording = context.document.recording
+        opened = None if recording is None else recording.folder
+        if not context.export.exporting:
+            context.export.begin(opened)
+        dialog = ExportDialog(context.export, opened, self._parent)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.open()
+
+    def _may_save(self, why: str) -> bool:
+        """Whether edits are saved, by the user's word."""
+        buttons = QMessageBox.StandardButton
+        words = f"{self._context.document.title} has changes that are not saved. {why}"
+        answer = QMessageBox.question(
+            self._parent, "Save changes?", words, buttons.Save | buttons.Cancel, buttons.Save
+        )
+        return answer == buttons.Save and self.save()
 
     def open_model(self) -> None:
         """Choose a model file, and use it."""

@@ -27,6 +27,7 @@ def connect_sentences(context: Context, messages: MessageBar) -> None:
         c.training,
         c.training_use,
         c.batch,
+        c.export,
     ):
         model.failed.connect(messages.warn)
     for model in (
@@ -38,6 +39,7 @@ def connect_sentences(context: Context, messages: MessageBar) -> None:
         c.training,
         c.training_use,
         c.batch,
+        c.export,
     ):
         model.noted.connect(messages.note)
 

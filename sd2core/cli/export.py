@@ -139,9 +139,9 @@ def _add_making(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("maps of recordings")
     group.add_argument(
         "--placements",
-        type=Path,
-        metavar="FILE",
-        help="sensors around the body besides the recording's own, as `sd2 placements` writes",
+        metavar="FILE|planned",
+        help="sensors around the body besides the recording's own, as `sd2 placements` writes"
+        " them, or those that each recording plans",
     )
     group.add_argument(
         "--tolerance",
@@ -236,7 +236,9 @@ def _making(options: argparse.Namespace) -> Making:
         kinds=_dataset_options(options).kinds,
         synthesis=chosen_options("paper", options.bins, options.v_max, nulled),
         tolerance=options.tolerance,
-        placements=None if options.placements is None else read_placements(options.placements),
+        placements=options.placements
+        if options.placements in (None, "planned")
+        else read_placements(Path(options.placements)),
         model=options.model,
     )
 

@@ -7,7 +7,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,7 @@ from sd2core.ladder.carry_out import synthesizer_for
 from sd2core.ladder.choosing import choose
 from sd2core.mesh import MeshSequence
 from sd2core.mocap.recording_pairs import on_clock
-from sd2core.placements import Placements
+from sd2core.placements import Place, Placements
 from sd2core.progress import Progress
 from sd2core.recording import Recording, open_recording
 from sd2core.sensor import Vector, VelocityAxis, VirtualSensor
@@ -52,9 +52,9 @@ class Making:
     tolerance : float, optional
         Error of a synthetic map that is allowed, as a share; the cheapest plan within it is
         chosen once per recording. None: as ``synthesis`` says.
-    placements : Placements, optional
+    placements : Placements or "planned", optional
         Where else sensors stand around the body, besides the recording's own; each gives
-        synthetic and denoised maps.
+        synthetic and denoised maps. ``"planned"``: where each recording itself plans them.
     model : str, optional
         Denoiser, by file or name; None: that of the recording, or the bundled one where
         nobody has chosen. A recording that is set to be shown without has no denoised map.
@@ -63,7 +63,7 @@ class Making:
     kinds: tuple[MapKind, ...] = KINDS
     synthesis: SynthesisOptions = PRESETS["paper"]
     tolerance: float | None = None
-    placements: Placements | None = None
+    placements: Placements | Literal["planned"] | None = None
     model: str | None = None
 
 
@@ -94,10 +94,7 @@ def recording_sources(
                 "one of them",
                 "Fit a mesh with `sd2 fit`",
             )
-        count = 0
-        if making.placements is not None and recording.mesh is not None:
-            count = len(making.placements.places())
-        for placement in range(1 + count):
+        for placement in range(1 + len(_places(recording, making))):
             key = SourceKey(subject, recording.folder.stem, placement)
             found.append(_lazy(shared, recording, key))
     return found
@@ -262,10 +259,9 @@ class _Opened:
     def _sensor(self, placement: int) -> VirtualSensor:
         if placement == 0:
             return self.recording.sensor
-        assert self._making.placements is not None
         target_m = self._target()
         assert target_m is not None
-        return self._making.placements.places()[placement - 1].sensor(target_m)
+        return _places(self.recording, self._making)[placement - 1].sensor(target_m)
 
     def _target(self) -> Vector | None:
         if self._target_m is None and self._mesh is not None:
@@ -289,6 +285,12 @@ class _Opened:
         return label_per_frame(self._spans, self._names, times_s)
 
 
+def _places(recording: Recording, making: Making) -> tuple[Place, ...]:
+    """Where else a recording is to be seen from."""
+    plan = recording.placements if making.placements == "planned" else making.placements
+    return () if plan is None or recording.mesh is None else plan.places()
+
+
 def _synthesizer(
     mesh: MeshSequence, sensor: VirtualSensor, making: Making
 ) -> tuple[Synthesizer, dict[str, Any]]:
@@ -308,8 +310,7 @@ def _fingerprint(recording: Recording, key: SourceKey, making: Making) -> str:
     """Of what the source is made of: labels and settings as they are, files by their sizes."""
     place = None
     if key.placement:
-        assert making.placements is not None
-        place = asdict(making.placements.places()[key.placement - 1])
+        place = asdict(_places(recording, making)[key.placement - 1])
     content = {
         "sensor": asdict(recording.sensor),
         "place": place,

@@ -81,6 +81,16 @@ def test_every_placement_is_seen_from_there(tmp_path: Path) -> None:
         assert np.array_equal(source.maps["synthetic"].values, expected)
 
 
+def test_each_recording_is_seen_from_where_it_plans(tmp_path: Path) -> None:
+    planning = recording(tmp_path / "anna.sd2", radar=False)
+    planning.placements = GRID
+    planning.save()
+    other = recording(tmp_path / "ben.sd2", radar=False)
+    making = Making(kinds=("synthetic",), placements="planned")
+    keys = [one.key for one in gather([planning.folder, other.folder], making)]
+    assert keys == [*(("anna", "anna", k) for k in range(5)), ("ben", "ben", 0)]
+
+
 def test_a_tolerance_chooses_a_plan_and_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,0 +1,43 @@
+"""What a data set would hold, in words."""
+
+from __future__ import annotations
+
+from sd2core.datasets.planning import Forecast
+
+
+def size_words(forecast: Forecast, length: int) -> str:
+    """How much it is: ``24 segments of 2.4 s from 3 views · 0.7 MB before compression``."""
+    seconds = length / forecast.frame_rate_hz
+    views = f"{forecast.sources:,} view{'s' * (forecast.sources != 1)}"
+    return (
+        f"{forecast.segments:,} segment{'s' * (forecast.segments != 1)} of {seconds:.1f} s"
+        f" from {views} · {bytes_words(forecast.total_bytes)} before compression"
+    )
+
+
+def label_words(forecast: Forecast) -> str:
+    """How many segments of each label."""
+    return " · ".join(f"{name} {count:,}" for name, count in forecast.of_label.items())
+
+
+def split_words(forecast: Forecast) -> str:
+    """How many segments of each split, and of whom."""
+    people = {
+        "train": forecast.split.training,
+        "validation": forecast.split.validation,
+        "test": forecast.split.test,
+    }
+    return " · ".join(
+        f"{name} {count:,} ({_named(people[name])})" for name, count in forecast.of_split().items()
+    )
+
+
+def bytes_words(count: int) -> str:
+    """Such as ``1.2 MB``."""
+    return f"{count / 1e9:,.1f} GB" if count >= 1e9 else f"{count / 1e6:,.1f} MB"
+
+
+def _named(people: tuple[str, ...]) -> str:
+    if not people:
+        return "nobody"
+    return ", ".join(people) if len(people) <= 3 else f"{len(people)} people"
