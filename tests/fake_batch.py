@@ -120,9 +120,10 @@ def run(plan, options: argparse.Namespace) -> int:
 def write_results(folder: BatchFolder, files) -> None:
     rows = [
         {
-            "recording": Path(file).name, "subject": Path(file).stem, "path": file,
-            "mesh": None, "placement": placement,
+            "recording": Path(file).name, "subject": Path(file).stem, "source": file,
+            "mesh": file, "placement": placement,
             "sensor": asdict(VirtualSensor((0.5 * placement, 0.0, 0.25))),
+            "target_m": [0.0, 0.0, 0.25],
             "start": start, "stop": start + 30,
             "synthetic": "synthetic/aa/a.npz", "denoised": "denoised/bb/b.npz",
         }
@@ -131,7 +132,7 @@ def write_results(folder: BatchFolder, files) -> None:
         for start in (0, 30)
     ]  # fmt: skip
     folder.results.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
-    folder.dataset.mkdir(exist_ok=True)
+    (folder.path / "dataset.card.md").write_text("# A data set", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -192,11 +192,6 @@ class BatchDialogs:
         if self._batch.batch is not None:
             _show_in_files(self._batch.batch.folder.path)
 
-    def open_dataset(self) -> None:
-        """Show the data set among the files."""
-        if (dataset := self._batch.results.dataset) is not None:
-            _show_in_files(dataset if dataset.is_dir() else dataset.parent)
-
     def open_result(self, row: int) -> None:
         """Open a recording in the window, with the sensor where a result says."""
         result = self._batch.results.rows[row]
@@ -291,22 +286,14 @@ def paths_of(result: Result) -> list[Path]:
     Raises
     ------
     Sd2Error
-        When the batch does not say, or the recording is damaged.
+        When the recording is damaged.
     """
-    if result.path is None:
-        raise Sd2Error(
-            f"The results do not say where {result.recording} is",
-            "results of this version of the program",
-            "Run the batch again: what is there stays",
-        )
-    path = Path(result.path)
-    video = path if path.suffix.lower() in VIDEO_SUFFIXES else None
-    if is_recording(path):
-        recording = open_recording(path)
+    source = Path(result.source)
+    video = source if source.suffix.lower() in VIDEO_SUFFIXES else None
+    if is_recording(source):
+        recording = open_recording(source)
         video = recording.video if recording.mesh is None else None
-    if video is None or result.mesh is None:
-        return [path]
-    return [video, Path(result.mesh)]
+    return [source] if video is None else [video, Path(result.mesh)]
 
 
 def _meant(path: Path) -> Path:

@@ -19,13 +19,14 @@ from PySide6.QtCore import (
 from sd2app.jobs.latest import LatestRunner
 from sd2core.batch.folder import BatchFolder
 from sd2core.errors import Sd2Error
-from sd2core.sensor import VirtualSensor
+from sd2core.placements import Place
+from sd2core.sensor import Vector, VirtualSensor, spherical_from_position
 
 Index = QModelIndex | QPersistentModelIndex
 _NOWHERE = QModelIndex()
 _MOST_ROWS = 50_000
 """A person looks at no more; the file has all."""
-_COLUMNS = ("Recording", "Subject", "Place", "Sensor at x, y, z", "Maps")
+_COLUMNS = ("Recording", "Subject", "Place", "Seen from the body", "Maps")
 
 
 @dataclass(frozen=True)
@@ -35,22 +36,24 @@ class Result:
     Parameters
     ----------
     recording, subject : str
-    path, mesh : str or None
-        The file that was worked on, and the mesh that the map is of; None where an older
-        batch does not say.
+    source, mesh : str
+        The file that was worked on, and the mesh that the map is of.
     placement : int
         0 is the recording's own sensor.
     sensor : VirtualSensor
+    target_m : tuple of 3 floats
+        Where the body is.
     maps : dict of str to str
         File of each kind of map, relative to the folder of the batch.
     """
 
     recording: str
     subject: str
-    path: str | None
-    mesh: str | None
+    source: str
+    mesh: str
     placement: int
     sensor: VirtualSensor
+    target_m: Vector
     maps: dict[str, str]
 
 
@@ -62,7 +65,7 @@ class BatchResults(QAbstractTableModel):
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._rows: list[Result] = []
-        self._dataset: Path | None = None
+        self._card = ""
         self._runner = LatestRunner("results", self)
         self._runner.finished.connect(self._take)
         # There may be none, or the disk is away.
@@ -74,26 +77,26 @@ class BatchResults(QAbstractTableModel):
         return self._rows
 
     @property
-    def dataset(self) -> Path | None:
-        """What was exported, where it was."""
-        return self._dataset
+    def card(self) -> str:
+        """What the exported data set says of itself, as Markdown; empty where there is none."""
+        return self._card
 
     def read(self, folder: BatchFolder) -> None:
         """Read those of a batch."""
-        self._runner.submit(lambda emit: (_rows(folder.results), _dataset(folder)))
+        self._runner.submit(lambda emit: (_rows(folder.results), _card(folder)))
 
     def forget(self) -> None:
         """Show none."""
         self._runner.cancel()
-        self._take(([], None))
+        self._take(([], ""))
 
     def close(self) -> None:
         """Stop reading."""
         self._runner.close()
 
-    def _take(self, found: tuple[list[Result], Path | None]) -> None:
+    def _take(self, found: tuple[list[Result], str]) -> None:
         self.beginResetModel()
-        self._rows, self._dataset = found
+        self._rows, self._card = found
         self.endResetModel()
         self.changed.emit()
 
@@ -120,12 +123,12 @@ class BatchResults(QAbstractTableModel):
         if role != Qt.ItemDataRole.DisplayRole or not index.isValid():
             return None
         row = self._rows[index.row()]
-        x, y, z = row.sensor.position_m
+        around = spherical_from_position(row.target_m, row.sensor.position_m)
         return (
             row.recording,
             row.subject,
             f"{row.placement:,}" if row.placement else "own sensor",
-            f"{x:.2f}, {y:.2f}, {z:.2f} m".replace("-", "−"),
+            Place(*(round(value, 2) + 0.0 for value in around)).words.replace("-", "−"),
             ", ".join(row.maps),
         )[index.column()]
 
@@ -149,18 +152,27 @@ def _row(line: str) -> Result | None:
         return Result(
             str(content["recording"]),
             str(content["subject"]),
-            content.get("path"),
-            content.get("mesh"),
+            str(content["source"]),
+            str(content["mesh"]),
             int(content["placement"] or 0),
             VirtualSensor(**content["sensor"]),
+            _vector(content["target_m"]),
             maps,
         )
     except (ValueError, KeyError, TypeError, Sd2Error):
         return None
 
 
-def _dataset(folder: BatchFolder) -> Path | None:
-    found = folder.dataset
-    if found.exists():
-        return Path(found)
-    return next(iter(sorted(folder.path.glob(f"{found.name}.*"))), None)
+def _vector(values: Any) -> Vector:
+    x, y, z = map(float, values)
+    return (x, y, z)
+
+
+def _card(folder: BatchFolder) -> str:
+    """What a data set says of itself; empty where none was exported."""
+    from sd2core.datasets.card import card_paths
+
+    try:
+        return card_paths(folder.path / "dataset")[0].read_text(encoding="utf-8")
+    except OSError:
+        return ""

@@ -21,7 +21,7 @@ from sd2core.relative_paths import plain_path
 
 OptionalStep = Literal["fit", "denoise", "export"]
 OPTIONAL_STEPS: tuple[OptionalStep, ...] = get_args(OptionalStep)
-Accuracy = Literal["tolerance", "exact"]
+Accuracy = Literal["exact", "tolerance"]
 ACCURACIES: tuple[Accuracy, ...] = get_args(Accuracy)
 FORMATS: tuple[Literal["zarr", "hdf5", "npz"], ...] = ("zarr", "hdf5", "npz")
 SUBJECTS: tuple[Literal["recording", "folder"], ...] = ("recording", "folder")
@@ -31,7 +31,7 @@ _DEFAULTS: dict[str, Any] = {
     "fit": True,
     "denoise": True,
     "export": True,
-    "accuracy": "tolerance",
+    "accuracy": "exact",
     "model": "denoiser",
     "format": "zarr",
     "subjects": "recording",
@@ -120,6 +120,11 @@ class BatchSetupModel(QObject):
             return None
         first = self._entries[0].path
         return first.parent / f"{first.stem} batch"
+
+    @property
+    def tolerance(self) -> float:
+        """Error that is allowed where a plan is chosen: that of the Trade panel."""
+        return self._settings.tolerance
 
     @property
     def workers(self) -> int:
@@ -211,7 +216,7 @@ class BatchSetupModel(QObject):
             raise Sd2Error(self.problem)
         assert self.out is not None
         values = self._values
-        tolerance = self._settings.tolerance if values["accuracy"] == "tolerance" else None
+        tolerance = self.tolerance if values["accuracy"] == "tolerance" else None
         where = {"kind": "recording"} if self._placements is None else self._placements.as_dict()
         return BatchPlan(
             out=str(self.out),

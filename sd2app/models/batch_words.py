@@ -68,7 +68,8 @@ def step_facts(batch: BatchFollower) -> list[tuple[str, int, int, str]]:
         return []
     facts = []
     for step in batch.steps:
-        total = status.total.get(step, 0)
+        if not (total := status.total.get(step, 0)):
+            continue
         done, there = status.done.get(step, 0), status.there.get(step, 0)
         words = f"{done + there:,} of {total:,}"
         if there:
@@ -95,7 +96,11 @@ def estimate_headline(facts: dict[str, Any]) -> str:
 
 def estimate_facts(facts: dict[str, Any]) -> list[tuple[str, str]]:
     """The same step by step, and what cannot be used."""
-    rows = [(STEP_WORDS.get(name, name), _step_text(step)) for name, step in facts["steps"].items()]
+    rows = [
+        (STEP_WORDS.get(name, name), _step_text(step))
+        for name, step in facts["steps"].items()
+        if step["to_do"] or step["there"]
+    ]
     if facts["looked_at"] < facts["recordings"]:
         rows.append(("Looked at", f"{facts['looked_at']:,}; the others are taken to be like them"))
     unusable = facts["unusable"]

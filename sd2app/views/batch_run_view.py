@@ -15,6 +15,7 @@ from PySide6.QtWidgets import (
     QPlainTextEdit,
     QProgressBar,
     QTableView,
+    QTextBrowser,
     QVBoxLayout,
     QWidget,
 )
@@ -27,6 +28,7 @@ from sd2app.views.inner_pages import InnerPage, InnerPages
 from sd2app.views.panel_parts import outlined, sentence, side_by_side
 
 _MOST_STEPS = 5
+_NO_DATASET = "No data set has been exported here yet."
 
 
 class Asks(Protocol):
@@ -38,9 +40,6 @@ class Asks(Protocol):
     def open_folder(self) -> None:
         """Show the folder of the results."""
 
-    def open_dataset(self) -> None:
-        """Show the data set among the files."""
-
     def open_result(self, row: int) -> None:
         """Open a recording in the window, with the sensor where a result says."""
 
@@ -51,6 +50,7 @@ class BatchRunView(QWidget):
     def __init__(self, batch: BatchModel, asks: Asks, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._batch, self._asks = batch, asks
+        self._shown_card: str | None = None
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(8)
@@ -91,18 +91,17 @@ class BatchRunView(QWidget):
     def _button_row(self) -> QHBoxLayout:
         asks, batch = self._asks, self._batch
         self._stop = outlined("Stop", "End it now; what is done stays", batch.stop, self)
-        self._resume = outlined("Go on", "Do what is missing", asks.resume, self)
+        self._resume = outlined("Go on", "Do what is missing or new", asks.resume, self)
         self._folder = outlined("Open folder", "Show the results as files", asks.open_folder, self)
-        self._dataset = outlined(
-            "Open data set", "Show the data set that was exported", asks.open_dataset, self
-        )
         self._new = outlined("New batch", "Set up another", lambda: batch.select(None), self)
-        buttons = (self._stop, self._resume, self._folder, self._dataset, self._new)
+        buttons = (self._stop, self._resume, self._folder, self._new)
         return side_by_side(*buttons, spacing_px=6)
 
     def _pages(self) -> InnerPages:
         self._failures = _text("What could not be done")
         self._log = _text("Log")
+        self._card = QTextBrowser(self)
+        self._card.setAccessibleName("What the data set holds")
         self._table = _result_table(self._open)
         self._table.setModel(self._batch.results)
         self._open_result = outlined(
@@ -123,6 +122,7 @@ class BatchRunView(QWidget):
             (
                 InnerPage("Failures", "Tasks that could not be done, and why", self._failures),
                 InnerPage("Results", "The maps that were made", results),
+                InnerPage("Data set", "What was exported to learn from", self._card),
                 InnerPage("Log", "What happened, as it happened", self._log),
             ),
             parent=self,
@@ -143,11 +143,14 @@ class BatchRunView(QWidget):
         self._stop.setVisible(run.under_way)
         self._stop.setEnabled(run.phase != "stopping")
         self._resume.setVisible(run.resumable)
+        self._resume.setText("Run again" if run.phase == "finished" else "Go on")
         self._folder.setEnabled(run.folder.path.is_dir())
-        self._dataset.setVisible(results.dataset is not None)
         self._new.setVisible(not run.under_way)
         _show(self._failures, "\n\n".join(map(failure_text, run.failures)) or "None.")
-        _show(self._log, run.log)
+        _show(self._log, run.log or "Nothing was noted.")
+        if results.card != self._shown_card:
+            self._shown_card = results.card
+            self._card.setMarkdown(results.card or _NO_DATASET)
         self._no_results.setVisible(not results.rows)
         self._table.setVisible(bool(results.rows))
         self._open_result.setVisible(bool(results.rows))
@@ -187,6 +190,7 @@ def _result_table(open_row: Callable[[], None]) -> QTableView:
     table.verticalHeader().setDefaultSectionSize(ROW_PX)
     header = table.horizontalHeader()
     header.setHighlightSections(False)
+    header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
     header.setStretchLastSection(True)
     header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
     header.setResizeContentsPrecision(50)

@@ -29,6 +29,7 @@ from sd2app.models.batch_setup import (
     most_workers,
 )
 from sd2app.models.batch_words import entry_text, estimate_facts, estimate_headline
+from sd2app.models.plan_words import percent
 from sd2app.views.elided import ElidedLabel
 from sd2app.views.fact_rows import FactRows
 from sd2app.views.inputs import Choice, NumberBox
@@ -39,8 +40,8 @@ _SUBJECT_TEXT = {
     "folder": "all in a folder are one person",
 }
 _ACCURACY_TEXT: dict[Accuracy, str] = {
-    "tolerance": "as the Trade panel allows",
     "exact": "as exactly as possible",
+    "tolerance": "within the tolerance of the Trade panel, {percent}, which takes time to plan",
 }
 _STEP_TEXT: dict[OptionalStep, tuple[str, str]] = {
     "fit": ("Fit bodies", "To the person in videos that have no mesh"),
@@ -207,6 +208,9 @@ class BatchSetupView(QWidget):
             ("format", self._format, FORMATS),
         ):
             with QSignalBlocker(choice):
+                if values is ACCURACIES:
+                    allowed = percent(setup.tolerance)
+                    choice.setItemText(1, _ACCURACY_TEXT["tolerance"].format(percent=allowed))
                 choice.setCurrentIndex(list(values).index(setup.value(name)))
         _fill(self._placements, self._asks.placement_choices(), self._asks.placement_index())
         names = list(dict.fromkeys([*self._asks.model_names(), setup.value("model")]))

@@ -252,6 +252,7 @@ class _Run:
                     start, stop = planned.stretches[index]
                     row = {
                         "source": origin.path,
+                        "mesh": mesh.path,
                         "recording": origin.name,
                         "subject": origin.subject,
                         "placement": planned.placement,

@@ -106,14 +106,15 @@ def test_what_is_added_is_looked_at_and_becomes_a_plan(qtbot, meshes, tmp_path):
     assert plan.recordings.files == tuple(map(str, meshes[:2]))
     assert plan.out == str(meshes[0].parent / "ann batch")
     assert plan.placements == {"kind": "recording"}
-    assert plan.synthesise.tolerance == pytest.approx(0.05)
-    setup.set_value("accuracy", "exact")
+    assert plan.synthesise.tolerance is None
+    setup.set_value("accuracy", "tolerance")
+    assert setup.plan().synthesise.tolerance == setup.tolerance
     setup.set_value("denoise", False)
     setup.set_value("export", False)
     setup.set_out(tmp_path / "made")
     setup.set_placements(PlacementGrid((1.0, 2.0)))
     plan = setup.plan()
-    assert plan.synthesise.tolerance is plan.denoise is plan.export is None
+    assert plan.denoise is plan.export is None
     assert plan.out == str(tmp_path / "made")
     assert plan.placement_count == 2
     setup.remove([meshes[0]])
@@ -247,10 +248,10 @@ def test_a_batch_runs_to_its_end_and_its_results_are_listed(qtbot, made, meshes)
     assert [(row.recording, row.placement) for row in model.results.rows] == [
         ("ben.npz", 1), ("ben.npz", 2), ("cleo.npz", 1), ("cleo.npz", 2),
     ]  # fmt: skip
-    assert model.results.dataset == run.folder.dataset
+    assert model.results.card == "# A data set"
     index = model.results.index
     assert [model.results.data(index(1, column)) for column in range(5)] == [
-        "ben.npz", "ben", "2", "1.00, 0.00, 0.25 m", "synthetic, denoised",
+        "ben.npz", "ben", "2", "1 m, azimuth 90°, elevation 0°", "synthetic, denoised",
     ]  # fmt: skip
     assert len(said) == 1
     assert "1 tasks could not be done" in said[0]

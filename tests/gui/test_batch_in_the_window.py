@@ -126,8 +126,9 @@ def test_a_batch_is_set_up_started_and_its_results_opened(
     shown: list[Path] = []
     monkeypatch.setattr(batch_dialogs, "_show_in_files", shown.append)
     click(dialog, "Open folder")
-    click(dialog, "Open data set")
-    assert shown == [tmp_path / "made", tmp_path / "made" / "dataset"]
+    assert shown == [tmp_path / "made"]
+    click(dialog, "Data set")
+    assert "A data set" in dialog._run._card.toPlainText()
     click(dialog, "Results")
     table = dialog.findChild(QTableView)
     table.selectRow(3)
