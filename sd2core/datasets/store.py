@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ import numpy as np
 from sd2core.atomic import atomic_write
 from sd2core.datasets.cutting import Arrays
 from sd2core.datasets.layout import (
+    CHUNK_SEGMENTS,
     Header,
     check_format,
     chunk_of,
@@ -30,6 +32,10 @@ from sd2core.io.kinds import is_dataset
 
 SOURCES_NAME = "sources.jsonl"
 LOCK_NAME = ".sd2-lock"
+FLUSH_EVERY_S = 2.0
+"""What a killed writer may lose; a source that takes longer is written at once."""
+_TOGETHER = 16 * CHUNK_SEGMENTS
+"""Segments that are written together."""
 _TORN = "*.partial"
 """What a killed Zarr leaves of a chunk that it was writing."""
 
@@ -57,6 +63,9 @@ class SegmentStore:
             name: self._group[name] for name in dict.fromkeys(names) if name in self._group
         }
         _drop_torn_line(path / SOURCES_NAME)
+        self._pending: list[tuple[int, Arrays]] = []
+        self._lines: list[str] = []
+        self._flushed_s = time.monotonic()
         self.rows = 0
         self.sources = 0
         for entry in read_sources(path / SOURCES_NAME):
@@ -95,12 +104,16 @@ class SegmentStore:
         return bool(self._group.attrs["complete"])
 
     def append(self, blocks: Iterable[Arrays], entry: dict[str, Any]) -> int:
-        """Add the segments of one source; they count once its line is written.
+        """Add the segments of one source.
+
+        Some are kept in memory and written together, which takes a fraction of the time.
+        They count once their source's line is written, see :meth:`flush`.
 
         Parameters
         ----------
         blocks : iterable of dict of str to array
-            Of :func:`~sd2core.datasets.cutting.cut_source`.
+            Of :func:`~sd2core.datasets.cutting.cut_source`. What they raise leaves the store
+            as it was.
         entry : dict
             What its line says, with a value for each of its columns in ``columns``.
 
@@ -113,23 +126,34 @@ class SegmentStore:
             self._group.attrs["complete"] = False
         columns = entry.pop("columns")
         stop = self.rows
-        for block in blocks:
-            start, stop = stop, stop + len(block["start_s"])
-            for kind in KINDS:
-                if kind in block and kind not in self._arrays:
-                    row = (self.header.length, self.header.axis.bins)
-                    self._arrays[kind] = _create(self._group, kind, "float32", row, start)
-            for name in self._arrays:
-                self._put(name, start, stop, block.get(name, columns.get(name, 0)))
-        entry |= {"start": self.rows, "stop": stop}
-        with (self.path / SOURCES_NAME).open("a", encoding="utf-8") as index:
-            index.write(_line(entry))
-            index.flush()
-            os.fsync(index.fileno())
+        try:
+            for block in blocks:
+                self._pending.append((stop, columns | block))
+                stop += len(block["start_s"])
+                if stop - self._pending[0][0] >= _TOGETHER:
+                    self._write()
+        except BaseException:
+            self._pending = [one for one in self._pending if one[0] < self.rows]
+            raise
         added = stop - self.rows
+        self._lines.append(_line(entry | {"start": self.rows, "stop": stop}))
         self.rows = stop
         self.sources += 1
+        if time.monotonic() - self._flushed_s >= FLUSH_EVERY_S:
+            self.flush()
         return added
+
+    def flush(self) -> None:
+        """Write what was appended: from here on it is there whatever happens."""
+        self._write()
+        self._flushed_s = time.monotonic()
+        if not self._lines:
+            return
+        with (self.path / SOURCES_NAME).open("a", encoding="utf-8") as index:
+            index.writelines(self._lines)
+            index.flush()
+            os.fsync(index.fileno())
+        self._lines = []
 
     def entries(self) -> Iterator[dict[str, Any]]:
         """Lines of the sources, one after another."""
@@ -143,6 +167,7 @@ class SegmentStore:
         header : Header
         split_of_subject : int8 array, shape (subjects,)
         """
+        self.flush()
         for name in [one for one in KINDS if one in self._arrays and one not in header.kinds]:
             del self._group[name], self._arrays[name]
         for array in self._arrays.values():
@@ -156,12 +181,29 @@ class SegmentStore:
         self._group.attrs.put(header.as_dict() | {"complete": True})
         self.header = header
 
-    def _put(self, name: str, start: int, stop: int, values: Any) -> None:
+    def _write(self) -> None:
+        """Put pending rows into the arrays."""
+        pending, self._pending = self._pending, []
+        if not pending:
+            return
+        start = pending[0][0]
+        stop = pending[-1][0] + len(pending[-1][1]["start_s"])
+        for kind in KINDS:
+            if kind not in self._arrays and any(kind in block for _, block in pending):
+                row = (self.header.length, self.header.axis.bins)
+                self._arrays[kind] = _create(self._group, kind, "float32", row, start)
+        for name, array in self._arrays.items():
+            values = np.zeros((stop - start, *array.shape[1:]), array.dtype)
+            for at, block in pending:
+                if name in block:
+                    values[at - start : at - start + len(block["start_s"])] = block[name]
+            self._put(name, start, stop, values)
+
+    def _put(self, name: str, start: int, stop: int, values: np.ndarray) -> None:
         array = self._arrays[name]
-        shape = (stop - start, *array.shape[1:])
         if array.shape[0] < stop:
-            array.resize((stop, *shape[1:]))
-        array[start:stop] = np.broadcast_to(np.asarray(values, array.dtype), shape)
+            array.resize((stop, *array.shape[1:]))
+        array[start:stop] = values
 
 
 def open_arrays(path: Path) -> tuple[Header, dict[str, Any]]:

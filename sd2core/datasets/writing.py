@@ -169,6 +169,20 @@ class _Writer:
             _refuse_other_settings(out, self._store.header, options)
 
     def write(self, sources: Iterable[Source | LazySource], progress: Progress) -> Written:
+        try:
+            added, failed, first_error = self._append_all(sources, progress)
+        finally:
+            if self._store is not None:
+                self._store.flush()
+        if not self._there:
+            raise first_error or Sd2Error("There are no sources", "one at least")
+        segments, count = self._finish(progress)
+        return Written(self._out, segments, count, added, tuple(failed))
+
+    def _append_all(
+        self, sources: Iterable[Source | LazySource], progress: Progress
+    ) -> tuple[int, list[Failed], Sd2Error | None]:
+        """How many were added, which failed, and the first error."""
         total = len(sources) if isinstance(sources, Sized) else 0
         seen: set[bytes] = set()
         failed: list[Failed] = []
@@ -193,10 +207,7 @@ class _Writer:
                 first_error = first_error or error
                 continue
             self._refuse_large()
-        if not self._there:
-            raise first_error or Sd2Error("There are no sources", "one at least")
-        segments, count = self._finish(progress)
-        return Written(self._out, segments, count, added, tuple(failed))
+        return added, failed, first_error
 
     def _refuse_large(self) -> None:
         if self._form == "npz" and self._store is not None:
