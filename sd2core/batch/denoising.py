@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sd2core.batch.stretches import joined
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.presence import Presence
 from sd2core.spectrum import DopplerMap
 
 if TYPE_CHECKING:
     from sd2core.denoise.live import TrainedDenoiser
-
-BEFORE_FRAMES, AFTER_FRAMES = 2048, 256
-"""What a model is shown besides a stretch of a longer map: docs/scale.md has what that misses."""
 
 
 @dataclass
@@ -29,48 +29,119 @@ class _Kept:
 _kept = _Kept()
 
 
-def denoise(maps: Sequence[Path], number: int, model: str, digest: str, out: Path) -> None:
-    """Denoise one of the stretches of a map and write it.
+def denoise(maps: Sequence[Path], model: str, digest: str, outs: Sequence[Path]) -> None:
+    """Denoise a map and write it.
 
     Parameters
     ----------
     maps : sequence of Path
-        The stretches that are looked at, in order: one, and its neighbours.
-    number : int
-        Which of them is denoised.
+        The stretches of the map, in order.
     model, digest : str
         Its file, and the hash of that.
-    out : Path
+    outs : sequence of Path
+        One per stretch; written in order.
 
     Raises
     ------
     Sd2Error
         When the map is not what the model was trained on.
     """
-    parts = [DopplerMap.load(path) for path in maps]
-    before = 0
-    if number:
-        first = parts[number - 1]
-        count = len(first.timebase)
-        before = min(BEFORE_FRAMES, count)
-        parts[number - 1] = first.between(count - before, count)
-    frames = len(parts[number].timebase)
-    if number + 1 < len(parts):
-        after = parts[number + 1]
-        parts[number + 1] = after.between(0, min(AFTER_FRAMES, len(after.timebase)))
-    own = parts[number]
-    denoised = _model(model, digest).denoise(_as_one(parts, own))
-    out.parent.mkdir(parents=True, exist_ok=True)
-    if len(parts) > 1:
-        denoised = denoised.between(before, before + frames)
-    denoised.save(out)
+    trained = _model(model, digest)
+    outs[0].parent.mkdir(parents=True, exist_ok=True)
+    if len(maps) == 1:
+        trained.denoise(DopplerMap.load(maps[0])).save(outs[0])
+    else:
+        _denoise_long(trained, maps, outs)
 
 
-def _as_one(parts: Sequence[DopplerMap], own: DopplerMap) -> DopplerMap:
-    """Joined; what the map says of itself is that of the stretch itself."""
-    from dataclasses import replace
+def _denoise_long(trained: TrainedDenoiser, maps: Sequence[Path], outs: Sequence[Path]) -> None:
+    """A stretch at a time, with what the model remembers of those before."""
+    from sd2core.denoise.long_maps import denoise_long
+    from sd2core.denoise.matching import check_map, clips, is_regular
 
-    return replace(joined(parts), meta=own.meta)
+    files, rate_hz = _Files(maps), trained.card.frame_rate_hz
+    check_map(files.part(0), trained.card)
+    runs = clips(files.times_s, files.there, rate_hz)
+    regular = all(is_regular(files.times_s[start:stop], rate_hz) for start, stop in runs)
+    writer = _Writer(trained, files, outs, resampled=not regular)
+    denoise_long(trained, runs, files.times_s, files.read, writer.take)
+    writer.end()
+
+
+class _Files:
+    """Frames from the files of stretches; the last two stay in memory."""
+
+    def __init__(self, maps: Sequence[Path]) -> None:
+        self._maps = maps
+        self._loaded: dict[int, DopplerMap] = {}
+        times_s, there = [], []
+        for number in range(len(maps)):
+            part = self.part(number)
+            times_s.append(part.times_s)
+            there.append(Presence.of(part.present, len(part.timebase)).there)
+        self.times_s = np.concatenate(times_s)
+        self.there = np.concatenate(there)
+        self.edges = np.cumsum([0, *map(len, times_s)])
+
+    def part(self, number: int) -> DopplerMap:
+        """One stretch."""
+        if number not in self._loaded:
+            while len(self._loaded) > 1:
+                del self._loaded[next(iter(self._loaded))]
+            self._loaded[number] = DopplerMap.load(self._maps[number])
+        return self._loaded[number]
+
+    def holding(self, frame: int) -> int:
+        """The stretch that a frame of the whole map belongs to."""
+        return int(np.searchsorted(self.edges, frame, side="right")) - 1
+
+    def read(self, start: int, stop: int) -> NDArray[np.float32]:
+        """Energies of frames of the whole map, (n, bins)."""
+        pieces = []
+        for number in range(self.holding(start), self.holding(stop - 1) + 1):
+            low, high = self.edges[number], self.edges[number + 1]
+            values = self.part(number).values[:, max(start - low, 0) : min(stop, high) - low]
+            pieces.append(values.T)
+        return np.ascontiguousarray(np.concatenate(pieces))
+
+
+class _Writer:
+    """Puts denoised frames, which come in order, into one file per stretch."""
+
+    def __init__(
+        self, trained: TrainedDenoiser, files: _Files, outs: Sequence[Path], resampled: bool
+    ) -> None:
+        self._trained, self._files, self._outs = trained, files, outs
+        self._resampled = resampled
+        self._number = 0
+        self._energies = self._empty()
+
+    def take(self, first: int, energies: NDArray[np.float32]) -> None:
+        """Frames from ``first`` on; those that are passed over stay empty."""
+        while len(energies):
+            while first >= self._files.edges[self._number + 1]:
+                self._next()
+            low, high = self._files.edges[self._number : self._number + 2]
+            count = min(len(energies), high - first)
+            self._energies[first - low : first - low + count] = energies[:count]
+            first, energies = first + count, energies[count:]
+
+    def end(self) -> None:
+        """Write what is left."""
+        while self._number < len(self._outs):
+            self._next()
+
+    def _next(self) -> None:
+        part = self._files.part(self._number)
+        denoised = self._trained.as_denoised(part, self._energies, self._resampled)
+        denoised.save(self._outs[self._number])
+        self._number += 1
+        if self._number < len(self._outs):
+            self._energies = self._empty()
+
+    def _empty(self) -> NDArray[np.float32]:
+        low, high = self._files.edges[self._number : self._number + 2]
+        return np.zeros((high - low, self._trained.card.axis.bins), np.float32)
 
 
 def _model(path: str, digest: str) -> TrainedDenoiser:

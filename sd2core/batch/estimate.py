@@ -233,7 +233,7 @@ def _count(
     if flow.plan.synthesise is None:
         return
     for planned in flow.maps_of(origin, mesh, found.sensor):
-        for task in (*planned.synthesis, *planned.denoising):
+        for task in planned.tasks:
             _add(steps[task.step], task, bool(mesh.identity) and flow.is_done(task), weight)
 
 
@@ -315,7 +315,7 @@ def _timed(flow: Flow, found: Inspection) -> dict[str, _Rate]:
             cleaned = {count: folder / f"denoised-{count}.npz" for count in outs}
 
             def clean(count: int) -> None:
-                denoise([outs[count]], 0, model, digest, cleaned[count])
+                denoise([outs[count]], model, digest, [cleaned[count]])
 
             clean(long)
             rates["denoise"] = _rate(clean, cleaned, long, short)

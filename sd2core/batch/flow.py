@@ -31,17 +31,28 @@ class PlannedMap:
     placement : int
         0 is the recording's own sensor; 1 and up are the places of the plan.
     sensor : VirtualSensor
-    synthesis : tuple of Task
-    denoising : tuple of Task
-        One per stretch as well, or none at all.
     stretches : tuple of (int, int)
+    synthesis : tuple of Task
+        One per stretch.
+    denoising : Task, optional
+        Of all stretches: a model remembers what was before.
     """
 
     placement: int
     sensor: VirtualSensor
-    synthesis: tuple[Task, ...]
-    denoising: tuple[Task, ...]
     stretches: tuple[Stretch, ...]
+    synthesis: tuple[Task, ...]
+    denoising: Task | None = None
+
+    @property
+    def tasks(self) -> tuple[Task, ...]:
+        """All of them."""
+        return self.synthesis if self.denoising is None else (*self.synthesis, self.denoising)
+
+    @property
+    def denoised(self) -> list[str]:
+        """Files of the denoised stretches, or none."""
+        return [] if self.denoising is None else list(self.denoising.details["outs"])
 
 
 class Flow:
@@ -82,7 +93,7 @@ class Flow:
         self._model = None if plan.denoise is None else _model_of(plan.denoise.model)
         # Of a map whose stretches are not all there yet: how many are missing.
         self._missing: dict[tuple[str, int], int] = {}
-        self._denoising: dict[tuple[str, int], tuple[Task, ...]] = {}
+        self._denoising: dict[tuple[str, int], Task] = {}
         self.total: Counter[str] = Counter()
         self.total["inspect"] = len(origins)
         if plan.export is not None:
@@ -156,7 +167,8 @@ class Flow:
         where = (task.origin.name, task.placement or 0)
         if task.step == "synthesise" and where in self._missing:
             del self._missing[where]
-            return {"denoise": len(self._denoising.pop(where))}
+            del self._denoising[where]
+            return {"denoise": 1}
         return {}
 
     def _maps_of_one(self, recordings: int) -> dict[str, int]:
@@ -193,9 +205,8 @@ class Flow:
         if self.plan.synthesise is None:
             return
         for planned in self.maps_of(origin, mesh, own):
-            more = len(planned.stretches) - 1
-            self.total += Counter({step: more for step in _MAPS if step in self.steps})
-            if planned.denoising:
+            self.total["synthesise"] += len(planned.stretches) - 1
+            if planned.denoising is not None:
                 where = (origin.name, planned.placement)
                 self._missing[where] = len(planned.stretches)
                 self._denoising[where] = planned.denoising
@@ -209,7 +220,7 @@ class Flow:
         if self._missing[where]:
             return iter(())
         del self._missing[where]
-        return iter(self._denoising.pop(where))
+        return iter((self._denoising.pop(where),))
 
     def maps_of(self, origin: Origin, mesh: MeshInput, own: VirtualSensor) -> Iterator[PlannedMap]:
         """All maps of one recording.
@@ -225,12 +236,8 @@ class Flow:
             synthesis = tuple(
                 self._synthesis_task(origin, mesh, placement, sensor, one) for one in stretches
             )
-            denoising: tuple[Task, ...] = ()
-            if self._model is not None:
-                denoising = tuple(
-                    self._denoising_task(synthesis, number) for number in range(len(synthesis))
-                )
-            yield PlannedMap(placement, sensor, synthesis, denoising, stretches)
+            denoising = None if self._model is None else self._denoising_task(synthesis)
+            yield PlannedMap(placement, sensor, stretches, synthesis, denoising)
 
     def _synthesis_task(
         self,
@@ -257,24 +264,20 @@ class Flow:
         frames = stretch[1] - stretch[0]
         return Task("synthesise", key, origin, details, placement, frames, origin.name, out)
 
-    def _denoising_task(self, synthesis: Sequence[Task], number: int) -> Task:
-        assert self._model is not None
-        model, digest = self._model
-        low, high = max(number - 1, 0), min(number + 2, len(synthesis))
-        seen, own = synthesis[low:high], synthesis[number]
-        key = key_of(
-            "denoise",
-            {"model": digest, "maps": [one.key for one in seen], "number": number - low},
-        )
-        out = str(self.folder.result("denoised", key, ".npz"))
+    def _denoising_task(self, synthesis: Sequence[Task]) -> Task:
+        model, digest = self.model
+        key = key_of("denoise", {"model": digest, "maps": [one.key for one in synthesis]})
+        ends = [".npz"] if len(synthesis) == 1 else [f"-{n}.npz" for n in range(len(synthesis))]
+        outs = [str(self.folder.result("denoised", key, end)) for end in ends]
         details = {
-            "maps": [one.out for one in seen],
-            "number": number - low,
+            "maps": [one.out for one in synthesis],
             "model": model,
             "digest": digest,
-            "out": out,
+            "outs": outs,
         }
-        return Task("denoise", key, own.origin, details, own.placement, own.frames, own.group, out)
+        one = synthesis[0]
+        frames = sum(each.frames for each in synthesis)
+        return Task("denoise", key, one.origin, details, one.placement, frames, one.group, outs[-1])
 
     def all_maps(self) -> Iterator[tuple[Origin, str, MeshInput, PlannedMap]]:
         """Every map of every recording that has been looked at and fitted, in order.

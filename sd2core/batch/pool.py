@@ -214,6 +214,8 @@ def local_pool(folder: BatchFolder, processes: int) -> Iterator[DaskPool]:
         "distributed.worker.memory.target": False,
         "distributed.worker.memory.spill": False,
         "distributed.worker.memory.pause": False,
+        "distributed.scheduler.http.routes": [],
+        "distributed.worker.http.routes": [],
     }
     with dask.config.set(settings), _dask_log(folder):
         cluster = LocalCluster(
@@ -221,8 +223,9 @@ def local_pool(folder: BatchFolder, processes: int) -> Iterator[DaskPool]:
             threads_per_worker=1,
             processes=True,
             host="127.0.0.1",
-            dashboard_address=None,
-            worker_dashboard_address=None,
+            dashboard_address="127.0.0.1:0",
+            scheduler_kwargs={"dashboard": False},
+            preload=["sd2core.batch.interrupts"],
             silence_logs=logging.CRITICAL,
             local_directory=str(folder.path / BEGUN),
             env=ONE_THREAD,

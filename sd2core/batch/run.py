@@ -262,8 +262,8 @@ class _Run:
                         "start": start,
                         "stop": stop,
                         "synthetic": _if_there(task.out, root),
-                        "denoised": _if_there(planned.denoising[index].out, root)
-                        if planned.denoising
+                        "denoised": _if_there(planned.denoised[index], root)
+                        if planned.denoised
                         else None,
                     }
                     if row["synthetic"] is not None:

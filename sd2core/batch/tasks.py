@@ -43,7 +43,7 @@ class Task:
     group : str
         Tasks of one group are best done by one process.
     out : str
-        The file that is there when it is done; empty where that is not a plain file.
+        What is written last; empty where that is not a file of its own.
     """
 
     step: Step
@@ -177,14 +177,13 @@ def _denoise(
     folder: BatchFolder,
     origin: Origin,
     maps: list[str],
-    number: int,
     model: str,
     digest: str,
-    out: str,
+    outs: list[str],
 ) -> None:
     from sd2core.batch.denoising import denoise
 
-    denoise([Path(path) for path in maps], number, model, digest, Path(out))
+    denoise([Path(one) for one in maps], model, digest, [Path(one) for one in outs])
 
 
 def _export(folder: BatchFolder, origin: Origin, export: Mapping[str, Any]) -> None:

@@ -90,10 +90,26 @@ class TrainedDenoiser:
                     work, values, times_s, self.card.frame_rate_hz
                 )
         progress(total, total)
-        denoised[:, list(doppler.unseen_bins)] = 0.0
+        return self.as_denoised(doppler, denoised, resampled)
+
+    def as_denoised(
+        self, doppler: DopplerMap, energies: NDArray[np.float32], resampled: bool
+    ) -> DopplerMap:
+        """A map with these denoised energies (frames, bins) in place of a synthetic one's.
+
+        Parameters
+        ----------
+        doppler : DopplerMap
+            What they were made of.
+        energies : float32 array, shape (frames, bins)
+            Changed: bins that the radar does not see are emptied.
+        resampled : bool
+            Whether frames were interpolated to the model's rate and back.
+        """
+        energies[:, list(doppler.unseen_bins)] = 0.0
         return replace(
             doppler,
-            values=denoised.T,
+            values=energies.T,
             kind="denoised",
             unit=self.card.unit,
             null_bins=self.card.null_bins,
