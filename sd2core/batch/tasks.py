@@ -23,6 +23,8 @@ BEGUN = "begun"
 """Folder of what is under way; it is there only while a batch runs."""
 
 _MARKER = "task-"
+_ONE_FILE = ("synthesise", "denoise")
+"""Steps that are done when their last file is there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +62,7 @@ class Task:
         return {
             "step": self.step,
             "key": self.key,
+            "out": self.out,
             "folder": str(folder),
             "origin": asdict(self.origin),
             "details": dict(self.details),
@@ -95,6 +98,8 @@ def run_task(record: Mapping[str, Any]) -> None:
     marker = folder.path / BEGUN / _process_name()
     try:
         marker.write_text(record["key"], encoding="ascii")
+        if record["out"] and os.path.exists(record["out"]) and record["step"] in _ONE_FILE:
+            return  # a worker that was lost had just written it
         _compile_once()
         _WORK[record["step"]](folder, Origin(**record["origin"]), **record["details"])
     except Sd2Error as error:
