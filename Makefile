@@ -12,7 +12,7 @@ COMPILED := .venv/.compiled
 # Among them every module in KERNEL_MODULES of sd2core/compiled.py.
 KERNELS := $(wildcard sd2core/compiled.py sd2core/raster.py sd2core/body/*.py sd2core/scattering/*.py sd2core/doppler/*.py sd2core/fmcw/*.py sd2core/simulate/people/*.py)
 
-.PHONY: help setup demo test test-slow lint format bench wheel screenshots accuracy fitting denoiser denoiser-comparison range-synthesis whole-loop clean
+.PHONY: help setup demo test test-slow lint format bench wheel screenshots accuracy fitting denoiser denoiser-comparison range-synthesis classifier whole-loop clean
 
 help:
 	@echo "make demo         set up, and open the sample recording in the window"
@@ -29,6 +29,7 @@ help:
 	@echo "make denoiser     docs/denoiser.md, measured (half an hour)"
 	@echo "make denoiser-comparison  docs/denoiser-comparison.md, trained and measured (hours)"
 	@echo "make range-synthesis  docs/range-synthesis.md, trained (half an hour)"
+	@echo "make classifier   docs/classifier.md, trained (an hour)"
 	@echo "make whole-loop   docs/whole-loop.md: from a recording to a classifier (20 minutes)"
 	@echo "make clean        remove what the above made, .venv included"
 
@@ -97,6 +98,9 @@ denoiser-comparison: setup
 
 range-synthesis: setup
 	$(BIN)/python docs/range_synthesis.py
+
+classifier: setup
+	$(BIN)/python docs/classifier.py
 
 whole-loop: setup
 	$(BIN)/python docs/whole_loop.py

@@ -16,8 +16,9 @@ take, as :func:`sd2core.denoise.metrics.stands_out` has it, is not known while l
     The paper's feature, the Doppler bin of maximum intensity: its velocity as a share of
     the axis' end, and 1 where the frame has a target. Both are 0 where it has none.
 ``columns``
-    The whole column: log10(1 + x / (10 noise)) / 3 of every bin. What is at the noise level
-    is about 0, and 40 dB above it is 1.
+    The whole column: log10(1 + x / (10 noise)) of every bin. What is at the noise level is
+    about 0, and 40 dB above it is 3. Most cells are near 0, so the whole is about as large
+    as a network's numbers should be.
 """
 
 from __future__ import annotations
@@ -122,7 +123,7 @@ class Features:
         if self.kind == "peak":
             return self._peak(values, noise), heard
         scale = np.where(noise > 0, STANDS_OUT * noise, 1.0)[:, None]
-        shown = np.log10(1.0 + values / scale) / np.log10(RANGE / STANDS_OUT)
+        shown = np.log10(1.0 + values / scale)
         return shown.astype(np.float32), heard
 
     def _peak(self, values: NDArray[np.float64], noise: NDArray[np.float64]) -> NDArray[np.float32]:

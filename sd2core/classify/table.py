@@ -40,9 +40,7 @@ VERSION = 1
 
 SHARES = (0.01, 0.02, 0.05, 0.1, 0.25, 0.5, 1.0)
 """Of the real data, for the learning curve."""
-QUICK_SHARES = (0.05, 0.25, 1.0)
-PAPER = ("lstm", "peak")
-"""Network and features of the paper."""
+QUICK_SHARES = (0.1, 1.0)
 
 
 @dataclass(frozen=True)

@@ -58,15 +58,15 @@ class TrainOptions:
     model: str = "lstm"
     features: Kind = "columns"
     options: Mapping[str, Any] = field(default_factory=dict)
-    steps: int = 300
+    steps: int = 150
     batch: int = 32
     window_frames: int = 450
     piece_frames: int = 75
     learning_rate: float = 0.01
     ssm_learning_rate: float = 0.003
     weight_decay: float = 0.01
-    check_steps: int = 20
-    patience: int = 5
+    check_steps: int = 15
+    patience: int = 4
     seed: int = 0
 
     def __post_init__(self) -> None:

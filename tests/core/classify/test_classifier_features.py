@@ -52,15 +52,15 @@ def test_targets_are_those_that_stand_out_of_the_whole_take() -> None:
     np.testing.assert_allclose(found[:, 0] * AXIS.v_max_mps, wanted, atol=1e-6)
 
 
-def test_columns_are_0_at_nothing_and_1_at_forty_db_over_the_noise() -> None:
+def test_columns_are_0_at_nothing_and_3_at_forty_db_over_the_noise() -> None:
     values = np.ones((10, AXIS.bins))
     values[:, list(NULLED)] = 0.0
     values[:, 5] = RANGE
     values[:, 7] = 0.0
     found, _ = features().of(values)
-    np.testing.assert_allclose(found[:, 5], 1.0, atol=1e-3)
+    np.testing.assert_allclose(found[:, 5], 3.0, atol=1e-3)
     np.testing.assert_array_equal(found[:, [7, *NULLED]], 0.0)
-    np.testing.assert_allclose(found[:, 20], np.log10(1.1) / 3, atol=1e-6)
+    np.testing.assert_allclose(found[:, 20], np.log10(1.1), atol=1e-6)
 
 
 @pytest.mark.parametrize("kind", KINDS)
