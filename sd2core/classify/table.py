@@ -194,9 +194,9 @@ def conditions_of(known: ClipSet, options: TableOptions, denoised: bool) -> list
     if has_synthetic(known):
         added = ["synthetic", "denoised"] if denoised else ["synthetic"]
         places = (False, True) if any(clip.placement for clip in known.clips) else (False,)
-        # What the radar saw of the same movements is what added maps are at best.
-        best: list[Added] = [*added, "radar"]
-        found += [replace(base, added=one, moved=moved) for one in best for moved in places]
+        found += [replace(base, added=one, moved=moved) for one in added for moved in places]
+        # What added maps are at best.
+        found.append(replace(base, added="radar"))
     for share in options.shares:
         found.append(replace(base, share=share))
         found += [replace(base, share=share, added=one) for one in added]

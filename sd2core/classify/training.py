@@ -58,14 +58,14 @@ class TrainOptions:
     model: str = "lstm"
     features: Kind = "columns"
     options: Mapping[str, Any] = field(default_factory=dict)
-    steps: int = 150
-    batch: int = 32
-    window_frames: int = 450
-    piece_frames: int = 75
+    steps: int = 120
+    batch: int = 48
+    window_frames: int = 300
+    piece_frames: int = 50
     learning_rate: float = 0.01
     ssm_learning_rate: float = 0.003
     weight_decay: float = 0.01
-    check_steps: int = 15
+    check_steps: int = 12
     patience: int = 4
     seed: int = 0
 

@@ -96,9 +96,10 @@ def test_without_synthetic_maps_all_movements_are_real() -> None:
 def test_every_condition_is_there_once() -> None:
     found = conditions_of(KNOWN, OPTIONS, denoised=True)
     assert len(found) == len(set(found))
-    for added in ("synthetic", "denoised", "radar"):
+    for added in ("synthetic", "denoised"):
         for moved in (False, True):
             assert Condition(added=added, moved=moved) in found
+    assert Condition(added="radar") in found
     assert Condition(share=0.5, added="denoised") in found
     assert Condition(features="peak") in found
 

@@ -8,6 +8,7 @@ from classifiers import CLASSES, classifier, doppler, energies
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from sd2core.classify.live import CHUNK
 from sd2core.classify.models import MODELS
 from sd2core.errors import Sd2Error
 from sd2core.sensor import VelocityAxis
@@ -21,7 +22,7 @@ SAME = 2e-5
 @pytest.mark.parametrize("kind", ["peak", "columns"])
 def test_frame_by_frame_equals_the_whole_map(model: str, kind: str) -> None:
     trained = classifier(model, kind)
-    values = energies(700)
+    values = energies(130)
     whole = trained.probabilities(doppler(values))
     memory, found = trained.initial_memory(), []
     for frame in values:
@@ -30,7 +31,7 @@ def test_frame_by_frame_equals_the_whole_map(model: str, kind: str) -> None:
     np.testing.assert_allclose(np.stack(found), whole, atol=SAME)
     np.testing.assert_allclose(whole.sum(axis=1), 1.0, atol=1e-5)
     assert whole.dtype == np.float32
-    assert whole.shape == (700, len(CLASSES))
+    assert whole.shape == (130, len(CLASSES))
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -44,6 +45,14 @@ def test_pieces_of_any_length_equal_the_whole(model: str, sizes: list[int]) -> N
         answer, memory = trained.advance(values[start : start + size], memory)
         found.append(answer)
     np.testing.assert_allclose(np.concatenate(found), trained.probabilities_of(values), atol=SAME)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_long_map_is_worked_out_in_pieces_that_do_not_show(model: str) -> None:
+    trained = classifier(model)
+    values = energies(CHUNK + 70)
+    whole, _ = trained.advance(values, trained.initial_memory())
+    np.testing.assert_allclose(trained.probabilities(doppler(values)), whole, atol=SAME)
 
 
 @pytest.mark.parametrize("model", MODELS)

@@ -68,17 +68,18 @@ def model(store: Path) -> Path:
     from sd2app.command_line import main
 
     path = store.parent / "model.safetensors"
-    assert main(["classify", "train", str(store), "--out", str(path), "--steps", "30"]) == 0
+    learnt = ("--steps", "60", "--learning-rate", "0.03")
+    assert main(["classify", "train", str(store), "--out", str(path), *learnt]) == 0
     return path
 
 
 @pytest.fixture
 def shown(tmp_path: Path) -> Path:
-    """A map with one gesture of each class, from 1 s and from 3 s on for a second."""
-    label = np.repeat([0, 1, 0, 2, 0], 30)
+    """A map with one gesture of each class, from 0.4 s and from 1.2 s on for 0.4 s."""
+    label = np.repeat([0, 1, 0, 2, 0], 12)
     path = tmp_path / "map.npz"
     DopplerMap(
-        energies(label, 7).T, AXIS, Timebase.regular(150, 30.0), "real", null_bins=NULLED
+        energies(label, 7).T, AXIS, Timebase.regular(60, 30.0), "real", null_bins=NULLED
     ).save(path)
     return path
 
@@ -131,7 +132,7 @@ def test_who_stops_keeps_the_best(
 
     def interrupted(self):
         for number, loss in enumerate(steps(self)):
-            if number == 20:
+            if number == 40:
                 raise KeyboardInterrupt
             yield loss
 
@@ -153,14 +154,14 @@ def test_gestures_of_a_map_become_labels(
     )
     spans = json.loads(told.out)["spans"]
     assert [one["label"] for one in spans] == ["horizontal", "vertical"]
-    for span, start_s in zip(spans, (1.0, 3.0), strict=True):
-        assert span["start_s"] == pytest.approx(start_s, abs=0.25)
-        assert span["end_s"] == pytest.approx(start_s + 1.0, abs=0.25)
+    for span, start_s in zip(spans, (0.4, 1.2), strict=True):
+        assert span["start_s"] == pytest.approx(start_s, abs=0.15)
+        assert span["end_s"] == pytest.approx(start_s + 0.4, abs=0.15)
         assert span["confidence"] > 0.5
     written = read_labels(out).labels
     assert [one.origin for one in written.spans] == ["suggestion"] * 2
     with np.load(values) as held:
-        assert held["probabilities"].shape == (150, 3)
+        assert held["probabilities"].shape == (60, 3)
         assert list(held["classes"]) == ["background", "horizontal", "vertical"]
         np.testing.assert_allclose(held["probabilities"].sum(axis=1), 1.0, atol=1e-5)
     words = sd2("classify", "apply", shown, "--model", model)
