@@ -297,6 +297,7 @@ def test_memory_does_not_grow_with_the_number_of_sources(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(store, "FLUSH_EVERY_S", 1e9)  # a slow machine writes as a fast one
+    monkeypatch.setattr(store, "_TOGETHER", 64)
     monkeypatch.setattr(card, "_ROWS", 256)  # fewer than any of these data sets has
 
     def many(count: int) -> Iterator[Source]:
@@ -311,6 +312,6 @@ def test_memory_does_not_grow_with_the_number_of_sources(
         return most
 
     peak(2, ".zarr")  # what is imported counts no more
-    few, lots = peak(16, ".zarr"), peak(40, ".zarr")  # more than is written together
-    segments = 24 * 75 * 24 * AXIS.bins * 4 * 2
+    few, lots = peak(4, ".zarr"), peak(12, ".zarr")  # more than is written together
+    segments = 8 * 75 * 24 * AXIS.bins * 4 * 2
     assert lots - few < segments / 10

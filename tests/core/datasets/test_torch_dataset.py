@@ -34,7 +34,9 @@ def stores(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
-@pytest.mark.parametrize(("ending", "started"), [(".zarr", "fork"), (".h5", "spawn")])
+@pytest.mark.parametrize(
+    ("ending", "started"), [(".zarr", "fork"), pytest.param(".h5", "spawn", marks=pytest.mark.slow)]
+)
 def test_two_workers_see_each_segment_once(
     stores: dict[str, Path], ending: str, started: str
 ) -> None:
