@@ -9,7 +9,7 @@ from PySide6.QtCore import QObject, Signal
 
 from sd2app.jobs.detached import start_detached
 from sd2app.models.batch_estimate import COMMAND, BatchEstimateModel
-from sd2app.models.batch_follower import BatchFollower, output_of
+from sd2app.models.batch_follower import BatchFollower, output_of, plan_of
 from sd2app.models.batch_results import BatchResults
 from sd2app.models.batch_setup import BatchSetupModel
 from sd2app.models.training_command import quoted
@@ -139,8 +139,7 @@ class BatchModel(QObject):
         out = Path(plan.out)
         if BatchFolder(out).live:
             raise Sd2Error(f"A process is at work in {out} already", "one batch at a time there")
-        # Beside its folder, which may not be there yet; the batch keeps one of its own.
-        file = out.with_name(f".{out.name}.plan.toml")
+        file = plan_of(out)  # beside its folder, which may not be there yet
         write_plan(file, plan)
         self._launch(out, file)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import time
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,6 +28,8 @@ UNDER_WAY: tuple[Phase, ...] = ("starting", "running", "stopping")
 
 POLL_MS = 400
 SLOW_POLL_MS = 3000
+_CLOCKS_S = 1.0
+"""By so much the times of two processes may disagree."""
 _KEPT_LINES = 500
 """Of failures: there may be thousands, and the report has all."""
 
@@ -55,6 +58,11 @@ def output_of(folder: Path) -> Path:
     return folder.with_name(f".{folder.name}.out")
 
 
+def plan_of(folder: Path) -> Path:
+    """What a batch is started with; it keeps a plan of its own in its folder."""
+    return folder.with_name(f".{folder.name}.plan.toml")
+
+
 class BatchFollower(QObject):
     """One batch: how it stands, what failed, and how to stop it.
 
@@ -79,7 +87,7 @@ class BatchFollower(QObject):
     ) -> None:
         super().__init__(parent)
         self.folder = BatchFolder(path)
-        self._pid = pid
+        self._pid, self._launched_s = pid, time.time()
         self._look_of = _Looker(self.folder, output_of(path))
         self._phase: Phase = "starting"
         self._known = self._seen_live = self._stopping = False
@@ -193,16 +201,15 @@ class BatchFollower(QObject):
         # Once it has been at the folder, a process that still ends is of no interest.
         if found.launching and not self._seen_live:
             return "starting"
-        if self._pid is not None and not self._seen_live:
-            return self._ended_unseen(found)
+        if self._pid is not None and not self._seen_live and not self._is_of_this_start(found):
+            # It was refused, or told to stop, before it had a folder.
+            return "stopped" if self._stopping else "failed"
         return found.status.state if found.status is not None else "gone"
 
-    def _ended_unseen(self, found: _Found) -> Phase:
-        """It may have been refused before it had a folder, or been too quick to be seen."""
-        said = last_words(output_of(self.folder.path))
-        if said or found.status is None or found.status.pid != self._pid:
-            return "stopped" if self._stopping else "failed"
-        return found.status.state
+    def _is_of_this_start(self, found: _Found) -> bool:
+        """Whether a batch that was too quick to be seen at work is the one just started."""
+        status = found.status
+        return status is not None and status.started_unix_s >= self._launched_s - _CLOCKS_S
 
     def _say_stop_again(self, found: _Found) -> None:
         """Where it had no folder when this was asked for, it may not have heard."""
@@ -227,6 +234,9 @@ class BatchFollower(QObject):
             self._text = error or said.removeprefix("sd2: ") or "The batch ended without a word."
         elif self._phase == "died":
             self._text = said.splitlines()[-1] if said else ""
+        plan_of(self.folder.path).unlink(missing_ok=True)
+        if self._phase in ("finished", "stopped"):
+            output_of(self.folder.path).unlink(missing_ok=True)
 
     def _fail(self, error: Exception) -> None:
         # The disk is away for a moment; it is looked at again.

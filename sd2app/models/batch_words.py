@@ -95,7 +95,7 @@ def estimate_headline(facts: dict[str, Any]) -> str:
 
 
 def estimate_facts(facts: dict[str, Any]) -> list[tuple[str, str]]:
-    """The same step by step, and what cannot be used."""
+    """The same step by step."""
     rows = [
         (STEP_WORDS.get(name, name), _step_text(step))
         for name, step in facts["steps"].items()
@@ -103,11 +103,16 @@ def estimate_facts(facts: dict[str, Any]) -> list[tuple[str, str]]:
     ]
     if facts["looked_at"] < facts["recordings"]:
         rows.append(("Looked at", f"{facts['looked_at']:,}; the others are taken to be like them"))
-    unusable = facts["unusable"]
-    if unusable:
-        more = f" (and {len(unusable) - 1:,} more)" if len(unusable) > 1 else ""
-        rows.append(("Cannot be used", f"{unusable[0]}{more}"))
     return rows
+
+
+def unusable_text(facts: dict[str, Any]) -> str:
+    """Which recordings cannot be used, and why the first of them; empty where all can."""
+    unusable = facts["unusable"]
+    if not unusable:
+        return ""
+    more = f" ({len(unusable) - 1:,} more cannot, either.)" if len(unusable) > 1 else ""
+    return f"Cannot be used: {unusable[0]}{more}"
 
 
 def _step_text(step: dict[str, Any]) -> str:

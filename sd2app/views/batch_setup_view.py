@@ -28,7 +28,7 @@ from sd2app.models.batch_setup import (
     OptionalStep,
     most_workers,
 )
-from sd2app.models.batch_words import entry_text, estimate_facts, estimate_headline
+from sd2app.models.batch_words import entry_text, estimate_facts, estimate_headline, unusable_text
 from sd2app.models.plan_words import percent
 from sd2app.views.elided import ElidedLabel
 from sd2app.views.fact_rows import FactRows
@@ -227,22 +227,20 @@ class BatchSetupView(QWidget):
     def _show_estimate(self) -> None:
         batch, estimate = self._batch, self._batch.estimate
         why_not = batch.why_not_start
-        known = not why_not and estimate.facts is not None
-        self._total.setVisible(known)
-        if known and estimate.facts is not None:
-            self._total.setText(estimate_headline(estimate.facts))
-            self._facts.show_facts(estimate_facts(estimate.facts)[:_MOST_FACTS])
-        else:
-            self._facts.show_facts(())
-        role = "warning" if estimate.problem and why_not == estimate.problem else "muted"
-        if any(entry.problem for entry in self._setup.entries):
-            role = "warning"
+        facts = None if why_not else estimate.facts
+        self._total.setVisible(facts is not None)
+        self._total.setText(estimate_headline(facts) if facts is not None else "")
+        self._facts.show_facts(() if facts is None else estimate_facts(facts)[:_MOST_FACTS])
+        text = why_not if facts is None else unusable_text(facts)
+        bad = facts is not None or why_not == estimate.problem
+        bad |= any(entry.problem for entry in self._setup.entries)
+        role = "warning" if bad else "muted"
         if self._problem.objectName() != role:
             self._problem.setObjectName(role)
             self._problem.style().unpolish(self._problem)
             self._problem.style().polish(self._problem)
-        self._problem.setText(why_not)
-        self._problem.setVisible(bool(why_not))
+        self._problem.setText(text)
+        self._problem.setVisible(bool(text))
         self._start.setEnabled(not why_not)
         self._save.setEnabled(not self._setup.problem)
 

@@ -14,7 +14,7 @@ import pytest
 
 from sd2app.models import batch_follower
 from sd2app.models.batch import BatchModel
-from sd2app.models.batch_follower import output_of
+from sd2app.models.batch_follower import output_of, plan_of
 from sd2app.models.batch_setup import BatchSetupModel
 from sd2app.models.batch_words import (
     estimate_facts,
@@ -23,6 +23,7 @@ from sd2app.models.batch_words import (
     headline,
     step_facts,
     time_text,
+    unusable_text,
 )
 from sd2app.settings import Settings
 from sd2core.batch.folder import BatchFolder
@@ -205,8 +206,11 @@ def test_a_start_waits_for_the_estimate_of_what_is_set_up(qtbot, made, meshes):
         ("Look at recordings", "0 to do · 2 there already"),
         ("Synthesise", "4 to do · 1 there already · about 3 min · some 2 MB"),
         ("Looked at", "2; the others are taken to be like them"),
-        ("Cannot be used", "a.npz: It is damaged. (and 1 more)"),
     ]
+    assert unusable_text(facts) == (
+        "Cannot be used: a.npz: It is damaged. (1 more cannot, either.)"
+    )
+    assert unusable_text({**facts, "unusable": []}) == ""
     assert model.why_not_start == ""
     model.setup.set_value("denoise", False)
     assert "has not been worked out" in model.why_not_start
@@ -242,6 +246,9 @@ def test_a_batch_runs_to_its_end_and_its_results_are_listed(qtbot, made, meshes)
     assert failure_text(run.failures[0]) == (
         "ann.npz, synthesise from place 2: It is damaged. Expected: a mesh. Make it again."
     )
+    # What only served to start it is gone.
+    assert not output_of(run.folder.path).exists()
+    assert not plan_of(run.folder.path).exists()
     assert run.log.splitlines() == [f"looked at {file.name}" for file in meshes]
     qtbot.waitUntil(lambda: bool(model.results.rows))
     # One row per map, of two stretches each.
