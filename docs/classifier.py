@@ -90,7 +90,8 @@ def main() -> None:
             folder, options.minutes, "--placements", 3, "--seed", SEED, "--processes", 2
         )
     tables = folder / "table"
-    sd2("classify", "table", campaign, "--out", tables, "--seeds", options.seeds)
+    chosen = ["--seeds", options.seeds, *(["--shares", options.shares] if options.shares else [])]
+    sd2("classify", "table", campaign, "--out", tables, *chosen)
     told = json.loads((tables / "table.json").read_text("utf-8"))
     page = [_head(options, campaign, told, made), (tables / "table.md").read_text("utf-8")]
     for name in ("curve", "confusion"):
@@ -108,6 +109,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--campaign", type=Path, help="a simulated campaign that is there already")
     parser.add_argument("--minutes", type=float, default=36.0, help="of the campaign (default: 36)")
     parser.add_argument("--seeds", type=int, default=5, help="default: 5")
+    parser.add_argument("--shares", help="of the real data, as `sd2 classify table` has them")
     shared = os.environ.get("SD2_SHARED_DATA")
     parser.add_argument(
         "--real",
@@ -124,6 +126,7 @@ def _head(options: argparse.Namespace, campaign: Path, told: dict, made: str) ->
     runs = [run for one in told["conditions"] for run in one["runs"]]
     given = [f"--seeds {options.seeds}"] if options.seeds != 5 else []
     given += [f"--minutes {options.minutes:g}"] if options.minutes != 36 else []
+    given += [f"--shares {options.shares}"] if options.shares else []
     return HEAD.format(
         here=f"here with `{' '.join(given)}`, " if given else "here ",
         machine=this_machine(),

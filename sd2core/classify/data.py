@@ -196,8 +196,20 @@ def clips_of_map(
     subject, movement : str
     frame_rate_hz : float, optional
         Brought to that rate where it is another; its own by default.
+
+    Raises
+    ------
+    Sd2Error
+        When the rates are too different.
     """
-    rate_hz = frame_rate_hz or doppler.timebase.frames_per_s
+    own_hz = doppler.timebase.frames_per_s
+    rate_hz = frame_rate_hz or own_hz
+    if not 1 / matching.MOST_RESAMPLED <= rate_hz / own_hz <= matching.MOST_RESAMPLED:
+        raise Sd2Error(
+            f"{subject}/{movement}: the {doppler.kind} map has {own_hz:.4g} frames/s",
+            f"{rate_hz:.4g} as the other maps, or up to {matching.MOST_RESAMPLED:g} times more or"
+            " less",
+        )
     label, classes = frame_labels(doppler.timebase, labels)
     clips = []
     for start, stop in matching.stretches(doppler, rate_hz):
@@ -236,26 +248,24 @@ def frame_labels(timebase: Timebase, labels: Labels) -> tuple[NDArray[np.int8], 
 
 
 def merged(sets: Sequence[ClipSet]) -> ClipSet:
-    """Several sets as one.
+    """Several sets as one; a bin that is emptied in one of them counts in none.
 
     Raises
     ------
     Sd2Error
-        When axes, emptied bins or frame rates differ, or there is none.
+        When axes or frame rates differ, or there is none.
     """
     if not sets:
         raise Sd2Error("Nothing to learn from is given", "pairs, recordings or radar files")
     first = sets[0]
     for other in sets[1:]:
-        for what, mine, theirs in (
-            ("velocity axis", first.axis, other.axis),
-            ("emptied bins", first.null_bins, other.null_bins),
-        ):
-            if mine != theirs:
-                raise Sd2Error(
-                    f"The data cannot be mixed: the {what} is {mine} and {theirs}",
-                    "the same in all of them",
-                )
+        if other.axis != first.axis:
+            raise Sd2Error(
+                f"The data cannot be mixed: {first.axis.bins} bins up to"
+                f" ±{first.axis.v_max_mps:g} m/s and {other.axis.bins} bins up to"
+                f" ±{other.axis.v_max_mps:g} m/s",
+                "the same velocity axis",
+            )
         if abs(other.frame_rate_hz / first.frame_rate_hz - 1.0) > matching.SAME_RATE:
             raise Sd2Error(
                 f"The data cannot be mixed: {first.frame_rate_hz:.4g} and"
@@ -269,7 +279,8 @@ def merged(sets: Sequence[ClipSet]) -> ClipSet:
         for clip in one.clips
     )
     provenance = first.provenance if len(sets) == 1 else {"mixed": [s.provenance for s in sets]}
-    return replace(first, classes=classes, clips=clips, provenance=provenance)
+    emptied = tuple(sorted({number for one in sets for number in one.null_bins}))
+    return replace(first, null_bins=emptied, classes=classes, clips=clips, provenance=provenance)
 
 
 def _renumbered(

@@ -68,7 +68,6 @@ class TableOptions:
     networks: tuple[tuple[str, Kind], ...] = (
         ("lstm", "peak"),
         ("lstm", "columns"),
-        ("s4", "peak"),
         ("s4", "columns"),
     )
     training: TrainOptions = field(default_factory=TrainOptions)

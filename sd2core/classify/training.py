@@ -6,6 +6,7 @@ import copy
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from typing import Any, NamedTuple
 
@@ -66,7 +67,7 @@ class TrainOptions:
     ssm_learning_rate: float = 0.003
     weight_decay: float = 0.01
     check_steps: int = 12
-    patience: int = 4
+    patience: int = 10
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -151,7 +152,7 @@ def train(
     Raises
     ------
     Sd2Error
-        When there is nothing to learn from, or a class has no frame.
+        When there is no labelled frame to learn from.
     """
     chosen = chosen or TrainOptions()
     weights = _class_weights(training, known.classes)
@@ -191,7 +192,9 @@ def train(
         except KeyboardInterrupt:
             interrupted = True
         say("end", best_step=best_at, interrupted=interrupted)
-        network.load_state_dict(kept)
+        # Stopped before the first look, it is as far as it came.
+        if best_at > 0:
+            network.load_state_dict(kept)
     card = ClassifierCard(
         chosen.model,
         dict(chosen.options),
@@ -317,12 +320,12 @@ def _class_weights(clips: Sequence[Clip], classes: tuple[str, ...]) -> torch.Ten
     return torch.from_numpy((weights / weights[counts > 0].mean()).astype(np.float32))
 
 
-class _one_thread:
+@contextmanager
+def _one_thread() -> Iterator[None]:
     """Small matrices are slower on several threads, and differ between machines."""
-
-    def __enter__(self) -> None:
-        self._before = torch.get_num_threads()
-        torch.set_num_threads(1)
-
-    def __exit__(self, *_: object) -> None:
-        torch.set_num_threads(self._before)
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)

@@ -104,7 +104,7 @@ def clips_of(
     for one in _unfolded(sources):
         kind = kind_of(one.path)
         if kind not in _WITH_SUBJECTS:
-            sets += _single(one, maps)
+            sets += _single(one, maps, sets[0].frame_rate_hz if sets else None)
         elif one.subject:
             raise Sd2Error(
                 f"{one.subject} is named for {one.path}",
@@ -186,8 +186,10 @@ def _inside(folder: Path) -> list[Path]:
     )
 
 
-def _single(one: Source, maps: Sequence[MapName] | None) -> list[ClipSet]:
-    """Of a recording, or of a radar's own file."""
+def _single(
+    one: Source, maps: Sequence[MapName] | None, frame_rate_hz: float | None
+) -> list[ClipSet]:
+    """Of a recording, or of a radar's own file; at the frame rate of the first map."""
     from sd2core.classify.data import clips_of_map
     from sd2core.io.radar import holds_map, load_recorded_map
     from sd2core.recording import is_recording, open_recording
@@ -202,6 +204,7 @@ def _single(one: Source, maps: Sequence[MapName] | None) -> list[ClipSet]:
                 recorded.labels,
                 subject=one.subject or _ONE,
                 movement=one.path.stem,
+                frame_rate_hz=frame_rate_hz,
             )
         ]
     if not is_recording(one.path):
@@ -221,9 +224,15 @@ def _single(one: Source, maps: Sequence[MapName] | None) -> list[ClipSet]:
             "a recording in which gestures are labelled",
             "Label it in the window, or leave it out",
         )
-    return [
-        clips_of_map(
-            doppler, labels, subject=one.subject or recording.title, movement=one.path.stem
+    found: list[ClipSet] = []
+    for doppler in maps_of(recording, tuple(maps or usual_maps(recording)), axis=axis).values():
+        found.append(
+            clips_of_map(
+                doppler,
+                labels,
+                subject=one.subject or recording.title,
+                movement=one.path.stem,
+                frame_rate_hz=found[0].frame_rate_hz if found else frame_rate_hz,
+            )
         )
-        for doppler in maps_of(recording, tuple(maps or usual_maps(recording)), axis=axis).values()
-    ]
+    return found

@@ -25,6 +25,7 @@ from sd2core.errors import Sd2Error
 from sd2core.labels.label_set import Label, LabelSet
 from sd2core.labels.spans import Labels, Span, Track
 from sd2core.pairs import PairSet, Take
+from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 
 SWIPES = ("background", "left-to-right", "right-to-left", "up-to-down", "down-to-up")
@@ -133,6 +134,8 @@ def test_a_map_is_parted_by_absence_and_brought_to_another_rate() -> None:
     np.testing.assert_allclose(half.clips[0].energies[:30], values[::2], atol=1e-3)
     np.testing.assert_array_equal(half.clips[0].label[:30], np.arange(30) >= 15)
     assert half.frame_rate_hz == 15.0
+    with pytest.raises(Sd2Error, match="30 frames/s"):
+        clips_of_map(doppler(values), labels(), subject="a", movement="m", frame_rate_hz=7.0)
 
 
 def test_sets_of_other_classes_are_put_together() -> None:
@@ -145,8 +148,9 @@ def test_sets_of_other_classes_are_put_together() -> None:
     assert both.subjects == ("anna", "s01", "s02")
     assert both.clips[0].label.max() == 3
     np.testing.assert_array_equal(both.clips[1].label, one.clips[0].label)
-    with pytest.raises(Sd2Error, match="emptied bins"):
-        merged([one, replace(other, null_bins=())])
+    assert merged([one, replace(other, null_bins=(3,))]).null_bins == (3, *NULLED)
+    with pytest.raises(Sd2Error, match="16 bins"):
+        merged([one, replace(other, axis=VelocityAxis(16, 2.0))])
     with pytest.raises(Sd2Error, match="frames/s"):
         merged([one, replace(other, frame_rate_hz=10.0)])
     with pytest.raises(Sd2Error, match="Nothing to learn from"):
