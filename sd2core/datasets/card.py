@@ -80,7 +80,7 @@ def describe_dataset(dataset: Dataset) -> dict[str, Any]:
         "placements": sources.placements,
         **{name: counts.extent(name) for name in _EXTENTS},
         "frames_without_person": sources.frames_without_person,
-        "resampled_sources": sources.resampled(header.frame_rate_hz),
+        "resampled_segments": counts.resampled,
         "sources_without_segments": sources.empty,
         "simulated_recordings": sources.simulated,
         "how": sources.how(),
@@ -89,7 +89,7 @@ def describe_dataset(dataset: Dataset) -> dict[str, Any]:
 
 _NOT_ON_CARD = {"format", "version", "all_kinds"}
 _EXTENTS = ("range_m", "azimuth_deg", "elevation_deg")
-_READ = ("segment_label", "purity", "subject", "split", "available", *_EXTENTS)
+_READ = ("segment_label", "purity", "subject", "split", "available", "resampled", *_EXTENTS)
 
 
 class _Counts:
@@ -103,6 +103,7 @@ class _Counts:
         self.label_split = np.zeros((labels, len(SPLITS)), np.int64)
         self.kind = np.zeros(len(KINDS), np.int64)
         self.purity = 0.0
+        self.resampled = 0
         self._extents: dict[str, list[float]] = {name: [] for name in _EXTENTS}
 
     def add(self, rows: dict[str, np.ndarray]) -> None:
@@ -112,6 +113,7 @@ class _Counts:
         np.add.at(self.label_split, (rows["segment_label"], rows["split"]), 1)
         self.frames += np.bincount(rows["label"].ravel(), minlength=len(self.frames))
         self.kind += rows["available"].sum(axis=0)
+        self.resampled += int(rows["resampled"].sum())
         self.purity += float(rows["purity"].sum(dtype=np.float64))
         for name, known in self._extents.items():
             values = rows[name][np.isfinite(rows[name])].astype(float)
@@ -134,7 +136,6 @@ class _Sources:
         self.minutes = 0.0
         self.frames_without_person = 0
         self.recordings: set[int] = set()
-        self._rates_hz: Counter[float] = Counter()
         self._how: dict[str, Counter[str]] = {kind: Counter() for kind in KINDS}
 
     def add(self, entry: dict[str, Any]) -> None:
@@ -142,7 +143,6 @@ class _Sources:
         self.empty += entry["start"] == entry["stop"]
         self.placements = max(self.placements, entry["placement"] + 1)
         self.recordings.add(hash((entry["subject"], entry["recording"])))
-        self._rates_hz[entry["frame_rate_hz"]] += 1
         provenance = entry["provenance"]
         if entry["placement"] == 0:
             self.minutes += entry["frames"] / entry["frame_rate_hz"] / 60
@@ -150,12 +150,6 @@ class _Sources:
             self.simulated += bool(provenance.get("simulated"))
         for kind, made in provenance["maps"].items():
             self._how[kind][how_words(kind, made, provenance)] += 1
-
-    def resampled(self, frame_rate_hz: float) -> int:
-        """Sources of clearly another frame rate."""
-        return sum(
-            count for rate, count in self._rates_hz.items() if abs(rate / frame_rate_hz - 1) > 0.02
-        )
 
     def how(self) -> dict[str, dict[str, int]]:
         """Ways in which maps of each kind were made, and of how many sources."""

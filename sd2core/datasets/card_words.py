@@ -58,10 +58,10 @@ def limits(card: dict[str, Any]) -> list[str]:
     several = [kind for kind, units in card["units"].items() if len(units) > 1]
     if several:
         found.append(f"Values of {' and '.join(several)} come in several units: scale each source.")
-    if card["resampled_sources"]:
+    if card["resampled_segments"]:
         found.append(
-            f"{card['resampled_sources']} sources had another frame rate and were brought to"
-            f" {card['frame_rate_hz']:g} frames/s by linear interpolation."
+            f"{card['resampled_segments']:,} segments had uneven frames or another frame rate and"
+            f" were brought to {card['frame_rate_hz']:g} frames/s by linear interpolation."
         )
     if card["frames_without_person"]:
         found.append(

@@ -8,14 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.classify.data import Clip, ClipSet, in_order
-from sd2core.datasets.layout import Header
 from sd2core.datasets.reading import Dataset
 from sd2core.datasets.source import KINDS
 from sd2core.errors import Sd2Error
 from sd2core.spectrum import MapKind
 
 _SLACK_FRAMES = 0.01
-"""How far from a whole number of frames two segments of one clip may begin."""
+"""Of times that were rounded."""
 
 
 def clips_of_dataset(dataset: Dataset, kind: MapKind) -> ClipSet:
@@ -41,11 +40,13 @@ def clips_of_dataset(dataset: Dataset, kind: MapKind) -> ClipSet:
     classes = in_order(names)
     table = np.array([classes.index(name) for name in names], np.int8)
     rows = np.flatnonzero(dataset["available"][:][:, KINDS.index(kind)])
-    source, start_s = dataset["source"][:][rows], dataset["start_s"][:][rows]
+    source = dataset["source"][:][rows]
     subject, placement = dataset["subject"][:][rows], dataset["placement"][:][rows]
     recordings = [one["recording"] for one in dataset.sources()]
     clips = []
-    for run, starts in _runs(source, start_s, header):
+    resampled = dataset["resampled"][:][rows]
+    first_frame = _first_frames(dataset, rows, resampled)
+    for run, starts in _runs(2 * source + resampled, first_frame, header.length):
         energies = _joined(dataset[kind][rows[run]], starts)
         label = _joined(dataset["label"][rows[run]], starts)
         first = run.start
@@ -69,19 +70,35 @@ def clips_of_dataset(dataset: Dataset, kind: MapKind) -> ClipSet:
     )
 
 
+def _first_frames(
+    dataset: Dataset, rows: NDArray[np.integer], resampled: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Where segments begin, in frames of the data set: differences count, within a source.
+
+    A camera's frames come at times of its own, which are no whole numbers of frames; only
+    what was resampled has just its times.
+    """
+    frames = dataset["start_frame"][:][rows].astype(np.float64)
+    times_s = dataset["start_s"][:][rows]
+    return np.where(resampled, times_s * dataset.header.frame_rate_hz, frames)
+
+
 def _runs(
-    source: NDArray[np.integer], start_s: NDArray[np.float64], header: Header
+    belongs: NDArray[np.integer], first_frame: NDArray[np.float64], length: int
 ) -> Iterator[tuple[slice, NDArray[np.int64]]]:
-    """Rows of one clip each, and at which of its frames each of its segments begins."""
-    apart = np.diff(start_s) * header.frame_rate_hz  # frames from one segment to the next
+    """Rows of one clip each, and at which of its frames each of its segments begins.
+
+    Rows of one clip have the same number in ``belongs``.
+    """
+    apart = np.diff(first_frame)
     steps = np.rint(apart)
     goes_on = (
-        (np.diff(source) == 0)
+        (np.diff(belongs) == 0)
         & (np.abs(apart - steps) <= _SLACK_FRAMES)
         & (steps > 0)
-        & (steps <= header.length)
+        & (steps <= length)
     )
-    edges = np.concatenate([[0], np.flatnonzero(~goes_on) + 1, [len(source)]])
+    edges = np.concatenate([[0], np.flatnonzero(~goes_on) + 1, [len(belongs)]])
     for begun, ended in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
         starts = np.concatenate([[0], np.cumsum(steps[begun : ended - 1])]).astype(np.int64)
         yield slice(begun, ended), starts

@@ -123,7 +123,7 @@ def cut_source(
     ------
     dict of str to array
         Per segment, first axis: the kinds the source has and ``available``, ``label``,
-        ``segment_label``, ``purity``, ``start_s``, ``start_frame``.
+        ``segment_label``, ``purity``, ``start_s``, ``start_frame``, ``resampled``.
     """
     known = source.known
     kinds = [kind for kind in options.kinds if kind in source.maps]
@@ -149,6 +149,7 @@ def cut_source(
                 arrays["label"], int(label_numbers.max()) + 1, options
             )
             arrays["start_s"] = clip.times_s[starts]
+            arrays["resampled"] = np.full(len(starts), clip.resampled)
             arrays["start_frame"] = (
                 np.searchsorted(source.times_s, arrays["start_s"] + 1e-9, side="right") - 1
                 if clip.resampled

@@ -31,6 +31,7 @@ COLUMNS: dict[str, tuple[str, tuple[int, ...]]] = {
     "placement": ("int32", ()),
     "start_s": ("float64", ()),
     "start_frame": ("int64", ()),
+    "resampled": ("bool", ()),
     "sensor_position_m": ("float64", (3,)),
     "sensor_direction_deg": ("float64", (2,)),
     "range_m": ("float32", ()),

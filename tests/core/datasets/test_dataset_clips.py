@@ -43,6 +43,35 @@ def test_segments_are_put_together_again(
         np.testing.assert_array_equal(clip.label, one.label)
 
 
+@pytest.mark.parametrize("rate_hz", [29.52, 29.97, 30.4])
+def test_a_camera_that_is_not_quite_on_time_gives_whole_clips(
+    tmp_path: Path, rate_hz: float
+) -> None:
+    times_s = np.arange(150) / rate_hz + np.random.default_rng(1).uniform(-5e-3, 5e-3, 150)
+    one = source(frames=150, times_s=times_s)
+    write_dataset(
+        tmp_path / "set.zarr", [one], DatasetOptions(length=24, overlap=4, frame_rate_hz=30.0)
+    )
+    with open_dataset(tmp_path / "set.zarr") as dataset:
+        assert not dataset["resampled"][:].any()
+        (clip,) = clips_of_dataset(dataset, "synthetic").clips
+    np.testing.assert_array_equal(clip.energies, one.maps["synthetic"].values.T)
+
+
+def test_what_was_resampled_is_put_together_by_its_times(tmp_path: Path) -> None:
+    one = source(frames=120, rate_hz=30.7)
+    out = tmp_path / "set.zarr"
+    write_dataset(out, [one], DatasetOptions(length=24, overlap=4, frame_rate_hz=30.0))
+    with open_dataset(out) as dataset:
+        assert dataset["resampled"][:].all()
+        (clip,) = clips_of_dataset(dataset, "synthetic").clips
+    times_s = np.arange(len(clip.energies)) / 30.0
+    for number, energies in enumerate(one.maps["synthetic"].values):
+        np.testing.assert_allclose(
+            clip.energies[:, number], np.interp(times_s, one.times_s, energies), atol=1e-6
+        )
+
+
 def test_who_leaves_the_picture_parts_a_clip(tmp_path: Path) -> None:
     present = np.ones(120, bool)
     present[50:60] = False
