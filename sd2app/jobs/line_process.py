@@ -28,6 +28,11 @@ class Ending:
     code: int | None
     errors: str
 
+    def reason(self, otherwise: str) -> str:
+        """Why it failed, as ``sd2`` says it in its last line, or else these words."""
+        said = self.errors.splitlines()[-1:]
+        return said[0].removeprefix("sd2: ") if said else otherwise
+
 
 class LineProcess(QObject):
     """Runs a program once; lines arrive whole, however the pipe cuts them.

@@ -92,8 +92,7 @@ class BatchEstimateModel(QObject):
         if isinstance(facts, dict):
             self._facts = facts
         else:
-            said = ending.errors.splitlines()[-1:]
-            self._problem = said[0].removeprefix("sd2: ") if said else "It cannot be estimated."
+            self._problem = ending.reason("It cannot be estimated.")
         self.changed.emit()
 
     def _clear_up(self) -> None:

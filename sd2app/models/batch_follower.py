@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QObject, Signal
 
 from sd2app.jobs.detached import is_alive, last_words
-from sd2app.jobs.latest import LatestRunner
+from sd2app.jobs.repeated_look import RepeatedLook
 from sd2core.batch.folder import BatchFolder, BatchStatus, status_of
 from sd2core.errors import Sd2Error
 from sd2core.train.progress import Event, ProgressTail
@@ -88,19 +88,14 @@ class BatchFollower(QObject):
         super().__init__(parent)
         self.folder = BatchFolder(path)
         self._pid, self._launched_s = pid, time.time()
-        self._look_of = _Looker(self.folder, output_of(path))
+        self._looker = _Looker(self.folder, output_of(path))
         self._phase: Phase = "starting"
         self._known = self._seen_live = self._stopping = False
         self._found: _Found | None = None
         self._text = ""
-        self._runner = LatestRunner("batch", self)
-        self._runner.finished.connect(self._take)
-        self._runner.failed.connect(self._fail)
-        self._timer = QTimer(self)
-        self._timer.setInterval(POLL_MS)
-        self._timer.timeout.connect(self.look)
-        self._timer.start()
-        self.look()
+        self._looking = RepeatedLook("batch", self._look, POLL_MS, self)
+        self._looking.found.connect(self._take)
+        self._looking.failed.connect(self._fail)
 
     # --- what is known --------------------------------------------------------------------
 
@@ -169,16 +164,12 @@ class BatchFollower(QObject):
 
     def close(self) -> None:
         """Look no more; the process goes on."""
-        self._timer.stop()
-        self._runner.close()
+        self._looking.close()
 
     # --- looking --------------------------------------------------------------------------
 
-    def look(self) -> None:
-        """Look at the folder, in the background."""
-        if not self._runner.busy:
-            pid = self._pid
-            self._runner.submit(lambda emit: self._look_of.look(pid))
+    def _look(self) -> _Found:
+        return self._looker.look(self._pid)
 
     def _take(self, found: _Found) -> None:
         told = found != self._found
@@ -223,7 +214,7 @@ class BatchFollower(QObject):
     def _settle(self, found: _Found) -> None:
         """The phase is another one."""
         under_way = self._phase in UNDER_WAY
-        self._timer.setInterval(POLL_MS if under_way else SLOW_POLL_MS)
+        self._looking.set_interval(POLL_MS if under_way else SLOW_POLL_MS)
         if under_way:
             return
         self._stopping = False

@@ -109,10 +109,7 @@ class PairMaker(QObject):
         else:
             self._clear_up()
             if not self._cancelled:
-                said = ending.errors.splitlines()[-1:]
-                self.failed.emit(
-                    said[0].removeprefix("sd2: ") if said else f"{out.stem} could not be made."
-                )
+                self.failed.emit(ending.reason(f"{out.stem} could not be made."))
         self.changed.emit()
 
     def _clear_up(self) -> None:

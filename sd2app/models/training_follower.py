@@ -10,10 +10,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QObject, Signal
 
 from sd2app.jobs.detached import is_alive, last_words
-from sd2app.jobs.latest import LatestRunner
+from sd2app.jobs.repeated_look import RepeatedLook
 from sd2app.models.training_command import output_of
 from sd2app.models.training_history import TrainingHistory
 from sd2app.models.training_phase import UNDER_WAY, Look, Phase, look_at, phase_of
@@ -81,14 +81,9 @@ class TrainingFollower(QObject):
         self._has_model = self._resumable = False
         self._wish: Word | None = None
         self._cancelled_s: float | None = None
-        self._runner = LatestRunner("training", self)
-        self._runner.finished.connect(self._take)
-        self._runner.failed.connect(self._fail)
-        self._timer = QTimer(self)
-        self._timer.setInterval(POLL_MS)
-        self._timer.timeout.connect(self.look)
-        self._timer.start()
-        self.look()
+        self._looking = RepeatedLook("training", self._look, POLL_MS, self)
+        self._looking.found.connect(self._take)
+        self._looking.failed.connect(self._fail)
 
     # --- what is known --------------------------------------------------------------------
 
@@ -160,15 +155,13 @@ class TrainingFollower(QObject):
 
     def close(self) -> None:
         """Look no more; the process goes on."""
-        self._timer.stop()
-        self._runner.close()
+        self._looking.close()
 
     # --- looking --------------------------------------------------------------------------
 
     def look(self) -> None:
-        """Look at the folder, in the background."""
-        if not self._runner.busy:
-            self._runner.submit(lambda emit: self._look())
+        """Look at the folder now, in the background."""
+        self._looking.look()
 
     def _look(self) -> _Found:
         launching = self._pid is not None and is_alive(self._pid)
@@ -216,7 +209,7 @@ class TrainingFollower(QObject):
     def _settle(self) -> None:
         """The phase is another one."""
         ended = self._phase not in UNDER_WAY
-        self._timer.setInterval(SLOW_POLL_MS if ended or self._phase == "paused" else POLL_MS)
+        self._looking.set_interval(SLOW_POLL_MS if ended or self._phase == "paused" else POLL_MS)
         if not ended:
             return
         self._wish = None
