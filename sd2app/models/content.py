@@ -31,6 +31,7 @@ UNTITLED = Path()
 _TOLD: dict[str, tuple[str, str]] = {
     "map": ("is a Doppler map", "Look at it with `sd2 info`"),
     "pairs": ("holds pairs to learn from", "Train with them in the Train panel"),
+    "dataset": ("is a data set", "Look at its card and its preview sheet, or use `sd2 info`"),
     "model": ("is a model", "Open a recording, then choose the model under Model"),
 }
 """Kinds that no recording is made of: what to say, and where they belong."""

@@ -27,6 +27,8 @@ EXAMPLES = 3
 _LOW_DB = -30.0
 _MOST_SEGMENTS = 1_000_000
 """Are looked at when examples are chosen; of more, the first ones."""
+_MOST_LABELS = 16
+"""Labels on a sheet: those of most segments."""
 _IN_A_BAND = 12
 _CELL_IN = (1.02, 0.86)
 _LEFT_IN = 0.8
@@ -88,7 +90,8 @@ def examples_of(dataset: Dataset, each: int = EXAMPLES) -> list[Example]:
         for name in ("segment_label", "purity", "available", "subject", "placement", "range_m")
     }
     found = []
-    for label in range(len(header.labels)):
+    counts = np.bincount(columns["segment_label"], minlength=len(header.labels))
+    for label in sorted(np.argsort(-counts, kind="stable")[:_MOST_LABELS].tolist()):
         rows = np.flatnonzero(columns["segment_label"] == label)
         kinds = columns["available"][rows].sum(axis=1)
         # Those of most kinds first, then those that hold most of their label.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any, NamedTuple, get_args
 
 import numpy as np
@@ -186,7 +186,8 @@ class Source:
     def fingerprint(self) -> str:
         """The same for the same maps, labels and sensor."""
         sums = hashlib.blake2b(digest_size=16)
-        sums.update(json.dumps([self.sensor.position_m, self.labels]).encode())
+        told = [asdict(self.sensor), self.labels, dict(self.classes)]
+        sums.update(json.dumps(told).encode())
         sums.update(np.ascontiguousarray(self.label, np.int16).data)
         sums.update(np.ascontiguousarray(self.times_s).data)
         for kind in KINDS:

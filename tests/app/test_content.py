@@ -55,6 +55,14 @@ def test_a_model_is_no_part_of_a_recording_and_says_where_it_belongs(tmp_path):
         recording_of([path])
 
 
+def test_a_data_set_is_no_part_of_a_recording_either(tmp_path):
+    path = tmp_path / "gestures.h5"
+    with h5py.File(path, "w") as file:
+        file.attrs["format"] = "sd2-dataset"
+    with pytest.raises(Sd2Error, match=r"is a data set.*preview sheet"):
+        recording_of([path])
+
+
 def test_a_radar_file_with_a_map_shows_it_and_brings_its_labels(tmp_path):
     path = tmp_path / "swing.h5"
     values = np.zeros((2, 32, 32, 10), np.float16)

@@ -245,6 +245,29 @@ def test_one_bad_source_does_not_stop_the_others(tmp_path: Path) -> None:
     assert not (tmp_path / "none.zarr").exists()
 
 
+def test_labels_of_all_sources_are_one_list(tmp_path: Path) -> None:
+    ours = ("background", "up-to-down", "pause", "left-to-right")
+    other = replace(
+        source("r2"), labels=ours, label=np.arange(100).astype(np.int16) // 25, classes={}
+    )
+    sources = [source("r1"), other, replace(other, recording="r3", labels=(*ours[:3], "wave"))]
+    out = tmp_path / "set.zarr"
+    write_dataset(out, sources, OPTIONS)
+    with open_dataset(out) as dataset:
+        names = np.array(dataset.header.labels)
+        assert names.tolist() == [*LABELS, "pause", "wave"]
+        for whose, start, label in zip(
+            dataset["source"][:], dataset["start_frame"][:], dataset["label"][:], strict=True
+        ):
+            one = sources[whose]
+            expected = np.array(one.labels)[one.label[start : start + 24]]
+            assert names[label].tolist() == expected.tolist()
+        assert dataset.header.classes == CLASSES
+    clash = replace(source("r4"), classes={"up-to-down": "horizontal"})
+    (failed,) = write_dataset(out, [clash], OPTIONS).failed
+    assert "'up-to-down' is of class 'horizontal'" in failed.reason
+
+
 def test_null_bins_are_empty_in_all_kinds(tmp_path: Path) -> None:
     out = tmp_path / "set.zarr"
     options = replace(OPTIONS, null_bins=(2, 3))
