@@ -38,10 +38,10 @@ class ActionSet:
     def __getitem__(self, name: str) -> QAction:
         return self._actions[name]
 
-    def fill_menu_bar(self, models: QMenu) -> QMenu:
+    def fill_menu_bar(self, models: QMenu, classifiers: QMenu) -> QMenu:
         """Make the menus; returns the one for recent files, which the window fills.
 
-        ``models`` is put into the menu of models.
+        ``models`` and ``classifiers`` are put into the menu of models.
         """
         bar = self._window.menuBar()
         menus = {name: bar.addMenu(f"&{name}") for name in _MENUS}
@@ -55,6 +55,9 @@ class ActionSet:
                 menus[row.menu] = self._submenu(row.menu, menus[_SUBMENUS[row.menu]])
             if row.separator_before:
                 menus[row.menu].addSeparator()
+            if row.id == "open_classifier":
+                menus["Model"].addSeparator()
+                menus["Model"].addMenu(classifiers)
             menus[row.menu].addAction(self._actions[row.id])
             if row.id == "open_folder":
                 menus["File"].addMenu(recent)

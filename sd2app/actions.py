@@ -11,6 +11,7 @@ from sd2app.action import (
     some_selected,
 )
 from sd2app.actions_by_hand import MARKING, SPANS, TRACKS
+from sd2app.actions_of_classifiers import CLASSIFIERS, FINDING
 from sd2app.actions_of_labels import COMPARING, LABEL_FILES, SUGGESTIONS
 
 MOUSE = (
@@ -28,7 +29,7 @@ MOUSE = (
     ("Drag the sensor in the scene", "Move it in the plane of the screen"),
     ("Click a planned place in the scene", "Put the sensor there"),
     ("Shift+drag, Ctrl+drag the sensor", "Move it vertically, or along the line to the body"),
-    ("Drop a model file (.safetensors)", "Denoise this recording with it"),
+    ("Drop a model file (.safetensors)", "Denoise this recording with it, or classify"),
     ("Drop a file of labels", "Import them"),
     ("Drag elsewhere, middle drag, wheel in the scene", "Turn, shift, zoom; double click resets"),
 )
@@ -371,6 +372,7 @@ ACTIONS: tuple[Action, ...] = (
     ),
     *TRACKS,
     *SUGGESTIONS,
+    *FINDING,
     *LABEL_FILES,
     Action(
         "restore_labels", "Labels", "Restore labels that were not saved", (),
@@ -430,6 +432,7 @@ ACTIONS: tuple[Action, ...] = (
         lambda w: w.context.live.set_wanted(not w.context.live.wanted),
         checked=lambda c: c.live.wanted,
     ),
+    *CLASSIFIERS,
     Action(
         "sample", "Help", "Open the sample recording", (), "A simulated person, four gestures",
         lambda w: w.open_sample(),

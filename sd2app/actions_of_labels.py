@@ -9,7 +9,7 @@ SUGGESTIONS: tuple[Action, ...] = (
         "suggest", "Labels", "Suggest spans", ("F",),
         "Find where something moves in a map; each suggestion is then accepted or rejected",
         lambda w: w.context.suggestions.start(),
-        lambda c: c.suggestions.source is not None, separator_before=True, edits_labels=True,
+        lambda c: not c.suggestions.finders[0].why_not, separator_before=True, edits_labels=True,
     ),
     Action(
         "accept_suggestion", "Labels", "Accept suggestion", ("Y",),

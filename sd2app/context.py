@@ -10,6 +10,7 @@ from PySide6.QtCore import QObject
 
 from sd2app.actions import ACTIONS
 from sd2app.commands import Edits
+from sd2app.jobs.denoise_process import DenoiseProcess
 from sd2app.label_dragging import LabelDragging
 from sd2app.label_edits import LabelEdits
 from sd2app.label_marking import LabelMarking
@@ -17,6 +18,9 @@ from sd2app.label_tracks import LabelTracks
 from sd2app.models.agreement import AgreementModel
 from sd2app.models.batch import BatchModel
 from sd2app.models.batch_estimate import COMMAND as BATCH_COMMAND
+from sd2app.models.class_training import ClassTraining
+from sd2app.models.classify import ClassifyModel
+from sd2app.models.classify_library import ClassifierLibrary, core_classifiers
 from sd2app.models.content import reference_of
 from sd2app.models.cut_out import CutOutModel
 from sd2app.models.denoise import DenoiseModel
@@ -40,6 +44,7 @@ from sd2app.models.placements import PlacementsModel
 from sd2app.models.playback import PlaybackModel
 from sd2app.models.reaction import ReactionModel
 from sd2app.models.sensor import SensorModel
+from sd2app.models.span_finders import GestureFinder, MotionFinder
 from sd2app.models.span_loop import SpanLoop
 from sd2app.models.suggestions import SuggestionsModel
 from sd2app.models.synthesis import SynthesisModel
@@ -80,6 +85,9 @@ class Context:
     uncertainty: UncertaintyModel
     denoise: DenoiseModel
     live: LiveDenoiseModel
+    classify: ClassifyModel
+    gestures: GestureFinder
+    class_training: ClassTraining
     difference: DifferenceModel
     edits: Edits
     labels: LabelsModel
@@ -128,6 +136,8 @@ class Context:
         self.training.close()
         self.uncertainty.close()
         self.live.close()
+        self.class_training.close()
+        self.classify.close()
         self.denoise.close()
         self.synthesis.close()
         self.trade.close()
@@ -145,11 +155,12 @@ def build_context(
     train_command: Sequence[str] | None = None,
     recovery: Path | None = None,
     batch_command: Sequence[str] | None = None,
+    classifiers: ClassifierLibrary | None = None,
 ) -> Context:
     """Make the models and let them follow the document.
 
-    Ladder and denoisers are the library's, the commands that fit, train and work in batches
-    ``sd2`` itself, and the recovery folder of labels is the user's by default.
+    Ladder, denoisers and classifiers are the library's, the commands that fit, train and work
+    in batches ``sd2`` itself, and the recovery folder of labels is the user's by default.
     """
     jobs = JobsModel(parent)
     document = DocumentModel(jobs, parent)
@@ -164,6 +175,7 @@ def build_context(
     follower = FitFollower(fit, document, playback, parent)
     synthesis = SynthesisModel(document, sensor, playback, span, synthetic, jobs, trade, parent)
     display, edits = DisplayModel(parent), Edits(document, sensor)
+    process = DenoiseProcess()
     denoise = DenoiseModel(
         document,
         synthesis,
@@ -172,7 +184,7 @@ def build_context(
         denoised,
         before,
         jobs,
-        denoisers or core_library(),
+        denoisers or core_library(process),
         edits.choose_denoiser,
         parent,
     )
@@ -181,6 +193,10 @@ def build_context(
     label_session = LabelSession(document, labels, recovery or recovery_folder(), parent)
     label_edits = LabelEdits(document, labels, playback, label_session, parent)
     reaction = ReactionModel(settings, parent)
+    maps = (synthetic, denoised, real)
+    library = classifiers or core_classifiers(process)
+    classify = ClassifyModel(maps, playback, synthesis, labels, settings, library, parent)
+    gestures = GestureFinder(classify)
     context = Context(
         settings=settings,
         jobs=jobs,
@@ -202,6 +218,9 @@ def build_context(
         uncertainty=UncertaintyModel(document, synthesis, trade, synthetic, jobs, settings, parent),
         denoise=denoise,
         live=LiveDenoiseModel(playback, synthetic, denoise, settings, parent),
+        classify=classify,
+        gestures=gestures,
+        class_training=ClassTraining(settings, classify.use, parent),
         difference=DifferenceModel(denoised, real, display, settings, parent),
         edits=edits,
         labels=labels,
@@ -211,7 +230,7 @@ def build_context(
         suggestions=SuggestionsModel(
             labels,
             playback,
-            (synthetic, denoised, real),
+            (MotionFinder(maps), gestures),
             document.undo_stack,
             label_edits.apply,
             parent,

@@ -26,7 +26,7 @@ from sd2app.dialogs.new_from_video import VIDEOS, NewFromVideoDialog
 from sd2app.dialogs.recover_labels import choose_recovery
 from sd2app.dialogs.strip import StripDialog
 from sd2app.models.comparison import ComparisonModel
-from sd2app.models.denoise_words import denoised_words
+from sd2app.models.denoise_words import denoised_words, denoiser_page
 from sd2app.models.figure import FigureModel
 from sd2app.models.fit_setup import FitSetupModel
 from sd2app.models.key_list import KeyListModel
@@ -304,7 +304,7 @@ class Dialogs:
         """What the model in use says about itself."""
         card = self._context.denoise.card
         if card is not None:
-            ModelCardDialog(card, self._parent).exec()
+            ModelCardDialog(denoiser_page(card), self._parent).exec()
 
     def export_strip(self) -> None:
         """Choose frames and write them side by side."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QDialog,
@@ -16,27 +14,24 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from sd2app.models.denoise_words import card_rows, card_sections, model_title
-
-if TYPE_CHECKING:
-    from sd2core.denoise.card import ModelCard
+from sd2app.models.denoise_words import ModelPage
 
 
 class ModelCardDialog(QDialog):
     """Read from the header of the model file; the model need not be loaded for it."""
 
-    def __init__(self, card: ModelCard, parent: QWidget | None = None) -> None:
+    def __init__(self, page: ModelPage, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setWindowTitle(f"Model: {model_title(card)}")
+        self.setWindowTitle(f"Model: {page.title}")
         inside = QWidget(self)
         self._grid = QGridLayout(inside)
         self._grid.setContentsMargins(16, 8, 16, 16)
         self._grid.setHorizontalSpacing(24)
         self._grid.setVerticalSpacing(4)
         self._grid.setColumnStretch(1, 1)
-        self._grid.addLayout(self._head(card), 0, 0, 1, 2)
-        self._add(list(card_rows(card)))
-        for heading, rows in card_sections(card):
+        self._grid.addLayout(self._head(page), 0, 0, 1, 2)
+        self._add(page.rows)
+        for heading, rows in page.sections:
             self._add(rows, heading)
         self._grid.setRowStretch(self._grid.rowCount(), 1)
         scroll = QScrollArea(self)
@@ -49,13 +44,13 @@ class ModelCardDialog(QDialog):
         layout.addWidget(buttons)
         self.resize(640, 560)
 
-    def _head(self, card: ModelCard) -> QHBoxLayout:
+    def _head(self, page: ModelPage) -> QHBoxLayout:
         row = QHBoxLayout()
         row.setSpacing(12)
-        title = QLabel(model_title(card), self)
+        title = QLabel(page.title, self)
         title.setObjectName("title")
         row.addWidget(title)
-        if card.trained_on == "simulated":
+        if page.simulated:
             badge = QLabel("simulated data only", self)
             badge.setObjectName("badge")
             badge.setToolTip("No real radar was there when this model learned")

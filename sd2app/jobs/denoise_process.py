@@ -1,4 +1,4 @@
-"""Denoisers that work in a process of their own, where torch is; the window never loads it."""
+"""Models that work in a process of their own, where torch is; the window never loads it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import threading
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,6 @@ from sd2app.jobs.denoise_messages import (
     packed_map,
     read_message,
     unpacked_map,
-    unpacked_values,
     write_message,
 )
 from sd2core.errors import Sd2Error
@@ -63,6 +62,16 @@ class DenoiseProcess:
         """
         return RemoteDenoiser(self, path)
 
+    def load_classifier(self, path: Path) -> RemoteClassifier:
+        """Load a classifier; it works beside the denoisers.
+
+        Raises
+        ------
+        Sd2Error
+            When it cannot be loaded.
+        """
+        return RemoteClassifier(self, path)
+
     def ask(self, content: dict[str, Any], numbers: bytes = b"") -> Message:
         """Ask, and wait for the answer.
 
@@ -85,7 +94,7 @@ class DenoiseProcess:
                 _let_go(process)
         if answer is None:
             raise Sd2Error(
-                "The process that denoises has ended",
+                "The process in which the models work has ended",
                 remedy="Choose the model again; if it ends again, there may be too little memory",
             )
         if "error" in answer[0]:
@@ -133,13 +142,41 @@ def _let_go(process: subprocess.Popen[bytes]) -> None:
                 stream.close()
 
 
-class RemoteDenoiser:
-    """A model in that process; what it offers is what ``TrainedDenoiser`` does."""
+class _Remote:
+    """A model in that process."""
+
+    _LOAD: ClassVar[str]
 
     def __init__(self, process: DenoiseProcess, path: Path) -> None:
         self._process = process
         self._path = path
         self._load()
+
+    def _load(self) -> None:
+        content, _ = self._process.ask({"do": self._LOAD, "path": str(self._path)})
+        self._number: int = content["model"]
+        self._generation = self._process.generation
+        self._take(content)
+
+    def _take(self, content: dict[str, Any]) -> None:
+        """What else was said of it."""
+
+    def _ready(self) -> int:
+        """Its number, loaded again where the process that had it is gone."""
+        if not self._process.running or self._process.generation != self._generation:
+            self._load()
+        return self._number
+
+    def _begin(self) -> int:
+        """A clip whose frames come one after another; its number."""
+        content, _ = self._process.ask({"do": "live", "model": self._ready()})
+        return int(content["live"])
+
+
+class RemoteDenoiser(_Remote):
+    """What it offers is what ``TrainedDenoiser`` does."""
+
+    _LOAD = "load"
 
     def denoise(self, doppler: DopplerMap) -> DopplerMap:
         """What a radar would show in place of a synthetic map."""
@@ -151,25 +188,33 @@ class RemoteDenoiser:
 
     def live(self) -> RemoteLive:
         """For frames as they come; the one before is forgotten."""
-        content, _ = self._process.ask({"do": "live", "model": self._ready()})
-        return RemoteLive(self._process, content["live"], self.equals_batch)
+        return RemoteLive(self._process, self._begin(), self.equals_batch)
 
-    def _load(self) -> None:
-        content, _ = self._process.ask({"do": "load", "path": str(self._path)})
-        self._number: int = content["model"]
+    def _take(self, content: dict[str, Any]) -> None:
         self.equals_batch: bool = content["equals_batch"]
         self.frame_rate_hz: float = content["frame_rate_hz"]
-        self._generation = self._process.generation
 
-    def _ready(self) -> int:
-        """Its number, loaded again where the process that had it is gone."""
-        if not self._process.running or self._process.generation != self._generation:
-            self._load()
-        return self._number
+
+class RemoteClassifier(_Remote):
+    """What it offers is what ``TrainedClassifier`` does."""
+
+    _LOAD = "load_classifier"
+
+    def probabilities(self, doppler: DopplerMap) -> NDArray[np.float32]:
+        """What every frame of a map shows, (frames, classes)."""
+        content, numbers = packed_map(doppler)
+        _, answer = self._process.ask(
+            {"do": "classify", "model": self._ready(), "map": content}, numbers
+        )
+        return np.frombuffer(answer, np.float32).reshape(len(doppler.timebase), -1).copy()
+
+    def live(self) -> RemoteLive:
+        """For frames of one stretch, all with a person, as they come."""
+        return RemoteLive(self._process, self._begin(), equals_batch=True)
 
 
 class RemoteLive:
-    """Frame in, frame out."""
+    """Frames in; for each of them what the model makes of it."""
 
     def __init__(self, process: DenoiseProcess, number: int, equals_batch: bool) -> None:
         self._process = process
@@ -184,14 +229,15 @@ class RemoteLive:
     def advance(
         self, energies: NDArray[np.float32], present: NDArray[np.bool_]
     ) -> NDArray[np.float32]:
-        """Answers to the next frames (frames, bins)."""
+        """Answers to the next frames (frames, bins), one row for each."""
         if self._process.generation != self._generation:
             raise Sd2Error(
-                "The process that denoises was started again", remedy="Choose the model again"
+                "The process in which the models work was started again",
+                remedy="Choose the model again",
             )
         frames, bins = energies.shape
         content = {"do": "advance", "live": self._number, "frames": frames, "bins": bins}
         values = np.ascontiguousarray(energies, np.float32)
         numbers = np.asarray(present, np.bool_).tobytes() + values.tobytes()
         _, answer = self._process.ask(content, numbers)
-        return unpacked_values(answer, (frames, bins))
+        return np.frombuffer(answer, np.float32).reshape(frames, -1).copy()

@@ -1,4 +1,4 @@
-"""The process that denoises for the window; it answers one request after another.
+"""The process that denoises and classifies for the window; one request after another.
 
 Run as ``python -m sd2app.jobs.denoise_worker``; it ends when nobody writes to it any more.
 """
@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sd2app.jobs.denoise_messages import (
     Message,
@@ -23,9 +24,9 @@ from sd2app.jobs.denoise_messages import (
 )
 from sd2core.errors import Sd2Error
 
-_KEPT = 3
-"""Models: the one in use, the one before, and the one that is about to be. Of clips that
-are denoised frame after frame as many."""
+_KEPT = 5
+"""Models: the denoiser in use, the one before, the one that is about to be; the classifier
+in use, and the next. Of clips that are gone through frame after frame as many."""
 
 
 class Worker:
@@ -46,18 +47,28 @@ class Worker:
 
         model = load_model(Path(content["path"]))
         self._models[number := self._number()] = model
-        while len(self._models) > _KEPT:
-            self._models.pop(next(iter(self._models)))
+        self._forget_old(self._models)
         about = {"equals_batch": model.live().equals_batch}
         return about | {"model": number, "frame_rate_hz": model.card.frame_rate_hz}, b""
+
+    def _do_load_classifier(self, content: dict[str, Any], numbers: bytes) -> Message:
+        from sd2core.classify.files import load_classifier
+
+        model = load_classifier(Path(content["path"]))
+        self._models[number := self._number()] = _Classifying(model)
+        self._forget_old(self._models)
+        return {"model": number}, b""
+
+    def _do_classify(self, content: dict[str, Any], numbers: bytes) -> Message:
+        doppler = unpacked_map(content["map"], numbers)
+        return {}, self._model(content).trained.probabilities(doppler).tobytes()
 
     def _do_denoise(self, content: dict[str, Any], numbers: bytes) -> Message:
         return packed_map(self._model(content).denoise(unpacked_map(content["map"], numbers)))
 
     def _do_live(self, content: dict[str, Any], numbers: bytes) -> Message:
         self._live[number := self._number()] = self._model(content).live()
-        while len(self._live) > _KEPT:
-            self._live.pop(next(iter(self._live)))
+        self._forget_old(self._live)
         return {"live": number}, b""
 
     def _do_advance(self, content: dict[str, Any], numbers: bytes) -> Message:
@@ -65,6 +76,8 @@ class Worker:
         if live is None:
             raise Sd2Error("The model is no longer loaded", remedy="Choose it again")
         frames, bins = content["frames"], content["bins"]
+        # What is used goes last, as what is forgotten goes first.
+        self._live[content["live"]] = self._live.pop(content["live"])
         present = np.frombuffer(numbers, np.bool_, frames)
         values = unpacked_values(numbers, (frames, bins), frames)
         if frames == 1:
@@ -78,9 +91,42 @@ class Worker:
         self._models[content["model"]] = self._models.pop(content["model"])  # the newest in use
         return model
 
+    def _forget_old(self, kept: dict[int, Any]) -> None:
+        while len(kept) > _KEPT:
+            kept.pop(next(iter(kept)))
+
     def _number(self) -> int:
         self._next += 1
         return self._next
+
+
+class _Classifying:
+    """A classifier, asked as denoisers are."""
+
+    def __init__(self, trained: Any) -> None:
+        self.trained = trained
+
+    def live(self) -> _LiveClasses:
+        return _LiveClasses(self.trained)
+
+
+class _LiveClasses:
+    """Frames of one stretch, all with a person, as they come."""
+
+    def __init__(self, trained: Any) -> None:
+        self._trained = trained
+        self._memory = trained.initial_memory()
+
+    def step(self, energies: NDArray[np.float32], present: bool) -> NDArray[np.float32]:
+        found: NDArray[np.float32] = self.advance(energies[None], np.array([present]))[0]
+        return found
+
+    def advance(
+        self, energies: NDArray[np.float32], present: NDArray[np.bool_]
+    ) -> NDArray[np.float32]:
+        found: NDArray[np.float32]
+        found, self._memory = self._trained.advance(energies, self._memory)
+        return found
 
 
 def serve(source: BinaryIO, sink: BinaryIO) -> None:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from sd2core.spectrum import DopplerMap
 
 if TYPE_CHECKING:
+    from sd2app.jobs.denoise_process import DenoiseProcess
     from sd2core.denoise.card import ModelCard
 
 
@@ -77,11 +78,8 @@ class DenoiserLibrary:
         return next((card for card in self.available() if card.name == name), None)
 
 
-def core_library() -> DenoiserLibrary:
+def core_library(process: DenoiseProcess) -> DenoiserLibrary:
     """The library's own: cards are read here, models work in another process."""
-    from sd2app.jobs.denoise_process import DenoiseProcess
-
-    process = DenoiseProcess()
 
     def available() -> Sequence[ModelCard]:
         from sd2core.denoise.files import available_models

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
     from sd2core.denoise.card import ModelCard
+    from sd2core.sensor import VelocityAxis
 
 _KINDS = {
     "s4": "S4 (HiPPO-LegS)",
@@ -50,26 +52,64 @@ def denoised_words(card: ModelCard | None) -> str:
     return "" if card is None else track_words(card)
 
 
+class ModelPage(NamedTuple):
+    """What a model says about itself.
+
+    Parameters
+    ----------
+    title : str
+    simulated : bool
+        Whether no real radar was there when it learned.
+    rows : list of tuple
+        Facts, a name and a text each.
+    sections : list of tuple
+        What its makers say, by heading.
+    """
+
+    title: str
+    simulated: bool
+    rows: list[tuple[str, str]]
+    sections: list[tuple[str, list[tuple[str, str]]]]
+
+
+def denoiser_page(card: ModelCard) -> ModelPage:
+    """Of a denoiser."""
+    return ModelPage(
+        model_title(card),
+        card.trained_on == "simulated",
+        list(card_rows(card)),
+        list(about_sections(card.about)),
+    )
+
+
 def card_rows(card: ModelCard) -> Iterator[tuple[str, str]]:
     """Facts of a model card, a name and a text each."""
-    axis = card.axis
     yield "Kind", f"{kind_words(card)}, {card.parameters:,} parameters"
     yield "Learned from", "simulated data only" if card.trained_on == "simulated" else "real data"
+    yield from map_and_file_rows(card.axis, card.frame_rate_hz, card.path)
+
+
+def map_and_file_rows(
+    axis: VelocityAxis, frame_rate_hz: float, path: Path | None
+) -> Iterator[tuple[str, str]]:
+    """The maps that a model knows, and its file."""
     yield (
         "Works on",
-        (f"{axis.bins} bins over ±{axis.v_max_mps:g} m/s, {card.frame_rate_hz:g} frames/s"),
+        (f"{axis.bins} bins over ±{axis.v_max_mps:g} m/s, {frame_rate_hz:g} frames/s"),
     )
-    if card.path is not None:
+    if path is not None:
         try:
-            size_kb = card.path.stat().st_size / 1000
-            yield "File", f"{card.path} ({size_kb:,.0f} kB)"
+            size_kb = path.stat().st_size / 1000
+            yield "File", f"{path} ({size_kb:,.0f} kB)"
         except OSError:
-            yield "File", f"{card.path} (not there any more)"
+            yield "File", f"{path} (not there any more)"
 
 
-def card_sections(card: ModelCard) -> Iterator[tuple[str, list[tuple[str, str]]]]:
+def about_sections(
+    content: Mapping[str, Any],
+) -> Iterator[tuple[str, list[tuple[str, str]]]]:
     """What its makers say of it, by heading: what they measured and where it fails first."""
-    about = dict(card.about)
+    about = dict(content)
     for name in ("limits", "metrics", "data", "command"):
         if name in about:
             yield _heading(name), list(_lines(about.pop(name)))

@@ -70,7 +70,13 @@ class SpanArrays:
     def of(cls, labels: Labels) -> SpanArrays:
         """Of labels as they are."""
         offered = labels.label_set.labels
-        tone_of = {one.name: number for number, one in enumerate(offered)}
+        # A class looks like the first of its labels; a label's own name goes before that.
+        tone_of = {
+            name: number
+            for names in ("gesture_class", "name")
+            for number, one in reversed(tuple(enumerate(offered)))
+            if (name := getattr(one, names))
+        }
         track_of = {one.name: number for number, one in enumerate(labels.tracks)}
         facts = [
             (one.start_s, one.end_s, one.id, track_of[one.track], tone_of.get(one.label, -1))

@@ -1,39 +1,37 @@
-"""Suggested spans: found in a map in the background, then accepted or rejected one by one."""
+"""Suggested spans: found in the background, then accepted or rejected one by one."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
-import numpy as np
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QUndoStack
 
-from sd2app.jobs.latest import Emit, LatestRunner
+from sd2app.jobs.latest import LatestRunner
 from sd2app.models.labels import LabelsModel
 from sd2app.models.playback import PlaybackModel
+from sd2app.models.span_finders import Found, SpanFinder, Threshold
 from sd2app.models.tracks import TrackModel
 from sd2core.labels.edits import Edit
 from sd2core.labels.offering import offer, pending, take, turn_down
 from sd2core.labels.spans import Labels, Span
-from sd2core.labels.suggest import TRACK, SuggestOptions, motion_energy_db, suggest_spans
+from sd2core.labels.suggest import LABEL, TRACK
 from sd2core.timebase import Timebase
 
-LOWEST_DB, HIGHEST_DB = 3.0, 40.0
 Apply = Callable[[Callable[[Labels, Timebase], Edit]], bool]
 
 
-class _Found(NamedTuple):
-    spans: tuple[Span, ...]
-    loudest_db: float
-
-
 class SuggestionsModel(QObject):
-    """What moves, as spans to be decided on; the spans themselves are among the labels.
+    """Spans to be decided on, as somebody finds them; they themselves are among the labels.
 
     Another threshold takes the place of the step before as long as nothing else was done, so
     that trying thresholds is one step. What was rejected does not come again while the
     recording is open.
+
+    Parameters
+    ----------
+    finders : sequence of SpanFinder
+        The first one is used unless another is asked for.
 
     Signals
     -------
@@ -47,19 +45,20 @@ class SuggestionsModel(QObject):
         self,
         labels: LabelsModel,
         playback: PlaybackModel,
-        maps: Sequence[TrackModel],
+        finders: Sequence[SpanFinder],
         undo_stack: QUndoStack,
         apply: Apply,
         parent: QObject | None = None,
     ) -> None:
         super().__init__(parent)
-        self._labels, self._playback, self._maps = labels, playback, tuple(maps)
+        self._labels, self._playback = labels, playback
+        self._finders = tuple(finders)
+        self._finder = self._finders[0]
         self._stack, self._apply = undo_stack, apply
         self._active = False
         self._wanted = False
-        self._source: TrackModel | None = None
-        self._threshold_db = SuggestOptions().high_db
-        self._loudest_db: float | None = None
+        self._thresholds = [finder.threshold.usual for finder in self._finders]
+        self._if_none = ""
         self._problem = ""
         self._declined: tuple[Span, ...] = ()
         self._home = labels.track
@@ -71,8 +70,9 @@ class SuggestionsModel(QObject):
         self._runner.idle_changed.connect(lambda _: self.changed.emit())
         labels.changed.connect(self._follow)
         labels.selection_changed.connect(self._remember_home)
-        for track in self._maps:
-            track.changed.connect(self._begin_if_complete)
+        for finder in self._finders:
+            for signal in finder.signals:
+                signal.connect(self._begin_if_complete)
 
     # --- what is there --------------------------------------------------------------------
 
@@ -92,54 +92,72 @@ class SuggestionsModel(QObject):
         return self._pending
 
     @property
+    def finders(self) -> tuple[SpanFinder, ...]:
+        """Ways to find spans."""
+        return self._finders
+
+    @property
+    def finder(self) -> SpanFinder:
+        """The way that is used."""
+        return self._finder
+
+    @property
     def sources(self) -> tuple[TrackModel, ...]:
         """Maps to look in."""
-        return tuple(track for track in self._maps if track.map is not None)
+        return self._finder.sources
 
     @property
     def source(self) -> TrackModel | None:
-        """The map that is looked in: the one chosen, else the first."""
-        there = self.sources
-        if self._source in there:
-            return self._source
-        return there[0] if there else None
+        """The map that is looked in."""
+        return self._finder.source
 
     @property
-    def threshold_db(self) -> float:
-        """Energy over the quiet level that a suggestion reaches somewhere."""
-        return self._threshold_db
+    def threshold(self) -> float:
+        """What a suggestion reaches, in the unit of :attr:`limits`."""
+        return self._thresholds[self._finders.index(self._finder)]
+
+    @property
+    def limits(self) -> Threshold:
+        """Of the threshold."""
+        return self._finder.threshold
 
     @property
     def accepted_as(self) -> str:
-        """The label that accepting gives to what has none of the label set."""
-        return self._labels.label
+        """The label that accepting gives to what is not known; empty where all is known."""
+        unknown = any(span.label == LABEL for span in self._pending)
+        return self._labels.label if unknown else ""
 
     @property
     def text(self) -> str:
         """How it stands, in words."""
-        source = self.source
-        if self._problem:
-            return self._problem
-        if source is None:
-            return "There is no map to look in"
+        source, why_not = self.source, self._problem or self._finder.why_not
+        if why_not or source is None:
+            return why_not
         if self._wanted:
-            return f"Waiting for the map: {source.title.lower()}"
+            title = source.title.lower()
+            waits = source.covered is not None
+            return f"Waiting for the map: {title}" if waits else f"Classifying the map: {title}"
         if self._runner.busy:
-            return "Looking for what moves…"
+            return "Looking…"
         count = len(self._pending)
         if count:
             return f"{count} suggestion{'s' * (count != 1)} to decide on"
-        if self._loudest_db is not None and self._loudest_db < self._threshold_db:
-            return f"Nothing: the loudest frame has {self._loudest_db:.1f} dB"
-        return "No suggestions left to decide on"
+        return self._if_none or "No suggestions left to decide on"
 
     # --- asking ---------------------------------------------------------------------------
 
-    def start(self) -> None:
-        """Look for what moves."""
-        if self.source is not None:
+    def start(self, finder: SpanFinder | None = None) -> None:
+        """Look for spans, in the way that is named or else the first one."""
+        self._finder = finder or self._finders[0]
+        if not self._finder.why_not:
             self._active = True
             self._made = None
+            self._look()
+
+    def set_finder(self, finder: SpanFinder) -> None:
+        """Look in another way; what it finds takes the place of what there was."""
+        if finder is not self._finder:
+            self._finder = finder
             self._look()
 
     def stop(self) -> None:
@@ -148,22 +166,23 @@ class SuggestionsModel(QObject):
         self._active = self._wanted = False
         self.changed.emit()
 
-    def set_threshold(self, threshold_db: float) -> None:
-        """Suggest what is louder."""
-        if threshold_db != self._threshold_db:
-            self._threshold_db = threshold_db
+    def set_threshold(self, threshold: float) -> None:
+        """Suggest what reaches this."""
+        if threshold != self.threshold:
+            self._thresholds[self._finders.index(self._finder)] = threshold
             self._look()
 
     def set_source(self, source: TrackModel) -> None:
         """Look in another map."""
         if source is not self.source:
-            self._source = source
+            self._finder.set_source(source)
             self._look()
 
     def open(self) -> None:
         """Another recording is there: of the one before nothing is remembered."""
-        self._declined, self._made, self._loudest_db, self._problem = (), None, None, ""
-        self._source = None
+        self._declined, self._made, self._if_none, self._problem = (), None, "", ""
+        for finder in self._finders:
+            finder.set_source(None)
         self._runner.cancel()
         self._wanted, self._active = False, bool(self._pending)
         self.changed.emit()
@@ -202,7 +221,7 @@ class SuggestionsModel(QObject):
         if not spans:
             return
         ids = [span.id for span in spans]
-        track, given = self._target(), label or self.accepted_as
+        track, given = self._target(), label or self._labels.label
         done = self._apply(
             lambda labels, base: take(labels, base, ids, track, given, keep_known=label is None)
         )
@@ -232,31 +251,24 @@ class SuggestionsModel(QObject):
     # --- looking --------------------------------------------------------------------------
 
     def _look(self) -> None:
-        source = self.source
-        if not self._active or source is None or source.map is None:
-            return
-        self._problem = ""
-        self._wanted = source.covered is not None
-        if self._wanted:
+        self._problem = self._if_none = ""
+        if not self._active or self._finder.why_not:
+            self._runner.cancel()
+            self._wanted = False
             self.changed.emit()
             return
-        doppler, high_db = source.map.shifted(source.offset_s), self._threshold_db
-        usual = SuggestOptions()
-        options = SuggestOptions(high_db=high_db, low_db=min(usual.low_db, high_db))
-
-        def look(emit: Emit) -> _Found:
-            spans = suggest_spans(doppler, options)
-            return _Found(spans, float(np.nanmax(motion_energy_db(doppler), initial=0.0)))
-
-        self._runner.submit(look)
+        self._wanted = not self._finder.ready
+        if not self._wanted:
+            look = self._finder.look(self.threshold)
+            self._runner.submit(lambda emit: look())
         self.changed.emit()
 
     def _begin_if_complete(self) -> None:
         if self._wanted:
             self._look()
 
-    def _receive(self, found: _Found) -> None:
-        self._loudest_db = found.loudest_db
+    def _receive(self, found: Found) -> None:
+        self._if_none = found.if_none
         if self._made is not None and self._nothing_since(*self._made):
             self._stack.undo()
         # What was rejected and brought back by an undo is not rejected any more.

@@ -46,7 +46,8 @@ class TrackModel(QObject):
     """One Doppler map on the shared time axis.
 
     ``reference`` is the value shown as 0 dB. It is set when a recording is
-    opened and stays, so that a placement farther away looks weaker.
+    opened and stays, so that a placement farther away looks weaker. ``revision`` counts
+    how often the map was set, also to one whose values changed in place.
     """
 
     changed = Signal()
@@ -55,6 +56,7 @@ class TrackModel(QObject):
     def __init__(self, title: str, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self.title = title
+        self.revision = 0
         self._map: DopplerMap | None = None
         self._covered: NDArray[np.bool_] | None = None
         self._uncertainty: CellUncertainty | None = None
@@ -130,6 +132,7 @@ class TrackModel(QObject):
         self, doppler_map: DopplerMap | None, covered: NDArray[np.bool_] | None = None
     ) -> None:
         """Show another map, or none."""
+        self.revision += 1
         self._map = doppler_map
         self._covered = covered
         self._uncertainty = None

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QToolButton, QWidget
+from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QLabel, QToolButton, QWidget
+
+from sd2app.views.elided import ElidedLabel
 
 
 def title(text: str) -> QLabel:
@@ -44,6 +46,31 @@ def outlined(text: str, tip: str, run: Callable[[], object] | None, parent: QWid
     if run is not None:
         button.clicked.connect(lambda: run())
     return button
+
+
+def data_row(
+    name: str, path: str, about: str, problem: str, remove: Callable[[], None], parent: QWidget
+) -> QWidget:
+    """Something to learn from: its name, what is known of it, and a button that removes it."""
+    row = QWidget(parent)
+    heading = ElidedLabel(row)
+    heading.setText(name)
+    heading.setToolTip(path)
+    facts = sentence(problem or about, "warning" if problem else "muted")
+    button = QToolButton(row)
+    button.setText("✕")
+    button.setToolTip(f"Do not learn from {name}")
+    button.setAccessibleName(button.toolTip())
+    button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+    button.clicked.connect(lambda: remove())
+    grid = QGridLayout(row)
+    grid.setContentsMargins(0, 0, 0, 0)
+    grid.setSpacing(0)
+    grid.addWidget(heading, 0, 0)
+    grid.addWidget(button, 0, 1, 2, 1, Qt.AlignmentFlag.AlignTop)
+    grid.addWidget(facts, 1, 0)
+    grid.setColumnStretch(0, 1)
+    return row
 
 
 def side_by_side(*widgets: QWidget, spacing_px: int = 8) -> QHBoxLayout:

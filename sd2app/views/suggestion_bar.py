@@ -6,7 +6,7 @@ from PySide6.QtCore import QSignalBlocker, Qt
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QWidget
 
 from sd2app.action_set import ActionSet
-from sd2app.models.suggestions import HIGHEST_DB, LOWEST_DB, SuggestionsModel
+from sd2app.models.suggestions import SuggestionsModel
 from sd2app.views.elided import ElidedLabel
 from sd2app.views.inputs import Choice, NumberBox, action_button
 
@@ -32,14 +32,10 @@ class SuggestionBar(QWidget):
         self._as.setObjectName("muted")
         self._source = Choice("The map in which suggestions are looked for", self)
         self._source.activated.connect(lambda at: model.set_source(model.sources[at]))
-        self._threshold = NumberBox(
-            LOWEST_DB,
-            HIGHEST_DB,
-            " dB",
-            "How far over the quiet level a suggestion must reach",
-            decimals=1,
-            step=0.5,
-        )
+        self._by = Choice("What suggests spans: motion in a map, or the classifier", self)
+        self._by.addItems([f"by {finder.title}" for finder in model.finders])
+        self._by.activated.connect(lambda at: model.set_finder(model.finders[at]))
+        self._threshold = NumberBox(0.0, 100.0, "", "")
         self._threshold.valueChanged.connect(model.set_threshold)
         layout = QHBoxLayout(self)
         layout.setContentsMargins(8, 2, 8, 2)
@@ -49,6 +45,7 @@ class SuggestionBar(QWidget):
         for name, text in _BUTTONS:
             layout.addWidget(_outlined(action_button(actions[name], text)))
         layout.addSpacing(8)
+        layout.addWidget(self._by)
         layout.addWidget(self._source)
         layout.addWidget(self._threshold)
         layout.addWidget(self._close_button())
@@ -68,7 +65,7 @@ class SuggestionBar(QWidget):
         model = self._model
         self.setVisible(model.active)
         self._text.setText(model.text)
-        self._as.setText(f"accepted as {model.accepted_as}" if model.pending else "")
+        self._as.setText(f"accepted as {model.accepted_as}" if model.accepted_as else "")
         self._as.setToolTip(
             "The label that was used last; the key of another label accepts as that"
         )
@@ -80,7 +77,20 @@ class SuggestionBar(QWidget):
             if model.source is not None:
                 self._source.setCurrentText(model.source.title)
         self._source.setVisible(len(titles) > 1)
-        self._threshold.show_value(model.threshold_db)
+        with QSignalBlocker(self._by):
+            self._by.setCurrentIndex(model.finders.index(model.finder))
+        self._show_threshold()
+
+    def _show_threshold(self) -> None:
+        box, limits = self._threshold, self._model.limits
+        with QSignalBlocker(box):
+            box.setRange(limits.low, limits.high)
+            box.setDecimals(limits.decimals)
+            box.setSingleStep(limits.step)
+            box.setSuffix(limits.unit)
+        box.setToolTip(limits.tip)
+        box.setAccessibleName(limits.tip)
+        box.show_value(self._model.threshold)
 
 
 def _outlined(button: QToolButton) -> QToolButton:

@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
+from sd2app.views.class_strip import ClassStrip
 from sd2app.views.difference import DifferenceView
 from sd2app.views.heatmap import HeatmapView
 from sd2app.views.label_area import LabelArea
 from sd2app.views.label_timeline import LabelTimeline
-from sd2app.views.model_menu import ModelButton, ModelMenu
+from sd2app.views.model_menu import ClassifierChooser, DenoiserChooser, ModelButton, ModelMenu
 from sd2app.views.other_timeline import OtherTimeline
 from sd2app.views.region_hand import RegionHand
 from sd2app.views.suggestion_bar import SuggestionBar
@@ -31,6 +32,7 @@ class Tracks(QWidget):
         self,
         context: Context,
         models: ModelMenu,
+        classifiers: ModelMenu,
         actions: ActionSet,
         parent: QWidget | None = None,
     ) -> None:
@@ -47,9 +49,10 @@ class Tracks(QWidget):
         self.real.offset_dragged.connect(c.edits.drag_offset)
         self.real.offset_released.connect(c.edits.end_offset_drag)
         # Beside the map it makes, or beside the one it could be made of.
-        self._offer = ModelButton(c.denoise, models)
+        denoisers = DenoiserChooser(c.denoise)
+        self._offer = ModelButton(denoisers, models)
         self.synthetic.set_button(self._offer)
-        self.denoised.set_button(ModelButton(c.denoise, models))
+        self.denoised.set_button(ModelButton(denoisers, models))
         hand = c.labels, c.label_dragging, c.span_loop
         for view in (self.synthetic, self.denoised, self.before, self.real, self.difference):
             RegionHand(view, *hand)
@@ -68,9 +71,12 @@ class Tracks(QWidget):
         column.setSpacing(0)
         for view in (self.synthetic, self.denoised, self.before, self.real, self.difference):
             column.addWidget(view, 1)
+        button = ModelButton(ClassifierChooser(c.classify), classifiers)
+        self.classes = ClassStrip(c.classify, c.labels, c.span, c.playback, c.display, button)
         bar = SuggestionBar(c.suggestions, actions)
         other = OtherTimeline(c.agreement, c.span, c.playback, c.display)
         for below in (
+            self.classes,
             bar,
             LabelArea(self.labels, c.labels),
             other,

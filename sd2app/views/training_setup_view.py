@@ -28,7 +28,7 @@ from sd2app.models.training_words import (
 )
 from sd2app.views.elided import ElidedLabel
 from sd2app.views.inputs import Choice, NumberBox
-from sd2app.views.panel_parts import outlined, sentence, title
+from sd2app.views.panel_parts import data_row, outlined, sentence, title
 
 _FIELDS = (
     # name, text, low, high, decimals, step, tip
@@ -274,27 +274,11 @@ class TrainingSetupView(QWidget):
             row.show()
 
     def _store_row(self, store: Store) -> QWidget:
-        row = QWidget(self)
-        name = ElidedLabel(row)
-        name.setText(store.path.name)
-        name.setToolTip(str(store.path))
-        facts = sentence(
-            store.problem or store_text(store.facts), "warning" if store.problem else "muted"
-        )
-        remove = QToolButton(row)
-        remove.setText("✕")
-        remove.setToolTip(f"Do not learn from {store.path.name}")
-        remove.setAccessibleName(remove.toolTip())
-        remove.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        remove.clicked.connect(lambda: self._setup.remove_store(store.path))
-        grid = QGridLayout(row)
-        grid.setContentsMargins(0, 0, 0, 0)
-        grid.setSpacing(0)
-        grid.addWidget(name, 0, 0)
-        grid.addWidget(remove, 0, 1, 2, 1, Qt.AlignmentFlag.AlignTop)
-        grid.addWidget(facts, 1, 0)
-        grid.setColumnStretch(0, 1)
-        return row
+        path, about = store.path, store_text(store.facts)
+        return data_row(
+            path.name, str(path), about, store.problem,
+            lambda: self._setup.remove_store(path), self,
+        )  # fmt: skip
 
     def _list_known(self) -> None:
         menu = self._add.menu()

@@ -29,16 +29,19 @@ from sd2app.views.frames import fill, panel, splitter
 if TYPE_CHECKING:
     from sd2app.context import Context
     from sd2app.dialogs.batch import BatchDialogs
+    from sd2app.dialogs.classify import ClassifyDialogs
     from sd2app.dialogs.dialogs import Dialogs
     from sd2app.dialogs.label_files import LabelFileDialogs
     from sd2app.dialogs.label_tracks import TrackDialogs
     from sd2app.dialogs.training import TrainingDialogs
+    from sd2app.models.classify_library import ClassifierLibrary
     from sd2app.models.denoise_library import DenoiserLibrary
     from sd2app.models.ladder import Ladder
     from sd2app.views.labels_panel import LabelsPanel
     from sd2app.views.scene3d import SceneView
     from sd2app.views.sensor_pages import SensorPages
     from sd2app.views.side_panel import SidePanel
+    from sd2app.views.train_page import TrainPage
 
 _SHARED_KEYS = ("play", "previous_frame", "next_frame", "back_second", "on_second", "zoom_fit")
 """Actions that work in the window of a comparison too."""
@@ -57,7 +60,9 @@ class MainWindow(QMainWindow):
     label_files: LabelFileDialogs
     track_dialogs: TrackDialogs
     train_dialogs: TrainingDialogs
+    class_dialogs: ClassifyDialogs
     side: SidePanel
+    train_page: TrainPage
     labels_panel: LabelsPanel
     sensor_pages: SensorPages
     batch_dialogs: BatchDialogs
@@ -71,6 +76,7 @@ class MainWindow(QMainWindow):
         train_command: Sequence[str] | None = None,
         recovery: Path | None = None,
         batch_command: Sequence[str] | None = None,
+        classifiers: ClassifierLibrary | None = None,
     ) -> None:
         super().__init__()
         self._settings = settings
@@ -80,6 +86,7 @@ class MainWindow(QMainWindow):
         self._train_command = train_command
         self._recovery = recovery
         self._batch_command = batch_command
+        self._classifiers = classifiers
         self._scene: SceneView | None = None
         self._ready = False
         self._painted = False
@@ -106,6 +113,7 @@ class MainWindow(QMainWindow):
             and not self.context.synthesis.busy
             and not self.context.placements.busy
             and not self.context.denoise.busy
+            and not self.context.classify.busy
             and not self.context.video.busy
         )
 
@@ -138,11 +146,12 @@ class MainWindow(QMainWindow):
         from sd2app.action_set import ActionSet
         from sd2app.context import build_context
         from sd2app.dialogs.batch import BatchDialogs
+        from sd2app.dialogs.classify import ClassifyDialogs
         from sd2app.dialogs.dialogs import Dialogs
         from sd2app.dialogs.label_files import LabelFileDialogs
         from sd2app.dialogs.label_tracks import TrackDialogs
         from sd2app.views.message_bar import MessageBar
-        from sd2app.views.model_menu import ModelMenu
+        from sd2app.views.model_menu import ClassifierChooser, DenoiserChooser, ModelMenu
         from sd2app.views.status import StatusLine
         from sd2app.views.transport import TransportBar
 
@@ -155,6 +164,7 @@ class MainWindow(QMainWindow):
             self._train_command,
             self._recovery,
             self._batch_command,
+            self._classifiers,
         )
         context = self.context
         context.display.set_dark(is_dark(self._settings))
@@ -167,8 +177,12 @@ class MainWindow(QMainWindow):
         self.track_dialogs = TrackDialogs(self, context, self.messages)
         self._actions = ActionSet(self)
         below = [self._actions[name] for name in ("open_model", "model_card")]
-        self._models = ModelMenu(context.denoise, self.dialogs.use_model, below, self)
-        self._recent_menu = self._actions.fill_menu_bar(self._models)
+        choosers = DenoiserChooser(context.denoise), ClassifierChooser(context.classify)
+        self._models = ModelMenu(choosers[0], self.dialogs.use_model, below, self)
+        self.class_dialogs = ClassifyDialogs(self, context, self.messages.warn)
+        below = [self._actions[name] for name in ("open_classifier", "classifier_card")]
+        self._classes = ModelMenu(choosers[1], self.class_dialogs.use, below, self)
+        self._recent_menu = self._actions.fill_menu_bar(self._models, self._classes)
         self._recent_menu.aboutToShow.connect(self._list_recent)
         self._fill_panels()
         self._column.insertWidget(0, self.messages)
@@ -190,6 +204,7 @@ class MainWindow(QMainWindow):
         context.fit.look_for_unfinished()
         context.training.look_for_runs()
         context.batch.look_for_batch()
+        context.class_training.look_for_runs()
         # VTK last, imported in a thread: everything else is usable while it loads.
         self._importer = LatestRunner("import", self)
         self._importer.finished.connect(self._add_scene)
@@ -200,6 +215,7 @@ class MainWindow(QMainWindow):
         from sd2app.dialogs.placements import PlacementDialogs
         from sd2app.dialogs.training import TrainingDialogs
         from sd2app.views.agreement_panel import AgreementPanel
+        from sd2app.views.class_panel import ClassPanel
         from sd2app.views.labels_panel import LabelsPanel
         from sd2app.views.page_widths import PageWidths
         from sd2app.views.panes import spectrum_pane, video_pane
@@ -209,6 +225,7 @@ class MainWindow(QMainWindow):
         from sd2app.views.side_panel import SidePanel
         from sd2app.views.tracks import Tracks
         from sd2app.views.trade_panel import TradePanel
+        from sd2app.views.train_page import TrainPage
         from sd2app.views.training_panel import TrainingPanel
 
         c = self.context
@@ -227,14 +244,17 @@ class MainWindow(QMainWindow):
         trade = TradePanel(c.trade, c.display, self._actions["measure"])
         self.train_dialogs = TrainingDialogs(self, c.training, c.training_use, self.messages.warn)
         train = TrainingPanel(c.training, c.training_use, c.display, self.train_dialogs)
+        self.train_page = TrainPage(
+            train, ClassPanel(c.class_training, c.display, self.class_dialogs)
+        )
         asks = LabelSetDialogs(self, c.labels, c.label_edits.apply, self.messages.warn)
         self.labels_panel = LabelsPanel(c, self._actions, asks)
         agree = AgreementPanel(c.agreement, c.playback, self._actions)
-        pages = {"Sensor": self.sensor_pages, "Trade": trade, "Train": train}
+        pages = {"Sensor": self.sensor_pages, "Trade": trade, "Train": self.train_page}
         self.side = SidePanel({**pages, "Labels": self.labels_panel, "Agree": agree})
         fill(self._panels["sensor"], self.side)
         self._widths = PageWidths(self._top, self.side, {"Labels": _LABELS_PX}, self._settings)
-        self._tracks = Tracks(c, self._models, self._actions)
+        self._tracks = Tracks(c, self._models, self._classes, self._actions)
         fill(self._panels["tracks"], self._tracks)
         fill(self._panels["spectrum"], spectrum_pane(c, self._actions))
 
@@ -288,12 +308,17 @@ class MainWindow(QMainWindow):
         connect_sentences(c, self.messages)
         self.labels_panel.model.noted.connect(self.messages.note)
         c.document.opened.connect(self._show_document)
-        c.training.changed.connect(lambda: self.side.set_mark("Train", c.training.mark))
+        for training in (c.training, c.class_training):
+            training.changed.connect(self._mark_training)
         # Without a person in the frame there is nothing to aim at.
         c.synthesis.target_changed.connect(lambda: self._actions.refresh_one("aim_sensor"))
         c.display.theme_changed.connect(self._restyle)
         for signal in signals_of_actions(c):
             signal.connect(self._refresh)
+
+    def _mark_training(self) -> None:
+        c = self.context
+        self.side.set_mark("Train", c.training.mark or c.class_training.mark)
 
     # --- following the models -------------------------------------------------------------
 
@@ -380,6 +405,11 @@ class MainWindow(QMainWindow):
         pages = {"spans": panel.show_spans, "search": panel.find, "label set": panel.show_label_set}
         pages[page]()
 
+    def show_classifiers(self) -> None:
+        """Bring up the training of classifiers."""
+        self.side.bring_up("Train")
+        self.train_page.show_classifiers()
+
     def close_window(self) -> None:
         """Close, after asking when edits would be lost."""
         self.close()
@@ -418,7 +448,8 @@ class MainWindow(QMainWindow):
             return
         event.acceptProposedAction()
         if len(paths) == 1 and paths[0].suffix == ".safetensors":
-            self.dialogs.use_model(paths[0])
+            if not self.class_dialogs.take_dropped(paths[0]):
+                self.dialogs.use_model(paths[0])
         elif len(paths) == 1 and self.label_files.take_dropped(paths[0]):
             pass
         elif event.modifiers() & Qt.KeyboardModifier.ShiftModifier:

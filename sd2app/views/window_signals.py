@@ -21,6 +21,7 @@ def connect_sentences(context: Context, messages: MessageBar) -> None:
         c.placements,
         c.uncertainty,
         c.denoise,
+        c.classify,
         c.video,
         c.label_session,
         c.label_edits,
@@ -28,6 +29,7 @@ def connect_sentences(context: Context, messages: MessageBar) -> None:
         c.training_use,
         c.batch,
         c.export,
+        c.class_training,
     ):
         model.failed.connect(messages.warn)
     for model in (
@@ -40,6 +42,7 @@ def connect_sentences(context: Context, messages: MessageBar) -> None:
         c.training_use,
         c.batch,
         c.export,
+        c.class_training,
     ):
         model.noted.connect(messages.note)
 
@@ -58,6 +61,7 @@ def signals_of_actions(context: Context) -> tuple[SignalInstance, ...]:
         c.uncertainty.changed,
         c.denoise.changed,
         c.live.changed,
+        c.classify.changed,
         c.difference.state_changed,
         c.fit.state_changed,
         c.synthesis.completed,

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import argparse
 import json
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +18,7 @@ if TYPE_CHECKING:
     from sd2core.classify.data import ClipSet
     from sd2core.classify.table import Table, TableOptions
     from sd2core.denoise.live import TrainedDenoiser
+    from sd2core.progress import Progress
 
 
 def add_table(kinds: argparse._SubParsersAction) -> None:
@@ -63,6 +67,11 @@ def add_table(kinds: argparse._SubParsersAction) -> None:
         help="of the curves: whole columns (the default), or the strongest bin",
     )
     parser.add_argument("--steps", type=positive_int, metavar="N", help="batches per training")
+    parser.add_argument(
+        "--progress-json",
+        action="store_true",
+        help="print what is done as JSON lines, for other programs (docs/formats.md)",
+    )
     add_json(parser)
 
 
@@ -80,15 +89,29 @@ def _table(options: argparse.Namespace) -> None:
     known = clips_of(options.data, None)
     chosen = _options(options)
     folder: Path = options.out
-    with progress_bar("Training", unit="run") as progress:
+    with _lines() if options.progress_json else progress_bar("Training", "run") as progress:
         table = make_table(folder / "runs", known, chosen, _denoiser(options, known), progress)
     content = finite(as_json(table))
     _write(folder, table, content)
-    if options.json:
+    if options.progress_json:
+        print(json.dumps({"event": "written", "folder": str(folder)}), flush=True)
+    elif options.json:
         print_json(content)
     else:
         print(as_text(table))
         print(f"\nWrote {folder}")
+
+
+@contextmanager
+def _lines() -> Iterator[Progress]:
+    """A JSON line for every training that is done, on standard output."""
+    begun_s = time.monotonic()
+
+    def report(done: int, total: int) -> None:
+        told = {"done": done, "total": total, "elapsed_s": time.monotonic() - begun_s}
+        print(json.dumps({"event": "run", **told}), flush=True)
+
+    yield report
 
 
 def _options(options: argparse.Namespace) -> TableOptions:

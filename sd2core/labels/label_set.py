@@ -75,6 +75,10 @@ class LabelSet:
         """The label of that name, if there is one."""
         return next((one for one in self.labels if one.name == name), None)
 
+    def of_class(self, name: str) -> tuple[Label, ...]:
+        """The labels that a classifier is to call so."""
+        return tuple(one for one in self.labels if one.gesture_class == name)
+
 
 def check_name(name: str, what: str) -> None:
     """Refuse a name that no file and no menu can hold."""

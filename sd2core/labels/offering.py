@@ -13,7 +13,7 @@ from sd2core.labels.matching import iou_of
 from sd2core.labels.rooms import Frames
 from sd2core.labels.span_fields import accept, reject, relabel
 from sd2core.labels.spans import Labels, Span, Track
-from sd2core.labels.suggest import TRACK
+from sd2core.labels.suggest import LABEL, TRACK
 from sd2core.timebase import Timebase
 
 SAME_IOU = 0.5
@@ -70,7 +70,8 @@ def take(
     Parameters
     ----------
     keep_known : bool
-        Those whose label is one of the label set keep it.
+        Those keep their label that say what they are: of which more is known than that
+        something moves, or whose label is one of the label set.
 
     Raises
     ------
@@ -86,7 +87,8 @@ def take(
             refusal = refusal or error
             continue
         done.append(one)
-        if not (keep_known and labels.label_set.find(span.label) is not None):
+        known = span.label != LABEL or labels.label_set.find(span.label) is not None
+        if not (keep_known and known):
             after = relabel(after, [one], label).labels
     if refusal is not None and not done:
         raise refusal

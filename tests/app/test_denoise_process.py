@@ -129,11 +129,49 @@ def test_a_process_that_ends_at_once_is_an_error_in_words(folder):
     process.close()
 
 
+@pytest.mark.parametrize("kind", ["lstm", "s4"])
+def test_a_classifier_beside_the_denoisers_answers_as_the_library(process, folder, tmp_path, kind):
+    import torch
+
+    from sd2core.classify.card import ClassifierCard
+    from sd2core.classify.features import Features
+    from sd2core.classify.files import load_classifier, save_classifier
+    from sd2core.classify.live import TrainedClassifier
+    from sd2core.classify.models import build
+
+    torch.manual_seed(5)
+    features = Features("columns", VelocityAxis(32, 2.0), (14, 15, 16), 30.0)
+    classes = ("background", "horizontal", "vertical")
+    card = ClassifierCard(kind, {}, features, classes, ("synthetic",))
+    path = tmp_path / "classifier.safetensors"
+    save_classifier(path, TrainedClassifier(build(kind, features.size, 3), card))
+    present = np.ones(120, bool)
+    present[40:55] = False
+    given = a_map(present=present)
+    denoiser = process.load(folder / "gru.safetensors")
+    classifier = process.load_classifier(path)
+    whole = classifier.probabilities(given)
+    np.testing.assert_allclose(whole, load_classifier(path).probabilities(given), atol=1e-5)
+    assert np.ptp(whole, axis=0).max() > 1e-3  # it does look at the map
+    # Frame by frame and in pieces it is the same, with a denoiser asked in between.
+    live, found = classifier.live(), []
+    for start, stop in ((55, 56), (56, 70), (70, 71), (71, 120)):
+        found.append(live.advance(given.values.T[start:stop], np.ones(stop - start, bool)))
+        denoiser.denoise(a_map())
+    np.testing.assert_allclose(np.concatenate(found), whole[55:], atol=1e-5)
+    with pytest.raises(Sd2Error, match="is a denoiser"):
+        process.load_classifier(folder / "gru.safetensors")
+
+
 def test_the_window_itself_never_loads_torch():
     code = (
         "import sys\n"
         "import sd2app.context, sd2app.models.denoise, sd2app.models.denoise_library as library\n"
-        "library.core_library().available()\n"
+        "import sd2app.models.classify_library as classifiers\n"
+        "from sd2app.jobs.denoise_process import DenoiseProcess\n"
+        "process = DenoiseProcess()\n"
+        "library.core_library(process).available()\n"
+        "classifiers.core_classifiers(process).available()\n"
         "assert 'torch' not in sys.modules, 'torch'\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)

@@ -11,6 +11,7 @@ from sd2app.label_dragging import LabelDragging
 from sd2app.label_edits import LabelEdits
 from sd2app.models.labels import LabelsModel
 from sd2app.models.playback import PlaybackModel
+from sd2app.models.span_finders import Found, MotionFinder, Threshold
 from sd2app.models.suggestions import SuggestionsModel
 from sd2app.models.tracks import TrackModel
 from sd2core.labels.spans import Labels, Span, Track
@@ -29,6 +30,27 @@ def moving(*loud: tuple[int, int, float]) -> DopplerMap:
     return DopplerMap(values, VelocityAxis(16, 2.0), Timebase.regular(600, RATE), "real")
 
 
+class KnownSpans:
+    """Finds two gestures and says which, as a classifier does."""
+
+    title, threshold = "classifier", Threshold(0.0, 100.0, 50.0, 5.0, 0, " %", "")
+    why_not, ready, signals = "", True, ()
+
+    def __init__(self, source) -> None:
+        self.sources, self.source = (source,), source
+
+    def set_source(self, source) -> None:
+        pass
+
+    def look(self, threshold):
+        spans = (
+            Span(1, "Suggestions", 5.0, 6.0, "horizontal", confidence=0.9, origin="suggestion"),
+            Span(2, "Suggestions", 8.0, 9.0, "up-to-down", confidence=0.6, origin="suggestion"),
+        )
+        named = tuple(span for span in spans if span.confidence >= threshold / 100)
+        return lambda: Found(named, "" if named else "Nothing that sure")
+
+
 @pytest.fixture
 def set_up(qtbot):
     from PySide6.QtGui import QUndoStack
@@ -43,7 +65,11 @@ def set_up(qtbot):
     real.set_map(moving((100, 130, 100.0), (200, 230, 20.0), (300, 330, 100.0), (400, 420, 100.0)))
     edits = LabelEdits(document, labels, playback, session)
     model = SuggestionsModel(
-        labels, playback, (TrackModel("Synthetic"), real), document.undo_stack, edits.apply
+        labels,
+        playback,
+        (MotionFinder((TrackModel("Synthetic"), real)), KnownSpans(real)),
+        document.undo_stack,
+        edits.apply,
     )
 
     def look(threshold_db: float | None = None) -> None:
@@ -182,3 +208,48 @@ def test_suggestions_of_a_file_are_to_be_decided_on_without_looking(set_up) -> N
     set_up.model.accept()
     (taken,) = set_up.labels.labels.spans
     assert (taken.origin, taken.label) == ("person", "background")
+
+
+def test_what_says_which_gesture_it_is_keeps_that_and_how_sure_it_is(set_up, qtbot) -> None:
+    model, labels = set_up.model, set_up.labels
+    labels.set_label("down-to-up")
+    model.start(model.finders[1])
+    qtbot.waitUntil(lambda: not model.busy, timeout=10_000)
+    assert [(span.label, span.confidence) for span in model.pending] == [
+        ("horizontal", 0.9),
+        ("up-to-down", 0.6),
+    ]
+    assert model.accepted_as == ""  # nothing is left to say of them
+    model.accept()
+    # Corrected: a label's key takes it as that.
+    model.accept("left-to-right")
+    taken = [span for span in labels.labels.spans if span.confidence is not None]
+    assert [(span.label, span.origin, span.confidence, span.track) for span in taken] == [
+        ("horizontal", "person", 0.9, "Gestures"),
+        ("left-to-right", "person", 0.6, "Gestures"),
+    ]
+    set_up.stack.undo()
+    assert [span.label for span in model.pending] == ["up-to-down"]
+
+
+def test_each_way_of_finding_has_its_own_threshold(set_up, qtbot) -> None:
+    model = set_up.model
+    set_up.look()
+    assert model.accepted_as == labels_in_use(set_up)
+    model.set_finder(model.finders[1])
+    qtbot.waitUntil(lambda: not model.busy, timeout=10_000)
+    assert starts(model.pending) == [5, 8]
+    model.set_threshold(95.0)
+    qtbot.waitUntil(lambda: not model.busy, timeout=10_000)
+    assert not model.pending
+    assert model.text == "Nothing that sure"
+    model.set_finder(model.finders[0])
+    assert model.threshold == 8.0
+    qtbot.waitUntil(lambda: not model.busy, timeout=10_000)
+    assert starts(model.pending) == [5, 10, 15]
+    # Trying ways is one step, as trying thresholds is.
+    assert set_up.stack.index() == 1
+
+
+def labels_in_use(set_up) -> str:
+    return set_up.labels.label

@@ -8,6 +8,7 @@ import av
 import numpy as np
 import pytest
 import trimesh
+from fake_classifiers import FakeClassifiers
 from fake_denoisers import FakeDenoisers
 from fake_ladder import FakeLadder
 from PySide6.QtCore import QCoreApplication, QEvent
@@ -112,18 +113,31 @@ def fake_models() -> FakeDenoisers:
 
 
 @pytest.fixture
-def empty_window(qtbot, compiled_kernels, fake, fake_models):
+def fake_classes() -> FakeClassifiers:
+    """No classifier, unless a test adds some."""
+    return FakeClassifiers()
+
+
+@pytest.fixture
+def empty_window(qtbot, compiled_kernels, fake, fake_models, fake_classes):
     """The window without a recording, all views in place."""
     from sd2app.settings import Settings
     from sd2app.views.window import MainWindow
 
-    window = MainWindow(Settings.forgetful(), fake.ladder, None, fake_models.library)
+    window = MainWindow(
+        Settings.forgetful(),
+        fake.ladder,
+        None,
+        fake_models.library,
+        classifiers=fake_classes.library,
+    )
     window.resize(1280, 800)
     window.show()
     window.populate()
     qtbot.waitUntil(lambda: window.settled, timeout=20_000)
     yield window
     fake.gate.set()
+    fake_classes.gate.set()
     if window.ready:
         window.context.document.undo_stack.clear()
     window.close()

@@ -1,0 +1,346 @@
+"""What every frame of a map shows, kept in step with the map."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from sd2app.jobs.latest import Emit, LatestRunner
+from sd2app.models.classify_library import Classifier, LiveClasses
+from sd2app.models.denoise_pieces import AT_ONCE, cut_out, known_frames
+from sd2app.models.tracks import TrackModel
+from sd2core.denoise.matching import check_bins, is_regular, stretches
+from sd2core.errors import Sd2Error
+from sd2core.spectrum import DopplerMap
+
+if TYPE_CHECKING:
+    from sd2core.classify.card import ClassifierCard
+
+_BETWEEN_MS = 120
+"""While a long map is painted piece by piece, it is looked at so often at most."""
+
+
+@dataclass(frozen=True)
+class ClassReading:
+    """What one frame shows.
+
+    Parameters
+    ----------
+    classes : tuple of str
+    shares : tuple of float
+        Probability of each of them.
+    current : bool
+        False while the map is another than the one that this was read from.
+    nobody : bool
+        Whether there is no person in the frame.
+    """
+
+    classes: tuple[str, ...]
+    shares: tuple[float, ...]
+    current: bool
+    nobody: bool
+
+    @property
+    def best(self) -> int:
+        """The most probable class."""
+        return max(range(len(self.shares)), key=self.shares.__getitem__)
+
+
+class _Going(NamedTuple):
+    """A stretch that was gone through up to a frame, and what is remembered of it."""
+
+    session: LiveClasses
+    start: int
+    next: int
+
+
+class _Piece(NamedTuple):
+    start: int
+    shares: NDArray[np.float32]
+    going: _Going | None
+
+
+class ClassTrack(QObject):
+    """Classifies what changed of a map, from the first frame that differs.
+
+    Classifiers are causal: what stands before that frame stays right, and where the map
+    only grows, the classifier goes on with what it remembers, as beside a live radar.
+
+    Parameters
+    ----------
+    moving : callable
+        Whether a hand moves the sensor of a map: then nothing of it counts as current.
+
+    Signals
+    -------
+    changed
+        What is known of the frames.
+    """
+
+    changed = Signal()
+
+    def __init__(self, moving: Callable[[TrackModel], bool], parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._moving = moving
+        self._source: TrackModel | None = None
+        self._classifier: Classifier | None = None
+        self._card: ClassifierCard | None = None
+        self._problem = ""
+        self._runner = LatestRunner("classify", self)
+        self._runner.partial.connect(self._receive)
+        self._runner.finished.connect(self._finish)
+        self._runner.failed.connect(self._fail)
+        self._calm = QTimer(self)
+        self._calm.setSingleShot(True)
+        self._calm.setInterval(_BETWEEN_MS)
+        self._calm.timeout.connect(self._go_on)
+        self._forget()
+
+    def _forget(self) -> None:
+        self._given: DopplerMap | None = None
+        self._known = np.zeros(0, bool)
+        self._shares = np.zeros((0, 0), np.float32)
+        self._done = np.zeros(0, bool)
+        self._revision = -1
+        self._going: _Going | None = None
+        self._until = 0
+        self._again = False
+
+    # --- what is known --------------------------------------------------------------------
+
+    @property
+    def card(self) -> ClassifierCard | None:
+        """Of the classifier at work."""
+        return self._card
+
+    @property
+    def busy(self) -> bool:
+        """Whether frames are being classified or about to be."""
+        return self._runner.busy or self._calm.isActive()
+
+    @property
+    def problem(self) -> str:
+        """Why this map cannot be classified; empty where it can."""
+        return self._problem
+
+    @property
+    def complete(self) -> bool:
+        """Whether every frame of the map as it is now is classified."""
+        source = self._source
+        whole = source is not None and source.map is not None and source.covered is None
+        return whole and self._done.size > 0 and bool(self._done.all())
+
+    @property
+    def shares(self) -> NDArray[np.float32]:
+        """Probabilities, (frames, classes); of frames that are not :attr:`done` older ones."""
+        return self._shares
+
+    @property
+    def done(self) -> NDArray[np.bool_]:
+        """Frames whose answer is of the map as it is now, (frames,)."""
+        return self._done
+
+    @property
+    def source(self) -> TrackModel | None:
+        """The map that is looked at."""
+        return self._source
+
+    @property
+    def current(self) -> bool:
+        """Whether what is known counts: no hand moves the sensor."""
+        return self._source is not None and not self._moving(self._source)
+
+    def at(self, time_s: float) -> ClassReading | None:
+        """What the frame at a time of the recording shows; None where that is not known."""
+        frame = self._source.frame_at(time_s) if self._source is not None else None
+        if frame is None or self._card is None or frame >= len(self._shares):
+            return None
+        shares = self._shares[frame]
+        if np.isnan(shares).any():
+            return None
+        present = self._given.present if self._given is not None else None
+        return ClassReading(
+            self._card.classes,
+            tuple(map(float, shares)),
+            bool(self._done[frame]) and self.current,
+            present is not None and not present[frame],
+        )
+
+    # --- requests -------------------------------------------------------------------------
+
+    def use(self, classifier: Classifier | None, card: ClassifierCard | None) -> None:
+        """Classify with another one, or not at all."""
+        self._classifier, self._card = classifier, card if classifier is not None else None
+        self._begin_anew()
+
+    def look_at(self, source: TrackModel | None) -> None:
+        """Look at another map, or at none."""
+        if source is self._source:
+            return
+        if self._source is not None:
+            self._source.changed.disconnect(self._follow)
+        self._source = source
+        if source is not None:
+            source.changed.connect(self._follow)
+        self._begin_anew()
+
+    def close(self) -> None:
+        """Stop."""
+        self._calm.stop()
+        self._runner.close()
+
+    # --- following the map ----------------------------------------------------------------
+
+    def _begin_anew(self) -> None:
+        self._runner.cancel()
+        self._calm.stop()
+        self._forget()
+        self._problem = ""
+        self._follow()
+        self.changed.emit()
+
+    def _follow(self) -> None:
+        source, card = self._source, self._card
+        if source is None or source.map is None or card is None:
+            if self._given is not None:
+                self._runner.cancel()
+                self._calm.stop()
+                self._forget()
+                self.changed.emit()
+            return
+        if source.revision == self._revision:
+            return  # its levels, its place in time
+        self._revision = source.revision
+        try:
+            check_bins(source.map, card)
+        except Sd2Error as error:
+            self._fail(error)
+            return
+        self._take(source.map, known_frames(source.map, source.covered))
+        if self._again:
+            return
+        if self._done.size <= AT_ONCE:
+            self._go_on()
+        elif not self._calm.isActive():
+            self._calm.start()
+
+    def _take(self, doppler: DopplerMap, known: NDArray[np.bool_]) -> None:
+        """Copied: the values go on changing while they are looked at."""
+        first = self._first_difference(doppler, known)
+        assert self._card is not None
+        if self._given is None or len(self._done) != len(known):
+            self._shares = np.full((len(known), len(self._card.classes)), np.nan, np.float32)
+            self._done = np.zeros(len(known), bool)
+        self._given, self._known = replace(doppler, values=doppler.values.copy()), known.copy()
+        self._problem = ""
+        self._done[first:] = False
+        # What is under way is still right where the map only grew behind it.
+        self._again = self._runner.busy and first >= self._until
+        if self._runner.busy and not self._again:
+            # The other side may have gone on without anybody to take its answer.
+            self._runner.cancel()
+            self._going = None
+        if self._going is not None and self._going.next > first:
+            self._going = None
+        if doppler.present is not None:
+            nobody = known & ~doppler.present
+            self._shares[nobody] = _of_nobody(self._card)
+            self._done[nobody] = True
+        self.changed.emit()
+
+    def _first_difference(self, doppler: DopplerMap, known: NDArray[np.bool_]) -> int:
+        """The first frame that is another than before."""
+        before = self._given
+        if before is None or not np.array_equal(before.times_s, doppler.times_s):
+            return 0
+        differs = (before.values != doppler.values).any(axis=0) | (self._known != known)
+        if before.present is not None or doppler.present is not None:
+            differs |= _present(before) != _present(doppler)
+        return int(differs.argmax()) if differs.any() else len(known)
+
+    # --- classifying ----------------------------------------------------------------------
+
+    def _go_on(self) -> None:
+        doppler, classifier, card = self._given, self._classifier, self._card
+        if doppler is None or classifier is None or card is None:
+            return
+        known, done, going = self._known, self._done.copy(), self._going
+        there = replace(doppler, present=_present(doppler) & known)
+        rate_hz = card.frame_rate_hz
+        wanted = [
+            piece for piece in stretches(there, rate_hz) if not done[piece[0] : piece[1]].all()
+        ]
+        if not wanted:
+            return
+        self._until = wanted[-1][1]
+
+        def work(emit: Emit) -> None:
+            for start, stop in wanted:
+                if is_regular(doppler.times_s[start:stop], rate_hz):
+                    _in_order(classifier, doppler, (start, stop), going, emit)
+                else:
+                    cut = cut_out(doppler, start, doppler.values[:, start:stop])
+                    cut = replace(cut, present=None)
+                    emit(_Piece(start, classifier.probabilities(cut), None))
+
+        self._runner.submit(work)
+
+    def _receive(self, piece: _Piece) -> None:
+        stop = piece.start + len(piece.shares)
+        self._shares[piece.start : stop] = piece.shares
+        self._done[piece.start : stop] = True
+        self._going = piece.going
+        self.changed.emit()
+
+    def _finish(self, _: object) -> None:
+        again, self._again = self._again, False
+        if again:
+            self._go_on()
+        self.changed.emit()
+
+    def _fail(self, error: Exception) -> None:
+        revision = self._revision
+        self._runner.cancel()
+        self._forget()
+        self._revision = revision
+        self._problem = str(error)
+        self.changed.emit()
+
+
+def _in_order(
+    classifier: Classifier,
+    doppler: DopplerMap,
+    stretch: tuple[int, int],
+    going: _Going | None,
+    emit: Emit,
+) -> None:
+    """One stretch piece by piece, from where it was left."""
+    start, stop = stretch
+    if going is not None and going.start == start and going.next < stop:
+        session, at = going.session, going.next
+    else:
+        session, at = classifier.live(), start
+    while at < stop:
+        end = min(at + AT_ONCE, stop)
+        energies = np.ascontiguousarray(doppler.values[:, at:end].T)
+        shares = session.advance(energies, np.ones(end - at, bool))
+        emit(_Piece(at, shares, _Going(session, start, end)))
+        at = end
+
+
+def _present(doppler: DopplerMap) -> NDArray[np.bool_]:
+    frames = len(doppler.timebase)
+    return np.ones(frames, bool) if doppler.present is None else doppler.present
+
+
+def _of_nobody(card: ClassifierCard) -> NDArray[np.float32]:
+    """Background for certain; where that is no class, nothing is known."""
+    count = len(card.classes)
+    if card.background is None:
+        return np.full(count, 1.0 / count, np.float32)
+    return np.eye(count, dtype=np.float32)[card.background]

@@ -1,0 +1,45 @@
+"""What the panel of classifiers leaves to dialogs."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+
+class ClassAsks(Protocol):
+    """Each may ask first, or be refused."""
+
+    def add_folder(self) -> None:
+        """Let the user choose a folder with labelled data."""
+
+    def add_file(self) -> None:
+        """Let the user choose a labelled radar file."""
+
+    def add_this(self) -> None:
+        """Learn from the recording that is open."""
+
+    def has_this(self) -> bool:
+        """Whether it can be learnt from: it is on disk."""
+
+    def train(self) -> None:
+        """Begin to train."""
+
+    def compare(self) -> None:
+        """Begin to compare."""
+
+    def again(self) -> None:
+        """Go on with the comparison in view."""
+
+    def copy_command(self) -> None:
+        """Put the command on the clipboard."""
+
+    def use_model(self) -> None:
+        """Use the model of the run in view."""
+
+    def show_result(self) -> None:
+        """Show what came of the comparison in view."""
+
+    def open_result(self) -> None:
+        """Let the user choose a result, and show it."""
+
+    def delete(self) -> None:
+        """Ask, then delete the run in view."""

@@ -1,0 +1,135 @@
+"""How well a classifier does while it learns: recall of the people who choose the best."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPen, QPolygonF
+from PySide6.QtWidgets import QWidget
+
+from sd2app.models.class_history import CheckPoint, ClassHistory
+from sd2app.models.class_training import ClassTraining
+from sd2app.models.display import DisplayModel
+from sd2app.views.point_plot import PointPlot
+from sd2app.views.time_axis import ticks
+
+
+class ClassCurve(PointPlot):
+    """Recall in per cent and, faint, the loss as a share of the first one, over the steps.
+
+    Hovering says what a look came to; with the keyboard Left and Right go from one to the
+    next.
+    """
+
+    MARGINS_PX = (40, 24, 10, 36)
+    HEIGHTS_PX = (140, 168, 260)
+    KEYS = frozenset({Qt.Key.Key_Left, Qt.Key.Key_Right, Qt.Key.Key_Home, Qt.Key.Key_End})
+
+    def __init__(
+        self, training: ClassTraining, display: DisplayModel, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(display, "Recall over the steps", parent)
+        self._training = training
+        training.changed.connect(self.update)
+
+    @property
+    def _history(self) -> ClassHistory:
+        run = self._training.run
+        return run.history if run is not None else ClassHistory()
+
+    def points(self) -> list[CheckPoint]:
+        """The looks at the validation so far."""
+        return self._history.checks
+
+    def first_point(self) -> CheckPoint | None:
+        """The best one."""
+        return self._history.best
+
+    def tip_place(self, point: CheckPoint) -> QPointF:
+        """At the point."""
+        return self.place_of(point.step, point.recall)
+
+    def words_of(self, point: CheckPoint) -> str:
+        """What a look came to."""
+        best = ", better than all before" if point.best else ""
+        return f"Step {point.step}{best}\nRecall {100 * point.recall:.1f} %"
+
+    def place_of(self, step: float, share: float) -> QPointF:
+        """Pixel of a share after so many steps."""
+        plot, total = self.plot_rect(), max(self._history.total, 1)
+        return QPointF(
+            plot.left() + plot.width() * step / total, plot.bottom() - plot.height() * share
+        )
+
+    # --- painting -------------------------------------------------------------------------
+
+    def paint_plot(self, painter: QPainter) -> None:
+        """Axes, loss, recall, the best, and what is pointed at."""
+        colours, history = self._display.palette, self._history
+        total = max(history.total, 1)
+        across = ticks(0.0, float(total), max(int(self.plot_rect().width() / 56), 2))
+        self.paint_axes(
+            painter,
+            [(self.place_of(value, 0.0).x(), f"{value:g}") for value in across],
+            [(self.place_of(0.0, share / 100).y(), f"{share}") for share in (0, 25, 50, 75, 100)],
+            "steps",
+        )
+        self._paint_legend(painter)
+        if history.losses:
+            first = max(history.losses[0].loss, 1e-9)
+            faint = QColor(colours.synthetic)
+            faint.setAlpha(110)
+            places = [self.place_of(one.step, min(one.loss / first, 1.0)) for one in history.losses]
+            painter.setPen(QPen(faint, 1))
+            painter.drawPolyline(QPolygonF(places))
+        painter.setPen(QPen(QColor(colours.real), 2))
+        places = [self.place_of(one.step, one.recall) for one in history.checks]
+        painter.drawPolyline(QPolygonF(places))
+        painter.setBrush(QColor(colours.real))
+        for place in places:
+            painter.drawEllipse(place, 2.0, 2.0)
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        for point, colour in ((history.best, colours.text), (self.pointed, colours.accent)):
+            if point is not None:
+                painter.setPen(QPen(QColor(colour), 1.5))
+                painter.drawEllipse(self.place_of(point.step, point.recall), 5.0, 5.0)
+
+    def _paint_legend(self, painter: QPainter) -> None:
+        colours, metrics = self._display.palette, painter.fontMetrics()
+        painter.setPen(QColor(colours.muted))
+        painter.drawText(QRectF(4, 0, 60, 20), Qt.AlignmentFlag.AlignVCenter, "%")
+        x = self.plot_rect().right()
+        for text, colour in (("recall, validation", colours.real), ("loss", colours.synthetic)):
+            width = metrics.horizontalAdvance(text)
+            x -= width
+            painter.setPen(QColor(colours.muted))
+            painter.drawText(QRectF(x, 0, width + 2, 20), Qt.AlignmentFlag.AlignVCenter, text)
+            painter.setPen(QPen(QColor(colour), 2))
+            painter.drawLine(QPointF(x - 18, 10), QPointF(x - 5, 10))
+            x -= 30
+
+    # --- pointing -------------------------------------------------------------------------
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """Say what the look nearest to the pointer came to."""
+        x, points = event.position().x(), self.points()
+        nearest = min(
+            points, key=lambda one: abs(self.place_of(one.step, 0.0).x() - x), default=None
+        )
+        self.point_at(nearest if self.plot_rect().contains(event.position()) else None)
+        self.explain()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Go from look to look."""
+        points, key = self.points(), event.key()
+        if not points or key not in self.KEYS:
+            super().keyPressEvent(event)
+            return
+        at = points.index(self.pointed) if self.pointed in points else len(points) - 1
+        at = {
+            Qt.Key.Key_Home: 0,
+            Qt.Key.Key_End: len(points) - 1,
+            Qt.Key.Key_Left: max(at - 1, 0),
+            Qt.Key.Key_Right: min(at + 1, len(points) - 1),
+        }[Qt.Key(key)]
+        self.point_at(points[at])
+        self.explain()

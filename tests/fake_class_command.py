@@ -1,0 +1,78 @@
+"""Keeps a folder as ``sd2app.jobs.kept_command`` does, and learns nothing.
+
+``fake_class_command.py [--step-s S] [--fail TEXT] [--die-at N] FOLDER classify train|table
+DATA… --out OUT …``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import time
+from pathlib import Path
+
+from sd2app.jobs.command_folder import CommandFolder
+
+STEPS = 6
+
+
+def say(event, **content):
+    print(json.dumps({"event": event, **content}), flush=True)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--step-s", type=float, default=0.0)
+    parser.add_argument("--fail", default="")
+    parser.add_argument("--die-at", type=int, default=0)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("command", nargs=2)
+    parser.add_argument("data", nargs="+", type=Path)
+    parser.add_argument("--out", type=Path)
+    for name in ("--quick", "--progress-json"):
+        parser.add_argument(name, action="store_true")
+    for name in ("--model", "--features", "--maps", "--steps", "--seed"):
+        parser.add_argument(name)
+    options = parser.parse_args()
+    folder = CommandFolder(options.folder)
+    lock = folder.lock()
+    assert lock.take()
+    code = work(options, folder)
+    folder.note_end(code)
+    lock.release()
+    return code
+
+
+def work(options, folder) -> int:
+    if options.fail:
+        print(f"sd2: {options.fail}", file=sys.stderr)
+        return 1
+    table, code = options.command[1] == "table", 0
+    if not table:
+        say("start", steps=STEPS, clips=3, frames=900)
+    for step in range(1, STEPS + 1):
+        time.sleep(options.step_s)
+        if options.die_at == step:
+            os._exit(9)
+        if table:
+            say("run", done=step - 1, total=STEPS, elapsed_s=float(step))
+        else:
+            say("step", step=step, loss=1.0 / step, elapsed_s=2.0 * step)
+            if step % 2 == 0:
+                say("check", step=step, validation_mean_recall=[0.5, 0.8, 0.7][step // 2 - 1])
+        if folder.stop_wanted:
+            code = 130
+            break
+    if table and code == 0:
+        options.out.mkdir()
+        (options.out / "table.json").write_text("{}")
+    if not table:
+        say("end", best_step=4, interrupted=code == 130)
+        options.out.write_bytes(b"a model")
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())
