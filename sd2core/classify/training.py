@@ -40,7 +40,7 @@ class TrainOptions:
     steps : int
         Batches that are learnt from.
     batch : int
-        Stretches per batch, of as many clips; fewer where there are not so many.
+        Stretches per batch; of few clips several each, cut at other places.
     window_frames : int
         Length of a stretch; clips that are longer are cut at random places.
     piece_frames : int
@@ -59,14 +59,14 @@ class TrainOptions:
     model: str = "lstm"
     features: Kind = "columns"
     options: Mapping[str, Any] = field(default_factory=dict)
-    steps: int = 120
-    batch: int = 48
+    steps: int = 160
+    batch: int = 32
     window_frames: int = 300
     piece_frames: int = 50
     learning_rate: float = 0.01
     ssm_learning_rate: float = 0.003
     weight_decay: float = 0.01
-    check_steps: int = 12
+    check_steps: int = 16
     patience: int = 10
     seed: int = 0
 
@@ -231,7 +231,7 @@ class _Learning:
             for group, rate in zip(self._optimiser.param_groups, self._highest, strict=True):
                 group["lr"] = share * rate
             drawn: list[int] = []
-            while len(drawn) < min(self._chosen.batch, len(self._material.labels)):
+            while len(drawn) < self._chosen.batch:
                 if not waiting:
                     waiting = self._rng.permutation(len(self._material.labels)).tolist()
                 drawn.append(waiting.pop())
