@@ -112,20 +112,24 @@ class Counting:
         of_kind: dict[MapKind, int] = {}
         for subject, outline in self.outlines:
             total, labels = count_segments(outline, rate_hz, options)
-            of_subject[subject] = of_subject.get(subject, 0) + total
+            if total:  # who has no segment is in no split
+                of_subject[subject] = of_subject.get(subject, 0) + total
             for name, count in labels.items():
                 of_label[name] = of_label.get(name, 0) + count
             for kind in outline.kinds:
                 if kind in options.kinds:
                     of_kind[kind] = of_kind.get(kind, 0) + total
         segments = sum(of_subject.values())
+        split = Split((), (), ())
+        if segments:
+            split = split_subjects(list(of_subject), options.validation, options.test)
         return Forecast(
             sources=len(self.outlines),
             segments=segments,
             of_subject=of_subject,
             of_label=of_label,
             of_kind={kind: of_kind[kind] for kind in KINDS if kind in of_kind},
-            split=split_subjects(list(of_subject), options.validation, options.test),
+            split=split,
             frame_rate_hz=rate_hz,
             total_bytes=segments * bytes_per_segment(options.length, bins, len(of_kind)),
             failed=tuple(self.failed),

@@ -115,7 +115,8 @@ class SegmentStore:
             Of :func:`~sd2core.datasets.cutting.cut_source`. What they raise leaves the store
             as it was.
         entry : dict
-            What its line says, with a value for each of its columns in ``columns``.
+            What its line says, with a value for each of its columns in ``columns``; it
+            learns ``start`` and ``stop``, its rows.
 
         Returns
         -------
@@ -136,7 +137,8 @@ class SegmentStore:
             self._pending = [one for one in self._pending if one[0] < self.rows]
             raise
         added = stop - self.rows
-        self._lines.append(_line(entry | {"start": self.rows, "stop": stop}))
+        entry |= {"start": self.rows, "stop": stop}
+        self._lines.append(_line(entry))
         self.rows = stop
         self.sources += 1
         if time.monotonic() - self._flushed_s >= FLUSH_EVERY_S:

@@ -5,27 +5,31 @@ from __future__ import annotations
 import hashlib
 import shutil
 from collections.abc import Iterable, Sized
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from sd2core import __version__
 from sd2core.datasets.card import write_card
+from sd2core.datasets.common import (
+    Names,
+    check_fits,
+    entry_of,
+    header_of,
+    refuse_other_settings,
+)
 from sd2core.datasets.cutting import cut_source
 from sd2core.datasets.formats import refuse_large_npz, write_packed
 from sd2core.datasets.layout import SPLITS, FileFormat, Header, format_of
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.reading import open_dataset
-from sd2core.datasets.source import BACKGROUND, KINDS, LazySource, Source, SourceKey
+from sd2core.datasets.source import KINDS, LazySource, Source, SourceKey
 from sd2core.datasets.store import LOCK_NAME, SegmentStore, open_arrays
-from sd2core.denoise.matching import MOST_RESAMPLED
 from sd2core.errors import Sd2Error
 from sd2core.file_lock import FileLock
 from sd2core.io.kinds import is_dataset
 from sd2core.progress import Progress, silent
-from sd2core.spectrum import DopplerMap
 from sd2core.train.data import Split, split_subjects
 
 _STEPS = 1000
@@ -119,40 +123,10 @@ def write_dataset(
     return written
 
 
-@dataclass
-class _Names:
-    """What sources have in common, in the order in which it came up."""
-
-    subjects: dict[str, int] = field(default_factory=dict)
-    labels: dict[str, int] = field(default_factory=lambda: {BACKGROUND: 0})
-    classes: dict[str, str] = field(default_factory=dict)
-    units: dict[str, dict[str, None]] = field(default_factory=dict)
-    kinds: set[str] = field(default_factory=set)
-
-    def learn(self, entry: dict[str, Any]) -> None:
-        """From the line of a source."""
-        self.subjects.setdefault(entry["subject"], len(self.subjects))
-        for label in entry["labels"]:
-            self.labels.setdefault(label, len(self.labels))
-        self.classes |= entry["classes"]
-        for kind, unit in entry["units"].items():
-            self.units.setdefault(kind, {})[unit] = None
-        self.kinds |= {*entry["segments_of_kind"]}
-
-    def check(self, source: Source) -> None:
-        """Refuse a source that calls the class of a label otherwise."""
-        for label, name in source.classes.items():
-            if self.classes.get(label, name) != name:
-                raise Sd2Error(
-                    f"{source.key.title}: the label {label!r} is of class {name!r}",
-                    f"{self.classes[label]!r}, as in the sources before",
-                )
-
-
 class _Writer:
     def __init__(self, out: Path, work: Path, form: FileFormat, options: DatasetOptions) -> None:
         self._out, self._work, self._form, self._options = out, work, form, options
-        self._names = _Names()
+        self._names = Names()
         self._there: dict[bytes, str] = {}
         self._store: SegmentStore | None = None
         begun = SegmentStore(work) if is_dataset(work) else None
@@ -164,9 +138,9 @@ class _Writer:
             with open_dataset(out) as there:
                 for entry in there.sources():
                     self._know(entry)
-                _refuse_other_settings(out, there.header, options)
+                refuse_other_settings(out, there.header, options)
         if self._store is not None:
-            _refuse_other_settings(out, self._store.header, options)
+            refuse_other_settings(out, self._store.header, options)
 
     def write(self, sources: Iterable[Source | LazySource], progress: Progress) -> Written:
         try:
@@ -238,9 +212,9 @@ class _Writer:
                 raise Sd2Error(f"{one.key.title} turned out to be {source.key.title}")
         store = self._open_store(source)
         header = store.header
-        _check_fits(source, header)
+        check_fits(source, header)
         self._names.check(source)
-        entry = _entry(source, header, fingerprint)
+        entry = entry_of(source, header, fingerprint)
         labels = dict(self._names.labels)
         for name in source.labels:
             labels.setdefault(name, len(labels))
@@ -281,7 +255,7 @@ class _Writer:
                         self._work, there.header, there.arrays, there.sources()
                     )
             else:
-                self._store = SegmentStore.begin(self._work, _header(source, self._options))
+                self._store = SegmentStore.begin(self._work, header_of(source, self._options))
         return self._store
 
     def _finish(self, progress: Progress) -> tuple[int, int]:
@@ -331,81 +305,7 @@ class _Writer:
     def _know(self, entry: dict[str, Any], digest: bytes | None = None) -> None:
         key = SourceKey(entry["subject"], entry["recording"], entry["placement"])
         self._there[digest or _digest(key)] = entry["fingerprint"]
-        entry = entry | {
-            "segments_of_kind": {
-                kind: count for kind, count in entry["segments_of_kind"].items() if count
-            }
-        }
         self._names.learn(entry)
-
-
-def _header(source: Source, options: DatasetOptions) -> Header:
-    first: DopplerMap = next(iter(source.maps.values()))
-    nulled = sorted({number for one in source.maps.values() for number in one.null_bins})
-    return Header(
-        length=options.length,
-        overlap=options.overlap,
-        axis=first.axis,
-        null_bins=tuple(nulled) if options.null_bins is None else tuple(options.null_bins),
-        frame_rate_hz=options.frame_rate_hz or round(first.timebase.frames_per_s, 3),
-        label_rule=options.label_rule,
-        min_share=options.min_share,
-        kinds_wanted=options.kinds,
-        title=options.title,
-        made_by=f"SD² Studio {__version__}",
-        provenance=options.provenance,
-    )
-
-
-def _check_fits(source: Source, header: Header) -> None:
-    title = source.key.title
-    if not {*source.maps} & {*header.kinds_wanted}:
-        raise Sd2Error(
-            f"{title} has maps of kind {', '.join(source.maps)}",
-            f"one of {', '.join(header.kinds_wanted)}",
-        )
-    for one in source.maps.values():
-        if one.axis != header.axis:
-            raise Sd2Error(
-                f"{title} has {one.axis.bins} bins over ±{one.axis.v_max_mps:g} m/s",
-                f"{header.axis.bins} over ±{header.axis.v_max_mps:g} m/s, as the data set has",
-            )
-        extra = sorted({*one.null_bins} - {*header.null_bins})
-        if extra:
-            raise Sd2Error(
-                f"{title}: bins {', '.join(map(str, extra))} of the {one.kind} map were emptied",
-                "energy there, as in the sources before",
-                "Export with --null-bins that name them, or make the maps anew",
-            )
-    rate_hz = next(iter(source.maps.values())).timebase.frames_per_s
-    factor = rate_hz / header.frame_rate_hz
-    if len(source.times_s) > 1 and not 1 / MOST_RESAMPLED <= factor <= MOST_RESAMPLED:
-        raise Sd2Error(
-            f"{title} has {rate_hz:.4g} frames/s",
-            f"{header.frame_rate_hz:g} frames/s, or up to {MOST_RESAMPLED:g} times more or less",
-        )
-
-
-def _entry(source: Source, header: Header, fingerprint: str) -> dict[str, Any]:
-    range_m, azimuth_deg, elevation_deg = source.spherical
-    kinds = [kind for kind in header.kinds_wanted if kind in source.maps]
-    return {
-        "subject": source.subject,
-        "recording": source.recording,
-        "placement": source.placement,
-        "fingerprint": fingerprint,
-        "frames": len(source.times_s),
-        "frames_with_person": int(source.present.sum()),
-        "frame_rate_hz": round(next(iter(source.maps.values())).timebase.frames_per_s, 3),
-        "labels": list(source.labels),
-        "classes": dict(source.classes),
-        "units": {kind: source.maps[kind].unit for kind in kinds},
-        "sensor": asdict(source.sensor),
-        "seen_from": None
-        if source.target_m is None
-        else {"range_m": range_m, "azimuth_deg": azimuth_deg, "elevation_deg": elevation_deg},
-        "provenance": source.made_of(),
-    }
 
 
 def _refuse_other(out: Path, form: FileFormat) -> None:
@@ -417,24 +317,6 @@ def _refuse_other(out: Path, form: FileFormat) -> None:
             raise Sd2Error(f"{out} is there and holds no data set", "a new name")
     elif out.exists():
         open_dataset(out).close()
-
-
-def _refuse_other_settings(out: Path, there: Header, options: DatasetOptions) -> None:
-    for what, before, now in (
-        ("segments of", there.length, options.length),
-        ("an overlap of", there.overlap, options.overlap),
-        ("kinds", list(there.kinds_wanted), list(options.kinds)),
-        ("frames/s", there.frame_rate_hz, options.frame_rate_hz),
-        ("null bins", there.null_bins, options.null_bins),
-        ("the label rule", there.label_rule, options.label_rule),
-        ("the least share", there.min_share, options.min_share),
-    ):
-        if now is not None and before != now:
-            raise Sd2Error(
-                f"{out} was begun with {what} {before}",
-                f"{now}, as it is asked for now",
-                "Go on with the same settings, or write another data set",
-            )
 
 
 def _digest(key: SourceKey) -> bytes:

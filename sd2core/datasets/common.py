@@ -1,0 +1,138 @@
+"""What the sources of a data set have in common: checked, and gathered as they come."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from sd2core import __version__
+from sd2core.datasets.layout import Header
+from sd2core.datasets.options import DatasetOptions
+from sd2core.datasets.source import BACKGROUND, Source
+from sd2core.denoise.matching import MOST_RESAMPLED
+from sd2core.errors import Sd2Error
+from sd2core.spectrum import DopplerMap
+
+
+@dataclass
+class Names:
+    """What sources have in common, in the order in which it came up."""
+
+    subjects: dict[str, int] = field(default_factory=dict)
+    labels: dict[str, int] = field(default_factory=lambda: {BACKGROUND: 0})
+    classes: dict[str, str] = field(default_factory=dict)
+    units: dict[str, dict[str, None]] = field(default_factory=dict)
+    kinds: set[str] = field(default_factory=set)
+
+    def learn(self, entry: dict[str, Any]) -> None:
+        """From the line of a source."""
+        # Who has no segment is in no split.
+        if entry["stop"] > entry["start"]:
+            self.subjects.setdefault(entry["subject"], len(self.subjects))
+        for label in entry["labels"]:
+            self.labels.setdefault(label, len(self.labels))
+        self.classes |= entry["classes"]
+        for kind, unit in entry["units"].items():
+            self.units.setdefault(kind, {})[unit] = None
+        self.kinds |= {kind for kind, count in entry["segments_of_kind"].items() if count}
+
+    def check(self, source: Source) -> None:
+        """Refuse a source that calls the class of a label otherwise."""
+        for label, name in source.classes.items():
+            if self.classes.get(label, name) != name:
+                raise Sd2Error(
+                    f"{source.key.title}: the label {label!r} is of class {name!r}",
+                    f"{self.classes[label]!r}, as in the sources before",
+                )
+
+
+def header_of(source: Source, options: DatasetOptions) -> Header:
+    """Header of a data set that begins with a source: what options leave open is its own."""
+    first: DopplerMap = next(iter(source.maps.values()))
+    nulled = sorted({number for one in source.maps.values() for number in one.null_bins})
+    return Header(
+        length=options.length,
+        overlap=options.overlap,
+        axis=first.axis,
+        null_bins=tuple(nulled) if options.null_bins is None else tuple(options.null_bins),
+        frame_rate_hz=options.frame_rate_hz or round(first.timebase.frames_per_s, 3),
+        label_rule=options.label_rule,
+        min_share=options.min_share,
+        kinds_wanted=options.kinds,
+        title=options.title,
+        made_by=f"SD² Studio {__version__}",
+        provenance=options.provenance,
+    )
+
+
+def check_fits(source: Source, header: Header) -> None:
+    """Refuse a source of another axis, frame rate, emptied bins, or without a wanted map."""
+    title = source.key.title
+    if not {*source.maps} & {*header.kinds_wanted}:
+        raise Sd2Error(
+            f"{title} has maps of kind {', '.join(source.maps)}",
+            f"one of {', '.join(header.kinds_wanted)}",
+        )
+    for one in source.maps.values():
+        if one.axis != header.axis:
+            raise Sd2Error(
+                f"{title} has {one.axis.bins} bins over ±{one.axis.v_max_mps:g} m/s",
+                f"{header.axis.bins} over ±{header.axis.v_max_mps:g} m/s, as the data set has",
+            )
+        extra = sorted({*one.null_bins} - {*header.null_bins})
+        if extra:
+            raise Sd2Error(
+                f"{title}: bins {', '.join(map(str, extra))} of the {one.kind} map were emptied",
+                "energy there, as in the sources before",
+                "Export with --null-bins that name them, or make the maps anew",
+            )
+    rate_hz = next(iter(source.maps.values())).timebase.frames_per_s
+    factor = rate_hz / header.frame_rate_hz
+    if len(source.times_s) > 1 and not 1 / MOST_RESAMPLED <= factor <= MOST_RESAMPLED:
+        raise Sd2Error(
+            f"{title} has {rate_hz:.4g} frames/s",
+            f"{header.frame_rate_hz:g} frames/s, or up to {MOST_RESAMPLED:g} times more or less",
+        )
+
+
+def entry_of(source: Source, header: Header, fingerprint: str) -> dict[str, Any]:
+    """What the line of a source says, but for its rows."""
+    range_m, azimuth_deg, elevation_deg = source.spherical
+    kinds = [kind for kind in header.kinds_wanted if kind in source.maps]
+    return {
+        "subject": source.subject,
+        "recording": source.recording,
+        "placement": source.placement,
+        "fingerprint": fingerprint,
+        "frames": len(source.times_s),
+        "frames_with_person": int(source.present.sum()),
+        "frame_rate_hz": round(next(iter(source.maps.values())).timebase.frames_per_s, 3),
+        "labels": list(source.labels),
+        "classes": dict(source.classes),
+        "units": {kind: source.maps[kind].unit for kind in kinds},
+        "sensor": asdict(source.sensor),
+        "seen_from": None
+        if source.target_m is None
+        else {"range_m": range_m, "azimuth_deg": azimuth_deg, "elevation_deg": elevation_deg},
+        "provenance": source.made_of(),
+    }
+
+
+def refuse_other_settings(out: Path, there: Header, options: DatasetOptions) -> None:
+    """Refuse to go on with a data set that was begun with other options."""
+    for what, before, now in (
+        ("segments of", there.length, options.length),
+        ("an overlap of", there.overlap, options.overlap),
+        ("kinds", list(there.kinds_wanted), list(options.kinds)),
+        ("frames/s", there.frame_rate_hz, options.frame_rate_hz),
+        ("null bins", there.null_bins, options.null_bins),
+        ("the label rule", there.label_rule, options.label_rule),
+        ("the least share", there.min_share, options.min_share),
+    ):
+        if now is not None and before != now:
+            raise Sd2Error(
+                f"{out} was begun with {what} {before}",
+                f"{now}, as it is asked for now",
+                "Go on with the same settings, or write another data set",
+            )
