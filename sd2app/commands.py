@@ -16,6 +16,7 @@ from sd2core.sensor import Vector, VirtualSensor, aimed_at
 
 if TYPE_CHECKING:
     from sd2core.fmcw.processing import Clutter
+    from sd2core.recording import Recording
 
 
 class Assign(QUndoCommand):
@@ -43,7 +44,7 @@ class Edits:
         self._document = document
         self._sensor = sensor
         self._before: Any = None
-        self._planned_before: tuple[Placements | None] | None = None
+        self._planned_before: tuple[Recording, Placements | None] | None = None
 
     # --- sensor ---------------------------------------------------------------------------
 
@@ -93,20 +94,18 @@ class Edits:
         recording = self._document.recording
         if recording is None:
             return
-        if self._planned_before is None:
-            self._planned_before = (recording.placements,)
+        if self._planned_before is None or self._planned_before[0] is not recording:
+            self._planned_before = (recording, recording.placements)
         self._document.set_placements(placements)
 
     def end_typing_placements(self) -> None:
         """It has been typed."""
         recording, before = self._document.recording, self._planned_before
         self._planned_before = None
-        if recording is not None and before is not None:
+        # Another recording may have been opened while somebody typed.
+        if recording is not None and before is not None and before[0] is recording:
             self._push(
-                "Plan placements",
-                self._document.set_placements,
-                before[0],
-                recording.placements,
+                "Plan placements", self._document.set_placements, before[1], recording.placements
             )
 
     # --- alignment of the real capture ----------------------------------------------------

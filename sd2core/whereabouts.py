@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.mesh import MeshSequence
-from sd2core.placements import Placements
 from sd2core.progress import Progress, silent
 from sd2core.sensor import RadarConfig, Vector, VirtualSensor
 
@@ -103,25 +102,6 @@ class Whereabouts:
                 velocity[row] = (vertices[1, ::stride] - points[row]) / passed_s
         x, y, z = middle.mean(axis=0).tolist()
         return cls((x, y, z), low, high, points, velocity)
-
-    def sensors(self, placements: Placements) -> tuple[VirtualSensor, ...]:
-        """A sensor per place, aimed at the body.
-
-        Raises
-        ------
-        Sd2Error
-            When one would stand in the body.
-        """
-        sensors = placements.sensors(self.target_m)
-        wrong = [number for number, one in enumerate(sensors) if self._holds(one)]
-        if wrong:
-            raise Sd2Error(
-                f"{len(wrong)} of {len(sensors)} placements stand in the body,"
-                f" such as {placements.places()[wrong[0]].words}",
-                "sensors outside the box around the body, at any time of the clip",
-                "Place them farther away",
-            )
-        return sensors
 
     def seen_by(self, sensors: Sequence[VirtualSensor], progress: Progress = silent) -> Sight:
         """What the body asks of sensors; a millisecond for each."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,6 +29,7 @@ from sd2core.errors import Sd2Error
 from sd2core.io.kinds import VIDEO_SUFFIXES
 from sd2core.placements import Placements, read_placements
 from sd2core.recording import is_recording, open_recording
+from sd2core.relative_paths import plain_path
 
 if TYPE_CHECKING:
     from sd2app.context import Context
@@ -64,7 +66,7 @@ class BatchDialogs:
         self._batch = context.batch
         self._report, self._open_paths = report, open_paths
         self._window: BatchWindow | None = None
-        self._opening: Result | None = None
+        self._opening: tuple[Result, set[Path]] | None = None
         context.document.opened.connect(self._place_sensor)
         context.document.failed.connect(lambda _: self._forget_result())
 
@@ -115,11 +117,11 @@ class BatchDialogs:
         placements, setup = self._context.placements.plan, self._batch.setup
         here = "As planned in the open recording"
         if placements is not None:
-            here += f" ({counted(len(placements.places()), 'placement')})"
+            here += f" ({_count_text(placements)})"
         chosen = setup.placements
         file = "Of a file…"
         if chosen is not None and setup.placed != _PLAN_HERE:
-            file = f"Of {setup.placed} ({counted(len(chosen.places()), 'placement')})"
+            file = f"Of {setup.placed} ({_count_text(chosen)})"
         return ("Where each recording has its own", here, file)
 
     def placement_index(self) -> int:
@@ -198,11 +200,16 @@ class BatchDialogs:
         found: list[list[Path]] = []
         self._attempt(lambda: found.append(paths_of(result)))
         if found and self._open_paths(found[0]):
-            self._opening = result
+            self._opening = (result, set(map(plain_path, found[0])))
 
     def _place_sensor(self) -> None:
-        if (result := self._opening) is not None:
-            self._opening = None
+        recording, opening = self._context.document.recording, self._opening
+        self._opening = None
+        if recording is None or opening is None:
+            return
+        result, paths = opening
+        # Something else may have been opened meanwhile.
+        if paths & {recording.folder, recording.video, recording.mesh}:
             self._context.edits.place_sensor(result.sensor, "Sensor to placement")
 
     def _forget_result(self) -> None:
@@ -294,6 +301,12 @@ def paths_of(result: Result) -> list[Path]:
         recording = open_recording(source)
         video = recording.video if recording.mesh is None else None
     return [source] if video is None else [video, Path(result.mesh)]
+
+
+@lru_cache(maxsize=8)
+def _count_text(placements: Placements) -> str:
+    # There may be ten thousand, and this is asked for whenever something changes.
+    return counted(len(placements.places()), "placement")
 
 
 def _meant(path: Path) -> Path:

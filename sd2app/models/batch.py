@@ -12,7 +12,7 @@ from sd2app.models.batch_estimate import COMMAND, BatchEstimateModel
 from sd2app.models.batch_follower import BatchFollower, output_of, plan_of
 from sd2app.models.batch_results import BatchResults
 from sd2app.models.batch_setup import BatchSetupModel
-from sd2app.models.training_command import quoted
+from sd2app.models.placement_words import counted
 from sd2app.settings import Settings
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.plan_file import write_plan
@@ -78,13 +78,6 @@ class BatchModel(QObject):
         if estimate.busy:
             return "Working out what it would do…"
         return estimate.problem
-
-    @property
-    def command(self) -> str:
-        """What goes on with the batch in view, or would start it, in a terminal."""
-        folder = self._follower.folder if self._follower is not None else None
-        plan = "PLAN.toml" if folder is None else str(folder.plan)
-        return quoted(["batch", plan, "--workers", str(self.setup.workers)])
 
     def set_watched(self, watched: bool) -> None:
         """Somebody looks at it, or no longer."""
@@ -181,6 +174,7 @@ class BatchModel(QObject):
             raise Sd2Error(
                 f"{self._command[0]} cannot be started", remedy="Look whether it is installed"
             )
+        self.estimate.forget()  # of what is about to be done
         self._follow(BatchFollower(out, self, pid=pid))
 
     # --- following ------------------------------------------------------------------------
@@ -223,5 +217,5 @@ class BatchModel(QObject):
             self.failed.emit(f"{name} did not come to its end. File → Batch… says more.")
         elif run.phase == "finished":
             failed = run.status.failed if run.status is not None else 0
-            but = f", but {failed:,} tasks could not be done" if failed else ""
+            but = f", but {counted(failed, 'task')} could not be done" if failed else ""
             self.noted.emit(f"{name} has come to its end{but}. File → Batch… opens results.")

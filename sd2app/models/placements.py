@@ -69,10 +69,13 @@ class PlacementsModel(QObject):
     -------
     changed
         Places, what is known of them, or their cost.
+    current_changed
+        The sensor is at another of them, or elsewhere.
     failed : str
     """
 
     changed = Signal()
+    current_changed = Signal()
     failed = Signal(str)
 
     def __init__(
@@ -98,7 +101,7 @@ class PlacementsModel(QObject):
         self._runner.failed.connect(self._fail)
         document.opened.connect(self._follow)
         document.changed.connect(self._follow)
-        sensor.changed.connect(self.changed)
+        sensor.changed.connect(self.current_changed)
         trade.plan_changed.connect(self.changed)
 
     # --- what is planned ------------------------------------------------------------------

@@ -99,6 +99,7 @@ class PlacementsPage(QWidget):
         layout.addWidget(self._planned)
         layout.addLayout(side_by_side(self._take, self._export, self._batch, spacing_px=6))
         layout.addStretch(1)
+        placements.current_changed.connect(self._show_current)
         for signal in (placements.changed, trade.changed, self._fields.changed):
             signal.connect(self._refresh)
         self._refresh()
@@ -178,7 +179,7 @@ class PlacementsPage(QWidget):
         self._scale.show_ranges([place.range_m for place in model.planned.places])
         self._limits.show_facts(limit_facts(model))
         _say(self._radar, limits_text(model))
-        self._current.setText(current_text(model))
+        self._show_current()
         with QSignalBlocker(self._shown):
             self._shown.setChecked(model.shown)
         cost, in_use = model.cost, self._trade.in_use
@@ -187,6 +188,10 @@ class PlacementsPage(QWidget):
         )
         known = cost is not None and in_use is not None
         _say(self._source, cost_source_text(cost, in_use) if known else "")  # type: ignore[arg-type]
+
+    def _show_current(self) -> None:
+        if self._model.plan is not None:
+            self._current.setText(current_text(self._model))
 
 
 class RangeScale(QWidget):

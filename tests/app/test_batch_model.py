@@ -261,7 +261,7 @@ def test_a_batch_runs_to_its_end_and_its_results_are_listed(qtbot, made, meshes)
         "ben.npz", "ben", "2", "1 m, azimuth 90°, elevation 0°", "synthetic, denoised",
     ]  # fmt: skip
     assert len(said) == 1
-    assert "1 tasks could not be done" in said[0]
+    assert "1 task could not be done" in said[0]
 
 
 def test_a_batch_outlives_the_model_and_is_found_again(qtbot, made, meshes):
@@ -335,10 +335,12 @@ def test_a_batch_that_is_refused_says_what_it_was_told(qtbot, made, meshes, tmp_
 
 
 def test_two_are_not_started_in_one_folder(qtbot, made, meshes, tmp_path):
-    model = made("--step-s", 0.4)
+    model = made("--step-s", 30)
     begin(qtbot, model, meshes)
     qtbot.waitUntil(lambda: model.batch.status is not None, timeout=20_000)
     model.select(None)
+    model.ask_estimate()
+    qtbot.waitUntil(lambda: not model.why_not_start, timeout=20_000)
     with pytest.raises(Sd2Error, match="A process is at work"):
         model.start()
     model.open_batch(meshes[0].parent / "ann batch")

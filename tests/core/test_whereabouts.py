@@ -37,10 +37,8 @@ def test_a_sensor_is_in_the_body_when_it_is_there_at_some_time():
     body = Whereabouts.of(cube_walking_right())
     # 0.6 m in front of where the cube passes, and 4.2 m beside the middle, in its way.
     in_front, in_its_way = PlacementGrid((0.6,)), PlacementGrid((4.2,), (90.0,))
-    assert not body.seen_by(body.sensors(in_front)).inside.any()
+    assert not body.seen_by(in_front.sensors(body.target_m)).inside.any()
     assert body.seen_by(in_its_way.sensors(body.target_m)).inside.all()
-    with pytest.raises(Sd2Error, match=r"1 of 1 placements .* 4\.2 m, azimuth 90"):
-        body.sensors(in_its_way)
 
 
 def test_radial_velocity_is_that_of_the_walk_seen_from_its_end_and_none_from_above():

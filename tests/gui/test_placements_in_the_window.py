@@ -92,6 +92,19 @@ def test_escape_takes_back_what_was_typed(window, page, qtbot):
     assert stack.count() == count
 
 
+def test_typing_that_ends_in_another_recording_is_no_step_there(
+    window, page, qtbot, recording_copy
+):
+    window.context.edits.plan_placements(GRID)
+    field = line(page, "Ranges, m")
+    write(field, "5")
+    with qtbot.waitSignal(window.context.document.opened, timeout=20_000):
+        window.open_paths([recording_copy])
+    field.clearFocus()
+    assert window.context.placements.plan is None
+    assert window.context.document.undo_stack.count() == 0
+
+
 def test_limits_and_cost_are_said(window, page, qtbot):
     window.context.edits.plan_placements(PlacementGrid((0.2, 2.0, 20.0)))
     settle(qtbot, window)

@@ -33,6 +33,8 @@ class Markers:
         look.SetAmbient(0.55)
         look.SetDiffuse(0.45)
         look.EdgeVisibilityOn()
+        # An eye at a place looks out of its marker.
+        look.BackfaceCullingOn()
         self.shape.show(False)
 
     def set_sensors(

@@ -108,4 +108,4 @@ def test_pyramids_point_where_their_sensors_look() -> None:
     corners = corners - positions[:, None, None]
     volume = np.linalg.det(corners).sum(axis=1) / 6
     edge = np.linalg.norm(each[0, 1] - each[0, 2])
-    np.testing.assert_allclose(np.abs(volume), edge**2 * 0.1 / 3, rtol=1e-4)
+    np.testing.assert_allclose(volume, edge**2 * 0.1 / 3, rtol=1e-4)
