@@ -24,7 +24,7 @@ def card_text(card: dict[str, Any]) -> str:
     parts = [
         f"# {title}",
         _summary(card),
-        "## What is simulated\n\n" + _simulated(card),
+        "## What is simulated, what is measured\n\n" + _simulated(card),
         "## Kinds of maps\n\n" + _table(("kind", "segments", "what 1 means", "what it is"), (
             (kind, f"{count:,}", "; ".join(card["units"].get(kind, [])) or "not stated",
              _WHAT[kind])

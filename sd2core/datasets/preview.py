@@ -214,7 +214,8 @@ def _cell(axes: Axes, header: Header, example: Example, kind: MapKind) -> Any:
                   ha="center", va="center")  # fmt: skip
     axes.set_xlim(0.0, length_s)
     axes.set_ylim(-limit, limit)
-    axes.set_yticks([-limit / 2, 0.0, limit / 2])
+    tick = round(limit / 2, 1)
+    axes.set_yticks([-tick, 0.0, tick], [f"−{tick:g}", "0", f"{tick:g}"])
     axes.set_xticks([0.0, round(length_s / 2, 1)])
     axes.tick_params(labelsize=6, length=2, pad=1.5, colors=_MUTED)
     for spine in axes.spines.values():
@@ -264,6 +265,7 @@ def _frame(
     said = (
         f"{segments:,} segments of {header.length} frames"
         f" ({header.length / header.frame_rate_hz:.1f} s). Coloured bars: frames with the label."
+        " Colours: dB relative to each segment's own strongest cell."
         + (" The radar is simulated." if header.simulated else "")
     )
     figure.text(0.3 / width, 1 - 0.46 / height, said, fontsize=7.5, color=_MUTED, va="top")
@@ -275,9 +277,7 @@ def _frame(
             ((width - 0.6) / width, 0.55 / height, 0.12 / width, (height - 1.9) / height)
         )
         scale = figure.colorbar(shown, cax=bar)
-        scale.set_label(
-            "dB relative to each segment's own strongest cell", fontsize=7, color=_MUTED
-        )
+        scale.set_label("dB", fontsize=7, color=_MUTED)
         scale.ax.tick_params(labelsize=6.5, colors=_MUTED)
         scale.outline.set_linewidth(0.4)
 

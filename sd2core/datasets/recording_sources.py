@@ -21,6 +21,7 @@ from sd2core.datasets.source import (
     Source,
     SourceKey,
     label_per_frame,
+    plain_name,
 )
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
 from sd2core.errors import Sd2Error
@@ -104,9 +105,13 @@ def labels_and_classes(labels: Labels) -> tuple[tuple[str, ...], dict[str, str]]
     """Names of all labels, background first, and what a classifier calls them."""
     known = [one.name for one in labels.label_set.labels]
     used = sorted({span.label for span in labels.spans} - {*known})
-    names = tuple(dict.fromkeys([BACKGROUND, *known, *used]))
-    classes = {one.name: one.gesture_class for one in labels.label_set.labels if one.gesture_class}
-    return names, classes
+    names = tuple(dict.fromkeys([BACKGROUND, *map(plain_name, [*known, *used])]))
+    classes = {
+        plain_name(one.name): plain_name(one.gesture_class)
+        for one in labels.label_set.labels
+        if one.gesture_class
+    }
+    return names, classes | {BACKGROUND: BACKGROUND}
 
 
 def radar_map(recording: Recording, axis: VelocityAxis) -> DopplerMap:

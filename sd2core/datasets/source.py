@@ -220,6 +220,11 @@ class LazySource:
     outline: Callable[[], Outline] | None = None
 
 
+def plain_name(label: str) -> str:
+    """The label, or :data:`BACKGROUND` where it is that in other letters (``Background``)."""
+    return BACKGROUND if label.casefold() == BACKGROUND else label
+
+
 def label_per_frame(
     spans: Any, labels: tuple[str, ...], times_s: NDArray[np.float64]
 ) -> NDArray[np.int16]:
@@ -235,7 +240,9 @@ def label_per_frame(
     """
     label = np.zeros(len(times_s), np.int16)
     for span in spans:
-        label[(times_s >= span.start_s) & (times_s < span.end_s)] = labels.index(span.label)
+        label[(times_s >= span.start_s) & (times_s < span.end_s)] = labels.index(
+            plain_name(span.label)
+        )
     return label
 
 

@@ -110,12 +110,14 @@ def write_dataset(
     lock = FileLock(work / LOCK_NAME)
     if not lock.take():
         raise Sd2Error(f"Somebody is writing to {out}", "a data set of its own", "Wait for that")
+    writer: _Writer | None = None
     try:
         writer = _Writer(out, work, form, options)
         written = writer.write(sources, progress)
     finally:
         lock.release()
-        if not is_dataset(work):
+        # A store without a segment would only be in the way of other settings.
+        if not is_dataset(work) or (writer is not None and writer.empty):
             shutil.rmtree(work, ignore_errors=True)
     if form != "zarr":
         shutil.rmtree(work, ignore_errors=True)
@@ -141,6 +143,11 @@ class _Writer:
                 refuse_other_settings(out, there.header, options)
         if self._store is not None:
             refuse_other_settings(out, self._store.header, options)
+
+    @property
+    def empty(self) -> bool:
+        """Whether there is a store, and no segment in it."""
+        return self._store is not None and self._store.rows == 0
 
     def write(self, sources: Iterable[Source | LazySource], progress: Progress) -> Written:
         try:

@@ -121,13 +121,14 @@ def test_suggestions_are_no_labels_and_classes_come_from_the_label_set(tmp_path:
             Span(1, "Gestures", 0.5, 1.0, "swing"),
             Span(2, "Gestures", 2.0, 2.5, "swing", origin="suggestion"),
             Span(3, "Gestures", 3.0, 3.5, "pause"),
+            Span(4, "Gestures", 3.6, 3.9, "Background"),
         ),
         SWINGS,
     )
     one.save()
     (source,) = made(one.folder, making=Making(kinds=("synthetic",)))
     assert source.labels == ("background", "swing", "pause")
-    assert source.classes == {"swing": "vertical"}
+    assert source.classes == {"swing": "vertical", "background": "background"}
     assert np.bincount(source.label).tolist() == [90, 15, 15]
 
 

@@ -301,6 +301,11 @@ def test_what_cannot_be_is_refused_in_words(
         write_dataset(tmp_path / "empty.zarr", [], OPTIONS)
     with pytest.raises(Sd2Error, match="No source has 24 frames"):
         write_dataset(tmp_path / "short.h5", [source(frames=20)], OPTIONS)
+    for ending in (".zarr", ".h5"):
+        with pytest.raises(Sd2Error, match="No source has 24 frames"):
+            write_dataset(tmp_path / f"tiny{ending}", [source(frames=20)], OPTIONS)
+        shorter = replace(OPTIONS, length=20)
+        assert write_dataset(tmp_path / f"tiny{ending}", [source(frames=20)], shorter).segments == 1
     with pytest.raises(Sd2Error, match=r"ending in \.zarr, \.h5"):
         write_dataset(tmp_path / "set.csv", several(), OPTIONS)
     (tmp_path / "mine.zarr").mkdir()
