@@ -6,10 +6,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtWidgets import QApplication, QFileDialog, QMessageBox, QWidget
+from PySide6.QtWidgets import QApplication, QFileDialog, QWidget
 
 from sd2app.dialogs.class_result import ClassResultDialog
 from sd2app.dialogs.model_card import ModelCardDialog
+from sd2app.dialogs.questions import may_delete
 from sd2app.models.class_result import read_result
 from sd2app.models.classify_words import classifier_page
 from sd2app.models.content import UNTITLED
@@ -124,16 +125,11 @@ class ClassifyDialogs:
         run = self._training.run
         if run is None:
             return
-        buttons = QMessageBox.StandardButton
-        answer = QMessageBox.question(
-            self._parent,
-            "Delete this?",
+        what = (
             f"{run.folder.path.name} is deleted with what it made. A classifier that was put to"
-            " use stays among your classifiers.",
-            buttons.Discard | buttons.Cancel,
-            buttons.Cancel,
+            " use stays among your classifiers."
         )
-        if answer == buttons.Discard:
+        if may_delete(self._parent, "Delete this run?", what):
             self._training.delete()
 
     def _show(self, path: Path) -> None:

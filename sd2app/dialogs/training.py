@@ -7,6 +7,7 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QApplication, QCheckBox, QFileDialog, QMessageBox, QWidget
 
+from sd2app.dialogs.questions import may_delete
 from sd2app.models.training import TrainingModel
 from sd2app.models.training_use import TrainingUse
 from sd2core.errors import Sd2Error
@@ -66,16 +67,11 @@ class TrainingDialogs:
         run = self._training.run
         if run is None:
             return
-        buttons = QMessageBox.StandardButton
-        answer = QMessageBox.question(
-            self._parent,
-            "Delete this run?",
+        what = (
             f"{run.folder.path.name} is deleted with its best model and its curves. A model that"
-            " was put to use stays among your models.",
-            buttons.Discard | buttons.Cancel,
-            buttons.Cancel,
+            " was put to use stays among your models."
         )
-        if answer == buttons.Discard:
+        if may_delete(self._parent, "Delete this run?", what):
             self._training.delete()
 
     def may_leave(self) -> bool:

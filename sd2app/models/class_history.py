@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
+from sd2app.models.event_lines import take_lines
+
 _MOST_POINTS = 1000
 """Beyond that, every second loss is forgotten: no screen shows more."""
 
@@ -63,17 +65,7 @@ class ClassHistory:
 
     def take(self, events: Iterable[dict[str, Any]]) -> bool:
         """Take lines; whether any of them was of use."""
-        taken = False
-        for event in events:
-            reader = _READERS.get(str(event.get("event")))
-            if reader is None:
-                continue
-            try:
-                reader(self, event)
-            except (KeyError, TypeError, ValueError, OverflowError):
-                continue
-            taken = True
-        return taken
+        return take_lines(self, _READERS, events)
 
     def _start(self, event: dict[str, Any]) -> None:
         self.total, self.clips = int(event["steps"]), int(event.get("clips", 0))

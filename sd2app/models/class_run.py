@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QObject, Signal
 
 from sd2app.jobs.command_folder import CommandFolder
 from sd2app.jobs.detached import is_alive
-from sd2app.jobs.latest import LatestRunner
+from sd2app.jobs.repeated_look import RepeatedLook
 from sd2app.models.class_history import ClassHistory
 
 Phase = Literal[
@@ -19,6 +19,8 @@ Phase = Literal[
 UNDER_WAY: tuple[Phase, ...] = ("starting", "running", "stopping", "cancelling")
 
 POLL_MS = 250
+SLOW_POLL_MS = 2000
+"""Of a run that has ended; somebody may delete it."""
 MODEL_NAME = "classifier.safetensors"
 TABLE_NAME = "table"
 _INTERRUPTED = 130
@@ -69,13 +71,8 @@ class ClassRun(QObject):
         self._cancelled = self._stopped = False
         self._text = ""
         self._has_result = False
-        self._runner = LatestRunner("class run", self)
-        self._runner.finished.connect(self._take)
-        self._timer = QTimer(self)
-        self._timer.setInterval(POLL_MS)
-        self._timer.timeout.connect(self.look)
-        self._timer.start()
-        self.look()
+        self._looking = RepeatedLook("class run", self._look, POLL_MS, self)
+        self._looking.found.connect(self._take)
 
     # --- what is known --------------------------------------------------------------------
 
@@ -137,15 +134,9 @@ class ClassRun(QObject):
 
     def close(self) -> None:
         """Look no more; the process goes on."""
-        self._timer.stop()
-        self._runner.close()
+        self._looking.close()
 
     # --- looking --------------------------------------------------------------------------
-
-    def look(self) -> None:
-        """Look at the folder, in the background."""
-        if not self._runner.busy:
-            self._runner.submit(lambda emit: self._look())
 
     def _look(self) -> _Look:
         folder = self.folder
@@ -168,7 +159,7 @@ class ClassRun(QObject):
         another = before != self._phase or not self._known or look.has_result != self._has_result
         self._known, self._has_result = True, look.has_result
         if self._phase not in UNDER_WAY:
-            self._timer.stop()
+            self._looking.set_interval(SLOW_POLL_MS)
             self._text = _reason(look) if self._phase in ("failed", "died") else ""
         if told or another:
             self.changed.emit()

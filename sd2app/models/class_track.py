@@ -224,19 +224,27 @@ class ClassTrack(QObject):
         self._take(source.map, known_frames(source.map, source.covered))
         if self._again:
             return
-        if self._done.size <= AT_ONCE:
+        if np.count_nonzero(self._known & ~self._done) <= AT_ONCE:
+            self._calm.stop()
             self._go_on()
         elif not self._calm.isActive():
             self._calm.start()
 
     def _take(self, doppler: DopplerMap, known: NDArray[np.bool_]) -> None:
         """Copied: the values go on changing while they are looked at."""
-        first = self._first_difference(doppler, known)
         assert self._card is not None
-        if self._given is None or len(self._done) != len(known):
+        before = self._given
+        if before is None or not np.array_equal(before.times_s, doppler.times_s):
             self._shares = np.full((len(known), len(self._card.classes)), np.nan, np.float32)
             self._done = np.zeros(len(known), bool)
-        self._given, self._known = replace(doppler, values=doppler.values.copy()), known.copy()
+            first, values = 0, doppler.values.copy()
+        else:
+            # Of a long map little is known while it grows frame by frame: no more is looked at.
+            numbers = np.flatnonzero(known | self._known)
+            start, stop = (int(numbers[0]), int(numbers[-1]) + 1) if numbers.size else (0, 0)
+            differs = self._differs(before, doppler, known, slice(start, stop))
+            first = start + int(differs.argmax()) if differs.any() else len(known)
+            values = before.values
         self._problem = ""
         self._done[first:] = False
         # What is under way is still right where the map only grew behind it.
@@ -247,21 +255,25 @@ class ClassTrack(QObject):
             self._going = None
         if self._going is not None and self._going.next > first:
             self._going = None
+        if before is not None and values is before.values:
+            # What is read meanwhile is before it, or of no interest any more.
+            values[:, first:stop] = doppler.values[:, first:stop]
+        self._given, self._known = replace(doppler, values=values), known.copy()
         if doppler.present is not None:
             nobody = known & ~doppler.present
             self._shares[nobody] = _of_nobody(self._card)
             self._done[nobody] = True
         self.changed.emit()
 
-    def _first_difference(self, doppler: DopplerMap, known: NDArray[np.bool_]) -> int:
-        """The first frame that is another than before."""
-        before = self._given
-        if before is None or not np.array_equal(before.times_s, doppler.times_s):
-            return 0
-        differs = (before.values != doppler.values).any(axis=0) | (self._known != known)
+    def _differs(
+        self, before: DopplerMap, doppler: DopplerMap, known: NDArray[np.bool_], part: slice
+    ) -> NDArray[np.bool_]:
+        """Which frames of a part are others than before."""
+        differs = (before.values[:, part] != doppler.values[:, part]).any(axis=0)
+        differs |= self._known[part] != known[part]
         if before.present is not None or doppler.present is not None:
-            differs |= _present(before) != _present(doppler)
-        return int(differs.argmax()) if differs.any() else len(known)
+            differs |= _present(before)[part] != _present(doppler)[part]
+        return np.asarray(differs)
 
     # --- classifying ----------------------------------------------------------------------
 
@@ -269,18 +281,18 @@ class ClassTrack(QObject):
         doppler, classifier, card = self._given, self._classifier, self._card
         if doppler is None or classifier is None or card is None:
             return
-        known, done, going = self._known, self._done.copy(), self._going
-        there = replace(doppler, present=_present(doppler) & known)
-        rate_hz = card.frame_rate_hz
-        wanted = [
-            piece for piece in stretches(there, rate_hz) if not done[piece[0] : piece[1]].all()
-        ]
-        if not wanted:
+        waiting = self._known & ~self._done
+        numbers = np.flatnonzero(waiting)
+        if not numbers.size:
             return
-        self._until = wanted[-1][1]
+        self._until = int(numbers[-1]) + 1
+        known, going, rate_hz = self._known, self._going, card.frame_rate_hz
 
         def work(emit: Emit) -> None:
-            for start, stop in wanted:
+            there = replace(doppler, present=_present(doppler) & known)
+            for start, stop in stretches(there, rate_hz):
+                if not waiting[start:stop].any():
+                    continue
                 if is_regular(doppler.times_s[start:stop], rate_hz):
                     _in_order(classifier, doppler, (start, stop), going, emit)
                 else:

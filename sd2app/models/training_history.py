@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
+from sd2app.models.event_lines import take_lines
 from sd2core.errors import Sd2Error
 
 Outcome = Literal["finished", "stopped", "cancelled", "failed"]
@@ -113,17 +114,7 @@ class TrainingHistory:
 
     def take(self, events: Iterable[dict[str, Any]]) -> bool:
         """Take lines; whether any of them was of use."""
-        taken = False
-        for event in events:
-            reader = _READERS.get(str(event.get("event")))
-            if reader is None:
-                continue
-            try:
-                reader(self, event)
-            except (KeyError, TypeError, ValueError, OverflowError):
-                continue
-            taken = True
-        return taken
+        return take_lines(self, _READERS, events)
 
     def _start(self, event: dict[str, Any]) -> None:
         steps_per_epoch, epochs = _count(event["steps_per_epoch"], 1), _count(event.get("epochs"))

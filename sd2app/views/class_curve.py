@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPen, QPolygonF
+from PySide6.QtCore import QPointF, Qt
+from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPen, QPolygonF
 from PySide6.QtWidgets import QWidget
 
 from sd2app.models.class_history import CheckPoint, ClassHistory
 from sd2app.models.class_training import ClassTraining
 from sd2app.models.display import DisplayModel
-from sd2app.views.point_plot import PointPlot
+from sd2app.views.stepped_plot import SteppedPlot
 from sd2app.views.time_axis import ticks
 
 
-class ClassCurve(PointPlot):
+class ClassCurve(SteppedPlot):
     """Recall in per cent and, faint, the loss as a share of the first one, over the steps.
 
-    Hovering says what a look came to; with the keyboard Left and Right go from one to the
-    next.
+    Hovering says what a look came to, as the keyboard does.
     """
 
     MARGINS_PX = (40, 24, 10, 36)
     HEIGHTS_PX = (140, 168, 260)
-    KEYS = frozenset({Qt.Key.Key_Left, Qt.Key.Key_Right, Qt.Key.Key_Home, Qt.Key.Key_End})
 
     def __init__(
         self, training: ClassTraining, display: DisplayModel, parent: QWidget | None = None
@@ -73,7 +71,9 @@ class ClassCurve(PointPlot):
             [(self.place_of(0.0, share / 100).y(), f"{share}") for share in (0, 25, 50, 75, 100)],
             "steps",
         )
-        self._paint_legend(painter)
+        self.paint_legend(
+            painter, "%", [("loss", colours.synthetic), ("recall, validation", colours.real)]
+        )
         if history.losses:
             first = max(history.losses[0].loss, 1e-9)
             faint = QColor(colours.synthetic)
@@ -93,20 +93,6 @@ class ClassCurve(PointPlot):
                 painter.setPen(QPen(QColor(colour), 1.5))
                 painter.drawEllipse(self.place_of(point.step, point.recall), 5.0, 5.0)
 
-    def _paint_legend(self, painter: QPainter) -> None:
-        colours, metrics = self._display.palette, painter.fontMetrics()
-        painter.setPen(QColor(colours.muted))
-        painter.drawText(QRectF(4, 0, 60, 20), Qt.AlignmentFlag.AlignVCenter, "%")
-        x = self.plot_rect().right()
-        for text, colour in (("recall, validation", colours.real), ("loss", colours.synthetic)):
-            width = metrics.horizontalAdvance(text)
-            x -= width
-            painter.setPen(QColor(colours.muted))
-            painter.drawText(QRectF(x, 0, width + 2, 20), Qt.AlignmentFlag.AlignVCenter, text)
-            painter.setPen(QPen(QColor(colour), 2))
-            painter.drawLine(QPointF(x - 18, 10), QPointF(x - 5, 10))
-            x -= 30
-
     # --- pointing -------------------------------------------------------------------------
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
@@ -116,20 +102,4 @@ class ClassCurve(PointPlot):
             points, key=lambda one: abs(self.place_of(one.step, 0.0).x() - x), default=None
         )
         self.point_at(nearest if self.plot_rect().contains(event.position()) else None)
-        self.explain()
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Go from look to look."""
-        points, key = self.points(), event.key()
-        if not points or key not in self.KEYS:
-            super().keyPressEvent(event)
-            return
-        at = points.index(self.pointed) if self.pointed in points else len(points) - 1
-        at = {
-            Qt.Key.Key_Home: 0,
-            Qt.Key.Key_End: len(points) - 1,
-            Qt.Key.Key_Left: max(at - 1, 0),
-            Qt.Key.Key_Right: min(at + 1, len(points) - 1),
-        }[Qt.Key(key)]
-        self.point_at(points[at])
         self.explain()

@@ -4,28 +4,27 @@ from __future__ import annotations
 
 import math
 
-from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPen, QPolygonF
+from PySide6.QtCore import QPointF, Qt
+from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPen, QPolygonF
 from PySide6.QtWidgets import QWidget
 
 from sd2app.models.class_result import ClassResult, CurvePoint
 from sd2app.models.display import DisplayModel
-from sd2app.views.point_plot import PointPlot
+from sd2app.views.stepped_plot import SteppedPlot
 from sd2app.views.time_axis import ticks
 
 _PAD = 1.15
 _NEAR_PX = 14.0
 
 
-class LearningCurve(PointPlot):
+class LearningCurve(SteppedPlot):
     """Mean recall with bars of one standard deviation over the share of real data.
 
-    Hovering reads a point; with the keyboard Left and Right go from one to the next.
+    Hovering reads a point, as the keyboard does.
     """
 
     MARGINS_PX = (44, 26, 12, 38)
     HEIGHTS_PX = (180, 240, 420)
-    KEYS = frozenset({Qt.Key.Key_Left, Qt.Key.Key_Right, Qt.Key.Key_Home, Qt.Key.Key_End})
 
     def __init__(
         self, result: ClassResult, display: DisplayModel, parent: QWidget | None = None
@@ -81,20 +80,9 @@ class LearningCurve(PointPlot):
             [(self.place_of(1.0, value / 100).y(), f"{value:g}") for value in upwards],
             f"share of the {self._kind} radar's data that is learnt from",
         )
-        x = self.plot_rect().right()
-        metrics = painter.fontMetrics()
-        for curve, colour in reversed(list(zip(self._curves, self._colours(), strict=False))):
-            width = metrics.horizontalAdvance(curve[0].title)
-            x -= width
-            painter.setPen(QColor(self._display.palette.muted))
-            painter.drawText(
-                QRectF(x, 0, width + 2, 20), Qt.AlignmentFlag.AlignVCenter, curve[0].title
-            )
-            painter.setPen(QPen(QColor(colour), 2))
-            painter.drawLine(QPointF(x - 18, 10), QPointF(x - 5, 10))
-            x -= 32
-        painter.setPen(QColor(self._display.palette.muted))
-        painter.drawText(QRectF(4, 0, 120, 20), Qt.AlignmentFlag.AlignVCenter, "mean recall, %")
+        titles = [curve[0].title for curve in self._curves]
+        names = list(zip(titles, self._colours(), strict=False))
+        self.paint_legend(painter, "mean recall, %", names)
         for curve, colour in zip(self._curves, self._colours(), strict=False):
             self._paint_curve(painter, curve, QColor(colour))
         if self.pointed is not None:
@@ -130,20 +118,4 @@ class LearningCurve(PointPlot):
 
         nearest = min(self.points(), key=far)
         self.point_at(nearest if far(nearest) <= _NEAR_PX else None)
-        self.explain()
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Go from point to point."""
-        points, key = self.points(), event.key()
-        if key not in self.KEYS:
-            super().keyPressEvent(event)
-            return
-        at = points.index(self.pointed) if self.pointed in points else 0
-        at = {
-            Qt.Key.Key_Home: 0,
-            Qt.Key.Key_End: len(points) - 1,
-            Qt.Key.Key_Left: max(at - 1, 0),
-            Qt.Key.Key_Right: min(at + 1, len(points) - 1),
-        }[Qt.Key(key)]
-        self.point_at(points[at])
         self.explain()

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from PySide6.QtCore import QEvent, QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPen, QPolygonF
+from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPen, QPolygonF
 from PySide6.QtWidgets import QWidget
 
 from sd2app.models.display import DisplayModel
@@ -14,13 +14,12 @@ from sd2app.models.training import TrainingModel
 from sd2app.models.training_history import EpochPoint, TrainingHistory
 from sd2app.models.training_words import point_text
 from sd2app.views.log_axis import LogAxis, tick_text
-from sd2app.views.point_plot import PointPlot
+from sd2app.views.stepped_plot import SteppedPlot
 from sd2app.views.time_axis import ticks
 
 _PAD = 1.12
 _LEAST_RATIO = 1.6
 _ROUND = ((1,), (1, 3), (1, 2, 5), (1, 2, 3, 5, 7), (1, 1.5, 2, 3, 4, 5, 6, 8))
-_STEPS = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
 
 
 @dataclass(frozen=True)
@@ -38,16 +37,14 @@ class _Scale:
         return QPointF(self.x_of(epoch), self.errors.px(rmse))
 
 
-class TrainingCurves(PointPlot):
+class TrainingCurves(SteppedPlot):
     """Training and validation, the best epoch marked.
 
-    Hovering says what an epoch came to; with the keyboard Left and Right go from epoch
-    to epoch, Home and End to the first and the last, Escape gives the keyboard back.
+    Hovering says what an epoch came to, as the keyboard does.
     """
 
     MARGINS_PX = (48, 24, 10, 36)
     HEIGHTS_PX = (160, 176, 280)
-    KEYS = frozenset({Qt.Key.Key_Home, Qt.Key.Key_End, Qt.Key.Key_Escape, *_STEPS})
 
     def __init__(
         self, training: TrainingModel, display: DisplayModel, parent: QWidget | None = None
@@ -128,7 +125,9 @@ class TrainingCurves(PointPlot):
         colours, plot, history = self._display.palette, self.plot_rect(), self._history
         scale = self._scale()
         self._paint_axes(painter, plot, scale)
-        self._paint_legend(painter, plot)
+        self.paint_legend(
+            painter, "RMSE", [("training", colours.synthetic), ("validation", colours.real)]
+        )
         painter.save()
         painter.setClipRect(plot.adjusted(-6, -6, 6, 6))
         faint = QColor(colours.synthetic)
@@ -157,20 +156,6 @@ class TrainingCurves(PointPlot):
             [(scale.errors.px(value), tick_text(value)) for value in errors],
             "epochs",
         )
-
-    def _paint_legend(self, painter: QPainter, plot: QRectF) -> None:
-        colours, metrics = self._display.palette, painter.fontMetrics()
-        painter.setPen(QColor(colours.muted))
-        painter.drawText(QRectF(4, 0, 60, 20), Qt.AlignmentFlag.AlignVCenter, "RMSE")
-        x = plot.right()
-        for text, colour in (("validation", colours.real), ("training", colours.synthetic)):
-            width = metrics.horizontalAdvance(text)
-            x -= width
-            painter.setPen(QColor(colours.muted))
-            painter.drawText(QRectF(x, 0, width + 2, 20), Qt.AlignmentFlag.AlignVCenter, text)
-            painter.setPen(QPen(QColor(colour), 2))
-            painter.drawLine(QPointF(x - 18, 10), QPointF(x - 5, 10))
-            x -= 30
 
     def _paint_line(
         self, painter: QPainter, points: list[tuple[float, float]], pen: QPen, scale: _Scale
@@ -213,25 +198,6 @@ class TrainingCurves(PointPlot):
         super().leaveEvent(event)
         if not self.hasFocus():
             self.point_at(None)
-
-    # --- keyboard -------------------------------------------------------------------------
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Go from epoch to epoch."""
-        points, key = self.points(), event.key()
-        if not points or key not in self.KEYS:
-            super().keyPressEvent(event)
-        elif key == Qt.Key.Key_Escape:
-            self.clearFocus()
-        else:
-            here = self.pointed or self._history.best or points[-1]
-            at = points.index(here)
-            if key in (Qt.Key.Key_Home, Qt.Key.Key_End):
-                at = 0 if key == Qt.Key.Key_Home else len(points) - 1
-            elif self.pointed is not None:
-                at = min(max(at + _STEPS[Qt.Key(key)], 0), len(points) - 1)
-            self.point_at(points[at])
-            self.explain()
 
 
 def error_ticks(axis: LogAxis, most: int) -> list[float]:

@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Protocol
 
-from PySide6.QtCore import QSignalBlocker
 from PySide6.QtGui import QHideEvent, QShowEvent
-from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from sd2app.models.display import DisplayModel
 from sd2app.models.training import TrainingModel
 from sd2app.models.training_use import TrainingUse
-from sd2app.views.inputs import Choice
 from sd2app.views.panel_parts import outlined
+from sd2app.views.run_choice import RunChoice
 from sd2app.views.training_gain_view import TrainingGainView
 from sd2app.views.training_run_view import TrainingRunView
 from sd2app.views.training_setup_view import TrainingSetupView
 
-_NEW = "New training"
-_OPEN = "Open a run…"
 _TIP = "Runs: those under way, and those that have ended"
 
 
@@ -65,14 +61,10 @@ class TrainingPanel(QWidget):
         super().__init__(parent)
         self.setObjectName("page")
         self._training = training
-        self._asks = asks
-        self._paths: list[Path | None] = []
         layout = QVBoxLayout(self)
         layout.setContentsMargins(8, 6, 8, 6)
         layout.setSpacing(8)
-        self._runs = Choice(_TIP, self)
-        self._runs.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
-        self._runs.activated.connect(self._choose)
+        self._runs = RunChoice(_TIP, training.select, asks.open_run, self)
         self._new = outlined("New", "Set up another training", lambda: training.select(None), self)
         row = QHBoxLayout()
         row.setSpacing(6)
@@ -94,13 +86,6 @@ class TrainingPanel(QWidget):
         self._use = use
         self._refresh()
 
-    def _choose(self, index: int) -> None:
-        if index < len(self._paths):
-            self._training.select(self._paths[index])
-        else:
-            self._asks.open_run()
-            self._list_runs()
-
     def showEvent(self, event: QShowEvent) -> None:
         """Look again at what lies on disk, and time a step where that is not known."""
         super().showEvent(event)
@@ -119,23 +104,7 @@ class TrainingPanel(QWidget):
         in_use = run is not None and self._use.run == run.folder.path
         self._gain.setVisible(in_use)
         self._run.set_in_use(in_use)
-        self._list_runs()
-
-    def _list_runs(self) -> None:
-        runs, run = self._training.library.runs, self._training.run
-        here = run.folder.path if run is not None else None
-        paths: list[Path | None] = [None, *(known.path for known in runs)]
-        texts = [_NEW, *(known.title for known in runs)]
-        if here not in paths:
-            # Just begun: it is not in the list yet.
-            paths.insert(1, here)
-            texts.insert(1, here.name if here is not None else _NEW)
-        self._runs.setToolTip(str(here) if here is not None else _TIP)
-        texts.append(_OPEN)
-        if texts != [self._runs.itemText(index) for index in range(self._runs.count())]:
-            with QSignalBlocker(self._runs):
-                self._runs.clear()
-                self._runs.addItems(texts)
-        self._paths = paths
-        with QSignalBlocker(self._runs):
-            self._runs.setCurrentIndex(paths.index(here))
+        self._runs.show_runs(
+            [(known.path, known.title) for known in self._training.library.runs],
+            run.folder.path if run is not None else None,
+        )
