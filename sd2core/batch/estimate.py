@@ -104,7 +104,7 @@ class BatchEstimate:
 
 
 @dataclass(frozen=True)
-class _Rate:
+class TaskRate:
     """Seconds and bytes of a task: so many, and so many per frame."""
 
     seconds: float
@@ -253,15 +253,15 @@ def _time(
         rate = rates.get("fit", _FIT_S_PER_FRAME)
         assert plan.fit is not None
         each = _MESH_BYTES_PER_FRAME[plan.fit.resolution]
-        _Rate(1.0, rate, 0.0, each).apply(steps["fit"], steps["fit"].frames, steps["fit"].to_do)
+        TaskRate(1.0, rate, 0.0, each).apply(steps["fit"], steps["fit"].frames, steps["fit"].to_do)
         steps["fit"].basis = "as in earlier batches" if "fit" in rates else "assumed"
     if plan.synthesise is None:
         return
-    timed = [_timed(flow, one) for one in _sample(found)]
+    timed = [task_rates(flow, one) for one in _sample(found)]
     for step in ("synthesise", "denoise"):
         here = [one[step] for one in timed if step in one]
         if step in steps and here and steps[step].to_do:
-            mean = _Rate(*np.mean([list(asdict(one).values()) for one in here], axis=0).tolist())
+            mean = TaskRate(*np.mean([list(asdict(one).values()) for one in here], axis=0).tolist())
             mean.apply(steps[step], steps[step].frames, steps[step].to_do)
             steps[step].basis = f"measured on {len(here)} of the meshes"
         elif step in steps:
@@ -276,7 +276,7 @@ def _sample(found: Sequence[Inspection]) -> list[Inspection]:
     return usable[middle : middle + _TIMED_MESHES]
 
 
-def _timed(flow: Flow, found: Inspection) -> dict[str, _Rate]:
+def task_rates(flow: Flow, found: Inspection) -> dict[str, TaskRate]:
     """What a map of this mesh costs, by doing it for a few frames."""
     from sd2core.batch.denoising import denoise
     from sd2core.batch.synthesis import synthesise
@@ -290,7 +290,7 @@ def _timed(flow: Flow, found: Inspection) -> dict[str, _Rate]:
     long = min(_LONG_FRAMES, mesh.frames)
     short = max(1, min(_SHORT_FRAMES, long // 2))
     middle = (mesh.frames - long) // 2
-    rates: dict[str, _Rate] = {}
+    rates: dict[str, TaskRate] = {}
     with tempfile.TemporaryDirectory(prefix="sd2-batch-") as name:
         folder = Path(name)
         chosen = folder / "plan.json" if told.tolerance is not None else None
@@ -307,7 +307,7 @@ def _timed(flow: Flow, found: Inspection) -> dict[str, _Rate]:
         if chosen is not None:
             known = rates["synthesise"]
             extra_s = max(choosing_s - fresh_s, 0.0)
-            rates["synthesise"] = _Rate(
+            rates["synthesise"] = TaskRate(
                 known.seconds + extra_s, known.frame_s, known.bytes, known.frame_bytes
             )
         if plan.denoise is not None:
@@ -322,13 +322,13 @@ def _timed(flow: Flow, found: Inspection) -> dict[str, _Rate]:
     return rates
 
 
-def _rate(work: Callable[[int], None], outs: dict[int, Path], long: int, short: int) -> _Rate:
+def _rate(work: Callable[[int], None], outs: dict[int, Path], long: int, short: int) -> TaskRate:
     """From the same done to many frames and to few."""
     seconds = {count: min(_seconds(lambda: work(count)) for _ in range(2)) for count in outs}  # noqa: B023
     sizes = {count: outs[count].stat().st_size for count in outs}
     per_frame_s, fixed_s = _line(seconds, long, short)
     per_frame, fixed = _line(sizes, long, short)
-    return _Rate(fixed_s, per_frame_s, fixed, per_frame)
+    return TaskRate(fixed_s, per_frame_s, fixed, per_frame)
 
 
 def _line(values: dict[int, Any], long: int, short: int) -> tuple[float, float]:
