@@ -15,8 +15,13 @@ from sd2core.batch.tasks import Task, TaskFailed, killed_in
 from sd2core.errors import Sd2Error
 
 AHEAD = 4
-"""Tasks that each process is given before it has done the first: it never waits for the next,
-and a million tasks do not wait in the scheduler."""
+"""Bundles that each process is given before it has done the first: it never waits for the
+next, and a million tasks do not wait in the scheduler."""
+
+_BUNDLE_S = 1.0
+_LARGEST_BUNDLE = 32
+"""Tasks of one recording that take little are given out together, for about a second: to give
+out anything takes some milliseconds."""
 
 _POLL_S = 0.2
 _MOST_RETURNS = 20
@@ -146,19 +151,37 @@ class Driver:
             if not free:
                 self._again.appendleft(task)
                 return
-            self._submit(task, free)
+            self._submit(self._bundle(task), free)
+
+    def _bundle(self, first: Task) -> tuple[Task, ...]:
+        """A task and those after it that are like it."""
+        bundle, most = [first], self._most_in_bundle(first)
+        # Until they are given out others may turn out to be the same.
+        self.running[first.key] = _Running("", 0.0)
+        while len(bundle) < most and (task := self._next()) is not None:
+            alike = (task.step, task.group) == (first.step, first.group)
+            if not alike or self._returns[task.key]:
+                self._again.appendleft(task)
+                break
+            bundle.append(task)
+            self.running[task.key] = _Running("", 0.0)
+        return tuple(bundle)
+
+    def _most_in_bundle(self, task: Task) -> int:
+        done = self.tally.done[task.step]
+        # One that was lost goes alone.
+        if not done or self._returns[task.key]:
+            return 1
+        each_s = max(self.tally.seconds[task.step] / done, 1e-3)
+        return min(max(int(_BUNDLE_S / each_s), 1), _LARGEST_BUNDLE)
 
     def _next(self) -> Task | None:
         """The next task that is to be done; what is there already is passed over."""
         while True:
-            if self._again:
-                return self._again.popleft()
-            if not self._sources:
-                return None
-            task = next(self._sources[-1], None)
+            task = self._again.popleft() if self._again else self._of_sources()
             if task is None:
-                self._sources.pop()
-            elif task.key in self.running:
+                return None
+            if task.key in self.running:
                 # Of two recordings with the same content: it goes on when that is there.
                 self.running[task.key].others.append(task)
             elif self._flow.is_done(task):
@@ -169,6 +192,15 @@ class Driver:
             else:
                 return task
 
+    def _of_sources(self) -> Task | None:
+        """The next one of the newest source that has one."""
+        while self._sources:
+            task = next(self._sources[-1], None)
+            if task is not None:
+                return task
+            self._sources.pop()
+        return None
+
     def _free(self) -> dict[str, int]:
         """Processes that have room, and for how many tasks."""
         if self._pool is None:
@@ -177,46 +209,54 @@ class Driver:
         free = {one: AHEAD * threads - self._load[one] for one, threads in workers.items()}
         return {one: room for one, room in free.items() if room > 0}
 
-    def _submit(self, task: Task, free: dict[str, int]) -> None:
+    def _submit(self, bundle: tuple[Task, ...], free: dict[str, int]) -> None:
         """To who has worked on the same recording, else to who has most room."""
-        homes = self._homes.setdefault(task.group, set())
-        self._homes.move_to_end(task.group)
+        group = bundle[0].group
+        homes = self._homes.setdefault(group, set())
+        self._homes.move_to_end(group)
         if len(self._homes) > _HOMES:
             self._homes.popitem(last=False)
         known = [one for one in homes if one in free]
         worker = max(known or free, key=lambda one: free[one])
         homes.add(worker)
         self._load[worker] += 1
-        self.running[task.key] = _Running(worker, time.monotonic())
+        for task in bundle:
+            running = self.running[task.key]
+            running.worker, running.since_s = worker, time.monotonic()
         assert self._pool is not None
-        self._pool.submit(task, worker)
+        self._pool.submit(bundle, worker)
 
     def _take(self, ending: Ending) -> None:
-        task = ending.task
-        running = self.running.pop(task.key)
-        self._load[running.worker] -= 1
+        tasks = ending.tasks
+        running = [self.running.pop(task.key) for task in tasks]
+        worker = running[0].worker
+        self._load[worker] -= 1
         now_s = time.monotonic()
-        if ending.outcome == "done":
-            begun_s = max(self._ended_s.get(running.worker, 0.0), running.since_s)
-            self._ended_s[running.worker] = now_s
-            if self._go_on(task):
-                self.tally.done[task.step] += 1
-                self.tally.seconds[task.step] += now_s - begun_s
-                self.tally.frames[task.step] += task.frames
-                self.last = task
-            for other in running.others:
-                if self._go_on(other):
-                    self.tally.there[task.step] += 1
-        elif ending.outcome == "failed":
-            assert ending.failure is not None
-            if ending.failure.fatal:
-                raise Sd2Error(**ending.failure.error)
-            self._fail(task, ending.failure)
-            for other in running.others:
-                self._fail(other, ending.failure)
-        else:
-            self._return(task)
-            self._again.extend(running.others)
+        begun_s = max(self._ended_s.get(worker, 0.0), running[0].since_s)
+        each_s = (now_s - begun_s) / len(tasks)
+        self._ended_s[worker] = now_s
+        failures = ending.failures or (None,) * len(tasks)
+        for task, own, failure in zip(tasks, running, failures, strict=True):
+            if ending.killed and not self._flow.is_done(task):
+                self._return(task)
+                self._again.extend(own.others)
+            elif failure is None:
+                self._done(task, each_s)
+                for other in own.others:
+                    if self._go_on(other):
+                        self.tally.there[task.step] += 1
+            elif failure.fatal:
+                raise Sd2Error(**failure.error)
+            else:
+                for one in (task, *own.others):
+                    self._fail(one, failure)
+
+    def _done(self, task: Task, seconds: float) -> None:
+        if self._go_on(task):
+            self.tally.done[task.step] += 1
+            self.tally.seconds[task.step] += seconds
+            self.tally.frames[task.step] += task.frames
+            self.last = task
 
     def _return(self, task: Task) -> None:
         """A process is gone: its task is done again, unless it is what ends them."""

@@ -113,6 +113,7 @@ class TaskRate:
     frame_bytes: float
 
     def apply(self, step: StepEstimate, frames: int, tasks: int) -> None:
+        """Add so many tasks, which work on so many frames altogether, to a step."""
         step.seconds += tasks * (self.seconds + _TASK_S) + frames * self.frame_s
         step.bytes += round(tasks * self.bytes + frames * self.frame_bytes)
 

@@ -11,11 +11,11 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, Protocol
+from typing import Any, Protocol
 
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.keys import all_code_digest
-from sd2core.batch.tasks import BEGUN, Task, TaskFailed, probe, run_task
+from sd2core.batch.tasks import BEGUN, SomeFailed, Task, TaskFailed, probe, run_tasks
 from sd2core.errors import Sd2Error
 from sd2core.worker_processes import ONE_THREAD
 
@@ -26,19 +26,20 @@ _CLOSE_S = 5.0
 
 @dataclass(frozen=True, eq=False)
 class Ending:
-    """How a task came to its end.
+    """How tasks that were given out together came to their end.
 
     Parameters
     ----------
-    task : Task
-    outcome : {"done", "failed", "killed"}
-        ``killed``: the process that it was given to is gone.
-    failure : TaskFailed, optional
+    tasks : tuple of Task
+    failures : tuple
+        One per task; None for those that were done.
+    killed : bool
+        The process that they were given to is gone; some of them may have been done.
     """
 
-    task: Task
-    outcome: Literal["done", "failed", "killed"]
-    failure: TaskFailed | None = None
+    tasks: tuple[Task, ...]
+    failures: tuple[TaskFailed | None, ...] = ()
+    killed: bool = False
 
 
 class Pool(Protocol):
@@ -55,8 +56,8 @@ class Pool(Protocol):
     def workers(self) -> Mapping[str, int]:
         """Names of the processes that are there now, and how many tasks each does at once."""
 
-    def submit(self, task: Task, worker: str) -> None:
-        """Have a task done, by this process if it stays."""
+    def submit(self, tasks: tuple[Task, ...], worker: str) -> None:
+        """Have tasks done one after the other, by this process if it stays."""
 
     def ended(self, timeout_s: float) -> list[Ending]:
         """What came to its end since the last call; waits for the first."""
@@ -80,7 +81,7 @@ class DaskPool:
         place = str(folder.path.absolute())
         self._name = hashlib.sha256(f"{place}{uuid.uuid4()}".encode()).hexdigest()[:8]
         self._tries = 0
-        self._endings: queue.SimpleQueue[tuple[Task, Any]] = queue.SimpleQueue()
+        self._endings: queue.SimpleQueue[tuple[tuple[Task, ...], Any]] = queue.SimpleQueue()
         self._futures: dict[str, Any] = {}
         self._workers: dict[str, int] = {}
         self._checked: set[str] = set()
@@ -101,20 +102,21 @@ class DaskPool:
             self._look()
         return self._workers
 
-    def submit(self, task: Task, worker: str) -> None:
+    def submit(self, tasks: tuple[Task, ...], worker: str) -> None:
         """See :class:`Pool`."""
         self._tries += 1
-        name = f"{task.step}-{self._name}-{self._tries}"
+        name = f"{tasks[0].step}-{self._name}-{self._tries}"
+        folder = self._folder.path.absolute()
         future = self._client.submit(
-            run_task,
-            task.record(self._folder.path.absolute()),
+            run_tasks,
+            [task.record(folder) for task in tasks],
             key=name,
             pure=False,
             workers=[worker],
             allow_other_workers=True,
         )
         self._futures[name] = future
-        future.add_done_callback(lambda ended: self._endings.put((task, ended)))
+        future.add_done_callback(lambda ended: self._endings.put((tasks, ended)))
 
     def ended(self, timeout_s: float) -> list[Ending]:
         """See :class:`Pool`."""
@@ -126,19 +128,19 @@ class DaskPool:
         except queue.Empty:
             return endings
 
-    def _ending(self, task: Task, future: Any) -> Ending:
+    def _ending(self, tasks: tuple[Task, ...], future: Any) -> Ending:
         from distributed.scheduler import KilledWorker
 
         self._futures.pop(future.key, None)
         if future.status == "finished":
-            return Ending(task, "done")
+            return Ending(tasks, (None,) * len(tasks))
         error = future.exception() if future.status == "error" else None
-        if isinstance(error, TaskFailed):
-            return Ending(task, "failed", error)
+        if isinstance(error, SomeFailed):
+            return Ending(tasks, error.failures)
         if error is None or isinstance(error, KilledWorker):
-            return Ending(task, "killed")
+            return Ending(tasks, killed=True)
         words = f"The worker cannot carry it out ({type(error).__name__}: {error})"
-        return Ending(task, "failed", TaskFailed(words, "", ""))
+        return Ending(tasks, (TaskFailed(words, "", ""),) * len(tasks))
 
     def _look(self) -> None:
         try:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -84,6 +84,41 @@ class TaskFailed(Exception):
         self.error = {"found": found, "expected": expected, "remedy": remedy}
         self.fatal = fatal
         super().__init__(found, expected, remedy, fatal)
+
+
+class SomeFailed(Exception):
+    """Of some tasks that were given out together, some cannot be done.
+
+    Parameters
+    ----------
+    failures : tuple
+        One per task; None for those that were done.
+    """
+
+    def __init__(self, failures: tuple[TaskFailed | None, ...]) -> None:
+        self.failures = failures
+        super().__init__(failures)
+
+
+def run_tasks(records: Sequence[Mapping[str, Any]]) -> None:
+    """Carry out tasks in this process, one after the other.
+
+    Raises
+    ------
+    SomeFailed
+        When not all could be done; after a failure that is fatal the others are not tried.
+    """
+    failures: list[TaskFailed | None] = []
+    for record in records:
+        fatal = failures[-1] if failures and failures[-1] and failures[-1].fatal else None
+        try:
+            if fatal is None:
+                run_task(record)
+            failures.append(fatal)
+        except TaskFailed as failure:
+            failures.append(failure)
+    if any(failures):
+        raise SomeFailed(tuple(failures))
 
 
 def run_task(record: Mapping[str, Any]) -> None:

@@ -195,7 +195,7 @@ def memory(folder: Path, minutes: float, recordings: int, vertices: int, how: st
 def _in_this_process(bodies: Path, how: str) -> None:
     """One worker's part of a batch; prints its peak after each step."""
     from sd2core.batch.pool import Ending
-    from sd2core.batch.tasks import run_task
+    from sd2core.batch.tasks import run_tasks
 
     out = bodies / "made"
     text = _PLAN.format(out=out, files="*.zarr", places="[0, 0, 0]", how=how)
@@ -213,10 +213,10 @@ def _in_this_process(bodies: Path, how: str) -> None:
         def workers(self) -> dict[str, int]:
             return {"here": 1}
 
-        def submit(self, task: Any, worker: str) -> None:
-            run_task(task.record(out))
-            peaks[task.step] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-            self._ended.append(Ending(task, "done"))
+        def submit(self, tasks: tuple[Any, ...], worker: str) -> None:
+            run_tasks([task.record(out) for task in tasks])
+            peaks[tasks[0].step] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+            self._ended.append(Ending(tasks, (None,) * len(tasks)))
 
         def ended(self, timeout_s: float) -> list[Any]:
             ended, self._ended = self._ended, []

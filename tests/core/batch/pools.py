@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from sd2core.batch.pool import Ending
-from sd2core.batch.tasks import BEGUN, Task, TaskFailed, run_task
+from sd2core.batch.tasks import BEGUN, SomeFailed, Task, TaskFailed, run_tasks
 
 
 class SerialPool:
@@ -26,8 +26,8 @@ class SerialPool:
     ----------
     submitted : Counter
         Tasks per step.
-    most_waiting : int
-        That were ever given out at once.
+    most_waiting, largest : int
+        Bundles that were ever given out at once, and tasks in one.
     """
 
     most_deaths = 2
@@ -38,35 +38,39 @@ class SerialPool:
         self._folder = folder
         self._names = {f"worker-{number}": 1 for number in range(workers)}
         self._dies = dies or (lambda task: False)
-        self._waiting: deque[Task] = deque()
+        self._waiting: deque[tuple[Task, ...]] = deque()
         self.submitted: Counter[str] = Counter()
         self.by_worker: dict[str, list[Task]] = {name: [] for name in self._names}
-        self.most_waiting = 0
+        self.most_waiting = self.largest = 0
 
     def workers(self) -> Mapping[str, int]:
         return self._names
 
-    def submit(self, task: Task, worker: str) -> None:
-        self._waiting.append(task)
-        self.submitted[task.step] += 1
-        self.by_worker[worker].append(task)
+    def submit(self, tasks: tuple[Task, ...], worker: str) -> None:
+        self._waiting.append(tasks)
+        self.submitted[tasks[0].step] += len(tasks)
+        self.by_worker[worker] += tasks
+        self.largest = max(self.largest, len(tasks))
         self.most_waiting = max(self.most_waiting, len(self._waiting))
 
     def ended(self, timeout_s: float) -> list[Ending]:
         if not self._waiting:
             return []
-        task = self._waiting.popleft()
-        if self._dies(task):
-            (self._folder / BEGUN / "task-here-1").write_text(task.key)
-            # Whatever else it was given goes with it.
-            lost = [task, *self._waiting]
-            self._waiting.clear()
-            return [Ending(one, "killed") for one in lost]
-        try:
-            run_task(task.record(self._folder))
-        except TaskFailed as failure:
-            return [Ending(task, "failed", failure)]
-        return [Ending(task, "done")]
+        tasks = self._waiting.popleft()
+        failures: list[TaskFailed | None] = []
+        for task in tasks:
+            if self._dies(task):
+                (self._folder / BEGUN / "task-here-1").write_text(task.key)
+                # Whatever else it was given goes with it.
+                lost = [tasks, *self._waiting]
+                self._waiting.clear()
+                return [Ending(one, killed=True) for one in lost]
+            try:
+                run_tasks([task.record(self._folder)])
+                failures.append(None)
+            except SomeFailed as error:
+                failures += error.failures
+        return [Ending(tasks, tuple(failures))]
 
 
 @contextmanager

@@ -221,6 +221,8 @@ def test_few_tasks_are_given_out_at_once(run: Runs) -> None:
     end = run(text, workers=2)
     assert end.facts["done"]["synthesise"] == 120
     assert run.pool.most_waiting <= 2 * AHEAD
+    # What takes little is given out together.
+    assert run.pool.largest > 1
 
 
 _CHEAP = "[synthesise]\nvisibility = 'none'"
