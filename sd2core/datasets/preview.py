@@ -31,7 +31,7 @@ _MOST_LABELS = 16
 """Labels on a sheet: those of most segments."""
 _IN_A_BAND = 12
 _CELL_IN = (1.02, 0.86)
-_LEFT_IN = 0.8
+_LEFT_IN, _LEAST_IN = 0.8, 8.6
 _PIXELS_PER_INCH = 150
 _INK, _MUTED, _NOTHING = "#1d232b", "#5a6370", "#eef0f3"
 _NO_COLOUR = "#8a8f98"
@@ -111,7 +111,8 @@ def draw_preview(title: str, header: Header, examples: list[Example], segments: 
     columns = max(map(len, bands))
     wide, high = _CELL_IN
     band_in = len(kinds) * high + 0.95
-    width, height = _LEFT_IN + columns * wide + 0.8, len(bands) * band_in + 0.95
+    width = max(_LEFT_IN + columns * wide + 0.8, _LEAST_IN)
+    height = len(bands) * band_in + 0.95
     figure = Figure(figsize=(width, height), dpi=_PIXELS_PER_INCH)
     figure.set_facecolor("white")
     shown: Any = None

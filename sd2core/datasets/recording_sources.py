@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
@@ -176,7 +177,7 @@ class _Opened:
         self._spans = [span for span in labels.spans if span.origin != "suggestion"]
 
     def outline(self, placement: int) -> Outline:
-        timebase, present, radar_kind = self._clock()
+        timebase, present, radar_kind = self._clock
         kinds: list[MapKind] = []
         if self._mesh is not None:
             kinds += ["synthetic"]
@@ -232,6 +233,7 @@ class _Opened:
             },
         )
 
+    @cached_property
     def _clock(self) -> tuple[Timebase, NDArray[np.bool_] | None, MapKind | None]:
         """Times, frames with a person, and the kind of the radar's map: cheaply."""
         recording = self.recording
