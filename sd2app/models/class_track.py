@@ -21,6 +21,9 @@ from sd2core.spectrum import DopplerMap
 if TYPE_CHECKING:
     from sd2core.classify.card import ClassifierCard
 
+_LATE_S = 0.2
+"""While a map grows frame by frame, what is known is that much behind the clock at most."""
+
 _BETWEEN_MS = 120
 """While a long map is painted piece by piece, it is looked at so often at most."""
 
@@ -156,10 +159,14 @@ class ClassTrack(QObject):
         return self._source is not None and not self._moving(self._source)
 
     def at(self, time_s: float) -> ClassReading | None:
-        """What the frame at a time of the recording shows; None where that is not known."""
+        """What the frame at a time of the recording shows; None where that is not known.
+
+        Of a map that is still growing up to there, what its newest frames show.
+        """
         frame = self._source.frame_at(time_s) if self._source is not None else None
         if frame is None or self._card is None or frame >= len(self._shares):
             return None
+        frame = self._newest(frame)
         shares = self._shares[frame]
         if np.isnan(shares).any():
             return None
@@ -170,6 +177,13 @@ class ClassTrack(QObject):
             bool(self._done[frame]) and self.current,
             present is not None and not present[frame],
         )
+
+    def _newest(self, frame: int) -> int:
+        """The newest frame up to this one that is done, if it is hardly earlier."""
+        assert self._given is not None
+        late = round(_LATE_S * self._given.timebase.frames_per_s)
+        done = np.flatnonzero(self._done[max(frame - late, 0) : frame + 1])
+        return max(frame - late, 0) + int(done[-1]) if done.size else frame
 
     # --- requests -------------------------------------------------------------------------
 
