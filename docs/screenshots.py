@@ -25,6 +25,7 @@ from sd2app.screenshot import wait_until_settled
 from sd2app.settings import Settings
 from sd2app.theme import apply_theme
 from sd2app.views.window import MainWindow
+from sd2core.placements import PlacementCloud
 from sd2core.resources import resource_path
 from sd2core.sensor import VirtualSensor, aimed_at
 
@@ -64,6 +65,16 @@ def labels(window: MainWindow) -> None:
     window.show_labels()
     span = window.context.labels.labels.spans[2]
     window.context.label_edits.go_to(span)
+
+
+def placements(window: MainWindow) -> None:
+    """A cloud of sensors planned around the sample's body."""
+    window.resize(1280, 960)
+    window.context.playback.seek(1.9)
+    window.show_placements()
+    window.context.edits.plan_placements(
+        PlacementCloud(120, (1.0, 4.0), (-80.0, 80.0), (-10.0, 50.0), seed=2)
+    )
 
 
 def real(window: MainWindow) -> None:
@@ -212,6 +223,7 @@ def main() -> None:
     take(application, "dark.png", swipes, far_in_the_dark)
     take(application, "trade.png", swipes, trade)
     take(application, "labels.png", swipes, labels)
+    take(application, "placements.png", swipes, placements)
     comparison(application)
     training(application)
     walk = [SHARED / "video" / "walk.mkv", SHARED / "mesh" / "walk.npz"]

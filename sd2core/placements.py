@@ -62,8 +62,12 @@ class Place:
     @property
     def words(self) -> str:
         """Such as ``2.2 m, azimuth 30°, elevation -10°``."""
+        # Adding 0.0 makes -0.0 plain.
+        azimuth_deg, elevation_deg = (
+            round(angle, 1) + 0.0 for angle in (self.azimuth_deg, self.elevation_deg)
+        )
         return (
-            f"{self.range_m:g} m, azimuth {self.azimuth_deg:g}°, elevation {self.elevation_deg:g}°"
+            f"{round(self.range_m, 2):g} m, azimuth {azimuth_deg:g}°, elevation {elevation_deg:g}°"
         )
 
 

@@ -128,7 +128,7 @@ class BatchResults(QAbstractTableModel):
             row.recording,
             row.subject,
             f"{row.placement:,}" if row.placement else "own sensor",
-            Place(*(round(value, 2) + 0.0 for value in around)).words.replace("-", "−"),
+            Place(*around).words.replace("-", "−"),
             ", ".join(row.maps),
         )[index.column()]
 

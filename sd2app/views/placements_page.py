@@ -120,19 +120,20 @@ class PlacementsPage(QWidget):
         self._cost.setWordWrap(True)
         self._cost.setAccessibleName("What the maps cost")
         self._source = sentence("")
-        self._shown = QCheckBox("Draw in the scene", self)
+        self._shown = QCheckBox("In the scene", self)
+        self._shown.setToolTip("Draw them in the scene")
         self._shown.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self._shown.toggled.connect(self._model.set_shown)
         self._current = sentence("", "plain")
         model = self._model
         back = outlined("Previous", "Put the sensor there", lambda: model.step(-1), self)
         on = outlined("Next", "Put the sensor there", lambda: model.step(1), self)
-        self._step = side_by_side(back, on, spacing_px=6)
-        for widget in (self._how, self._problem, rule(), self._count, self._scale):
+        for widget in (self._how, self._problem, rule()):
             layout.addWidget(widget)
-        for widget in (self._limits, self._radar, self._shown, self._current):
+        layout.addLayout(_apart(self._count, self._shown))
+        for widget in (self._scale, self._limits, self._radar):
             layout.addWidget(widget)
-        layout.addLayout(self._step)
+        layout.addLayout(_apart(self._current, back, on))
         for widget in (rule(), self._cost, self._source):
             layout.addWidget(widget)
 
@@ -237,6 +238,16 @@ class RangeScale(QWidget):
         )
         top = (self.height() - self._BAR) / 2
         painter.drawImage(QRectF(left, top, self.width() - left - right, self._BAR), image)
+
+
+def _apart(wide: QWidget, *others: QWidget) -> QHBoxLayout:
+    """What takes the room there is, and others at the right edge."""
+    row = QHBoxLayout()
+    row.setSpacing(6)
+    row.addWidget(wide, 1)
+    for widget in others:
+        row.addWidget(widget)
+    return row
 
 
 def _say(label: QLabel, text: str) -> None:

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from sd2core.errors import Sd2Error
 from sd2core.placements import (
     MOST,
+    Place,
     PlacementCloud,
     PlacementGrid,
     placements_from_dict,
@@ -175,3 +176,7 @@ def test_toml_by_hand_is_read_and_a_bad_file_is_named(tmp_path):
             read_placements(file)
     with pytest.raises(Sd2Error, match="nowhere"):
         read_placements(tmp_path / "nowhere.json")
+
+
+def test_words_are_rounded_and_know_no_minus_nought():
+    assert Place(2.89955, 74.7898, -0.04).words == "2.9 m, azimuth 74.8°, elevation 0°"
