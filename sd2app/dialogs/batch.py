@@ -23,7 +23,7 @@ from sd2app.models.batch_results import Result
 from sd2app.models.placement_words import counted
 from sd2app.views.batch_run_view import BatchRunView
 from sd2app.views.batch_setup_view import BatchSetupView
-from sd2app.views.panel_parts import outlined, title
+from sd2app.views.panel_parts import outlined, sentence, title
 from sd2core.batch.plan_file import write_plan
 from sd2core.errors import Sd2Error
 from sd2core.io.kinds import VIDEO_SUFFIXES
@@ -67,6 +67,7 @@ class BatchDialogs:
         self._report, self._open_paths = report, open_paths
         self._window: BatchWindow | None = None
         self._opening: tuple[Result, set[Path]] | None = None
+        context.placements.changed.connect(self._follow_plan)
         context.document.opened.connect(self._place_sensor)
         context.document.failed.connect(lambda _: self._forget_result())
 
@@ -138,7 +139,7 @@ class BatchDialogs:
         elif index == _PLANNED:
             placements = self._context.placements.plan
             if placements is None:
-                self._report("The open recording plans no placements: Edit → Placements… does.")
+                self._say("The open recording plans no placements: Edit → Placements… does.")
             setup.set_placements(placements, _PLAN_HERE)
         else:
             self._ask_placements()
@@ -151,6 +152,16 @@ class BatchDialogs:
             self._attempt(lambda: found.append(read_placements(Path(name))))
             if found:
                 self._batch.setup.set_placements(found[0], Path(name).name)
+
+    def _follow_plan(self) -> None:
+        """What is planned in the open recording is what was chosen, as long as it is open."""
+        setup, placements = self._batch.setup, self._context.placements.plan
+        if setup.placements is None or setup.placed != _PLAN_HERE:
+            return
+        if placements is None:
+            setup.set_placements(setup.placements, _PLAN_BEFORE)
+        elif placements != setup.placements:
+            setup.set_placements(placements, _PLAN_HERE)
 
     def model_names(self) -> Sequence[str]:
         """Models that are installed."""
@@ -221,13 +232,22 @@ class BatchDialogs:
         return self._window or self._parent
 
     def _attempt(self, work: Callable[[], object]) -> None:
+        self._say("")
         try:
             work()
         except (Sd2Error, OSError) as error:
-            self._report(str(error))
+            self._say(str(error))
+
+    def _say(self, text: str) -> None:
+        """Where the user looks."""
+        if self._window is not None and self._window.isVisible():
+            self._window.warn(text)
+        elif text:
+            self._report(text)
 
 
 _PLAN_HERE = "the open recording"
+_PLAN_BEFORE = "what was planned before"
 
 
 class BatchWindow(QDialog):
@@ -250,7 +270,10 @@ class BatchWindow(QDialog):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(16, 12, 16, 16)
         layout.setSpacing(10)
+        self._warning = sentence("", "warning")
+        self._warning.hide()
         layout.addLayout(head)
+        layout.addWidget(self._warning)
         layout.addWidget(self._pages, 1)
         # Not while somebody still turns a number.
         self._patience = QTimer(self)
@@ -261,6 +284,11 @@ class BatchWindow(QDialog):
         batch.setup.changed.connect(self._patience.start)
         self.resize(620, 640)
         self._refresh()
+
+    def warn(self, text: str) -> None:
+        """Say what went wrong, or nothing any more."""
+        self._warning.setText(text)
+        self._warning.setVisible(bool(text))
 
     def showEvent(self, event: QShowEvent) -> None:
         """Somebody looks: say what it would take."""

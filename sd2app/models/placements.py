@@ -189,12 +189,11 @@ class PlacementsModel(QObject):
     def _follow(self) -> None:
         mesh, plan = self._document.mesh, self.plan
         wish = _Wish(mesh, plan) if mesh is not None and plan is not None else None
-        same_mesh = (self._wish and self._wish.mesh) is (wish and wish.mesh)
-        if same_mesh and (self._wish and self._wish.plan) == plan:
+        if wish == self._wish:
             return
+        if wish is None or self._wish is None or wish.mesh is not self._wish.mesh:
+            self._planned = Planned()  # places of another body say nothing of this one
         self._wish = wish
-        if wish is None or not same_mesh:
-            self._planned = Planned()
         if wish is None:
             self._runner.cancel()
         else:

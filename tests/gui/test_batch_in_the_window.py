@@ -186,13 +186,25 @@ def test_placements_of_the_recording_or_of_a_file_are_taken(opened, qtbot, tmp_p
     assert setup.plan().placement_count == 3
     choice = dialog._setup._placements
     assert "3 placements" in choice.currentText()
+    # The plan is followed, as long as its recording is open.
+    context.edits.plan_placements(PlacementGrid((1.0,)))
+    assert setup.placements == PlacementGrid((1.0,))
+    assert "1 placement)" in choice.currentText()
+    context.edits.plan_placements(None)
+    assert setup.placements == PlacementGrid((1.0,))
+    assert "what was planned before (1 placement)" in choice.currentText()
     file = tmp_path / "two.json"
     write_placements(file, PlacementGrid((1.0, 2.0)))
     monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(file), ""))
     dialog.activateWindow()
     qtbot.waitUntil(dialog.isActiveWindow)
     choice.setFocus()
+    QTest.keyClick(choice, Qt.Key.Key_Home)
+    QTest.keyClick(choice, Qt.Key.Key_Down)
+    assert "plans no placements" in words(dialog)
+    assert setup.placements is None
     QTest.keyClick(choice, Qt.Key.Key_End)
+    assert "plans no placements" not in words(dialog)
     assert setup.placements == PlacementGrid((1.0, 2.0))
     assert "two.json (2 placements)" in choice.currentText()
     QTest.keyClick(choice, Qt.Key.Key_Home)

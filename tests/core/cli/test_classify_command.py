@@ -217,7 +217,10 @@ def test_real_radar_files_have_classes_of_their_own(
         (("train", "nowhere.zarr", "--out", "m.safetensors"), "nowhere.zarr does not exist"),
         (("train", "STORE", "--out", "m.pt"), "ends in .safetensors"),
         (("train", "STORE", "--out", "m.safetensors", "--maps", "colour"), "The maps are"),
-        (("train", "anna=STORE", "--out", "m.safetensors"), "pairs and data sets say whose they are"),
+        (
+            ("train", "anna=STORE", "--out", "m.safetensors"),
+            "pairs and data sets say whose they are",
+        ),
         (("train", "STORE", "--out", "m.safetensors", "--test-subjects", "s9"), "'s9'"),
         (("train", "MAP", "--out", "m.safetensors"), "nothing with labels"),
         (("eval", "STORE", "--model", "MAP"), "no model file"),
