@@ -46,6 +46,7 @@ from sd2app.models.reaction import ReactionModel
 from sd2app.models.sensor import SensorModel
 from sd2app.models.span_finders import GestureFinder, MotionFinder
 from sd2app.models.span_loop import SpanLoop
+from sd2app.models.standing import Standing
 from sd2app.models.suggestions import SuggestionsModel
 from sd2app.models.synthesis import SynthesisModel
 from sd2app.models.tracks import PointerModel, TrackModel
@@ -195,7 +196,8 @@ def build_context(
     reaction = ReactionModel(settings, parent)
     maps = (synthetic, denoised, real)
     library = classifiers or core_classifiers(process)
-    classify = ClassifyModel(maps, playback, synthesis, labels, settings, library, parent)
+    standing = Standing(sensor, synthesis, denoise, synthetic, denoised, parent)
+    classify = ClassifyModel(maps, playback, standing, labels, settings, library, parent)
     gestures = GestureFinder(classify)
     context = Context(
         settings=settings,

@@ -52,10 +52,8 @@ class ClassifyDialogs:
 
     def take_dropped(self, path: Path) -> bool:
         """Use a file that was dropped; False where it is no classifier."""
-        from sd2core.classify.files import describe_classifier
-
         try:
-            describe_classifier(path)
+            self._context.classify.describe(path)
         except Sd2Error:
             return False
         self.use(path)

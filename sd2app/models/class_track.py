@@ -76,8 +76,8 @@ class ClassTrack(QObject):
 
     Parameters
     ----------
-    moving : callable
-        Whether a hand moves the sensor of a map: then nothing of it counts as current.
+    counts : callable
+        Whether a map is of the sensor where it stands: else nothing of it is current.
 
     Signals
     -------
@@ -87,9 +87,9 @@ class ClassTrack(QObject):
 
     changed = Signal()
 
-    def __init__(self, moving: Callable[[TrackModel], bool], parent: QObject | None = None) -> None:
+    def __init__(self, counts: Callable[[TrackModel], bool], parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._moving = moving
+        self._counts = counts
         self._source: TrackModel | None = None
         self._classifier: Classifier | None = None
         self._card: ClassifierCard | None = None
@@ -133,10 +133,10 @@ class ClassTrack(QObject):
 
     @property
     def complete(self) -> bool:
-        """Whether every frame of the map as it is now is classified."""
+        """Whether every frame of the map is classified, as it is now and is to be."""
         source = self._source
         whole = source is not None and source.map is not None and source.covered is None
-        return whole and self._done.size > 0 and bool(self._done.all())
+        return whole and self.current and self._done.size > 0 and bool(self._done.all())
 
     @property
     def shares(self) -> NDArray[np.float32]:
@@ -155,8 +155,8 @@ class ClassTrack(QObject):
 
     @property
     def current(self) -> bool:
-        """Whether what is known counts: no hand moves the sensor."""
-        return self._source is not None and not self._moving(self._source)
+        """Whether what is known counts: the map is of the sensor where it stands."""
+        return self._source is not None and self._counts(self._source)
 
     def at(self, time_s: float) -> ClassReading | None:
         """What the frame at a time of the recording shows; None where that is not known.

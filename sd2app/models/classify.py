@@ -13,7 +13,7 @@ from sd2app.models.class_track import ClassReading, ClassTrack
 from sd2app.models.classify_library import Classifier, ClassifierLibrary
 from sd2app.models.labels import LabelsModel
 from sd2app.models.playback import PlaybackModel
-from sd2app.models.synthesis import SynthesisModel
+from sd2app.models.standing import Standing
 from sd2app.models.tracks import TrackModel
 from sd2app.settings import Settings
 
@@ -46,7 +46,7 @@ class ClassifyModel(QObject):
     moved
         What it makes of the frames, or the frame on screen.
     counts_changed
-        Whether what it makes of them counts: a hand moves the sensor, or rests.
+        Whether what it makes of them counts: the sensor has moved, or the map has followed.
     failed : str
         A sentence for the user.
     """
@@ -60,7 +60,7 @@ class ClassifyModel(QObject):
         self,
         maps: Sequence[TrackModel],
         playback: PlaybackModel,
-        synthesis: SynthesisModel,
+        standing: Standing,
         labels: LabelsModel,
         settings: Settings,
         library: ClassifierLibrary,
@@ -70,9 +70,7 @@ class ClassifyModel(QObject):
         self._synthetic, self._denoised, self._real = self._maps = tuple(maps)
         self._playback, self._labels = playback, labels
         self._settings, self._library = settings, library
-        self.track = ClassTrack(
-            lambda track: track is not self._real and synthesis.moving, parent=self
-        )
+        self.track = ClassTrack(standing.of, self)
         self._path: Path | None = next(iter(settings.paths(_MODEL)), None)
         self._card: ClassifierCard | None = None
         self._problem = ""
@@ -89,7 +87,7 @@ class ClassifyModel(QObject):
         for track in self._maps:
             track.changed.connect(self._follow)
         playback.frame_changed.connect(lambda _: self.moved.emit())
-        synthesis.moving_changed.connect(self.counts_changed)
+        standing.changed.connect(self.counts_changed)
         self.counts_changed.connect(self.moved)
 
     # --- what is known --------------------------------------------------------------------
@@ -170,6 +168,10 @@ class ClassifyModel(QObject):
             return labels[0].name
         return name
 
+    def describe(self, path: Path) -> ClassifierCard:
+        """Card of a file; raises where it is no classifier."""
+        return self._library.describe(path)
+
     # --- requests -------------------------------------------------------------------------
 
     def use(self, path: Path | None) -> None:
@@ -180,7 +182,7 @@ class ClassifyModel(QObject):
         Sd2Error
             When the file is no classifier.
         """
-        card = self._library.describe(path) if path is not None else None
+        card = self.describe(path) if path is not None else None
         self._path = None if path is None else Path(path).absolute()
         self._settings.set_paths(_MODEL, [self._path] if self._path is not None else [])
         self._set_card(card)

@@ -140,6 +140,11 @@ class DenoisedMap(QObject):
         return self._runner.busy or self._again.isActive()
 
     @property
+    def shows_source(self) -> bool:
+        """Whether some of it is of the synthetic map as it is now, and none of another sensor's."""
+        return bool(self._shown.any())
+
+    @property
     def keeps_up(self) -> bool:
         """Whether the model is fast enough to follow a hand."""
         # The best of some: a busy machine is not a slow model.

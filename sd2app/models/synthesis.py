@@ -131,6 +131,11 @@ class SynthesisModel(QObject):
         return canvas.final and canvas.sensor == self._sensor.sensor
 
     @property
+    def shows_sensor(self) -> bool:
+        """Whether what is on the map is of the sensor where it stands, exact or not."""
+        return self._painted.canvas.sensor == self._sensor.sensor
+
+    @property
     def torso_m(self) -> Vector | None:
         """Median vertex of the frame on screen: inside the torso whatever the limbs do."""
         return self._reader.torso_m()

@@ -28,8 +28,8 @@ def a_map(frames=90, seed=0, rate=RATE, **more):
 
 @pytest.fixture
 def set_up(qtbot):
-    fake, source, state = FakeClassifiers(), TrackModel("Denoised"), SimpleNamespace(moving=False)
-    track = ClassTrack(lambda _: state.moving)
+    fake, source, state = FakeClassifiers(), TrackModel("Denoised"), SimpleNamespace(counts=True)
+    track = ClassTrack(lambda _: state.counts)
     track.look_at(source)
     track.use(FakeClassifier(fake), class_card("/a.safetensors"))
 
@@ -133,12 +133,13 @@ def test_an_answer_to_another_sensor_is_dropped(set_up, qtbot):
     np.testing.assert_allclose(set_up.track.shares, expected(second.values.T), rtol=1e-6)
 
 
-def test_while_a_hand_moves_the_sensor_nothing_counts(set_up):
+def test_while_the_map_is_of_another_sensor_nothing_counts(set_up):
     set_up.source.set_map(a_map())
     set_up.settle()
-    set_up.state.moving = True
+    set_up.state.counts = False
     assert not set_up.track.at(1.0).current
-    set_up.state.moving = False
+    assert not set_up.track.complete
+    set_up.state.counts = True
     assert set_up.track.at(1.0).current
 
 

@@ -23,9 +23,17 @@ from sd2core.spectrum import DopplerMap
 from sd2core.timebase import Timebase
 
 
-class Synthesis(QObject):
-    moving_changed = Signal()
-    moving = False
+class Standing(QObject):
+    """Of which maps it is said that they are of the sensor where it stands."""
+
+    changed = Signal()
+
+    def __init__(self):
+        super().__init__()
+        self.others = []
+
+    def of(self, track):
+        return track not in self.others
 
 
 def a_map(kind, seed=0):
@@ -37,12 +45,12 @@ def a_map(kind, seed=0):
 def set_up(qtbot):
     fake, settings, labels = FakeClassifiers("a"), Settings.forgetful(), LabelsModel()
     tracks = [TrackModel(name) for name in ("Synthetic", "Denoised", "Radar (simulated)")]
-    playback, synthesis = PlaybackModel(), Synthesis()
+    playback, standing = PlaybackModel(), Standing()
     playback.set_timebase(Timebase.regular(60, 30.0))
     made = []
 
     def model():
-        made.append(ClassifyModel(tracks, playback, synthesis, labels, settings, fake.library))
+        made.append(ClassifyModel(tracks, playback, standing, labels, settings, fake.library))
         return made[-1]
 
     def settle():
@@ -50,7 +58,7 @@ def set_up(qtbot):
 
     (path,) = fake.cards
     yield SimpleNamespace(
-        model=model, fake=fake, tracks=tracks, playback=playback, synthesis=synthesis,
+        model=model, fake=fake, tracks=tracks, playback=playback, standing=standing,
         labels=labels, settle=settle, path=path,
     )  # fmt: skip
     fake.gate.set()
@@ -67,7 +75,7 @@ def test_the_frame_on_screen_is_followed(set_up):
     for frame in (0, 17, 59):
         set_up.playback.seek_frame(frame)
         assert model.reading.shares == pytest.approx(told[frame])
-    set_up.synthesis.moving = True
+    set_up.standing.others = [set_up.tracks[1]]
     assert not model.reading.current
     # What the sensor does is nothing to the radar's own map.
     set_up.tracks[2].set_map(doppler)

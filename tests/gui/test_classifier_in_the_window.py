@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import replace
 
 import fake_class_command
 import numpy as np
@@ -12,7 +13,8 @@ from answering import answer, once_asked
 from class_tables import a_table
 from fake_classifiers import CLASSES, expected
 from label_hands import CONTROL, LEFT, SHIFT, key
-from PySide6.QtCore import QPoint, Qt
+from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
+from PySide6.QtGui import QDropEvent
 from PySide6.QtWidgets import QFileDialog, QLabel, QToolButton
 from small_pairs import write_pairs
 
@@ -112,6 +114,9 @@ def test_what_belongs_to_another_sensor_is_not_shown_as_current(classified, fake
     before = readout.text
     assert before
     fake_classes.gate.clear()
+    # Typed: until the map has followed, what is on screen is of where the sensor was.
+    c.edits.place_sensor(replace(c.sensor.sensor, position_m=(0.3, 0.0, 0.0)))
+    assert readout.text == ""
     position = c.sensor.sensor.position_m
     c.edits.begin_sensor_drag()
     c.edits.drag_sensor((position[0] + 0.5, position[1], position[2]))
@@ -239,6 +244,17 @@ def test_the_card_calls_simulated_what_is(classified, qtbot):
     once_asked(ModelCardDialog, read)
     classified._actions["classifier_card"].trigger()
     assert {"waves", "simulated data only", "background, horizontal, vertical"} <= set(texts)
+
+
+def test_a_classifier_that_is_dropped_is_used(window, fake_classes, qtbot):
+    (path,) = fake_classes.cards
+    data = QMimeData()
+    data.setUrls([QUrl.fromLocalFile(str(path))])
+    none = Qt.KeyboardModifier.NoModifier
+    window.dropEvent(QDropEvent(QPointF(50, 50), Qt.DropAction.CopyAction, data, LEFT, none))
+    qtbot.waitUntil(lambda: window.context.classify.track.complete, timeout=10_000)
+    assert window.context.classify.path == path
+    assert window.context.denoise.path is None
 
 
 def test_what_is_no_classifier_is_said(window, tmp_path):
