@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QRectF, QSignalBlocker, Qt
+from PySide6.QtCore import QRectF, QSignalBlocker, QSize, Qt
 from PySide6.QtGui import (
     QBrush,
     QColor,
@@ -16,7 +16,7 @@ from PySide6.QtGui import (
     QPaintEvent,
     QWheelEvent,
 )
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
 from sd2app.models.class_track import ClassReading
 from sd2app.models.classify import ClassifyModel
@@ -114,7 +114,10 @@ class ClassStrip(QWidget):
 
 
 class ClassReadout(QWidget):
-    """A bar for every class, and the most probable one in words; grey while it is not current."""
+    """A bar for every class, and the most probable one in words; grey while it is not current.
+
+    Where there is no room for the bars there are the words alone.
+    """
 
     def __init__(
         self,
@@ -126,6 +129,7 @@ class ClassReadout(QWidget):
         super().__init__(parent)
         self._classify, self._labels, self._display = classify, labels, display
         self._shown: ClassReading | None = None
+        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
         self._resize()
         for signal in (classify.moved, display.theme_changed):
             signal.connect(self._follow)
@@ -145,10 +149,19 @@ class ClassReadout(QWidget):
         longest = ["no person", *(f"{name} 100 %" for name in names)]
         words = max(map(QFontMetrics(bold).horizontalAdvance, longest))
         bars = sum(metrics.horizontalAdvance(name) for name in names)
-        bars += len(names) * (_BAR_PX[0] + 4 + _GAP_PX)
+        self._bars_px = bars + len(names) * (_BAR_PX[0] + 4 + _GAP_PX)
         self._words_px = words + 8
-        self.setFixedSize(bars + self._words_px, metrics.height() + 4)
+        self.setFixedHeight(metrics.height() + 4)
+        self.updateGeometry()
         self._follow()
+
+    def sizeHint(self) -> QSize:
+        """Room for all."""
+        return QSize(self._bars_px + self._words_px, self.fontMetrics().height() + 4)
+
+    def minimumSizeHint(self) -> QSize:
+        """Room for the words."""
+        return QSize(self._words_px, self.fontMetrics().height() + 4)
 
     def _follow(self) -> None:
         self._shown = self._classify.reading
@@ -157,38 +170,39 @@ class ClassReadout(QWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Bars with their names, then the words."""
-        reading = self._shown
+        reading, palette = self._shown, self._display.palette
         if reading is None:
             return
-        palette, offered = self._display.palette, self._labels.labels.label_set
-        ink = QColor(palette.text if reading.current else palette.muted)
         with QPainter(self) as painter:
-            metrics, x = painter.fontMetrics(), 0.0
-            centre = self.height() / 2
-            for name, share in zip(reading.classes, reading.shares, strict=True):
-                width = metrics.horizontalAdvance(name)
-                painter.setPen(QColor(palette.muted))
-                painter.drawText(
-                    QRectF(x, 0, width + 1, self.height()), Qt.AlignmentFlag.AlignVCenter, name
-                )
-                x += width + 4
-                box = QRectF(x, centre - _BAR_PX[1] / 2, *_BAR_PX)
-                painter.fillRect(box, QColor(palette.well))
-                colour = QColor(class_colour(name, offered))
-                colour.setAlpha(255 if reading.current else _FAINT)
-                painter.fillRect(
-                    QRectF(box.left(), box.top(), share * box.width(), box.height()), colour
-                )
-                x += _BAR_PX[0] + _GAP_PX
-            painter.setPen(ink)
+            if self.width() >= self._bars_px + self._words_px:
+                self._paint_bars(painter, reading)
             font = painter.font()
             font.setBold(reading.current)
             painter.setFont(font)
+            painter.setPen(QColor(palette.text if reading.current else palette.muted))
             painter.drawText(
-                QRectF(x, 0, self.width() - x, self.height()),
+                self.rect(),
                 Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight,
                 reading_text(reading) if reading.current else "…",
             )
+
+    def _paint_bars(self, painter: QPainter, reading: ClassReading) -> None:
+        palette, offered = self._display.palette, self._labels.labels.label_set
+        metrics, centre = painter.fontMetrics(), self.height() / 2
+        x = float(self.width() - self._bars_px - self._words_px)
+        for name, share in zip(reading.classes, reading.shares, strict=True):
+            width = metrics.horizontalAdvance(name)
+            painter.setPen(QColor(palette.muted))
+            room = QRectF(x, 0, width + 1, self.height())
+            painter.drawText(room, Qt.AlignmentFlag.AlignVCenter, name)
+            x += width + 4
+            box = QRectF(x, centre - _BAR_PX[1] / 2, *_BAR_PX)
+            painter.fillRect(box, QColor(palette.well))
+            colour = QColor(class_colour(name, offered))
+            colour.setAlpha(255 if reading.current else _FAINT)
+            box.setWidth(share * box.width())
+            painter.fillRect(box, colour)
+            x += _BAR_PX[0] + _GAP_PX
 
 
 class ClassPlot(QWidget):
