@@ -12,7 +12,7 @@ COMPILED := .venv/.compiled
 # Among them every module in KERNEL_MODULES of sd2core/compiled.py.
 KERNELS := $(wildcard sd2core/compiled.py sd2core/raster.py sd2core/body/*.py sd2core/scattering/*.py sd2core/doppler/*.py sd2core/fmcw/*.py sd2core/simulate/people/*.py)
 
-.PHONY: help setup demo test test-slow lint format bench wheel screenshots accuracy fitting denoiser denoiser-comparison range-synthesis classifier whole-loop clean
+.PHONY: help setup demo test test-slow lint format bench wheel screenshots accuracy fitting denoiser denoiser-comparison range-synthesis scale classifier whole-loop clean
 
 help:
 	@echo "make demo         set up, and open the sample recording in the window"
@@ -31,6 +31,7 @@ help:
 	@echo "make range-synthesis  docs/range-synthesis.md, trained (half an hour)"
 	@echo "make classifier   docs/classifier.md, trained (an hour)"
 	@echo "make whole-loop   docs/whole-loop.md: from a recording to a classifier (20 minutes)"
+	@echo "make scale        docs/scale.md, measured (some ten minutes)"
 	@echo "make clean        remove what the above made, .venv included"
 
 setup: system-packages $(COMPILED) landmark-models
@@ -104,6 +105,9 @@ classifier: setup
 
 whole-loop: setup
 	$(BIN)/python docs/whole_loop.py
+
+scale: setup
+	$(BIN)/python docs/scale.py
 
 clean:
 	rm -rf .venv build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks \

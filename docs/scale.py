@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import argparse
 import statistics
+import subprocess
 import sys
 import tempfile
-import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from sd2core.batch.driver import AHEAD
 from sd2core.batch.estimate import task_rates
 from sd2core.batch.flow import Flow
 from sd2core.batch.folder import BatchFolder
@@ -22,8 +23,8 @@ from sd2core.batch.plan_file import plan_from_text
 from sd2core.batch.stretches import LONGEST_FRAMES
 from sd2core.cli.batch_words import bytes_words
 from sd2core.compiled import warm_up
-from sd2core.errors import Sd2Error
 from sd2core.ladder.scene import this_machine
+from sd2core.recording import open_recording
 from sd2core.resources import resource_path
 
 DOCS = Path(__file__).resolve().parent
@@ -32,6 +33,7 @@ from batches import (  # noqa: E402
     Compared,
     Memory,
     files_per_second,
+    fit_of,
     memory,
     nothing_to_do,
     ten_times_the_tasks,
@@ -40,8 +42,6 @@ from batches import (  # noqa: E402
 
 RECORDINGS, FRAMES, PLACES = 1_000_000, 1800, 8
 """What is reckoned for: a minute each at 30 frames/s."""
-
-_GB = 1e9
 
 INTRODUCTION = """\
 # Batches at scale
@@ -53,8 +53,13 @@ Made by
 make scale
 ```
 
-on {machine}. How it works is [decision 39](decisions/0039-batches.md), what a plan and its folder
-hold [formats.md](formats.md#batches).
+on {machine}. How it works is [decision 39](decisions/0039-batches.md); what a plan
+and its folder hold, [formats.md](formats.md#batches).
+"""
+
+
+LITTLE = """
+**Measured in little (`--quick`), beside other work: these are not the final figures.**
 """
 
 
@@ -69,11 +74,11 @@ class Sizes:
     tenth_places: int
     minutes: tuple[float, ...]
     many: int
-    fit: bool
+    fit_frames: tuple[int, ...]
 
 
-FULL = Sizes(4, 55, 3, 10, 8, (1.0, 12.0, 90.0), 20, fit=True)
-QUICK = Sizes(2, 5, 1, 2, 3, (0.2, 0.5), 2, fit=False)
+FULL = Sizes(4, 55, 3, 10, 8, (1.0, 12.0, 90.0), 20, (150, 1050))
+QUICK = Sizes(2, 5, 1, 2, 3, (0.2, 0.5), 2, (20, 40))
 
 
 @dataclass(frozen=True)
@@ -93,6 +98,16 @@ class Cost:
     def bytes(self, frames: int) -> float:
         """That one task writes."""
         return self.task_bytes + frames * self.frame_bytes
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A fit to so many frames: processor seconds, the most memory, and what was written."""
+
+    frames: int
+    seconds: float
+    peak_mb: float
+    bytes: int
 
 
 def main() -> None:
@@ -121,49 +136,67 @@ def _page(root: Path, sizes: Sizes) -> str:
     )
     there_s = nothing_to_do(folder("nothing to do"), 10 * sizes.tenth, sizes.tenth_places)
     place = folder("memory")
-    how = "visibility = 'facing'"
-    used = [memory(place, minutes, 1, 1229, how) for minutes in sizes.minutes]
-    used.append(memory(place, sizes.minutes[0], sizes.many, 1229, how))
-    used.append(memory(place, sizes.minutes[0], 1, 13348, "visibility = 'exact'"))
-    costs = _costs(folder("costs"), sizes)
-    written, looked = files_per_second(folder("files"))
+    used = [memory(place, minutes, 1, 1229, "facing") for minutes in sizes.minutes]
+    used.append(memory(place, sizes.minutes[0], sizes.many, 1229, "facing"))
+    used.append(memory(place, sizes.minutes[0], 1, 13348, ""))
+    fits = _fits(folder("fits"), sizes.fit_frames)
+    costs = _costs(folder("costs"), fits)
+    files = files_per_second(folder("files"))
     own_s = statistics.median(ten.own_s) / ten.tasks
     return "\n".join(
         [
-            INTRODUCTION.format(machine=this_machine()),
+            INTRODUCTION.format(machine=this_machine()) + (LITTLE if sizes is QUICK else ""),
             _processes(two, ten, there_s),
-            _memory(used),
+            _memory(used, fits),
             _steps(costs),
-            _million(costs, two, own_s, written, looked),
+            _million(costs, two, own_s, files),
         ]
     )
 
 
 def _processes(two: Compared, ten: Compared, there_s: float) -> str:
-    rounds = len(two.one_s)
-    return f"""\
-## Processes and tasks
+    rounds = "one round" if len(two.one_s) == 1 else f"{len(two.one_s)} rounds"
+    own_ms = 1e3 * statistics.median(ten.own_s) / ten.tasks
+    rows = (
+        (
+            f"{two.tasks} maps of 2,000 vertices, exact: two processes against one",
+            f"{two.ratio:.2f} times as fast ({_both(two)})",
+            "≥ 1.8",
+        ),
+        (
+            f"{ten.tasks} quick maps against a tenth of them",
+            f"{ten.ratio:.2f} times the time ({_both(ten)})",
+            "≤ 10.5",
+        ),
+        (
+            "each of these, in the process that gives out and schedules",
+            f"{own_ms:.1f} ms of processor time",
+            "",
+        ),
+        ("a map that is there already", f"{1e3 * there_s:.2f} ms", ""),
+    )
+    return "\n".join(
+        [
+            "## Processes and tasks",
+            "",
+            f"In turns, {rounds}; ratios are the medians of those of the rounds. The processes had",
+            "been started and had loaded the program, which takes some seconds once.",
+            "",
+            "| what | measured | wanted |",
+            "|---|---|---|",
+            *(f"| {what} | {measured} | {wanted} |" for what, measured, wanted in rows),
+            "",
+            "Tasks of one recording that take little go out in bundles of about a second. Each",
+            f"process has {AHEAD} bundles ahead: the scheduler never holds more, however many"
+            " there are.",
+            "",
+        ]
+    )
 
-In turns, {rounds} round{"s" if rounds > 1 else ""} each; the median of the rounds' ratios. Processes
-had been started and had loaded the program.
 
-| what | measured | wanted |
-|---|---|---|
-| {two.tasks} maps of 2,000 vertices, exact: two processes against one | {two.ratio:.2f} times as fast \
-({_seconds(two.one_s)} s and {_seconds(two.other_s)} s) | ≥ 1.8 |
-| {ten.tasks} maps against a tenth of them | {ten.ratio:.2f} times the time \
-({_seconds(ten.one_s)} s and {_seconds(ten.other_s)} s) | ≤ 10.5 |
-| a task, in the process that gives them out and schedules them | \
-{1e3 * statistics.median(ten.own_s) / ten.tasks:.1f} ms of processor time | |
-| a map that is there already | {1e3 * there_s:.2f} ms | |
-
-Each process is given four tasks ahead: the scheduler never holds more, however many there are.
-"""
-
-
-def _memory(used: list[Memory]) -> str:
+def _memory(used: list[Memory], fits: list[Fitted]) -> str:
     rows = [
-        f"| {one.recordings} | {one.minutes:g} min | {one.vertices:,} |"
+        f"| {one.recordings} | {one.minutes:g} min | {one.vertices:,} | {one.how or 'exact'} |"
         + "|".join(f" {one.peak_mb[step]:.0f} MB " for step in ("synthesise", "denoise", "export"))
         + "|"
         for one in used
@@ -172,25 +205,40 @@ def _memory(used: list[Memory]) -> str:
         [
             "## Memory of one process",
             "",
-            "The most that a process had by the end of a step, in MB. Wanted: at most 1 GB, whatever",
-            f"the number and length of recordings. A mesh is streamed, and a map is made in stretches"
-            f" of {LONGEST_FRAMES:,}",
-            "frames. From the step `denoise` on, torch is loaded.",
+            "The most that a process had by the end of a step. Wanted: at most 1 GB, whatever the",
+            "number and length of recordings. A mesh is streamed, and a map is made in stretches",
+            f"of {LONGEST_FRAMES:,} frames. From the step `denoise` on, torch is loaded.",
             "",
-            "| recordings | each | vertices | synthesise | denoise | export |",
-            "|---|---|---|---|---|---|",
+            "| recordings | each | vertices | visibility | synthesise | denoise | export |",
+            "|---|---|---|---|---|---|---|",
             *rows,
             "",
-            "A fit holds the whole clip: what it takes grows with the length of the video, see",
-            "[decision 39](decisions/0039-batches.md).",
-            "",
+            *_fit_memory(fits),
         ]
     )
 
 
+def _fit_memory(fits: list[Fitted]) -> list[str]:
+    if len(fits) < 2:
+        return []
+    short, long = fits[0], fits[-1]
+    each_mb = (long.peak_mb - short.peak_mb) / (long.frames - short.frames)
+    lines = [
+        f"A fit holds its clip as a whole: {short.peak_mb:.0f} MB with {short.frames:,} frames,"
+        f" {long.peak_mb:.0f} MB with {long.frames:,}.",
+    ]
+    if each_mb > 0:
+        most = short.frames + (1000 - short.peak_mb) / each_mb
+        lines.append(
+            f"If it goes on so, {1e3 * each_mb:.0f} kB per frame, 1 GB is reached with"
+            f" {most:,.0f} frames, {most / 1800:.0f} min at 30 frames/s."
+        )
+    return [*lines, ""]
+
+
 def _steps(costs: list[Cost]) -> str:
     rows = [
-        f"| {one.step} | {1e3 * one.frame_s:.2f} ms | {1e3 * one.task_s:.0f} ms |"
+        f"| {one.step} | {1e3 * one.frame_s:.3f} ms | {1e3 * one.task_s:.0f} ms |"
         f" {one.frame_bytes:.0f} B | {bytes_words(one.task_bytes)} |"
         for one in costs
     ]
@@ -198,7 +246,9 @@ def _steps(costs: list[Cost]) -> str:
         [
             "## Steps",
             "",
-            "On one process, for the sample recording (5,000 vertices). `fit` is its video.",
+            "On one process, for the sample recording (5,000 vertices); `fit` is of its video, in",
+            "processor time. A tolerance saves time where a recording is long, as a plan is",
+            "chosen for each map.",
             "",
             "| step | per frame | and per task | written per frame | and per task |",
             "|---|---|---|---|---|",
@@ -208,66 +258,68 @@ def _steps(costs: list[Cost]) -> str:
     )
 
 
-def _million(costs: list[Cost], two: Compared, own_s: float, written: float, looked: float) -> str:
+def _million(costs: list[Cost], two: Compared, own_s: float, files: tuple[float, float]) -> str:
     by_step = {one.step: one for one in costs}
     count = {"fit": RECORDINGS, "synthesise": RECORDINGS * PLACES, "denoise": RECORDINGS * PLACES}
-    exact, quick = by_step["synthesise"], by_step["synthesise, 2 %"]
-    rows, total_s, total_bytes = [], 0.0, 0.0
-    for step, tasks in count.items():
-        cost = by_step.get(step)
-        if cost is None:
-            continue
-        seconds, size = tasks * cost.seconds(FRAMES), tasks * cost.bytes(FRAMES)
-        total_s, total_bytes = total_s + seconds, total_bytes + size
-        rows.append(f"| {step} | {tasks:,} | {seconds / 3600:,.0f} | {bytes_words(size)} |")
-    tasks = RECORDINGS + sum(count[step] for step in count if step in by_step)
-    cores = (256, 1024, 4096)
-    machines = "\n".join(
-        f"| {number:,} | {-(-number // 64):,} | {total_s / number / 86400:.1f} days |"
-        f" {tasks / (total_s / number):.0f} | {tasks * own_s / (total_s / number):.0%} |"
-        for number in cores
-    )
-    full = total_s / (tasks * own_s)
-    saved = RECORDINGS * PLACES * (exact.seconds(FRAMES) - quick.seconds(FRAMES)) / 3600
-    gain = two.ratio / 2
-    first = (
-        "the scheduler"
-        if 1 / own_s < written * 2
-        else "the file system, if it does not write faster than the disk here"
-    )
-    return f"""\
-## A million recordings
+    count = {step: tasks for step, tasks in count.items() if step in by_step}
+    seconds = {step: tasks * by_step[step].seconds(FRAMES) for step, tasks in count.items()}
+    size = {step: tasks * by_step[step].bytes(FRAMES) for step, tasks in count.items()}
+    tasks, total_s = RECORDINGS + sum(count.values()), sum(seconds.values())
+    # What each part lets through, in cores that it keeps at work.
+    full = {
+        "the process that gives out tasks and schedules them": total_s / (tasks * own_s),
+        "a file system that writes no faster than the disk here": total_s / (tasks / files[0]),
+    }
+    first = min(full, key=lambda part: full[part])
+    rows = [
+        f"| {step} | {tasks:,} | {seconds[step] / 3600:,.0f} | {bytes_words(size[step])} |"
+        for step, tasks in count.items()
+    ]
+    machines = [
+        f"| {number:,} | {-(-number // 64):,} | {total_s / number / 3600:,.0f} h |"
+        f" {tasks / (total_s / number):,.0f} | {tasks * own_s / (total_s / number):.0%} |"
+        for number in (64, 256, 1024, 4096)
+    ]
+    lines = [
+        "## A million recordings",
+        "",
+        f"Reckoned from the above, for {RECORDINGS:,} videos of {FRAMES:,} frames, each from"
+        f" {PLACES} placements,",
+        f"on processors like this one. Two processes here do {two.ratio / 2:.0%} of twice the work"
+        " of one; more",
+        "are taken to lose no more.",
+        "",
+        "| step | tasks | hours of one core | written |",
+        "|---|---|---|---|",
+        *rows,
+        f"| all, with the looking | {tasks:,} | {total_s / 3600:,.0f} |"
+        f" {bytes_words(sum(size.values()))} |",
+        "",
+        "| cores | machines of 64 | time | tasks/s | load of the scheduler |",
+        "|---|---|---|---|---|",
+        *machines,
+        "",
+        f"- **Scheduler.** {1 / own_s:,.0f} tasks/s at most, in one process beside the batch's",
+        "  own work; above 100 % it keeps cores waiting. Longer recordings load it less, as a task",
+        "  is a map. Beyond that, divide the recordings over several plans, each with a scheduler",
+        "  and a folder.",
+        f"- **File system.** {tasks:,} small files in 256 folders per kind. Here {files[0]:,.0f}",
+        f"  are written in a second, each flushed to disk, and {files[1]:,.0f} looked at; a run",
+        "  that finds all made looks at each.",
+        f"- **First to saturate:** the processors, up to {full[first]:,.0f} cores; from there on",
+        f"  {first}.",
+        "",
+    ]
+    return "\n".join(lines)
 
-Reckoned from the above, for {RECORDINGS:,} recordings of {FRAMES:,} frames from {PLACES} placements each,
-on processors like this one. Two processes here give {gain:.0%} of twice the work; so would more, as far as
-memory and disks keep up.
 
-| step | tasks | hours of one core | written |
-|---|---|---|---|
-{chr(10).join(rows)}
-| all | {tasks:,} | {total_s / 3600:,.0f} | {bytes_words(total_bytes)} |
-
-| cores | machines of 64 | time | tasks/s | load of the scheduler |
-|---|---|---|---|---|
-{machines}
-
-- **Hours.** {total_s / 3600:,.0f} of one core. A tolerance of 2 % (`tolerance = 0.02`) saves
-  {saved:,.0f} of them, once a plan is chosen per map.
-- **Bytes.** {bytes_words(total_bytes)}, of which fitted meshes are most; they can be deleted when their maps are made,
-  and are made again when another placement is asked for.
-- **Scheduler.** {1 / own_s:,.0f} tasks/s at most: one process gives out tasks and schedules them. It is full with
-  {full:,.0f} cores at work on recordings of this length; shorter ones fill it sooner.
-- **File system.** {tasks:,} small files in 256 folders per kind. Here {written:,.0f} are written in a second, each flushed
-  to disk, and {looked:,.0f} looked at. A run that finds everything made looks at each once.
-- **First to saturate:** the processors, up to some {min(full, written / (tasks / total_s)):,.0f} cores; then {first}.
-"""
-
-
-def _costs(folder: Path, sizes: Sizes) -> list[Cost]:
+def _costs(folder: Path, fits: list[Fitted]) -> list[Cost]:
     sample = resource_path("swipes.sd2")
     costs = []
-    if sizes.fit and (fit := _fit_cost(folder, sample)) is not None:
-        costs.append(fit)
+    if fits:
+        longest = fits[-1]
+        each_s, each_bytes = longest.seconds / longest.frames, longest.bytes / longest.frames
+        costs.append(Cost("fit", each_s, 0.0, each_bytes, 0.0))
     for title, how in (("synthesise", ""), ("synthesise, 2 %", "tolerance = 0.02")):
         text = (
             f'out = "{folder / "made"}"\n[recordings]\nfiles = ["{sample}"]\n'
@@ -292,28 +344,26 @@ def _costs(folder: Path, sizes: Sizes) -> list[Cost]:
     return costs
 
 
-def _fit_cost(folder: Path, sample: Path) -> Cost | None:
-    """Of the sample's video; None where the landmark models are not there."""
-    from sd2core.batch.fitting import fit_to_video
-    from sd2core.recording import open_recording
-
-    video = open_recording(sample).video
+def _fits(folder: Path, frames: tuple[int, ...]) -> list[Fitted]:
+    """Of the sample's video; none where the landmark models are not there."""
+    video = open_recording(resource_path("swipes.sd2")).video
     assert video is not None
-    begun_s = time.process_time()
-    try:
-        fit_to_video(str(video), {}, None, str(folder / "fit.zarr"))
-    except Sd2Error as error:
-        _say(f"no fit: {error}")
-        return None
-    seconds = time.process_time() - begun_s
-    size = sum(one.stat().st_size for one in (folder / "fit.zarr").rglob("*") if one.is_file())
-    with open_recording(sample).open_video() as reader:
-        count = len(reader)
-    return Cost("fit", seconds / count, 0.0, size / count, 0.0)
+    fits = []
+    for count in frames:
+        try:
+            seconds, peak_mb = fit_of(video, count, folder)
+        except subprocess.CalledProcessError as error:
+            _say(f"no fit: {error.stderr}")
+            return []
+        mesh = folder / f"{count}.zarr"
+        size = sum(one.stat().st_size for one in mesh.rglob("*") if one.is_file())
+        fits.append(Fitted(count, seconds, peak_mb, size))
+    return fits
 
 
-def _seconds(values: list[float]) -> str:
-    return f"{statistics.median(values):.1f}"
+def _both(compared: Compared) -> str:
+    one_s, other_s = map(statistics.median, (compared.one_s, compared.other_s))
+    return f"{one_s:.1f} s and {other_s:.1f} s"
 
 
 def _say(text: str) -> None:

@@ -13,6 +13,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
+from itertools import cycle, islice
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,8 @@ from sd2core.batch.plan_file import plan_from_text
 from sd2core.batch.pool import DaskPool
 from sd2core.batch.run import BatchEnd, run_batch
 from sd2core.io.mesh import save_mesh
+from sd2core.io.video import open_video
+from sd2core.io.video_writing import write_video
 from sd2core.worker_processes import ONE_THREAD
 
 _PLAN = """
@@ -165,6 +168,8 @@ class Memory:
     minutes : float
         Of every recording, at 30 frames/s.
     recordings, vertices : int
+    how : str
+        Visibility; empty: the preset's.
     peak_mb : dict of str to float
         After the last task of a step.
     """
@@ -172,6 +177,7 @@ class Memory:
     minutes: float
     recordings: int
     vertices: int
+    how: str
     peak_mb: dict[str, float]
 
 
@@ -183,13 +189,13 @@ def memory(folder: Path, minutes: float, recordings: int, vertices: int, how: st
         frames = round(minutes * 1800) + number
         save_mesh(body(vertices, frames), bodies / f"{number:05d}.zarr")
     told = subprocess.run(
-        [sys.executable, __file__, str(bodies), how],
+        [sys.executable, __file__, str(bodies), f"visibility = '{how}'" if how else ""],
         env=os.environ | ONE_THREAD,
         capture_output=True,
         text=True,
         check=True,
     )
-    return Memory(minutes, recordings, vertices, json.loads(told.stdout.splitlines()[-1]))
+    return Memory(minutes, recordings, vertices, how, json.loads(told.stdout.splitlines()[-1]))
 
 
 def _in_this_process(bodies: Path, how: str) -> None:
@@ -227,6 +233,39 @@ def _in_this_process(bodies: Path, how: str) -> None:
     print(json.dumps(peaks))
 
 
+def fit_of(video: Path, frames: int, folder: Path) -> tuple[float, float]:
+    """Processor seconds and peak in MB of a fit to so many frames of a video, again and again.
+
+    Raises
+    ------
+    subprocess.CalledProcessError
+        When it fails: without the landmark models, for one.
+    """
+    made = folder / f"{frames}.mp4"
+    with open_video(video) as reader:
+        pictures = (reader.read(number) for number in islice(cycle(range(len(reader))), frames))
+        write_video(made, pictures, 30, (reader.width, reader.height), preset="ultrafast")
+    out = str(folder / f"{frames}.zarr")
+    told = subprocess.run(
+        [sys.executable, __file__, "fit", str(made), out],
+        env=os.environ | ONE_THREAD,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    seconds, peak_mb = json.loads(told.stdout.splitlines()[-1])
+    return seconds, peak_mb
+
+
+def _fit_in_this_process(video: str, out: str) -> None:
+    from sd2core.batch.fitting import fit_to_video
+
+    begun_s = time.process_time()
+    fit_to_video(video, {}, None, out)
+    peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(json.dumps([time.process_time() - begun_s, peak_mb]))
+
+
 def files_per_second(folder: Path, count: int = 400) -> tuple[float, float]:
     """Small files written in one step each, and looked at, per second."""
     text = "x" * 2000
@@ -241,4 +280,7 @@ def files_per_second(folder: Path, count: int = 400) -> tuple[float, float]:
 
 
 if __name__ == "__main__":
-    _in_this_process(Path(sys.argv[1]), sys.argv[2])
+    if sys.argv[1] == "fit":
+        _fit_in_this_process(*sys.argv[2:])
+    else:
+        _in_this_process(Path(sys.argv[1]), sys.argv[2])
