@@ -256,7 +256,7 @@ ACTIONS: tuple[Action, ...] = (
     Action(
         "show_train", "View", "Train panel", ("Shift+T",),
         "Train a denoiser beside the window, watch it, and use it",
-        lambda w: w.side.bring_up("Train"),
+        lambda w: w.show_training("denoisers"),
     ),
     Action(
         "show_labels", "View", "Labels panel", ("Shift+L",),

@@ -36,6 +36,6 @@ CLASSIFIERS: tuple[Action, ...] = (
     Action(
         "train_classifier", "Model", "Train a classifier…", ("Shift+C",),
         "Learn gestures from labelled maps, beside the window",
-        lambda w: w.show_classifiers(),
+        lambda w: w.show_training("classifiers"),
     ),
 )  # fmt: skip

@@ -24,7 +24,7 @@ _DEFAULTS: dict[str, Any] = {
     "model": "lstm",
     "features": "columns",
     "maps": "radar",
-    "steps": 300,
+    "steps": 160,
     "seed": 0,
     "quick": "yes",
 }
@@ -159,19 +159,19 @@ class ClassSetup(QObject):
     def train_arguments(self, out: Path) -> list[str]:
         """``sd2 classify train`` with what is not as it is by default."""
         values = self._values
-        # The network is named even where it is the default: it is what one looks for.
-        words = ["classify", "train", *map(str, self._paths), "--model", values["model"]]
-        plain = {**_DEFAULTS, "maps": "radar"}
-        for name in ("features", "maps", "steps", "seed"):
-            if values[name] != plain[name]:
+        # Network and steps are named even where they are the default: one looks for them.
+        words = ["classify", "train", *map(str, self._paths)]
+        words += ["--model", values["model"], "--steps", f"{values['steps']}"]
+        for name in ("features", "maps", "seed"):
+            if values[name] != _DEFAULTS[name]:
                 words += [f"--{name}", f"{values[name]}"]
         return [*words, "--out", str(out)]
 
     def table_arguments(self, out: Path) -> list[str]:
         """``sd2 classify table`` with the network that is chosen."""
         values = self._values
-        words = ["classify", "table", *map(str, self._paths)]
-        for name in ("model", "features", "steps"):
+        words = ["classify", "table", *map(str, self._paths), "--steps", f"{values['steps']}"]
+        for name in ("model", "features"):
             if values[name] != _DEFAULTS[name]:
                 words += [f"--{name}", f"{values[name]}"]
         if values["quick"] == "yes":

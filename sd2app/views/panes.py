@@ -1,4 +1,4 @@
-"""What the window's plain panes hold."""
+"""What the window's plain panes hold, and the bars over them."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtWidgets import QVBoxLayout
 
+from sd2app.views.fit_bar import FitBar
+from sd2app.views.label_bar import LabelBar
 from sd2app.views.level_bar import LevelBar
 from sd2app.views.spectrum import Curve, SpectrumView
 from sd2app.views.video import VideoView
@@ -14,6 +16,7 @@ from sd2app.views.video_bar import VideoBar
 if TYPE_CHECKING:
     from sd2app.action_set import ActionSet
     from sd2app.context import Context
+    from sd2app.dialogs.dialogs import Dialogs
 
 _COLOURS = ("synthetic", "denoised", "before", "real")
 
@@ -36,3 +39,22 @@ def spectrum_pane(context: Context, actions: ActionSet) -> QVBoxLayout:
     layout.addWidget(SpectrumView(curves, c.playback, c.display, c.pointer), 1)
     layout.addWidget(LevelBar(c.display, c.tracks, actions["uncertain"]))
     return layout
+
+
+def fit_bar(context: Context, dialogs: Dialogs) -> FitBar:
+    """How far a fit is, and what can be done with it."""
+    c = context
+    return FitBar(
+        c.fit,
+        c.fit_follower,
+        c.fit_offer,
+        begin=dialogs.new_from_video,
+        open_result=dialogs.open_fitted,
+        resume=dialogs.resume_fit,
+    )
+
+
+def label_bar(context: Context, dialogs: Dialogs) -> LabelBar:
+    """Labels that were not saved, and who else edits."""
+    c = context
+    return LabelBar(c.label_session, c.document, c.label_edits.restore, dialogs.recover_labels)

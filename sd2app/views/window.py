@@ -152,6 +152,7 @@ class MainWindow(QMainWindow):
         from sd2app.dialogs.label_tracks import TrackDialogs
         from sd2app.views.message_bar import MessageBar
         from sd2app.views.model_menu import ClassifierChooser, DenoiserChooser, ModelMenu
+        from sd2app.views.panes import fit_bar, label_bar
         from sd2app.views.status import StatusLine
         from sd2app.views.transport import TransportBar
 
@@ -186,8 +187,8 @@ class MainWindow(QMainWindow):
         self._recent_menu.aboutToShow.connect(self._list_recent)
         self._fill_panels()
         self._column.insertWidget(0, self.messages)
-        self._column.insertWidget(1, self._label_bar())
-        self._column.insertWidget(2, self._fit_bar())
+        self._column.insertWidget(1, label_bar(context, self.dialogs))
+        self._column.insertWidget(2, fit_bar(context, self.dialogs))
         self._column.addWidget(
             TransportBar(context.playback, context.span_loop, self._actions, self)
         )
@@ -211,72 +212,21 @@ class MainWindow(QMainWindow):
         self._importer.submit(lambda emit: import_module("sd2app.views.scene3d"))
 
     def _fill_panels(self) -> None:
-        from sd2app.dialogs.label_set import LabelSetDialogs
-        from sd2app.dialogs.placements import PlacementDialogs
-        from sd2app.dialogs.training import TrainingDialogs
-        from sd2app.views.agreement_panel import AgreementPanel
-        from sd2app.views.class_panel import ClassPanel
-        from sd2app.views.labels_panel import LabelsPanel
         from sd2app.views.page_widths import PageWidths
         from sd2app.views.panes import spectrum_pane, video_pane
-        from sd2app.views.placements_page import PlacementsPage
-        from sd2app.views.sensor_pages import SensorPages
-        from sd2app.views.sensor_panel import SensorPanel
-        from sd2app.views.side_panel import SidePanel
+        from sd2app.views.side_pages import side_pages
         from sd2app.views.tracks import Tracks
-        from sd2app.views.trade_panel import TradePanel
-        from sd2app.views.train_page import TrainPage
-        from sd2app.views.training_panel import TrainingPanel
 
-        c = self.context
-        fill(self._panels["video"], video_pane(c, self._actions))
-        to_camera, aim = self._actions["sensor_to_camera"], self._actions["aim_sensor"]
-        sensor = SensorPanel(c.sensor, c.document, c.synthesis, c.edits, to_camera, aim)
-        asks_places = PlacementDialogs(self, c.placements, self.messages.warn, self.messages.note)
-        places = PlacementsPage(
-            c.placements,
-            c.trade,
-            asks_places.take,
-            asks_places.export,
-            self.batch_dialogs.show_with_placements,
+        c, actions = self.context, self._actions
+        fill(self._panels["video"], video_pane(c, actions))
+        self.side, self.sensor_pages, self.train_page, self.labels_panel, self.train_dialogs = (
+            side_pages(self, actions)
         )
-        self.sensor_pages = SensorPages(sensor, places)
-        trade = TradePanel(c.trade, c.display, self._actions["measure"])
-        self.train_dialogs = TrainingDialogs(self, c.training, c.training_use, self.messages.warn)
-        train = TrainingPanel(c.training, c.training_use, c.display, self.train_dialogs)
-        self.train_page = TrainPage(
-            train, ClassPanel(c.class_training, c.display, self.class_dialogs)
-        )
-        asks = LabelSetDialogs(self, c.labels, c.label_edits.apply, self.messages.warn)
-        self.labels_panel = LabelsPanel(c, self._actions, asks)
-        agree = AgreementPanel(c.agreement, c.playback, self._actions)
-        pages = {"Sensor": self.sensor_pages, "Trade": trade, "Train": self.train_page}
-        self.side = SidePanel({**pages, "Labels": self.labels_panel, "Agree": agree})
         fill(self._panels["sensor"], self.side)
         self._widths = PageWidths(self._top, self.side, {"Labels": _LABELS_PX}, self._settings)
-        self._tracks = Tracks(c, self._models, self._classes, self._actions)
+        self._tracks = Tracks(c, self._models, self._classes, actions)
         fill(self._panels["tracks"], self._tracks)
-        fill(self._panels["spectrum"], spectrum_pane(c, self._actions))
-
-    def _fit_bar(self) -> QWidget:
-        from sd2app.views.fit_bar import FitBar
-
-        c = self.context
-        return FitBar(
-            c.fit,
-            c.fit_follower,
-            c.fit_offer,
-            begin=self.dialogs.new_from_video,
-            open_result=self.dialogs.open_fitted,
-            resume=self.dialogs.resume_fit,
-        )
-
-    def _label_bar(self) -> QWidget:
-        from sd2app.views.label_bar import LabelBar
-
-        c = self.context
-        restore, recover = c.label_edits.restore, self.dialogs.recover_labels
-        return LabelBar(c.label_session, c.document, restore, recover)
+        fill(self._panels["spectrum"], spectrum_pane(c, actions))
 
     def _add_scene(self) -> None:
         if not self._ready:
@@ -405,10 +355,11 @@ class MainWindow(QMainWindow):
         pages = {"spans": panel.show_spans, "search": panel.find, "label set": panel.show_label_set}
         pages[page]()
 
-    def show_classifiers(self) -> None:
-        """Bring up the training of classifiers."""
+    def show_training(self, page: Literal["denoisers", "classifiers"]) -> None:
+        """Bring up the training of denoisers, or that of classifiers."""
         self.side.bring_up("Train")
-        self.train_page.show_classifiers()
+        train = self.train_page
+        {"denoisers": train.show_denoisers, "classifiers": train.show_classifiers}[page]()
 
     def close_window(self) -> None:
         """Close, after asking when edits would be lost."""

@@ -53,7 +53,7 @@ def test_what_is_set_up_is_the_command(set_up):
     out = Path("m.safetensors")
     data = str(set_up.data)
     assert model.setup.train_arguments(out) == [
-        "classify", "train", data, "--model", "lstm", "--out", "m.safetensors",
+        "classify", "train", data, "--model", "lstm", "--steps", "160", "--out", "m.safetensors",
     ]  # fmt: skip
     model.setup.set_value("model", "s4")
     model.setup.set_value("features", "peak")
@@ -62,13 +62,13 @@ def test_what_is_set_up_is_the_command(set_up):
     model.setup.set_map("denoised", True)
     words = model.setup.train_arguments(out)
     assert words[3:] == [
-        "--model", "s4", "--features", "peak", "--maps", "radar,denoised", "--steps", "50",
+        "--model", "s4", "--steps", "50", "--features", "peak", "--maps", "radar,denoised",
         "--seed", "7", "--out", "m.safetensors",
     ]  # fmt: skip
     assert model.command.startswith("sd2 classify train")
     # A comparison takes its seeds and maps itself.
     assert model.setup.table_arguments(Path("t"))[3:] == [
-        "--model", "s4", "--features", "peak", "--steps", "50", "--quick", "--out", "t",
+        "--steps", "50", "--model", "s4", "--features", "peak", "--quick", "--out", "t",
     ]  # fmt: skip
     model.setup.set_value("quick", "no")
     assert "--quick" not in model.setup.table_arguments(Path("t"))
@@ -84,8 +84,11 @@ def test_what_is_set_up_is_the_command(set_up):
 
 def test_the_command_is_one_that_the_program_has(set_up):
     from sd2app.command_line import full_parser
+    from sd2core.classify.training import TrainOptions
 
     model = set_up.training()
+    # The window may not ask for them: that would load torch.
+    assert model.setup.value("steps") == TrainOptions().steps
     set_up.ready(model)
     for words in (
         model.setup.train_arguments(Path("m.safetensors")),
