@@ -90,7 +90,7 @@ class BatchFollower(QObject):
         self._pid, self._launched_s = pid, time.time()
         self._looker = _Looker(self.folder, output_of(path))
         self._phase: Phase = "starting"
-        self._known = self._seen_live = self._stopping = False
+        self._known = self._seen = self._stopping = False
         self._found: _Found | None = None
         self._text = ""
         self._looking = RepeatedLook("batch", self._look, POLL_MS, self)
@@ -174,7 +174,7 @@ class BatchFollower(QObject):
     def _take(self, found: _Found) -> None:
         told = found != self._found
         self._found = found
-        self._seen_live |= found.live
+        self._seen |= found.live or self._is_of_this_start(found)
         phase = self._phase_of(found)
         another = phase != self._phase or not self._known
         self._phase, self._known = phase, True
@@ -190,17 +190,21 @@ class BatchFollower(QObject):
         if found.live:
             return "running"
         # Once it has been at the folder, a process that still ends is of no interest.
-        if found.launching and not self._seen_live:
+        if found.launching and not self._seen:
             return "starting"
-        if self._pid is not None and not self._seen_live and not self._is_of_this_start(found):
+        if self._pid is not None and not self._seen:
             # It was refused, or told to stop, before it had a folder.
             return "stopped" if self._stopping else "failed"
         return found.status.state if found.status is not None else "gone"
 
     def _is_of_this_start(self, found: _Found) -> bool:
-        """Whether a batch that was too quick to be seen at work is the one just started."""
+        """Whether what is there is of the process just started, which may be over by now."""
         status = found.status
-        return status is not None and status.started_unix_s >= self._launched_s - _CLOCKS_S
+        return (
+            self._pid is not None
+            and status is not None
+            and status.started_unix_s >= self._launched_s - _CLOCKS_S
+        )
 
     def _say_stop_again(self, found: _Found) -> None:
         """Where it had no folder when this was asked for, it may not have heard."""

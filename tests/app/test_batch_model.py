@@ -6,6 +6,7 @@ import glob
 import os
 import shutil
 import signal
+import subprocess
 import sys
 from pathlib import Path
 
@@ -14,7 +15,7 @@ import pytest
 
 from sd2app.models import batch_follower
 from sd2app.models.batch import BatchModel
-from sd2app.models.batch_follower import output_of, plan_of
+from sd2app.models.batch_follower import BatchFollower, output_of, plan_of
 from sd2app.models.batch_setup import BatchSetupModel
 from sd2app.models.batch_words import (
     estimate_facts,
@@ -27,7 +28,8 @@ from sd2app.models.batch_words import (
 )
 from sd2app.settings import Settings
 from sd2core.batch.folder import BatchFolder
-from sd2core.batch.plan_file import read_plan
+from sd2core.batch.plan import BatchPlan, Recordings, Synthesise
+from sd2core.batch.plan_file import read_plan, write_plan
 from sd2core.errors import Sd2Error
 from sd2core.io.mesh import save_mesh
 from sd2core.mesh import MeshSequence
@@ -356,3 +358,28 @@ def test_a_batch_that_was_deleted_is_looked_at_no_more(qtbot, made, meshes):
     shutil.rmtree(model.batch.folder.path)
     qtbot.waitUntil(lambda: model.batch is None, timeout=20_000)
     assert not BatchFolder(meshes[0].parent / "ann batch").exists
+
+
+def test_a_batch_that_was_too_quick_to_be_seen_at_work_is_told_from_one_that_was_refused(
+    qtbot, meshes, tmp_path, monkeypatch
+):
+    out = tmp_path / "made"
+    write_plan(
+        plan_of(out),
+        BatchPlan(
+            out=str(out), recordings=Recordings(files=(str(meshes[0]),)), synthesise=Synthesise()
+        ),
+    )
+    command = [sys.executable, str(FAKE), "batch", str(plan_of(out)), "--workers", "1"]
+    process = subprocess.Popen(command)
+    assert process.wait() == 0
+    for slack_s, phase in ((60.0, "finished"), (-60.0, "failed")):
+        monkeypatch.setattr(batch_follower, "_CLOCKS_S", slack_s)
+        follower = BatchFollower(out, pid=process.pid)
+        qtbot.waitUntil(lambda f=follower: f.known, timeout=20_000)
+        assert follower.phase == phase
+        if phase == "finished":
+            shutil.move(out, tmp_path / "elsewhere")
+            qtbot.waitUntil(lambda f=follower: f.phase == "gone", timeout=20_000)
+            shutil.move(tmp_path / "elsewhere", out)
+        follower.close()
