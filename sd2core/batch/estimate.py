@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from sd2core.batch.fitting import fitted
 from sd2core.batch.flow import Flow
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.inputs import (
@@ -153,7 +154,11 @@ def estimate(plan: BatchPlan, workers: int, progress: Progress = silent) -> Batc
     steps["inspect"].seconds = hashed_s * weight + len(new) * _TASK_S
     steps["inspect"].basis = "measured on those looked at"
     made.looked_at = len(known) + len(glanced) + len(made.unusable)
-    _time(flow, steps, [one for _, one in (*glanced, *known)], plan)
+    meshes = [
+        found if found.mesh is not None else replace(found, mesh=_fitted(flow, origin, found))
+        for origin, found in (*glanced, *known)
+    ]
+    _time(flow, steps, meshes, plan)
     if "export" in steps:
         sources = steps["synthesise"].to_do + steps["synthesise"].there
         rates = known_rates()
@@ -226,17 +231,24 @@ def _count(
         assert found.video is not None
         if flow.plan.fit is None:
             return
-        task = flow.fit_task(origin, found.video)
-        done = bool(found.video.identity) and flow.is_done(task)
-        _add(steps["fit"], task, done, weight)
-        video = found.video
-        # Its mesh is not there yet: what is made of it is all to be done.
-        mesh = MeshInput("", "", video.frames, 0, video.frames_per_s, (0.0, 0.0, 0.0))
+        task, video = flow.fit_task(origin, found.video), found.video
+        mesh = _fitted(flow, origin, found)
+        _add(steps["fit"], task, mesh is not None, weight)
+        if mesh is None:
+            # What is made of it is all to be done.
+            mesh = MeshInput("", "", video.frames, 0, video.frames_per_s, (0.0, 0.0, 0.0))
     if flow.plan.synthesise is None:
         return
     for planned in flow.maps_of(origin, mesh, found.sensor):
         for task in planned.tasks:
             _add(steps[task.step], task, bool(mesh.identity) and flow.is_done(task), weight)
+
+
+def _fitted(flow: Flow, origin: Origin, found: Inspection) -> MeshInput | None:
+    """The mesh of a video, where it is there."""
+    if found.video is None or not found.video.identity or flow.plan.fit is None:
+        return None
+    return fitted(Path(flow.fit_task(origin, found.video).out))
 
 
 def _add(step: StepEstimate, task: Task, done: bool, weight: float) -> None:
@@ -271,7 +283,7 @@ def _time(
                     np.mean([one["open"].seconds for one in timed])
                 )
             steps[step].basis = f"measured on {len(here)} of the meshes"
-        elif step in steps:
+        elif step in steps and steps[step].to_do:
             steps[step].basis = "nothing to measure it on: no mesh is there yet"
 
 

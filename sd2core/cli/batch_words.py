@@ -32,9 +32,10 @@ def print_estimate(made: BatchEstimate, plan: BatchPlan) -> None:
             )
         )
     print_rows(rows, right=(1, 2, 3, 4))
+    workers = "1 process" if made.workers == 1 else f"{made.workers} processes"
     print(
-        f"Estimated: {duration(made.hours * 3600)} on {counted(made.workers, 'process')}"
-        f", {bytes_words(made.bytes)}".replace("processs", "processes")
+        f"Estimated: {duration(made.hours * 3600)} on {workers}, {bytes_words(made.bytes)};"
+        " some seconds more to start them"
     )
     if made.looked_at < made.recordings:
         print(f"From {made.looked_at:,} recordings; the others are taken to be like them.")

@@ -320,3 +320,28 @@ def test_recordings_become_a_data_set(run: Runs) -> None:
     recording.write_text(recording.read_text().replace('"title": "take3"', '"title": "other"'))
     run(text)
     assert run.pool.submitted == {"inspect": 1, "export": 1}
+
+
+def test_what_would_be_done_is_what_is_done(run: Runs) -> None:
+    from sd2core.batch.estimate import estimate
+
+    save_spheres(run.folder / "meshes", 3)
+    (run.folder / "meshes" / "broken.npz").write_bytes(b"nothing")
+    plan = plan_from_text(BOTH + "[export]\n", run.folder)
+    before = estimate(plan, 2)
+    assert not run.out.exists()
+    assert {step: one.to_do for step, one in before.steps.items()} == {
+        "inspect": 4, "synthesise": 6, "denoise": 6, "export": 1
+    }  # fmt: skip
+    assert before.steps["synthesise"].frames == 6 * 40
+    assert len(before.unusable) == 1
+    assert before.hours > 0
+    run(BOTH)
+    after = estimate(plan, 2)
+    assert {step: one.there for step, one in after.steps.items()} == {
+        "inspect": 3, "synthesise": 6, "denoise": 6, "export": 0
+    }  # fmt: skip
+    assert after.steps["synthesise"].seconds == after.steps["synthesise"].to_do == 0
+    # Bytes are those of the files, to a third: small archives vary.
+    written = sum(path.stat().st_size for path in run.out.glob("synthetic/*/*.npz"))
+    assert before.steps["synthesise"].bytes == pytest.approx(written, rel=0.34)
