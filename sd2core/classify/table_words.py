@@ -152,9 +152,9 @@ def _lines(table: Table, lines_of: Callable[[Rows], list[str]]) -> list[str]:
     )
     lines = [
         f"Judged on a {table.kind} radar's maps of {who}. Numbers are per cent, mean ± standard"
-        f" deviation over {table.options.seeds} seeds (each other people, another draw, another"
-        " network). Frames: mean over classes of the share of frames that were found. Gestures:"
-        " the same of whole gestures, by what most of their frames were taken for.",
+        f" deviation over {table.options.seeds} seeds (each other"
+        f" {'movements' if table.by_movement else 'people'}, another draw, another network)."
+        " Frames: mean over classes of the share of frames that were found. Gestures: the same of whole gestures, by what most of their frames were taken for.",
         "",
         "Networks, all real data, equal steps of training:",
         "",
