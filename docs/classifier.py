@@ -50,8 +50,8 @@ one core.
 
 Of the takes of the people who are learnt from, five in seven are there as the radar saw them, and
 two in seven, 0.4 times as many frames, as video only: what is added are other movements than the
-real ones. With less real data the video stays as much as it was. All trainings have equally many
-steps; the best of them is chosen on as little real data as is learnt from. *Moved sensors* means
+radar saw. With less of the radar's data the video stays as much as it was. All trainings have
+equally many steps; the best is chosen on as small a share of the radar's data. *Moved sensors* is
 range synthesis: the added movements also as other places of the sensor see them, so more frames.
 *Moved, frames* judges the radar's maps from those places; *radar of the same movements* is what
 added maps are at best.
@@ -134,7 +134,8 @@ def _head(options: argparse.Namespace, campaign: Path, told: dict, made: str) ->
         minutes=sum(facts["minutes_of_subject"].values()) / facts["placements"],
         people=len(facts["minutes_of_subject"]),
         places=facts["placements"],
-        table=f"sd2 classify table gestures.zarr --out tables --seeds {options.seeds}",
+        table=f"sd2 classify table gestures.zarr --out tables --seeds {options.seeds}"
+        + (f" --shares {options.shares}" if options.shares else ""),
         runs=len(runs),
         cpu_min=sum(run["cpu_s"] for run in runs) / 60.0,
     )
@@ -154,7 +155,8 @@ def _findings(told: dict) -> str:
 
     lines = ["### What that says", ""]
     lines.append(
-        f"- Real data only, unseen people: {percent(of())} of the frames (mean over classes),"
+        f"- The {told['radar']} radar's data only, unseen people: {percent(of())} of the frames"
+        " (mean over classes),"
         f" {percent(of(), 'mean_recall_gestures')} of the gestures. The paper reports 87 to 92 %"
         " per class, of a sensor and movements of its own."
     )
@@ -174,10 +176,14 @@ def _findings(told: dict) -> str:
         if helps:
             lines.append(
                 "  More than its standard deviation over seeds is gained with"
-                f" {', '.join(f'{share:.0%}' for share in helps)} of the real data."
+                f" {', '.join(f'{share:.0%}' for share in helps)} of the radar's data."
             )
         else:
             lines.append("  Nowhere is that more than its standard deviation over seeds.")
+    lines.append(
+        "- Trainings are short. Longer ones help most where there is little to learn from, and gain"
+        " less by what is added: [decision 37](decisions/0037-gesture-classifiers.md)."
+    )
     return "\n".join([*lines, "", ""])
 
 

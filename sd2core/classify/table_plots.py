@@ -26,7 +26,7 @@ _COLOURS = ("#444444", "#b35806", "#2166ac")
 
 
 def draw_confusions(table: Table) -> Figure:
-    """One matrix for each of what is added to all real data."""
+    """One matrix for each of what is added to all of the radar's data."""
     shown = [one for one in main_conditions(table) if one.share == 1.0 and one.added != "radar"]
     return confusion_figure(
         [mean_confusion(table, one) for one in shown],
@@ -65,7 +65,7 @@ def confusion_figure(
 
 
 def draw_curve(table: Table) -> Figure:
-    """Mean recall of frames by the share of real data; bars are standard deviations."""
+    """Mean recall of frames by the share of the radar's data; bars are standard deviations."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6.4, 4.2), dpi=120, layout="constrained")

@@ -19,7 +19,7 @@ Rows = list[list[str]]
 def title_of(condition: Condition) -> str:
     """What is learnt from, in words."""
     words = {
-        "nothing": "real only",
+        "nothing": "radar only",
         "synthetic": "+ synthetic",
         "denoised": "+ denoised synthetic",
         "radar": "+ radar of the same movements",
@@ -57,7 +57,7 @@ def as_json(table: Table) -> dict[str, Any]:
 
 
 def network_rows(table: Table) -> Rows:
-    """Networks and features at equal budget, all real data, nothing added."""
+    """Networks and features at equal budget, all of the radar's data, nothing added."""
     rows = [["network", "parameters", *_score_head(table), "CPU s"]]
     for condition in table.conditions:
         if condition.share == 1.0 and condition.added == "nothing":
@@ -70,7 +70,7 @@ def network_rows(table: Table) -> Rows:
 
 
 def added_rows(table: Table) -> Rows:
-    """All real data, and what is added."""
+    """All of the radar's data, and what is added."""
     rows = [["learnt from", "frames added", *_score_head(table), "gain, points", "moved, frames"]]
     for condition in main_conditions(table):
         if condition.share == 1.0:
@@ -88,9 +88,9 @@ def added_rows(table: Table) -> Rows:
 
 
 def curve_rows(table: Table) -> Rows:
-    """Mean recall by the share of real data, with and without what is added."""
+    """Mean recall by the share of the radar's data, with and without what is added."""
     titles = list(dict.fromkeys(title_of(one) for one in curve_conditions(table)))
-    rows = [["real data", "frames", *titles, *(f"gain {one}" for one in titles[1:])]]
+    rows = [["of the radar's data", "frames", *titles, *(f"gain {one}" for one in titles[1:])]]
     for share in sorted({one.share for one in curve_conditions(table)}):
         own = {title_of(one): one for one in curve_conditions(table) if one.share == share}
         frames = np.mean([sum(run.real.values()) for run in table.of(own[titles[0]])])
@@ -154,14 +154,15 @@ def _lines(table: Table, lines_of: Callable[[Rows], list[str]]) -> list[str]:
         f"Judged on a {table.kind} radar's maps of {who}. Numbers are per cent, mean ± standard"
         f" deviation over {table.options.seeds} seeds (each other"
         f" {'movements' if table.by_movement else 'people'}, another draw, another network)."
-        " Frames: mean over classes of the share of frames that were found. Gestures: the same of whole gestures, by what most of their frames were taken for.",
+        " Frames: mean over classes of the share of frames that were found. Gestures:"
+        " the same of whole gestures, by what most of their frames were taken for.",
         "",
-        "Networks, all real data, equal steps of training:",
+        "Networks, all of the radar's data, equal steps of training:",
         "",
         *lines_of(network_rows(table)),
     ]
     if len(main_conditions(table)) > 1:
-        lines += ["", "What is added to all real data:", "", *lines_of(added_rows(table))]
+        lines += ["", "What is added to all of the radar's data:", "", *lines_of(added_rows(table))]
     if len({one.share for one in curve_conditions(table)}) > 1:
         lines += ["", "Learning curve, frames:", "", *lines_of(curve_rows(table))]
     for condition in main_conditions(table):

@@ -163,7 +163,7 @@ def test_words_and_pictures_of_a_table(tmp_path: Path) -> None:
     assert len(draw_confusions(table).axes) >= 3
     axes = draw_curve(table).axes[0]
     assert [one.get_text() for one in axes.get_legend().get_texts()] == [
-        "real only",
+        "radar only",
         "+ synthetic",
     ]
 
