@@ -29,7 +29,7 @@ def test_matrices_are_means_over_seeds_with_their_spread(written):
     assert result.path == folder / "table.json"
     assert result.heading == ("Frames of a simulated radar, mean ± standard deviation of 3 seeds")
     assert [matrix.title for matrix in result.matrices] == [
-        "real only", "+ synthetic", "+ denoised synthetic",
+        "radar only", "+ synthetic", "+ denoised synthetic",
     ]  # fmt: skip
     for condition, matrix in zip(
         (Condition(), Condition(added="synthetic"), Condition(added="denoised")),

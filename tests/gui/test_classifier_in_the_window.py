@@ -326,7 +326,7 @@ def test_a_result_is_opened_and_looked_at(window, tmp_path, qtbot, monkeypatch):
     window.class_dialogs.open_result()
     dialog = window.findChild(ClassResultDialog)
     left, right = dialog.findChildren(ConfusionView)
-    assert left.matrix.title == "real only"
+    assert left.matrix.title == "radar only"
     assert right.matrix.title == "+ denoised synthetic"
     assert "horizontal taken for horizontal: 81.0 ± 1.0 %" in left.accessibleDescription()
     choice = dialog.findChild(Choice)
