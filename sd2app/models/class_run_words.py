@@ -33,7 +33,8 @@ def time_text(run: ClassRun) -> str:
     if run.phase == "running" and history.left_s is not None:
         parts.append(f"{about(history.left_s)} left")
     if history.elapsed_s is not None:
-        parts.append(f"{exact_text(history.elapsed_s)} so far")
+        passed = exact_text(history.elapsed_s)
+        parts.append(f"{passed} so far" if run.under_way else f"took {passed}")
     return " · ".join(parts)
 
 

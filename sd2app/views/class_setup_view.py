@@ -189,8 +189,9 @@ class ClassSetupView(QWidget):
         with QSignalBlocker(self._quick):
             self._quick.setChecked(setup.value("quick") == "yes")
         why_not = training.why_not_train
-        # That there is nothing to learn from is said above.
-        self._problem.setText(why_not if setup.data else "")
+        # What is wrong with the data, or that there is none, is said above.
+        said = not setup.data or any(one.problem for one in setup.data)
+        self._problem.setText("" if said else why_not)
         self._problem.setVisible(bool(self._problem.text()))
         self._start.setEnabled(not why_not)
         self._copy.setEnabled(not setup.train_problem)

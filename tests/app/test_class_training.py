@@ -123,7 +123,7 @@ def test_a_training_is_followed_to_its_end_and_its_model_is_used(set_up):
         (0.5, True), (0.8, True), (0.7, False),
     ]  # fmt: skip
     assert facts(run) == [("Best recall", "80.0 %, at step 4")]
-    assert time_text(run) == "0:12 so far"
+    assert time_text(run) == "took 0:12"
     assert not model.in_use
     model.use_model()
     (kept,) = set_up.used
