@@ -69,6 +69,7 @@ class Sizes:
 
     recordings: int
     places: int
+    frames: int
     rounds: int
     tenth: int
     tenth_places: int
@@ -77,8 +78,8 @@ class Sizes:
     fit_frames: tuple[int, ...]
 
 
-FULL = Sizes(4, 55, 3, 10, 8, (1.0, 12.0, 90.0), 20, (150, 1050))
-QUICK = Sizes(2, 5, 1, 2, 3, (0.2, 0.5), 2, (20, 40))
+FULL = Sizes(4, 55, 600, 3, 10, 8, (1.0, 12.0, 90.0), 20, (150, 750))
+QUICK = Sizes(2, 5, 60, 1, 2, 3, (0.2, 0.5), 2, (20, 40))
 
 
 @dataclass(frozen=True)
@@ -130,7 +131,9 @@ def _page(root: Path, sizes: Sizes) -> str:
         made.mkdir()
         return made
 
-    two = two_against_one(folder("two processes"), sizes.recordings, sizes.places, sizes.rounds)
+    two = two_against_one(
+        folder("two processes"), sizes.recordings, sizes.places, sizes.rounds, sizes.frames
+    )
     ten = ten_times_the_tasks(
         folder("ten times the tasks"), sizes.tenth, sizes.tenth_places, sizes.rounds
     )
@@ -146,7 +149,7 @@ def _page(root: Path, sizes: Sizes) -> str:
     return "\n".join(
         [
             INTRODUCTION.format(machine=this_machine()) + (LITTLE if sizes is QUICK else ""),
-            _processes(two, ten, there_s),
+            _processes(two, ten, there_s, sizes.frames),
             _memory(used, fits),
             _steps(costs),
             _million(costs, two, own_s, files),
@@ -154,12 +157,12 @@ def _page(root: Path, sizes: Sizes) -> str:
     )
 
 
-def _processes(two: Compared, ten: Compared, there_s: float) -> str:
+def _processes(two: Compared, ten: Compared, there_s: float, frames: int) -> str:
     rounds = "one round" if len(two.one_s) == 1 else f"{len(two.one_s)} rounds"
     own_ms = 1e3 * statistics.median(ten.own_s) / ten.tasks
     rows = (
         (
-            f"{two.tasks} maps of 2,000 vertices, exact: two processes against one",
+            f"{two.tasks} maps of 5,000 vertices and {frames} frames: two processes against one",
             f"{two.ratio:.2f} times as fast ({_both(two)})",
             "≥ 1.8",
         ),

@@ -120,9 +120,11 @@ class Compared:
         return ratios[len(ratios) // 2]
 
 
-def two_against_one(folder: Path, recordings: int, places: int, rounds: int) -> Compared:
-    """The same maps on one process and on two."""
-    save_bodies(folder / "bodies", recordings, 2000, 60)
+def two_against_one(
+    folder: Path, recordings: int, places: int, rounds: int, frames: int = 600
+) -> Compared:
+    """The same maps on one process and on two; of as many vertices as a fit gives."""
+    save_bodies(folder / "bodies", recordings, 5000, frames)
     one_s, two_s, own_s = [], [], []
     with processes(1, folder) as one, processes(2, folder) as two:
         for _ in range(rounds):
