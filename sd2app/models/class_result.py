@@ -122,9 +122,10 @@ class ClassResult:
             for point in dict.fromkeys((*known[:1], *known[-1:])):
                 gain = 100 * (point.recall.mean - plain[point.share])
                 text = f"{gain:+.1f}".replace("-", "−")
-                gains.append(f"{text} points with {100 * point.share:g} % of the real data")
+                gains.append(f"{text} points with {100 * point.share:g} %")
             if gains:
-                parts.append(f"{curve[0].title}: {', '.join(gains)}.")
+                of = f"of the {self.kind} radar's data"
+                parts.append(f"{curve[0].title}: {', '.join(gains)} {of}.")
         if self.by_movement:
             parts.append("All data is of one person: how it is with others stays unknown.")
         return "\n".join(parts)

@@ -178,7 +178,7 @@ class ClassTraining(QObject):
         self._start(path, [*words, "--progress-json"], {"what": "train"})
 
     def compare(self) -> None:
-        """Begin to compare real with real and synthetic; raises what :meth:`train` does."""
+        """Begin to compare the radar alone with synthetic data added; raises as :meth:`train`."""
         if self.why_not_compare:
             raise Sd2Error(self.why_not_compare)
         path = self._new_folder("comparison")

@@ -27,8 +27,8 @@ _MAP_TIPS = {
     "denoised": "The synthetic ones, as the bundled denoiser makes them a radar's",
 }
 _COMPARISON = (
-    "Does synthetic data help? Trains again and again on the radar's maps alone and with synthetic"
-    " ones added, and with less and less of the radar's; judged on people who were not learnt from."
+    "Trains again and again on the radar's maps alone and with synthetic ones added, and with less"
+    " and less of the radar's; judged on people who were not learnt from."
 )
 
 
@@ -149,7 +149,7 @@ class ClassSetupView(QWidget):
         layout.addLayout(side_by_side(self._start, self._copy, spacing_px=6))
 
     def _add_comparison(self, layout: QVBoxLayout) -> None:
-        layout.addWidget(title("Real against real + synthetic"))
+        layout.addWidget(title("Does synthetic data help?"))
         layout.addWidget(sentence(_COMPARISON))
         self._quick = QCheckBox("Quick: fewer trainings, to see how it looks", self)
         self._quick.setToolTip("Two seeds instead of five, and fewer shares of the radar's data")

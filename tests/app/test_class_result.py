@@ -59,8 +59,8 @@ def test_curves_have_the_whole_at_their_end(written):
         [(0.1, 0.71), (1.0, 0.86)],
     ]
     assert result.summary == (
-        "+ denoised synthetic: +10.0 points with 10 % of the real data,"
-        " +5.0 points with 100 % of the real data."
+        "+ denoised synthetic: +10.0 points with 10 %, +5.0 points with 100 % of the simulated"
+        " radar's data."
     )
 
 
