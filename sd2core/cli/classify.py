@@ -26,7 +26,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "  sd2 classify apply walk.sd2 --model gestures.safetensors"
         ),
     )
-    kinds = parser.add_subparsers(title="what to do", metavar="WHAT", required=True)
+    kinds = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     add_train(kinds)
     add_eval(kinds)
     add_apply(kinds)

@@ -78,6 +78,12 @@ def add_train(kinds: argparse._SubParsersAction) -> None:
             " or a sixth of all)",
         )
     parser.add_argument("--steps", type=positive_int, metavar="N", help="batches to learn from")
+    parser.add_argument(
+        "--patience",
+        type=positive_int,
+        metavar="N",
+        help="end after so many looks at the validation people without a better one",
+    )
     parser.add_argument("--learning-rate", type=positive_float, metavar="R", help="at its highest")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="default: 0")
     parser.add_argument(
@@ -134,7 +140,7 @@ def _options(options: argparse.Namespace) -> TrainOptions:
 
     given: dict[str, Any] = {
         name: getattr(options, name)
-        for name in ("steps", "learning_rate")
+        for name in ("steps", "patience", "learning_rate")
         if getattr(options, name) is not None
     }
     return TrainOptions(model=options.model, features=options.features, seed=options.seed, **given)

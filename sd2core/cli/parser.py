@@ -49,6 +49,7 @@ examples:
   sd2 train pairs.zarr --out runs/s4          teach a denoiser from pairs
   sd2 classify train pairs.zarr --out g.safetensors    teach a classifier of gestures
   sd2 export walk.sd2 --out walk.zarr         a data set of segments to learn from
+  sd2 batch plan.toml                         all of that for many recordings and places
   sd2 ladder walk.npz --quick                 what accuracy this scene requires
 
 `sd2 COMMAND --help` explains one command.

@@ -229,8 +229,9 @@ def test_a_comparison_that_was_stopped_goes_on_in_its_folder(set_up, qtbot):
 def test_a_real_command_is_stopped_as_by_ctrl_c(set_up, tmp_path, qtbot):
     folder = CommandFolder(tmp_path / "run")
     out = tmp_path / "c.safetensors"
-    words = ["classify", "train", str(set_up.data), "--out", str(out), "--steps", "100000"]
-    folder.start([*words, "--progress-json"], {"what": "train"})
+    words = ["classify", "train", str(set_up.data), "--out", str(out)]
+    endless = ["--steps", "100000", "--patience", "100000"]
+    folder.start([*words, *endless, "--progress-json"], {"what": "train"})
     lines, seen = folder.lines(), []
 
     def stepped() -> bool:
