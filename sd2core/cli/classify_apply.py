@@ -85,7 +85,7 @@ def _apply(options: argparse.Namespace) -> None:
         check_output(options.probabilities, ".npz")
     chosen = SpanOptions(options.min_duration_s, options.merge_gap_s)
     card = describe_classifier(options.model)
-    doppler, clock = map_and_clock(options)
+    doppler, clock = map_and_clock(options, card.axis)
     # Before torch is loaded, which takes seconds.
     check_bins(doppler, card)
     with progress_bar("Classifying") as progress:

@@ -15,6 +15,7 @@ from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
     from sd2core.recording import Recording
+    from sd2core.sensor import VelocityAxis
     from sd2core.spectrum import DopplerMap
     from sd2core.timebase import Timebase
 
@@ -132,8 +133,13 @@ def _suggest(options: argparse.Namespace) -> None:
         print(f"  not kept: {sentence}")
 
 
-def map_and_clock(options: argparse.Namespace) -> tuple[DopplerMap, Timebase]:
-    """The map that ``options.map`` and ``options.of`` name, and the clock of its labels."""
+def map_and_clock(
+    options: argparse.Namespace, axis: VelocityAxis | None = None
+) -> tuple[DopplerMap, Timebase]:
+    """The map that ``options.map`` and ``options.of`` name, and the clock of its labels.
+
+    A recording's capture becomes a map on the axis, or on one of its own.
+    """
     from sd2core.io.kinds import kind_of
     from sd2core.io.radar import holds_map, load_recorded_map
     from sd2core.recording import open_recording
@@ -143,7 +149,7 @@ def map_and_clock(options: argparse.Namespace) -> tuple[DopplerMap, Timebase]:
     kind = kind_of(path)
     if kind == "recording":
         recording = open_recording(path)
-        return _map_of(recording, options.of), recording_clock(recording)
+        return _map_of(recording, options.of, axis), recording_clock(recording)
     if options.of is not None:
         raise Sd2Error(f"--of is given, and {path} is no recording", "--of for a recording only")
     if kind == "map":
@@ -159,7 +165,7 @@ def map_and_clock(options: argparse.Namespace) -> tuple[DopplerMap, Timebase]:
     return doppler, doppler.timebase
 
 
-def _map_of(recording: Recording, which: MapName | None) -> DopplerMap:
+def _map_of(recording: Recording, which: MapName | None, axis: VelocityAxis | None) -> DopplerMap:
     """The synthetic map where there is a mesh, else the radar's, or the one asked for."""
     name = which or ("radar" if recording.mesh is None else "synthetic")
-    return maps_of(recording, (name,))[name]
+    return maps_of(recording, (name,), axis=axis)[name]

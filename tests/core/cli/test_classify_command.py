@@ -181,6 +181,12 @@ def test_a_classifier_is_judged_on_a_labelled_recording(sd2: Sd2, model: Path) -
     assert np.sum(found["gestures"]) == 8
 
 
+def test_a_capture_of_a_recording_is_seen_as_the_classifier_learnt(sd2: Sd2, model: Path) -> None:
+    found = sd2("classify", "apply", SAMPLE, "--of", "radar", "--model", model, "--json")
+    assert found.code == 0, found.err
+    assert json.loads(found.out)["map_kind"] == "simulated"
+
+
 def test_a_table_is_made_once(sd2: Sd2, store: Path, tmp_path: Path) -> None:
     arguments = ("classify", "table", store, "--out", tmp_path, "--seeds", 1, "--steps", 2)
     first = sd2(*arguments, "--shares", "50%,100%")
