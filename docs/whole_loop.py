@@ -94,7 +94,7 @@ STEPS = (
     Step(
         "Plan sensors around the person",
         "sd2 placements swipes.sd2 --ranges 1.5:3:0.5 --azimuths=-30:30:30 --out grid.json",
-        "*Placements* page: grid or cloud, drawn in the scene, with what it will cost.",
+        "*Edit → Placements…*: grid or cloud, drawn in the scene, with what it will cost.",
     ),
     Step(
         "Look ahead",
@@ -108,28 +108,28 @@ STEPS = (
     ),
     Step(
         "Export a data set",
-        "sd2 export swipes.sd2 campaign.zarr --out set.zarr",
+        "sd2 export swipes.sd2 campaign.zarr --validation s05 --test s06 --out set.zarr",
         "*File → Export data set…*, for recordings.",
     ),
     Step(
         "Train a classifier on it",
-        "sd2 classify train set.zarr --out gestures.safetensors",
-        "*Classify* page → *Train*.",
+        "sd2 classify train set.zarr --maps radar,denoised --out gestures.safetensors",
+        "*Train* page, *Classifier*.",
     ),
     Step(
         "Judge it on somebody it has not seen",
-        "sd2 classify eval campaign.zarr --model gestures.safetensors --subjects s06",
-        "*Classify* page.",
+        "sd2 classify eval campaign.zarr --model gestures.safetensors",
+        "*Train* page, *Classifier*: *Open a result…* shows what `--json` wrote.",
     ),
     Step(
         "Find gestures in the sample",
-        "sd2 classify apply swipes.sd2 --of radar --model gestures.safetensors --out found.json",
+        "sd2 classify apply swipes.sd2 --of denoised --model gestures.safetensors --out found.json",
         "*Labels → Find gestures*: offered as suggestions, with a read-out while playing.",
     ),
     Step(
         "What does synthetic data add?",
         "sd2 classify table campaign.zarr --out tables --quick",
-        "*Classify* page → *Compare*.",
+        "*Train* page, *Classifier*: *Compare* shows the matrices and the curve.",
     ),
 )
 
