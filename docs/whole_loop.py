@@ -175,7 +175,7 @@ def _run(command: str, folder: Path) -> tuple[str, float]:
     took_s = time.monotonic() - begun_s
     if done.returncode:
         sys.exit(f"{command}: exit code {done.returncode}\n{done.stdout}")
-    return done.stdout, took_s
+    return done.stdout.replace(f"{folder.resolve()}{os.sep}", ""), took_s
 
 
 def _part(number: int, step: Step, printed: str, took_s: float) -> str:
