@@ -8,6 +8,7 @@ how it ended, and can stop it: see :mod:`sd2app.jobs.command_folder`. Run as
 from __future__ import annotations
 
 import _thread
+import signal
 import sys
 import threading
 from pathlib import Path
@@ -26,6 +27,8 @@ def main() -> int:
     if not lock.take():
         print("sd2: Another process is at this already.", file=sys.stderr)
         return 1
+    # Whoever was started in the background of a script has Ctrl-C switched off.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     over = threading.Event()
     threading.Thread(target=_watch, args=(folder, over), daemon=True).start()
     from sd2app.command_line import main as run

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -231,7 +232,12 @@ def test_a_real_command_is_stopped_as_by_ctrl_c(set_up, tmp_path, qtbot):
     out = tmp_path / "c.safetensors"
     words = ["classify", "train", str(set_up.data), "--out", str(out)]
     endless = ["--steps", "100000", "--patience", "100000"]
-    folder.start([*words, *endless, "--progress-json"], {"what": "train"})
+    # As it is for whoever was started in the background of a script.
+    heeded = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        folder.start([*words, *endless, "--progress-json"], {"what": "train"})
+    finally:
+        signal.signal(signal.SIGINT, heeded)
     lines, seen = folder.lines(), []
 
     def stepped() -> bool:
