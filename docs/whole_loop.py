@@ -181,8 +181,7 @@ def _run(command: str, folder: Path) -> tuple[str, float]:
 def _part(number: int, step: Step, printed: str, took_s: float) -> str:
     lines = printed.rstrip().splitlines()
     shown = "\n".join(lines[:LINES] + (["…"] if len(lines) > LINES else []))
-    content = (PLAN if step.command == "sd2 batch plan.toml --dry-run" else "").rstrip()
-    given = f"`plan.toml`:\n\n```toml\n{content}\n```\n\n" if content else ""
+    given = f"`plan.toml`:\n\n```toml\n{PLAN}```\n\n" if "--dry-run" in step.command else ""
     return (
         f"## {number}. {step.title}\n\n{given}```\n$ {step.command}\n{shown}\n```\n\n"
         f"{took_s:.0f} s. In the window: {step.window}\n"

@@ -12,9 +12,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from sd2app.jobs.detached import last_words, start_detached
+from sd2app.jobs.detached import last_words, launch
 from sd2core.atomic import atomic_write_text
-from sd2core.errors import Sd2Error
 from sd2core.file_lock import FileLock, is_locked
 from sd2core.train.progress import ProgressTail
 from sd2core.worker_processes import ONE_THREAD
@@ -109,10 +108,7 @@ class CommandFolder:
         atomic_write_text(self.path / _ABOUT, json.dumps(told, indent=1) + "\n")
         # What moves on the screen comes first: it gets by with one processor.
         words = [*command, str(self.path), *arguments]
-        pid = start_detached(words, self.path / _OUTPUT, ONE_THREAD)
-        if pid is None:
-            raise Sd2Error(f"{command[0]} cannot be started", remedy="Look whether it is installed")
-        return pid
+        return launch(words, self.path / _OUTPUT, ONE_THREAD)
 
     def stop(self) -> None:
         """Tell it to stop, as Ctrl-C does."""

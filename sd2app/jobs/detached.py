@@ -9,6 +9,8 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
+from sd2core.errors import Sd2Error
+
 _WINDOWS_FLAGS = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0) | getattr(
     subprocess, "CREATE_NO_WINDOW", 0
 )
@@ -52,6 +54,22 @@ def start_detached(
     # Nobody is going to wait for it: it may outlive this process.
     process.returncode = 0
     return process.pid
+
+
+def launch(
+    command: Sequence[str], output: Path, environment: Mapping[str, str] | None = None
+) -> int:
+    """Start it as :func:`start_detached` does, and give its process number.
+
+    Raises
+    ------
+    Sd2Error
+        When it cannot be started.
+    """
+    pid = start_detached(command, output, environment)
+    if pid is None:
+        raise Sd2Error(f"{command[0]} cannot be started", remedy="Look whether it is installed")
+    return pid
 
 
 def is_alive(pid: int) -> bool:

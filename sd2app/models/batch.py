@@ -7,7 +7,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.jobs.detached import start_detached
+from sd2app.jobs.detached import launch
 from sd2app.models.batch_estimate import COMMAND, BatchEstimateModel
 from sd2app.models.batch_follower import BatchFollower, output_of, plan_of
 from sd2app.models.batch_results import BatchResults
@@ -169,11 +169,7 @@ class BatchModel(QObject):
         # What an earlier start said is not about this one.
         output.unlink(missing_ok=True)
         words = ["batch", str(plan), "--workers", str(self.setup.workers)]
-        pid = start_detached([*self._command, *words], output)
-        if pid is None:
-            raise Sd2Error(
-                f"{self._command[0]} cannot be started", remedy="Look whether it is installed"
-            )
+        pid = launch([*self._command, *words], output)
         self.estimate.forget()  # of what is about to be done
         self._follow(BatchFollower(out, self, pid=pid))
 

@@ -9,7 +9,7 @@ from typing import Literal
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from sd2app.jobs.detached import start_detached
+from sd2app.jobs.detached import launch
 from sd2app.models.pair_maker import PairMaker
 from sd2app.models.step_times import COMMAND as TIMING_COMMAND
 from sd2app.models.step_times import StepKey, StepTimes
@@ -236,11 +236,7 @@ class TrainingModel(QObject):
 
     def _launch(self, path: Path, arguments: list[str]) -> None:
         # What moves on the screen comes first: the training gets by with one processor.
-        pid = start_detached([*self._command, *arguments], output_of(path), ONE_THREAD)
-        if pid is None:
-            raise Sd2Error(
-                f"{self._command[0]} cannot be started", remedy="Look whether it is installed"
-            )
+        pid = launch([*self._command, *arguments], output_of(path), ONE_THREAD)
         self._follow(TrainingFollower(path, self, pid=pid))
         self.library.refresh()
 
