@@ -23,6 +23,21 @@ _CONNECT_S = 20.0
 _LOOK_EVERY_S = 1.0
 _CLOSE_S = 5.0
 
+_LOCAL_SETTINGS = {
+    # Which of the tasks of a lost worker ended it is found out here.
+    "distributed.scheduler.allowed-failures": 0,
+    # Results are files: nothing is kept that could be spilt to disk.
+    "distributed.worker.memory.target": False,
+    "distributed.worker.memory.spill": False,
+    "distributed.worker.memory.pause": False,
+    "distributed.scheduler.http.routes": [],
+    "distributed.worker.http.routes": [],
+    # Looking at themselves costs every process 3 % of a core, and nobody sees it.
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "1s",
+    "distributed.admin.system-monitor.interval": "5s",
+}
+
 
 @dataclass(frozen=True, eq=False)
 class Ending:
@@ -206,20 +221,24 @@ def local_pool(folder: BatchFolder, processes: int) -> Iterator[DaskPool]:
 
     Reachable on the loopback interface only, without a dashboard.
     """
+    with _dask_log(folder), local_client(folder.path / BEGUN, processes) as client:
+        yield DaskPool(client, folder, most_deaths=2)
+
+
+@contextmanager
+def local_client(scratch: Path, processes: int) -> Iterator[Any]:
+    """Client of a cluster on this machine, as :func:`local_pool` has it.
+
+    Parameters
+    ----------
+    scratch : Path
+        Where Dask may put files.
+    processes : int
+    """
     import dask
     from distributed import Client, LocalCluster
 
-    settings = {
-        # Which of the tasks of a lost worker ended it is found out here.
-        "distributed.scheduler.allowed-failures": 0,
-        # Results are files: nothing is kept that could be spilt to disk.
-        "distributed.worker.memory.target": False,
-        "distributed.worker.memory.spill": False,
-        "distributed.worker.memory.pause": False,
-        "distributed.scheduler.http.routes": [],
-        "distributed.worker.http.routes": [],
-    }
-    with dask.config.set(settings), _dask_log(folder):
+    with dask.config.set(_LOCAL_SETTINGS):
         cluster = LocalCluster(
             n_workers=processes,
             threads_per_worker=1,
@@ -229,13 +248,13 @@ def local_pool(folder: BatchFolder, processes: int) -> Iterator[DaskPool]:
             scheduler_kwargs={"dashboard": False},
             preload=["sd2core.batch.interrupts"],
             silence_logs=logging.CRITICAL,
-            local_directory=str(folder.path / BEGUN),
+            local_directory=str(scratch),
             env=ONE_THREAD,
         )
         try:
             client = Client(cluster, set_as_default=False)
             try:
-                yield DaskPool(client, folder, most_deaths=2)
+                yield client
             finally:
                 client.close(timeout=_CLOSE_S)
         finally:

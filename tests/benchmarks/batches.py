@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import logging
 import os
 import resource
 import subprocess
@@ -22,7 +21,7 @@ from scaling import body
 from sd2core.atomic import atomic_write_text
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.plan_file import plan_from_text
-from sd2core.batch.pool import DaskPool
+from sd2core.batch.pool import DaskPool, local_client
 from sd2core.batch.run import BatchEnd, run_batch
 from sd2core.io.mesh import save_mesh
 from sd2core.io.video import open_video
@@ -73,21 +72,7 @@ def run(
 @contextmanager
 def processes(count: int, folder: Path) -> Iterator[Any]:
     """A client of so many warm workers on this machine; the scheduler is in this process."""
-    from distributed import Client, LocalCluster
-
-    with (
-        LocalCluster(
-            n_workers=count,
-            threads_per_worker=1,
-            host="127.0.0.1",
-            dashboard_address="127.0.0.1:0",
-            scheduler_kwargs={"dashboard": False},
-            silence_logs=logging.CRITICAL,
-            local_directory=str(folder / "dask"),
-            env=ONE_THREAD,
-        ) as cluster,
-        Client(cluster, set_as_default=False) as client,
-    ):
+    with local_client(folder / "dask", count) as client:
         warm = folder / f"warm-{count}"
         save_bodies(warm, 2 * count, 100, 10)
         run(warm, "*.npz", 4, "", client)
