@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from sd2core.atomic import atomic_write
 from sd2core.errors import Sd2Error
-from sd2core.presence import checked
+from sd2core.presence import Presence, checked
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 
@@ -253,6 +254,26 @@ def peak_velocity_mps(
     _check(energies, axis)
     peak = axis.centres_mps[energies.argmax(axis=1)]
     return np.where(energies.max(axis=1) > floor, peak, np.nan)
+
+
+def joined(maps: Sequence[DopplerMap]) -> DopplerMap:
+    """Maps that follow one another in time as one; what it says of itself is the first's.
+
+    Parameters
+    ----------
+    maps : sequence of DopplerMap
+        On one axis.
+    """
+    if len(maps) == 1:
+        return maps[0]
+    present = [Presence.of(one.present, len(one.timebase)).there for one in maps]
+    return replace(
+        maps[0],
+        values=np.concatenate([one.values for one in maps], axis=1),
+        timebase=Timebase(np.concatenate([one.times_s for one in maps])),
+        present=np.concatenate(present),
+        uncertainty=None,
+    )
 
 
 def mean_velocity_mps(

@@ -148,7 +148,11 @@ def _rows(file: Path) -> list[Result]:
 def _row(line: str) -> Result | None:
     try:
         content = json.loads(line)
-        maps = {kind: content[kind] for kind in ("synthetic", "denoised") if content.get(kind)}
+        maps = {
+            kind: content[kind]
+            for kind in ("synthetic", "denoised", "simulated")
+            if content.get(kind)
+        }
         return Result(
             str(content["recording"]),
             str(content["subject"]),

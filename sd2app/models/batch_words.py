@@ -14,6 +14,7 @@ STEP_WORDS = {
     "fit": "Fit bodies",
     "synthesise": "Synthesise",
     "denoise": "Denoise",
+    "simulate": "Simulate radar",
     "export": "Export",
 }
 _PHASES: dict[Phase, str] = {

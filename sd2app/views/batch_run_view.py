@@ -27,7 +27,7 @@ from sd2app.views.elided import ElidedLabel
 from sd2app.views.inner_pages import InnerPage, InnerPages
 from sd2app.views.panel_parts import outlined, sentence, side_by_side
 
-_MOST_STEPS = 5
+_MOST_STEPS = 6
 _NO_DATASET = "No data set has been exported here yet."
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from sd2core.batch.fitting import fitted
-from sd2core.batch.flow import Flow
+from sd2core.batch.flow import Flow, simulation_of
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.inputs import (
     Inspection,
@@ -33,6 +33,7 @@ from sd2core.progress import Progress, silent
 _LOOKED_AT = 100
 _TIMED_MESHES = 2
 _SHORT_FRAMES, _LONG_FRAMES = 120, 480
+_SIMULATED_FRAMES = 60
 _FIT_S_PER_FRAME = 0.08
 """Where no batch has fitted anything on this machine: processor time in docs/fitting.md."""
 _EXPORT_S_PER_SOURCE = 0.05
@@ -171,7 +172,8 @@ def estimate(plan: BatchPlan, workers: int, progress: Progress = silent) -> Batc
 
 
 def _kinds(plan: BatchPlan) -> list[str]:
-    return ["synthetic"] + (["denoised"] if plan.denoise is not None else [])
+    made = {"denoised": plan.denoise, "simulated": plan.simulate}
+    return ["synthetic", *(kind for kind, told in made.items() if told is not None)]
 
 
 def _sorted(
@@ -272,7 +274,7 @@ def _time(
     if plan.synthesise is None:
         return
     timed = [task_rates(flow, one) for one in _sample(found)]
-    for step in ("synthesise", "denoise"):
+    for step in ("synthesise", "denoise", "simulate"):
         here = [one[step] for one in timed if step in one]
         if step in steps and here and steps[step].to_do:
             mean = TaskRate(*np.mean([list(asdict(one).values()) for one in here], axis=0).tolist())
@@ -308,7 +310,8 @@ def task_rates(flow: Flow, found: Inspection) -> dict[str, TaskRate]:
     Returns
     -------
     dict
-        ``synthesise`` and ``denoise`` per task, and ``open``, once per recording.
+        ``synthesise``, ``denoise`` and ``simulate`` per task, and ``open``, once per
+        recording.
     """
     from sd2core.batch.denoising import denoise
 
@@ -337,6 +340,9 @@ def task_rates(flow: Flow, found: Inspection) -> dict[str, TaskRate]:
             for count in outs:
                 clean(count)
             rates["denoise"] = _rate(clean, cleaned)
+        if flow.plan.simulate is not None:
+            seen = {count: folder / f"simulated-{count}.npz" for count in maps.simulated}
+            rates["simulate"] = _rate(lambda count: maps.simulate(count, seen[count]), seen)
     return rates
 
 
@@ -351,6 +357,9 @@ class _TimedMaps:
         self._sensor = sensors[len(sensors) // 2]
         self.long = min(_LONG_FRAMES, found.mesh.frames)
         self.short = max(1, min(_SHORT_FRAMES, self.long // 2))
+        few = min(_SIMULATED_FRAMES, self.long)
+        self.simulated = few, max(1, few // 4)
+        self._simulation = None if plan.simulate is None else simulation_of(plan.simulate)
         self._made = 0
 
     def make(self, count: int, out: Path, chosen: Path | None) -> None:
@@ -363,6 +372,15 @@ class _TimedMaps:
         sensor = replace(self._sensor, position_m=(x + 1e-3 * self._made, y, z))
         first = (self._mesh.frames - self.long) // 2
         synthesise(self._mesh, sensor, self.told, (first, first + count), chosen, out)
+
+    def simulate(self, count: int, out: Path) -> None:
+        """Simulate one."""
+        from sd2core.batch.simulation import simulate
+
+        assert self._simulation is not None
+        first = (self._mesh.frames - count) // 2
+        axis = self.told.options().axis
+        simulate(self._mesh, self._sensor, self._simulation, axis, (first, first + count), out)
 
 
 def _rate(work: Callable[[int], None], outs: Mapping[int, Path]) -> TaskRate:

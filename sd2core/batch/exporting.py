@@ -15,11 +15,11 @@ from sd2core.atomic import atomic_write_text
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.keys import file_digest, key_of
 from sd2core.batch.plan import Export
-from sd2core.batch.stretches import LONGEST_FRAMES, joined
+from sd2core.batch.stretches import LONGEST_FRAMES
 from sd2core.errors import Sd2Error
 from sd2core.progress import Progress
 from sd2core.sensor import VirtualSensor
-from sd2core.spectrum import DopplerMap, MapKind
+from sd2core.spectrum import DopplerMap, MapKind, joined
 from sd2core.timebase import Timebase
 
 if TYPE_CHECKING:
@@ -181,7 +181,7 @@ def _loader(
         from sd2core.labels.spans import Labels
 
         maps: dict[MapKind, DopplerMap] = {}
-        kinds: tuple[MapKind, ...] = ("synthetic", "denoised")
+        kinds: tuple[MapKind, ...] = ("synthetic", "denoised", "simulated")
         for kind in kinds:
             if all(row[kind] is not None for row in rows):
                 maps[kind] = _stretch_of(folder, rows, kind, part)
@@ -189,7 +189,7 @@ def _loader(
         first = next(iter(maps.values()))
         if recording is not None and recording.radar is not None and key.placement == 0:
             radar = opened.radar(recording, first, first.timebase)
-            maps[radar.kind] = radar
+            maps.setdefault(radar.kind, radar)
         labels = Labels() if recording is None else recording.labelled
         names, classes = labels_and_classes(labels)
         spans = [one for one in labels.spans if one.origin != "suggestion"]

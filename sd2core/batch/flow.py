@@ -7,19 +7,23 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from sd2core.batch.exporting import dataset_key, dataset_path, is_exported, rows_of
 from sd2core.batch.fitting import fit_choices, fitted
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.inputs import Inspection, MeshInput, Origin, VideoInput, known_inspection
 from sd2core.batch.keys import file_digest, key_of
-from sd2core.batch.plan import STEPS, BatchPlan, Step
+from sd2core.batch.plan import STEPS, BatchPlan, Simulate, Step
 from sd2core.batch.stretches import Stretch, stretches_of
 from sd2core.batch.tasks import Task
 from sd2core.errors import Sd2Error
 from sd2core.sensor import VirtualSensor
 
-_MAPS: dict[Step, str] = {"synthesise": "synthetic", "denoise": "denoised"}
+if TYPE_CHECKING:
+    from sd2core.datasets.simulating import Simulation
+
+_MAPS: tuple[Step, ...] = ("synthesise", "denoise", "simulate")
 
 
 @dataclass(frozen=True)
@@ -36,6 +40,8 @@ class PlannedMap:
         One per stretch.
     denoising : Task, optional
         Of all stretches: a model remembers what was before.
+    simulation : tuple of Task
+        One per stretch, or none.
     """
 
     placement: int
@@ -43,11 +49,13 @@ class PlannedMap:
     stretches: tuple[Stretch, ...]
     synthesis: tuple[Task, ...]
     denoising: Task | None = None
+    simulation: tuple[Task, ...] = ()
 
     @property
     def tasks(self) -> tuple[Task, ...]:
         """All of them."""
-        return self.synthesis if self.denoising is None else (*self.synthesis, self.denoising)
+        denoising = () if self.denoising is None else (self.denoising,)
+        return (*self.synthesis, *denoising, *self.simulation)
 
     @property
     def denoised(self) -> list[str]:
@@ -74,7 +82,7 @@ class Flow:
     Raises
     ------
     Sd2Error
-        When the model of the plan cannot be used.
+        When the model or the radar of the plan cannot be used.
     """
 
     def __init__(self, plan: BatchPlan, folder: BatchFolder, origins: Sequence[Origin]) -> None:
@@ -91,6 +99,7 @@ class Flow:
             }
         )
         self._model = None if plan.denoise is None else _model_of(plan.denoise.model)
+        self._simulation = None if plan.simulate is None else simulation_of(plan.simulate)
         # Of a map whose stretches are not all there yet: how many are missing.
         self._missing: dict[tuple[str, int], int] = {}
         self._denoising: dict[tuple[str, int], Task] = {}
@@ -211,6 +220,11 @@ class Flow:
                 self._missing[where] = len(planned.stretches)
                 self._denoising[where] = planned.denoising
             yield from planned.synthesis
+        if self._simulation is not None:
+            # After all that is quick, so that this can be given out together.
+            for planned in self.maps_of(origin, mesh, own):
+                self.total["simulate"] += len(planned.stretches) - 1
+                yield from planned.simulation
 
     def _after_map(self, task: Task) -> Iterator[Task]:
         where = (task.origin.name, task.placement or 0)
@@ -237,7 +251,14 @@ class Flow:
                 self._synthesis_task(origin, mesh, placement, sensor, one) for one in stretches
             )
             denoising = None if self._model is None else self._denoising_task(synthesis)
-            yield PlannedMap(placement, sensor, stretches, synthesis, denoising)
+            simulation = (
+                ()
+                if self._simulation is None
+                else tuple(
+                    self._simulation_task(origin, mesh, placement, sensor, one) for one in stretches
+                )
+            )
+            yield PlannedMap(placement, sensor, stretches, synthesis, denoising, simulation)
 
     def _synthesis_task(
         self,
@@ -279,6 +300,40 @@ class Flow:
         frames = sum(each.frames for each in synthesis)
         return Task("denoise", key, one.origin, details, one.placement, frames, one.group, outs[-1])
 
+    def _simulation_task(
+        self,
+        origin: Origin,
+        mesh: MeshInput,
+        placement: int,
+        sensor: VirtualSensor,
+        stretch: Stretch,
+    ) -> Task:
+        assert self._simulation is not None
+        assert self.plan.synthesise is not None
+        axis = asdict(self.plan.synthesise.options().axis)
+        key = key_of(
+            "simulate",
+            {
+                "mesh": mesh.identity,
+                "sensor": asdict(sensor),
+                "axis": axis,
+                "simulation": self._simulation.as_json(),
+                "stretch": stretch,
+            },
+        )
+        out = str(self.folder.result("simulated", key, ".npz"))
+        details = {
+            "mesh": asdict(mesh),
+            "sensor": asdict(sensor),
+            "axis": axis,
+            "radar": asdict(self._simulation.radar),
+            "seed": self._simulation.seed,
+            "stretch": list(stretch),
+            "out": out,
+        }
+        frames = stretch[1] - stretch[0]
+        return Task("simulate", key, origin, details, placement, frames, origin.name, out)
+
     def all_maps(self) -> Iterator[tuple[Origin, str, MeshInput, PlannedMap]]:
         """Every map of every recording that has been looked at and fitted, in order.
 
@@ -301,6 +356,14 @@ def _changing(origin: Origin) -> Sd2Error:
         "files that stay as they are",
         "Start the batch again when it is complete",
     )
+
+
+def simulation_of(told: Simulate) -> Simulation:
+    """The radar of a plan; refused before the work begins."""
+    from sd2core.datasets.simulating import Simulation
+    from sd2core.io.radar.named import named_radar
+
+    return Simulation(named_radar(told.radar), told.seed)
 
 
 def _model_of(name: str) -> tuple[str, str]:

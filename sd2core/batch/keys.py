@@ -39,6 +39,20 @@ _CODE: dict[Step, tuple[str, ...]] = {
         "segments.py",
         "spectrum.py",
     ),
+    "simulate": (
+        "batch/simulation.py",
+        "batch/stretches.py",
+        "datasets/simulating.py",
+        "fmcw",
+        "io",
+        "mesh.py",
+        "mocap/recording_pairs.py",
+        "presence.py",
+        "scattering",
+        "sensor.py",
+        "spectrum.py",
+        "timebase.py",
+    ),
     "export": ("batch/exporting.py", "datasets", "labels", "segments.py", "spectrum.py"),
 }
 """Modules that a step's results depend on, within sd2core."""

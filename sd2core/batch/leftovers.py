@@ -7,7 +7,7 @@ import shutil
 import time
 from pathlib import Path
 
-_KINDS = ("inputs", "meshes", "plans", "synthetic", "denoised")
+_KINDS = ("inputs", "meshes", "plans", "synthetic", "denoised", "simulated")
 _OLD_S = 3600.0
 """A write takes seconds. What is older belongs to nobody, also where a worker of an earlier run
 may still be at its last task on another machine."""

@@ -37,7 +37,7 @@ from sd2core.spectrum import MapKind
 FORMAT: Literal["sd2-batch-plan"] = "sd2-batch-plan"
 VERSION: Literal[1] = 1
 
-Step = Literal["inspect", "fit", "synthesise", "denoise", "export"]
+Step = Literal["inspect", "fit", "synthesise", "denoise", "simulate", "export"]
 """What is done, in this order; ``inspect`` is the look at what a recording holds."""
 
 STEPS: tuple[Step, ...] = get_args(Step)
@@ -179,6 +179,21 @@ class Denoise(_Section):
     model: Text = "denoiser"
 
 
+class Simulate(_Section):
+    """How a radar at each place is simulated, as ``sd2 export --simulate`` does it.
+
+    Parameters
+    ----------
+    radar : str
+        ``"paper"``, or the ``config.json`` of a capture.
+    seed : int
+        Of phases and noise.
+    """
+
+    radar: Text = "paper"
+    seed: Annotated[int, Field(ge=0)] = 0
+
+
 class Export(_Section):
     """How maps become a data set to learn from, as ``sd2 export`` does it.
 
@@ -224,7 +239,7 @@ class BatchPlan(_Section):
         camera where it has none), ``kind = "positions"`` with ``positions_m``, or what
         :func:`sd2core.placements.placements_from_dict` reads (``"grid"``, ``"cloud"``), around
         the body of each recording. With ``own = true`` the recording's own sensor besides.
-    fit, synthesise, denoise, export : optional
+    fit, synthesise, denoise, simulate, export : optional
     """
 
     format: Literal["sd2-batch-plan"] = FORMAT
@@ -235,6 +250,7 @@ class BatchPlan(_Section):
     fit: Fit | None = None
     synthesise: Synthesise | None = None
     denoise: Denoise | None = None
+    simulate: Simulate | None = None
     export: Export | None = None
 
     @field_validator("placements")
@@ -247,9 +263,11 @@ class BatchPlan(_Section):
     def _complete(self) -> BatchPlan:
         if self.fit is None and self.synthesise is None:
             raise ValueError("nothing is to be done: give a section [fit] or [synthesise]")
-        for name in ("denoise", "export"):
+        for name in ("denoise", "simulate", "export"):
             if getattr(self, name) is not None and self.synthesise is None:
-                raise ValueError(f"[{name}] works on maps: give a section [synthesise] as well")
+                raise ValueError(
+                    f"[{name}] goes with synthetic maps: give a section [synthesise] as well"
+                )
         return self
 
     @property

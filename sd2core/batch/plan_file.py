@@ -12,8 +12,9 @@ from typing import Any
 from pydantic import ValidationError
 
 from sd2core.atomic import atomic_write_text
-from sd2core.batch.plan import BatchPlan
+from sd2core.batch.plan import STEPS, BatchPlan
 from sd2core.errors import Sd2Error
+from sd2core.io.radar.named import PAPER
 from sd2core.relative_paths import is_absolute, located_path, stored_path
 from sd2core.toml_text import toml_lines
 
@@ -73,7 +74,7 @@ def plan_text(plan: BatchPlan, folder: Path) -> str:
     content["placements"] = dict(plan.placements)
     lines = ["# Plan of `sd2 batch`; docs/formats.md says what it may hold."]
     lines += toml_lines({k: v for k, v in content.items() if not isinstance(v, dict)}, folder)
-    for section in ("recordings", "placements", "fit", "synthesise", "denoise", "export"):
+    for section in ("recordings", "placements", *STEPS[1:]):
         # A section that is there is done, even with nothing in it.
         if getattr(plan, section) is not None:
             lines += _section_lines(section, content.get(section, {}), folder)
@@ -104,6 +105,9 @@ def _with_paths(plan: BatchPlan, changed: Any) -> BatchPlan:
         updates["fit"] = plan.fit.model_copy(update={"models": changed(plan.fit.models)})
     if plan.denoise is not None and _is_path(plan.denoise.model):
         updates["denoise"] = plan.denoise.model_copy(update={"model": changed(plan.denoise.model)})
+    if plan.simulate is not None and plan.simulate.radar != PAPER:
+        update = {"radar": changed(plan.simulate.radar)}
+        updates["simulate"] = plan.simulate.model_copy(update=update)
     return plan.model_copy(update=updates)
 
 

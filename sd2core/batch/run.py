@@ -265,6 +265,9 @@ class _Run:
                         "denoised": _if_there(planned.denoised[index], root)
                         if planned.denoised
                         else None,
+                        "simulated": _if_there(planned.simulation[index].out, root)
+                        if planned.simulation
+                        else None,
                     }
                     if row["synthetic"] is not None:
                         stream.write((json.dumps(row, ensure_ascii=False) + "\n").encode())

@@ -66,7 +66,7 @@ def synthesise(
         When the mesh cannot be read, the sensor stands in the body, or nothing holds the
         tolerance.
     """
-    _refuse_inside(mesh, sensor)
+    refuse_inside(mesh, sensor)
     plan = None if chosen is None else _plan(mesh, sensor, told, chosen)
     synthesizer = _synthesizer(mesh, told, plan)
     doppler = synthesizer.map(sensor, frames=stretch)
@@ -76,10 +76,16 @@ def synthesise(
     doppler.save(out)
 
 
-def _refuse_inside(mesh: MeshInput, sensor: VirtualSensor) -> None:
+def refuse_inside(mesh: MeshInput, sensor: VirtualSensor) -> None:
+    """Refuse a sensor that stands in the body.
+
+    Raises
+    ------
+    Sd2Error
+    """
     from sd2core.whereabouts import Whereabouts
 
-    opened = _mesh(mesh)
+    opened = kept_mesh(mesh)
     if _kept.body is None:
         _kept.body = Whereabouts.of(opened)
     if _kept.body.seen_by((sensor,)).inside[0]:
@@ -91,7 +97,14 @@ def _refuse_inside(mesh: MeshInput, sensor: VirtualSensor) -> None:
         )
 
 
-def _mesh(wanted: MeshInput) -> MeshSequence:
+def kept_mesh(wanted: MeshInput) -> MeshSequence:
+    """The mesh, which this process keeps open until it is asked for another one.
+
+    Raises
+    ------
+    Sd2Error
+        When it cannot be read.
+    """
     if _kept.mesh is None or _kept.mesh_of != wanted:
         # Before another one is opened, so that there are never two.
         _kept.mesh, _kept.body, _kept.synthesizer, _kept.made_for = None, None, None, ()
@@ -107,7 +120,7 @@ def _synthesizer(mesh: MeshInput, told: Synthesise, plan: dict[str, Any] | None)
     from sd2core.doppler import Synthesizer
     from sd2core.ladder.rungs import Plan
 
-    opened = _mesh(mesh)
+    opened = kept_mesh(mesh)
     wanted = (told, None if plan is None else json.dumps(plan["plan"], sort_keys=True))
     if _kept.synthesizer is None or _kept.made_for != wanted:
         _kept.synthesizer = None
@@ -129,7 +142,7 @@ def _plan(mesh: MeshInput, sensor: VirtualSensor, told: Synthesise, path: Path) 
     from sd2core.ladder import choose
 
     choice = choose(
-        _mesh(mesh), sensor, tolerance=told.tolerance, options=told.options(), dragging=False
+        kept_mesh(mesh), sensor, tolerance=told.tolerance, options=told.options(), dragging=False
     )
     if not choice.holds:
         raise Sd2Error(choice.summary, "a tolerance that can be held", "Allow more of it")

@@ -17,13 +17,13 @@ from sd2core.batch.keys import all_code_digest
 from sd2core.batch.plan import Export, Step, Synthesise
 from sd2core.errors import Sd2Error
 from sd2core.progress import silent
-from sd2core.sensor import VirtualSensor
+from sd2core.sensor import RadarConfig, VelocityAxis, VirtualSensor
 
 BEGUN = "begun"
 """Folder of what is under way; it is there only while a batch runs."""
 
 _MARKER = "task-"
-_ONE_FILE = ("synthesise", "denoise")
+_ONE_FILE = ("synthesise", "denoise", "simulate")
 """Steps that are done when their last file is there."""
 
 
@@ -226,6 +226,30 @@ def _denoise(
     denoise([Path(one) for one in maps], model, digest, [Path(one) for one in outs])
 
 
+def _simulate(
+    folder: BatchFolder,
+    origin: Origin,
+    mesh: Mapping[str, Any],
+    sensor: Mapping[str, Any],
+    axis: Mapping[str, Any],
+    radar: Mapping[str, Any],
+    seed: int,
+    stretch: list[int],
+    out: str,
+) -> None:
+    from sd2core.batch.simulation import simulate
+    from sd2core.datasets.simulating import Simulation
+
+    simulate(
+        mesh_input(mesh),
+        VirtualSensor(**sensor),
+        Simulation(RadarConfig(**radar), seed),
+        VelocityAxis(**axis),
+        (stretch[0], stretch[1]),
+        Path(out),
+    )
+
+
 def _export(folder: BatchFolder, origin: Origin, export: Mapping[str, Any]) -> None:
     from sd2core.batch.exporting import export_dataset
 
@@ -237,5 +261,6 @@ _WORK: dict[str, Callable[..., None]] = {
     "fit": _fit,
     "synthesise": _synthesise,
     "denoise": _denoise,
+    "simulate": _simulate,
     "export": _export,
 }

@@ -19,7 +19,7 @@ from sd2core.cli.options import (
     positive_int,
     share,
 )
-from sd2core.cli.output import counted, print_facts, print_json, progress_bar
+from sd2core.cli.output import counted, duration, print_facts, print_json, progress_bar
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
@@ -150,6 +150,12 @@ def _add_making(parser: argparse.ArgumentParser) -> None:
         help="make synthetic maps as quickly as this error allows, 2%% say (default: exactly)",
     )
     group.add_argument(
+        "--simulate",
+        metavar="paper|CONFIG.json",
+        help="compute the signal of this radar at every place, which takes far longer than"
+        " everything else (default: only what radar files hold)",
+    )
+    group.add_argument(
         "--model",
         metavar="FILE|NAME",
         help="the denoiser (default: that of each recording, or the bundled one)",
@@ -228,7 +234,9 @@ def _dataset_options(options: argparse.Namespace) -> DatasetOptions:
 
 def _making(options: argparse.Namespace) -> Making:
     from sd2core.datasets.recording_sources import Making
+    from sd2core.datasets.simulating import Simulation
     from sd2core.doppler.options import chosen_options
+    from sd2core.io.radar.named import named_radar
     from sd2core.placements import read_placements
 
     nulled = {} if options.null_bins is None else {"null_bins": options.null_bins}
@@ -239,6 +247,7 @@ def _making(options: argparse.Namespace) -> Making:
         placements=options.placements
         if options.placements in (None, "planned")
         else read_placements(Path(options.placements)),
+        simulation=None if options.simulate is None else Simulation(named_radar(options.simulate)),
         model=options.model,
     )
 
@@ -251,6 +260,7 @@ def _dry_run(
     with progress_bar("Counting", "source") as progress:
         counting = Counting.of(sources, progress)
     forecast = counting.forecast(wanted, making.synthesis.axis.bins)
+    simulating_s = _simulating_s(options, making)
     if options.json:
         print_json(
             {
@@ -263,13 +273,29 @@ def _dry_run(
                 "segments_of_split": forecast.of_split(),
                 "frame_rate_hz": forecast.frame_rate_hz,
                 "total_bytes": forecast.total_bytes,
+                "simulating_s": simulating_s,
                 "failed": list(forecast.failed),
             }
         )
     else:
-        print_facts(f"{options.out} would hold", _forecast_facts(forecast))
+        facts = _forecast_facts(forecast)
+        if simulating_s is not None:
+            facts["simulating"] = (
+                f"about {duration(simulating_s)} for all of it, as measured on some frames"
+            )
+        print_facts(f"{options.out} would hold", facts)
     _complain(forecast.failed)
     return 1 if forecast.failed else 0
+
+
+def _simulating_s(options: argparse.Namespace, making: Making) -> float | None:
+    """How long simulating radars would take; None where nobody asked for it."""
+    if making.simulation is None:
+        return None
+    from sd2core.datasets.cost import simulation_s
+    from sd2core.datasets.inputs import recordings_of
+
+    return simulation_s(recordings_of(options.inputs), making)
 
 
 def _forecast_facts(forecast: Forecast) -> dict[str, str]:

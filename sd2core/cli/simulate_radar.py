@@ -6,7 +6,7 @@ import argparse
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from sd2core.cli.options import (
     add_command,
@@ -22,7 +22,7 @@ from sd2core.cli.output import progress_bar
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
-    from sd2core.fmcw import WaveOptions
+    from sd2core.fmcw import SignalOptions, WaveOptions
     from sd2core.io.radar import RadarCapture
     from sd2core.mesh import MeshSequence
     from sd2core.sensor import RadarConfig, VirtualSensor
@@ -113,11 +113,18 @@ def add_radar(kinds: argparse._SubParsersAction) -> None:
         metavar="Z[,C]",
         help="a wall Z metres in front of the camera reflects, likewise",
     )
-    parser.add_argument(
+    noise = parser.add_mutually_exclusive_group()
+    noise.add_argument(
         "--snr-db",
         type=finite_float,
         metavar="S",
         help="add thermal noise this many decibels below the moving mesh's echo (default: none)",
+    )
+    noise.add_argument(
+        "--link-budget",
+        action="store_true",
+        help="gain and noise of a 60 GHz radar on one chip, so that what is farther away is weaker"
+        " (default: a gain that suits the strongest echo)",
     )
     parser.add_argument(
         "--seed", type=int, default=0, metavar="N", help="of noise and random phases (default: 0)"
@@ -136,44 +143,26 @@ def add_radar_choice(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def chosen_radar(name: str) -> RadarConfig:
-    """The radar that ``--radar`` names."""
-    from sd2core.sensor import PAPER_RADAR
-
-    if name == "paper":
-        return PAPER_RADAR
-    from sd2core.io.radar import read_radar_config
-
-    return read_radar_config(Path(name))
-
-
 def simulated(
     mesh: MeshSequence,
     sensor: VirtualSensor,
     config: RadarConfig,
-    visibility: str,
+    visibility: Literal["facing", "exact"],
     *,
     wave: WaveOptions | None = None,
-    snr_db: float | None = None,
-    seed: int = 0,
+    options: SignalOptions | None = None,
 ) -> RadarCapture:
-    """Raw samples of a mesh, with bars."""
+    """Raw samples of a mesh, with a bar; without noise unless the options say otherwise."""
     from sd2core.fmcw import SignalOptions, simulate_radar
 
-    seen = None
-    if visibility == "exact":
-        from sd2core.scattering.facets import facet_visibility
-
-        with progress_bar("Looking at what is hidden") as progress:
-            seen = facet_visibility(mesh, sensor, progress)
     with progress_bar("Simulating") as progress:
         return simulate_radar(
             mesh,
             config,
             sensor=sensor,
-            visibility="facing" if seen is None else seen,
+            visibility=visibility,
             wave=wave,
-            options=SignalOptions(snr_db=math.inf if snr_db is None else snr_db, seed=seed),
+            options=options or SignalOptions(snr_db=math.inf),
             progress=progress,
         )
 
@@ -196,15 +185,16 @@ def plane_at(text: str) -> tuple[float, ...]:
 def _radar(options: argparse.Namespace) -> None:
     from sd2core.cli.info import describe_capture, show
     from sd2core.cli.reading import mesh_and_sensor
-    from sd2core.fmcw import Mirror, WaveOptions
+    from sd2core.fmcw import LinkBudget, Mirror, SignalOptions, WaveOptions
     from sd2core.io.radar import check_replaceable, write_capture
+    from sd2core.io.radar.named import named_radar
 
     check_replaceable(options.out)
     if not options.out.absolute().parent.is_dir():
         raise Sd2Error(
             f"The folder {options.out.absolute().parent} does not exist", "an existing folder"
         )
-    config = chosen_radar(options.radar)
+    config = named_radar(options.radar)
     offsets: tuple[tuple[float, float, float], ...] = ()
     if options.receivers is not None:
         placed = not isinstance(options.receivers, int)
@@ -231,8 +221,11 @@ def _radar(options: argparse.Namespace) -> None:
         config,
         options.visibility,
         wave=wave,
-        snr_db=options.snr_db,
-        seed=options.seed,
+        options=SignalOptions(
+            snr_db=math.inf if options.snr_db is None else options.snr_db,
+            seed=options.seed,
+            link=LinkBudget() if options.link_budget else None,
+        ),
     )
     folder = write_capture(
         options.out,

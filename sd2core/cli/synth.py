@@ -20,7 +20,7 @@ from sd2core.cli.options import (
     positive_int,
 )
 from sd2core.cli.output import progress_bar
-from sd2core.cli.simulate_radar import add_radar_choice, chosen_radar, simulated
+from sd2core.cli.simulate_radar import add_radar_choice, simulated
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
@@ -289,9 +289,10 @@ def _check_fmcw(options: argparse.Namespace) -> None:
 
 def _by_fmcw(options: argparse.Namespace, mesh: MeshSequence, sensor: VirtualSensor) -> DopplerMap:
     from sd2core.fmcw import doppler_map
+    from sd2core.io.radar.named import named_radar
     from sd2core.sensor import VelocityAxis
 
-    config = chosen_radar(options.radar)
+    config = named_radar(options.radar)
     capture = simulated(mesh, sensor, config, options.visibility or "exact")
     default = VelocityAxis()
     axis = VelocityAxis(options.bins or default.bins, options.v_max or default.v_max_mps)

@@ -69,6 +69,17 @@ def gather(
     return found
 
 
+def recordings_of(paths: Sequence[Path]) -> list[Path]:
+    """The recordings among inputs and in folders of them.
+
+    Raises
+    ------
+    Sd2Error
+        When a path is nothing that can be exported.
+    """
+    return [one for path in paths for one in _expanded(Path(path)) if is_recording(one)]
+
+
 def recordings_in(folder: Path) -> list[Path]:
     """Recordings right in a folder, by name."""
     return sorted(path for path in folder.glob(f"*{SUFFIX}") if is_recording(path))

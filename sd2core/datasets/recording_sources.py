@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.datasets.denoising import Denoising
+from sd2core.datasets.simulating import CLUTTER, Simulation, simulated_map
 from sd2core.datasets.source import (
     BACKGROUND,
     KINDS,
@@ -40,6 +41,10 @@ from sd2core.spectrum import DopplerMap, MapKind
 from sd2core.timebase import Timebase
 from sd2core.whereabouts import Whereabouts
 
+_STEPS = 1000
+_COUNTED_SHARE = 0.05
+"""Of the time that a source takes whose radar is simulated."""
+
 
 @dataclass(frozen=True)
 class Making:
@@ -57,6 +62,10 @@ class Making:
     placements : Placements or "planned", optional
         Where else sensors stand around the body, besides the recording's own; each gives
         synthetic and denoised maps. ``"planned"``: where each recording itself plans them.
+    simulation : Simulation, optional
+        Gives every place a simulated map, also where the recording's own radar is simulated,
+        so that all are of one radar. It takes far longer than everything else. None: there
+        are simulated maps only where a recording's radar file holds one.
     model : str, optional
         Denoiser, by file or name; None: that of the recording, or the bundled one where
         nobody has chosen. A recording that is set to be shown without has no denoised map.
@@ -66,6 +75,7 @@ class Making:
     synthesis: SynthesisOptions = PRESETS["paper"]
     tolerance: float | None = None
     placements: Placements | Literal["planned"] | None = None
+    simulation: Simulation | None = None
     model: str | None = None
 
 
@@ -96,7 +106,7 @@ def recording_sources(
                 "one of them",
                 "Fit a mesh with `sd2 fit`",
             )
-        for placement in range(1 + len(_places(recording, making))):
+        for placement in range(1 + len(places_of(recording, making))):
             key = SourceKey(subject, recording.folder.stem, placement)
             found.append(_lazy(shared, recording, key))
     return found
@@ -127,7 +137,7 @@ def radar_map(recording: Recording, axis: VelocityAxis) -> DopplerMap:
     if recording.holds_radar_map:
         radar = recording.load_radar_map().doppler
     else:
-        radar = doppler_map(recording.load_capture(), axis=axis, clutter="mean")
+        radar = doppler_map(recording.load_capture(), axis=axis, clutter=CLUTTER)
     return radar.shifted(recording.radar_offset_s)
 
 
@@ -182,7 +192,8 @@ class _Opened:
         if self._mesh is not None:
             kinds += ["synthetic"]
             kinds += ["denoised"] if self._model() is not None else []
-        if radar_kind is not None and placement == 0:
+            kinds += ["simulated"] if self._simulates else []
+        if radar_kind is not None and placement == 0 and radar_kind not in kinds:
             kinds.append(radar_kind)
         return Outline(
             tuple(kind for kind in kinds if kind in self._making.kinds),
@@ -196,8 +207,9 @@ class _Opened:
         wanted = self._making.kinds
         maps: dict[MapKind, DopplerMap] = {}
         sensor = self._sensor(key.placement)
+        counted_share = _COUNTED_SHARE if self._simulates else 1.0
         if self._mesh is not None and {"synthetic", "denoised"} & {*wanted}:
-            synthetic = self._counted(sensor, progress)
+            synthetic = self._counted(sensor, _stage(progress, 0.0, counted_share))
             maps["synthetic"] = synthetic
             model = self._model()
             if "denoised" in wanted and model is not None:
@@ -208,6 +220,8 @@ class _Opened:
             radar = self._of_radar()
             there = self._mesh.timebase if self._mesh is not None else radar.timebase
             maps[radar.kind] = on_clock(radar, there)
+        if self._simulates:
+            maps["simulated"] = self._simulated(sensor, _stage(progress, counted_share, 1.0))
         maps = {kind: one for kind, one in maps.items() if kind in wanted}
         if not maps:
             raise Sd2Error(
@@ -250,6 +264,18 @@ class _Opened:
         assert own is not None
         return own.shifted(recording.radar_offset_s), None, kind
 
+    @property
+    def _simulates(self) -> bool:
+        """Whether a radar is simulated at every place."""
+        wanted = self._making.simulation is not None and "simulated" in self._making.kinds
+        return wanted and self._mesh is not None
+
+    def _simulated(self, sensor: VirtualSensor, progress: Progress) -> DopplerMap:
+        assert self._mesh is not None
+        assert self._making.simulation is not None
+        axis = self._making.synthesis.axis
+        return simulated_map(self._mesh, sensor, self._making.simulation, axis, None, progress)
+
     def _model(self) -> Path | None:
         """The denoiser's file; None where the recording is to be shown without."""
         from sd2core.denoise.files import DEFAULT_NAME, find_model
@@ -268,7 +294,7 @@ class _Opened:
             return self.recording.sensor
         target_m = self._target()
         assert target_m is not None
-        return _places(self.recording, self._making)[placement - 1].sensor(target_m)
+        return places_of(self.recording, self._making)[placement - 1].sensor(target_m)
 
     def _target(self) -> Vector | None:
         if self._target_m is None and self._mesh is not None:
@@ -292,7 +318,14 @@ class _Opened:
         return label_per_frame(self._spans, self._names, times_s)
 
 
-def _places(recording: Recording, making: Making) -> tuple[Place, ...]:
+def _stage(progress: Progress, start: float, stop: float) -> Progress:
+    """Progress of a part of the work, from one share of it to another."""
+    return lambda done, of: progress(
+        round(_STEPS * (start + (stop - start) * done / max(of, 1))), _STEPS
+    )
+
+
+def places_of(recording: Recording, making: Making) -> tuple[Place, ...]:
     """Where else a recording is to be seen from."""
     plan = recording.placements if making.placements == "planned" else making.placements
     return () if plan is None or recording.mesh is None else plan.places()
@@ -317,7 +350,7 @@ def _fingerprint(recording: Recording, key: SourceKey, making: Making) -> str:
     """Of what the source is made of: labels and settings as they are, files by their sizes."""
     place = None
     if key.placement:
-        place = asdict(_places(recording, making)[key.placement - 1])
+        place = asdict(places_of(recording, making)[key.placement - 1])
     content = {
         "sensor": asdict(recording.sensor),
         "place": place,
@@ -330,6 +363,7 @@ def _fingerprint(recording: Recording, key: SourceKey, making: Making) -> str:
         ],
         "synthesis": asdict(making.synthesis),
         "tolerance": making.tolerance,
+        "simulation": None if making.simulation is None else making.simulation.as_json(),
         "model": making.model or [str(recording.denoiser or ""), recording.bundled_denoiser],
         "kinds": making.kinds,
         "files": [

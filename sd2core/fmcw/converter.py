@@ -38,6 +38,7 @@ def digitise(
     options: SignalOptions,
     samples: NDArray[np.uint16],
     go_on: Callable[[], None] = lambda: None,
+    first: int = 0,
 ) -> dict[str, float]:
     """Gain, thermal noise and rounding to converter counts around mid-scale.
 
@@ -54,6 +55,8 @@ def digitise(
         Result, of the same shape.
     go_on : callable
         Called once per frame; may raise to stop.
+    first : int
+        Number of the first of these frames in the recording, whose noise it has.
 
     Returns
     -------
@@ -62,7 +65,10 @@ def digitise(
     """
     middle = 2 ** (config.adc_bits - 1)
     gain = options.peak_share * middle / peak if peak > 0 else 1.0
-    if math.isinf(options.snr_db) and options.snr_db > 0:
+    if options.link is not None:
+        gain = middle / options.link.full_scale
+        noise = gain * options.link.noise_rms(config)
+    elif math.isinf(options.snr_db) and options.snr_db > 0:
         noise = 0.0
     elif power > 0:
         noise = gain * math.sqrt(power) * 10.0 ** (-options.snr_db / 20.0)
@@ -71,7 +77,7 @@ def digitise(
     clipped = 0
     for frame, values in enumerate(signal):
         go_on()
-        random = np.random.default_rng([options.seed, frame])
+        random = np.random.default_rng([options.seed, first + frame])
         counts = np.rint(
             middle + gain * values.astype(np.float64) + noise * random.standard_normal(values.shape)
         )
@@ -116,9 +122,7 @@ def simulated_capture(
                 "source": Path(source).name,
                 "sensor": asdict(sensor),
                 **(how or {}),
-                # JSON has no infinity.
-                "options": asdict(options)
-                | {"snr_db": options.snr_db if math.isfinite(options.snr_db) else None},
+                "options": _told(options),
                 "first_frame_s": float(times_s[0]),
                 "frame_time": "middle of the burst of chirps",
                 **levels,
@@ -127,6 +131,16 @@ def simulated_capture(
             }
         },
     )
+
+
+def _told(options: SignalOptions) -> dict[str, Any]:
+    """What counts of the options; JSON has no infinity."""
+    told = asdict(options)
+    if options.link is None:
+        del told["link"]
+        return told | {"snr_db": options.snr_db if math.isfinite(options.snr_db) else None}
+    del told["snr_db"], told["peak_share"]
+    return told
 
 
 def check_converter(config: RadarConfig) -> None:

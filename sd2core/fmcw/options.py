@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
+from sd2core.fmcw.link import LinkBudget
 from sd2core.sensor import RadarConfig, Vector, VirtualSensor
 
 Model = Literal["nufft", "direct"]
@@ -164,12 +165,16 @@ class SignalOptions:
         noise reaches: this sets the gain.
     seed : int
         Same seed, same bits.
+    link : LinkBudget, optional
+        Sets gain and noise in place of ``snr_db`` and ``peak_share``: those of one
+        receiver, whatever the scene, so that what is farther away is weaker.
     """
 
     snr_db: float = 10.0
     reflectors: tuple[Reflector, ...] = ()
     peak_share: float = 0.5
     seed: int = 0
+    link: LinkBudget | None = None
 
     def __post_init__(self) -> None:
         if not self.snr_db > -math.inf:

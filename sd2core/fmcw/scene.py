@@ -13,7 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.triangle import mean_phasor
 from sd2core.mesh import MeshSequence, refuse_missing
+from sd2core.scattering.facets import visible_facets
 from sd2core.sensor import RadarConfig, VirtualSensor
+from sd2core.timebase import Timebase
 
 NEAREST_M = 0.05
 """The 1/R^2 of the far field is not continued to nearer than this."""
@@ -108,6 +110,17 @@ def facet_scatterers(
     )
 
 
+FacetsSeen = NDArray[np.bool_] | Literal["facing", "exact"]
+
+
+def radar_times_s(timebase: Timebase, config: RadarConfig) -> NDArray[np.float64]:
+    """Times of the radar frames that fit into a clip, from its first frame on."""
+    step_s = config.frame_repetition_s
+    span_s = float(timebase.times_s[-1]) - timebase.start_s
+    steps = np.arange(int(span_s / step_s + 1e-6) + 1, dtype=np.float64)
+    return timebase.start_s + steps * step_s
+
+
 class MeshScene:
     """A moving mesh as seen by one radar.
 
@@ -115,8 +128,9 @@ class MeshScene:
     ----------
     mesh : MeshSequence
         Must have faces.
-    visibility : bool array, shape (T, F), or "facing"
-        Per mesh frame, the facets that nothing hides from the sensor.
+    visibility : bool array, shape (T, F), "facing" or "exact"
+        Per mesh frame, the facets that nothing hides from the sensor; ``exact`` looks for
+        them frame by frame as they are asked for.
     """
 
     def __init__(
@@ -124,7 +138,7 @@ class MeshScene:
         mesh: MeshSequence,
         config: RadarConfig,
         sensor: VirtualSensor,
-        visibility: NDArray[np.bool_] | Literal["facing"] = "facing",
+        visibility: FacetsSeen = "facing",
     ) -> None:
         if mesh.faces is None:
             raise Sd2Error(
@@ -141,7 +155,7 @@ class MeshScene:
         self.mesh = mesh
         self.config = config
         self.sensor = sensor
-        self.visibility = None if isinstance(visibility, str) else visibility
+        self.visibility = visibility
         self._faces = mesh.faces
         self._first = 0
         self._block = np.empty((0, mesh.vertex_count, 3))
@@ -149,11 +163,7 @@ class MeshScene:
 
     def frame_times_s(self) -> NDArray[np.float64]:
         """Times of the radar frames that fit into the mesh, from its first frame on."""
-        timebase = self.mesh.timebase
-        step_s = self.config.frame_repetition_s
-        span_s = float(timebase.times_s[-1]) - timebase.start_s
-        steps = np.arange(int(span_s / step_s + 1e-6) + 1, dtype=np.float64)
-        return timebase.start_s + steps * step_s
+        return radar_times_s(self.mesh.timebase, self.config)
 
     def there(self, time_s: float) -> bool:
         """Whether there is somebody whose motion is known: in the mesh frames on both sides."""
@@ -185,10 +195,12 @@ class MeshScene:
 
     def visible(self, time_s: float) -> NDArray[np.bool_] | None:
         """Facets that nothing hides, (F,); None when that was not looked at."""
-        if self.visibility is None:
+        if isinstance(self.visibility, str) and self.visibility == "facing":
             return None
         first, last = self._stretch(time_s)
         frame = min(max(self.mesh.timebase.nearest_frame(time_s), first), last)
+        if isinstance(self.visibility, str):
+            return visible_facets(self._frame(frame), self._faces, self.sensor.position_m)
         return np.asarray(self.visibility[frame])
 
     def between(self, times_s: NDArray[np.float64]) -> Iterator[tuple[NDArray[np.float64], ...]]:

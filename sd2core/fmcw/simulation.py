@@ -10,7 +10,6 @@ import itertools
 import threading
 from concurrent.futures import FIRST_COMPLETED, wait
 from dataclasses import asdict
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 from sd2core.compiled import worker_count, workers
 from sd2core.fmcw.converter import check_converter, digitise, simulated_capture, store
 from sd2core.fmcw.options import SignalOptions, WaveOptions
+from sd2core.fmcw.scene import FacetsSeen
 from sd2core.fmcw.wave import WaveScene
 from sd2core.io.radar.capture import RadarCapture
 from sd2core.mesh import MeshSequence
@@ -35,7 +35,8 @@ def simulate_radar(
     config: RadarConfig,
     *,
     sensor: VirtualSensor | None = None,
-    visibility: NDArray[np.bool_] | Literal["facing"] = "facing",
+    visibility: FacetsSeen = "facing",
+    frames: tuple[int, int] | None = None,
     wave: WaveOptions | None = None,
     options: SignalOptions | None = None,
     memory_bytes: int = 500_000_000,
@@ -50,9 +51,13 @@ def simulate_radar(
     config : RadarConfig
     sensor : VirtualSensor
         At the camera by default.
-    visibility : bool array, shape (T, F), or "facing"
+    visibility : bool array, shape (T, F), "facing" or "exact"
         Per mesh frame, the facets that nothing hides from the sensor;
-        ``facing`` takes all whose normal points towards it.
+        ``facing`` takes all whose normal points towards it, ``exact`` finds those that
+        nothing hides as it goes.
+    frames : (int, int), optional
+        Only these radar frames, the last excluded. With a ``link`` they are those of the
+        whole recording; otherwise gain and noise follow from them alone.
     wave : WaveOptions
         Model of the sum, surface, motion, antennas, ground.
     options : SignalOptions
@@ -79,9 +84,10 @@ def simulate_radar(
     options = options or SignalOptions()
     check_converter(config)
     scene = WaveScene(mesh, config, sensor, visibility, wave, options.seed)
-    times_s = scene.scene.frame_times_s()
-    frames = len(times_s)
-    shape = (frames, config.receivers, config.chirps_per_frame, config.samples_per_chirp)
+    start, stop = frames or (0, None)
+    times_s = scene.scene.frame_times_s()[start:stop]
+    count = len(times_s)
+    shape = (count, config.receivers, config.chirps_per_frame, config.samples_per_chirp)
     # The gain is known when the last frame is. Single precision rounds the strongest sample
     # by a 2^9th of a count of 16 bits.
     signal = store(shape, np.float32, memory_bytes)
@@ -90,9 +96,9 @@ def simulate_radar(
     samples = store(shape, np.uint16, memory_bytes)
     mean_power = float(power[there].mean()) if there.any() else 0.0
     levels = digitise(
-        signal, peak, mean_power, config, options, samples, lambda: progress(frames, frames)
+        signal, peak, mean_power, config, options, samples, lambda: progress(count, count), start
     )
-    progress(frames, frames)
+    progress(count, count)
     return simulated_capture(
         samples,
         config,
@@ -102,7 +108,7 @@ def simulate_radar(
         options=options,
         levels=levels,
         how={
-            "visibility": "facing" if isinstance(visibility, str) else "exact",
+            "visibility": visibility if isinstance(visibility, str) else "exact",
             "wave": asdict(wave),
         },
         nobody=runs(~there),

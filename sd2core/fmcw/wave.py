@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.kernels import facet_echoes
 from sd2core.fmcw.options import Antenna, Reflector, WaveOptions, paths
-from sd2core.fmcw.scene import NEAREST_M, MeshScene
+from sd2core.fmcw.scene import NEAREST_M, FacetsSeen, MeshScene
 from sd2core.fmcw.sums import Echoes, direct, nufft
 from sd2core.mesh import MeshSequence
 from sd2core.sensor import RadarConfig, VirtualSensor
@@ -32,8 +31,8 @@ class WaveScene:
     config : RadarConfig
     sensor : VirtualSensor
         Transmitter and boresight.
-    visibility : bool array, shape (T, F), or "facing"
-        Per mesh frame, the facets that nothing hides from the sensor.
+    visibility : bool array, shape (T, F), "facing" or "exact"
+        See :class:`~sd2core.fmcw.scene.MeshScene`.
     wave : WaveOptions
     seed : int
         Of the random phases of a rough surface.
@@ -44,7 +43,7 @@ class WaveScene:
         mesh: MeshSequence,
         config: RadarConfig,
         sensor: VirtualSensor,
-        visibility: NDArray[np.bool_] | Literal["facing"] = "facing",
+        visibility: FacetsSeen = "facing",
         wave: WaveOptions | None = None,
         seed: int = 0,
     ) -> None:

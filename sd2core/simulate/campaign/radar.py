@@ -12,9 +12,8 @@ nobody moves would be anywhere.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +21,7 @@ from numpy.typing import NDArray
 from sd2core.body.rotations import Floats
 from sd2core.fmcw.chain import FrameChain, ProcessingOptions, own_clutter_removed
 from sd2core.fmcw.kernels import facet_echoes
+from sd2core.fmcw.link import LinkBudget
 from sd2core.fmcw.options import Reflector
 from sd2core.fmcw.processing import rebinning
 from sd2core.fmcw.scene import MeshScene
@@ -43,47 +43,6 @@ _EMPTY_FRAMES, _EMPTY_ROOM = 128, 2026
 
 
 @dataclass(frozen=True)
-class LinkBudget:
-    """What sets the level of echoes against noise.
-
-    Parameters
-    ----------
-    transmitted_dbm, transmit_gain_dbi, receive_gain_dbi : float
-        Of a 60 GHz radar on one chip with antennas in its package; 5 dBm and 5 dBi twice.
-    reflected : float
-        Share of the power that skin reflects at 60 GHz, 0.38 (permittivity 8 - 11j:
-        S. Gabriel, R. W. Lau, C. Gabriel, Phys. Med. Biol. 41, 1996, dry skin).
-    noise_figure_db, losses_db : float
-        Of the receiver, and of everything else together.
-    full_scale : float
-        Amplitude of an echo that fills the converter, in units of square metres of
-        smooth area over squared range.
-    """
-
-    transmitted_dbm: float = 5.0
-    transmit_gain_dbi: float = 5.0
-    receive_gain_dbi: float = 5.0
-    reflected: float = 0.38
-    noise_figure_db: float = 12.0
-    losses_db: float = 3.0
-    full_scale: float = 0.02
-
-    def noise_rms(self, config: RadarConfig) -> float:
-        """Thermal noise of one real sample, in the unit of amplitudes.
-
-        The radar equation with a plate's cross section, 4 π A² / λ²: an amplitude A / R²
-        receives P G G A² / ((4 π)² R⁴), of which a real sample has the mean square.
-        """
-        gain_db = self.transmitted_dbm + self.transmit_gain_dbi + self.receive_gain_dbi
-        gain_db += 10.0 * math.log10(self.reflected) - 20.0 * math.log10(4.0 * math.pi)
-        bandwidth_hz = 0.5 * config.sample_rate_hz
-        # kT at 290 K is -174 dBm/Hz.
-        noise_dbm = -174.0 + 10.0 * math.log10(bandwidth_hz)
-        noise_dbm += self.noise_figure_db + self.losses_db
-        return math.sqrt(0.5 * 10.0 ** (0.1 * (noise_dbm - gain_db)))
-
-
-@dataclass(frozen=True)
 class TargetOptions:
     """How targets are simulated.
 
@@ -98,7 +57,7 @@ class TargetOptions:
     """
 
     looks: int = 12
-    link: LinkBudget | None = LinkBudget()
+    link: LinkBudget | None = field(default_factory=LinkBudget)
     above_noise: float = 5.0
 
 

@@ -15,14 +15,14 @@ from moving_spheres import swinging_sphere
 from sd2core.batch.denoising import denoise
 from sd2core.batch.inputs import mesh_input_of
 from sd2core.batch.plan import Synthesise
-from sd2core.batch.stretches import LONGEST_FRAMES, joined, stretches_of
+from sd2core.batch.stretches import LONGEST_FRAMES, stretches_of
 from sd2core.batch.synthesis import synthesise
 from sd2core.denoise.files import find_model, load_model
 from sd2core.doppler import Synthesizer
 from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.mesh import MeshSequence
 from sd2core.sensor import VelocityAxis, VirtualSensor
-from sd2core.spectrum import DopplerMap
+from sd2core.spectrum import DopplerMap, joined
 from sd2core.timebase import Timebase
 
 

@@ -12,6 +12,7 @@ from matplotlib.image import imread
 from swinging_recordings import recording
 
 from sd2core.datasets.reading import open_dataset
+from sd2core.placements import PlacementGrid, write_placements
 
 SMALL = ("--kinds", "synthetic,simulated", "--length", 30, "--overlap", 5)
 
@@ -72,6 +73,25 @@ def test_a_dry_run_says_what_would_be_written_and_writes_nothing(
     assert sd2("export", people, "--out", out, *SMALL).code == 0
     again = sd2("export", people, "--out", out, *SMALL)
     assert "of which 3 were there already" in again.out
+
+
+def test_a_radar_is_simulated_at_every_place_and_its_cost_said_before(
+    sd2: Sd2, people: Path, tmp_path: Path
+) -> None:
+    grid = tmp_path / "grid.json"
+    write_placements(grid, PlacementGrid((1.5, 2.5)))
+    more = (*SMALL, "--placements", grid, "--simulate", "paper")
+    told = sd2("export", people, "--out", tmp_path / "s.zarr", *more, "--dry-run", "--json")
+    said = json.loads(told.out)
+    assert said["simulating_s"] > 0
+    assert said["segments_of_kind"] == {"synthetic": 45, "simulated": 45}
+    words = sd2("export", people, "--out", tmp_path / "s.zarr", *more, "--dry-run").out
+    assert "simulating" in words
+    without = sd2("export", people, "--out", tmp_path / "s.zarr", *SMALL, "--dry-run", "--json")
+    assert json.loads(without.out)["simulating_s"] is None
+    assert sd2("export", people, "--out", tmp_path / "s.zarr", *more).code == 0
+    with open_dataset(tmp_path / "s.zarr") as dataset:
+        assert dataset["available"][:, 2].all()
 
 
 def test_programs_are_told_line_by_line(sd2: Sd2, people: Path, tmp_path: Path) -> None:

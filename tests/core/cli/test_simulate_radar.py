@@ -55,6 +55,27 @@ def test_every_option_arrives(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
     assert simulation["options"]["seed"] == 9
 
 
+def test_a_link_budget_is_one_gain_and_noise_wherever_the_radar_stands(
+    sd2: Sd2, plate: Path, tmp_path: Path
+) -> None:
+    gains: dict[str, list[float]] = {"--link-budget": [], "--incoherent": []}
+    for number, (wish, levels) in enumerate(2 * list(gains.items())):
+        folder, sensor = tmp_path / str(number), "0,0,0" if number < 2 else "0,0,-4"
+        outcome = sd2("simulate", "radar", plate, folder, wish, "--sensor", sensor)
+        assert outcome.code == 0, outcome.err
+        levels.append(load_capture(folder).meta["simulation"]["counts_per_unit"])
+    near, far = gains["--link-budget"]
+    assert near == far == pytest.approx(2**11 / 0.02)
+    near, far = gains["--incoherent"]
+    assert near < 0.5 * far
+    simulation = load_capture(tmp_path / "0").meta["simulation"]
+    assert simulation["noise_rms_counts"] > 1
+    assert simulation["options"]["link"]["noise_figure_db"] == 12.0
+    assert "snr_db" not in simulation["options"]
+    both = sd2("simulate", "radar", plate, tmp_path / "x", "--link-budget", "--snr-db", 10)
+    assert both.code == 2
+
+
 def test_another_radar_and_a_row_of_receivers(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
     first, second = tmp_path / "first", tmp_path / "second"
     assert sd2("simulate", "radar", plate, first, "--receivers", 3).code == 0

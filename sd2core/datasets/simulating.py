@@ -1,0 +1,133 @@
+"""Simulated maps of meshes from any place: what a radar of fixed gain and noise shows there."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from sd2core.fmcw.chain import Clutter
+from sd2core.fmcw.link import LinkBudget
+from sd2core.fmcw.options import SignalOptions, WaveOptions
+from sd2core.fmcw.processing import doppler_map
+from sd2core.fmcw.scene import radar_times_s
+from sd2core.fmcw.simulation import simulate_radar
+from sd2core.mesh import MeshSequence
+from sd2core.mocap.recording_pairs import on_clock
+from sd2core.progress import Progress, silent
+from sd2core.sensor import PAPER_RADAR, RadarConfig, VelocityAxis, VirtualSensor
+from sd2core.spectrum import DopplerMap, joined
+from sd2core.timebase import Timebase
+
+CLUTTER: Clutter = "mean"
+"""How the static room is taken out of a capture's map, computed or recorded."""
+
+_BLOCK_FRAMES = 256
+_BLOCK_BYTES = 64 << 20
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """How radars are simulated: all of them alike, so that maps differ by place and motion alone.
+
+    A rough surface, what nothing hides, and the gain and noise of a
+    :class:`~sd2core.fmcw.link.LinkBudget`: what is farther away is weaker.
+
+    Parameters
+    ----------
+    radar : RadarConfig
+    seed : int
+        Of phases and noise; every mesh and place has its own from it, see :func:`seed_of`.
+    """
+
+    radar: RadarConfig = PAPER_RADAR
+    seed: int = 0
+
+    def as_json(self) -> dict[str, Any]:
+        """All that maps depend on."""
+        return {**asdict(self), "link": asdict(LinkBudget()), "clutter": CLUTTER}
+
+
+def seed_of(mesh: MeshSequence, sensor: VirtualSensor, simulation: Simulation) -> int:
+    """Seed of one mesh seen from one place: or all maps would have the same noise."""
+    told = json.dumps([simulation.seed, asdict(sensor)]).encode()
+    sums = hashlib.blake2b(told, digest_size=4)
+    sums.update(np.ascontiguousarray(mesh.read(0, 1), np.float32).tobytes())
+    return int.from_bytes(sums.digest(), "little")
+
+
+def simulated_map(
+    mesh: MeshSequence,
+    sensor: VirtualSensor,
+    simulation: Simulation,
+    axis: VelocityAxis,
+    frames: tuple[int, int] | None = None,
+    progress: Progress = silent,
+) -> DopplerMap:
+    """What a simulated radar shows of a mesh, at the times of the mesh's frames.
+
+    The same as the map of a recording whose radar file is the capture that
+    ``sd2 simulate radar --link-budget --incoherent`` makes with this sensor and seed. The raw
+    samples are of some hundred frames at a time and not kept.
+
+    Parameters
+    ----------
+    mesh : MeshSequence
+        With faces.
+    sensor : VirtualSensor
+    simulation : Simulation
+    axis : VelocityAxis
+    frames : (int, int), optional
+        Only these frames of the mesh, the last excluded: columns of the whole map.
+    progress : Progress
+
+    Raises
+    ------
+    Sd2Error
+        When the mesh has no faces, or the radar cannot be simulated.
+    """
+    start_s = mesh.timebase.start_s
+    # As a capture says it, whose clock begins with its first frame.
+    times_s = radar_times_s(mesh.timebase, simulation.radar)
+    there_s = (times_s - times_s[0]) + start_s
+    clock = mesh.timebase if frames is None else Timebase(mesh.times_s[slice(*frames)])
+    # With a neighbour on each side, so that the nearest is among them.
+    first = max(int(np.searchsorted(there_s, clock.start_s)) - 1, 0)
+    stop = min(int(np.searchsorted(there_s, clock.times_s[-1])) + 1, len(there_s))
+    options = SignalOptions(seed=seed_of(mesh, sensor, simulation), link=LinkBudget())
+    maps = []
+    for low in range(first, stop, _BLOCK_FRAMES):
+        high = min(low + _BLOCK_FRAMES, stop)
+        capture = simulate_radar(
+            mesh,
+            simulation.radar,
+            sensor=sensor,
+            visibility="exact",
+            frames=(low, high),
+            wave=WaveOptions(coherent=False),
+            options=options,
+            memory_bytes=_BLOCK_BYTES,
+            progress=partial(_part, progress, low - first, stop - first),
+        )
+        block = doppler_map(capture, axis=axis, clutter=CLUTTER)
+        meta = _of_all_frames(block.meta, capture.meta["simulation"])
+        maps.append(replace(block, timebase=Timebase(there_s[low:high]), meta=meta))
+    return on_clock(joined(maps), clock)
+
+
+def _part(progress: Progress, before: int, of: int, done: int, _: int) -> None:
+    """Say how far the frames of all blocks are."""
+    progress(before + done, of)
+
+
+def _of_all_frames(meta: dict[str, Any], simulation: dict[str, Any]) -> dict[str, Any]:
+    """What a block's map says of itself that holds for all frames."""
+    of_block = ("beyond_share", "notes")
+    of_capture = ("first_frame_s", "clipped_share", "without_person")
+    kept = {name: value for name, value in meta.items() if name not in of_block}
+    how = {name: value for name, value in simulation.items() if name not in of_capture}
+    return kept | {"simulation": how}
