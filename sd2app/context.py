@@ -222,7 +222,9 @@ def build_context(
         live=LiveDenoiseModel(playback, synthetic, denoise, settings, parent),
         classify=classify,
         gestures=gestures,
-        class_training=ClassTraining(settings, classify.use, parent),
+        class_training=ClassTraining(
+            settings, classify.use, parent, step_times=training.step_times
+        ),
         difference=DifferenceModel(denoised, real, display, settings, parent),
         edits=edits,
         labels=labels,

@@ -226,6 +226,12 @@ class Recording:
         """Whether nobody has labelled it; a radar file's own labels may then stand for it."""
         return self.labels is None and not self.spans
 
+    def effective_labels(self) -> Labels:
+        """The labels; where nobody has labelled it, those of its radar's file."""
+        if self.unlabelled and self.holds_radar_map:
+            return self.load_radar_map().labels.shifted(self.radar_offset_s)
+        return self.labelled
+
     def missing(self) -> dict[Role, Path]:
         """Files that are not where the recording says."""
         return {role: path for role, path in self._files().items() if not exists(role, path)}

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from sd2app.models.class_training import ClassTraining
 
 _FILES = "Classifiers (*.safetensors)"
-_RADAR = "Labelled radar files (*.h5 *.hdf5)"
+_DATA = "Data sets and labelled radar files (*.h5 *.hdf5 *.npz)"
 _RESULTS = "Results (*.json)"
 
 
@@ -64,14 +64,16 @@ class ClassifyDialogs:
     def add_folder(self) -> None:
         """Let the user choose a folder with labelled data."""
         name = QFileDialog.getExistingDirectory(
-            self._parent, "A campaign, pairs, a recording, or a folder of recordings"
+            self._parent, "A campaign, a data set, a recording, or a folder of recordings"
         )
         if name:
             self._training.setup.add(Path(name))
 
     def add_file(self) -> None:
-        """Let the user choose a labelled radar file."""
-        name, _ = QFileDialog.getOpenFileName(self._parent, "Labelled radar file", "", _RADAR)
+        """Let the user choose a data set or a labelled radar file."""
+        name, _ = QFileDialog.getOpenFileName(
+            self._parent, "Data set or labelled radar file", "", _DATA
+        )
         if name:
             self._training.setup.add(Path(name))
 

@@ -48,14 +48,18 @@ class ClassHistory:
         return min(self.done / self.total, 1.0) if self.total else None
 
     @property
-    def left_s(self) -> float | None:
-        """As long as it has taken so far, for what is left; None until that can be told."""
-        if self._first is None or self.elapsed_s is None or self.saving:
+    def step_s(self) -> float | None:
+        """Time of a step, or of a training of a comparison; None until that can be told."""
+        if self._first is None or self.elapsed_s is None:
             return None
         done, since_s = self._first
-        if self.done <= done:
-            return None
-        return (self.elapsed_s - since_s) / (self.done - done) * (self.total - self.done)
+        return (self.elapsed_s - since_s) / (self.done - done) if self.done > done else None
+
+    @property
+    def left_s(self) -> float | None:
+        """As long as it has taken so far, for what is left; None until that can be told."""
+        step_s = self.step_s
+        return None if step_s is None or self.saving else step_s * (self.total - self.done)
 
     @property
     def best(self) -> CheckPoint | None:

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.jobs.latest import LatestRunner
-from sd2app.models.training_words import store_text
+from sd2app.models.class_data import DataSource, division_of, looked_into, why_not_together
+from sd2app.models.step_times import StepKey
 from sd2app.settings import Settings
-from sd2core.errors import Sd2Error
-from sd2core.io.kinds import RADAR_MAP_SUFFIXES, kind_of
-from sd2core.pair_facts import pair_facts
 from sd2core.relative_paths import plain_path
+from sd2core.train.data import Split
 
 MAPS = ("radar", "synthetic", "denoised")
 MODELS = ("lstm", "s4")
@@ -29,25 +28,8 @@ _DEFAULTS: dict[str, Any] = {
     "quick": "yes",
 }
 """Those of ``sd2 classify train``; ``quick`` is of a comparison."""
+_DATA, _PEOPLE = "classify/train/data", "classify/train/people"
 _CHOICES = {"model": MODELS, "features": FEATURES, "quick": ("yes", "no")}
-
-
-@dataclass(frozen=True)
-class DataSource:
-    """Something labelled that was chosen.
-
-    Parameters
-    ----------
-    path : Path
-    text : str
-        What it holds; an ellipsis while it is being looked into.
-    problem : str
-        Why it cannot be used.
-    """
-
-    path: Path
-    text: str = "…"
-    problem: str = ""
 
 
 class ClassSetup(QObject):
@@ -65,7 +47,10 @@ class ClassSetup(QObject):
         for name, known in _CHOICES.items():
             if self._values[name] not in known:
                 self._values[name] = _DEFAULTS[name]
-        self._data = tuple(DataSource(path) for path in settings.paths("classify/train/data"))
+        people = _people(settings.stored(_PEOPLE, "{}"))
+        self._data = tuple(
+            DataSource(path, people.get(str(path), "")) for path in settings.paths(_DATA)
+        )
         self._runner = LatestRunner("labelled data", self)
         self._runner.finished.connect(self._take)
         self.refresh()
@@ -113,16 +98,28 @@ class ClassSetup(QObject):
             path = path.parent
         if path not in [one.path for one in self._data]:
             self._keep((*self._data, DataSource(path)))
+            self.refresh()
 
     def remove(self, path: Path) -> None:
         """Do not learn from this."""
         self._keep(tuple(one for one in self._data if one.path != path))
+        self.refresh()
+
+    def name_person(self, path: Path, name: str) -> None:
+        """Say who the recordings or radar files of a source are of; empty: as they say it."""
+        # The command takes a person as PERSON=PATH.
+        name = name.translate(str.maketrans("=/", "--")).strip()
+        known = {one.path: one.person for one in self._data}
+        if known.get(path, name) != name:
+            named = DataSource(path, name)
+            self._keep(tuple(named if one.path == path else one for one in self._data))
+            self.refresh()
 
     def refresh(self) -> None:
         """Look into the data again."""
-        paths = [one.path for one in self._data]
-        if paths:
-            self._runner.submit(lambda emit: tuple(_looked_into(path) for path in paths))
+        chosen = [(one.path, one.person) for one in self._data]
+        if chosen:
+            self._runner.submit(lambda emit: tuple(looked_into(*one) for one in chosen))
 
     def close(self) -> None:
         """Stop reading."""
@@ -131,8 +128,9 @@ class ClassSetup(QObject):
     def _keep(self, data: tuple[DataSource, ...]) -> None:
         self._runner.cancel()
         self._data = data
-        self._settings.set_paths("classify/train/data", [one.path for one in data])
-        self.refresh()
+        self._settings.set_paths(_DATA, [one.path for one in data])
+        people = {str(one.path): one.person for one in data if one.person}
+        self._settings.set_value(_PEOPLE, json.dumps(people))
         self.changed.emit()
 
     def _take(self, data: tuple[DataSource, ...]) -> None:
@@ -149,18 +147,34 @@ class ClassSetup(QObject):
         problems = [one.problem for one in self._data if one.problem]
         if problems:
             return problems[0]
-        return "Reading the data…" if self._runner.busy else ""
+        if any(not one.facts for one in self._data):
+            return "Reading the data…"
+        return why_not_together(self._data)
 
     @property
     def train_problem(self) -> str:
         """Why no classifier can be trained; empty when one can."""
-        return self.problem or ("" if self.maps else "Choose maps to learn from.")
+        if self.problem:
+            return self.problem
+        if not self.maps:
+            return "Choose maps to learn from."
+        return why_not_together(self._data, self.maps)
+
+    @property
+    def division(self) -> Split | None:
+        """Who does what in a training; None until the data is known and fits together."""
+        return None if self.problem else division_of(self._data)
+
+    @property
+    def step_key(self) -> StepKey:
+        """What the time of a step depends on."""
+        return StepKey.of_classifier(self._values["model"], self._values["features"])
 
     def train_arguments(self, out: Path) -> list[str]:
         """``sd2 classify train`` with what is not as it is by default."""
         values = self._values
         # Network and steps are named even where they are the default: one looks for them.
-        words = ["classify", "train", *map(str, self._paths)]
+        words = ["classify", "train", *self._sources]
         words += ["--model", values["model"], "--steps", f"{values['steps']}"]
         for name in ("features", "maps", "seed"):
             if values[name] != _DEFAULTS[name]:
@@ -170,7 +184,7 @@ class ClassSetup(QObject):
     def table_arguments(self, out: Path) -> list[str]:
         """``sd2 classify table`` with the network that is chosen."""
         values = self._values
-        words = ["classify", "table", *map(str, self._paths), "--steps", f"{values['steps']}"]
+        words = ["classify", "table", *self._sources, "--steps", f"{values['steps']}"]
         for name in ("model", "features"):
             if values[name] != _DEFAULTS[name]:
                 words += [f"--{name}", f"{values[name]}"]
@@ -179,26 +193,13 @@ class ClassSetup(QObject):
         return [*words, "--out", str(out)]
 
     @property
-    def _paths(self) -> tuple[Path, ...]:
-        return tuple(one.path for one in self._data)
+    def _sources(self) -> list[str]:
+        return [f"{one.person}={one.path}" if one.person else str(one.path) for one in self._data]
 
 
-def _looked_into(path: Path) -> DataSource:
-    """What something holds, as far as that is told without reading it all."""
+def _people(text: str) -> dict[str, str]:
+    """Who sources are of, by their paths, as it was stored."""
     try:
-        if path.is_dir() and path.suffix not in (".sd2", ".zarr"):
-            inside = sorted(
-                one
-                for one in path.iterdir()
-                if one.suffix == ".sd2" or one.suffix.lower() in RADAR_MAP_SUFFIXES
-            )
-            if inside:
-                return DataSource(path, f"folder with {len(inside)} recordings or radar files")
-        kind = kind_of(path)
-        if kind == "pairs":
-            return DataSource(path, store_text(pair_facts(path)))
-        if kind == "recording" or path.suffix.lower() in RADAR_MAP_SUFFIXES:
-            return DataSource(path, "recording" if kind == "recording" else "radar file")
-        raise Sd2Error(f"{path.name} is a {kind}", "pairs, labelled recordings or radar files")
-    except (Sd2Error, OSError) as error:
-        return DataSource(path, problem=str(error))
+        return {str(path): str(name) for path, name in json.loads(text).items()}
+    except (ValueError, AttributeError):
+        return {}

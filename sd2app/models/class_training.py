@@ -13,6 +13,7 @@ from sd2app.jobs.command_folder import COMMAND, CommandFolder, folders_in
 from sd2app.models.class_run import MODEL_NAME, TABLE_NAME, ClassRun
 from sd2app.models.class_setup import ClassSetup
 from sd2app.models.classify_library import user_classifiers_folder
+from sd2app.models.step_times import PatientTiming, StepKey, StepTime, StepTimes
 from sd2app.models.training_command import quoted
 from sd2app.models.training_words import clock_text
 from sd2app.settings import Settings
@@ -40,6 +41,8 @@ class ClassTraining(QObject):
         Of the classifiers; runs are in ``runs`` below it.
     command : sequence of str
         What runs ``sd2`` commands in a folder.
+    step_times : StepTimes, optional
+        Shared with the training of denoisers.
 
     Signals
     -------
@@ -60,12 +63,17 @@ class ClassTraining(QObject):
         parent: QObject | None = None,
         folder: Path | None = None,
         command: Sequence[str] = COMMAND,
+        step_times: StepTimes | None = None,
     ) -> None:
         super().__init__(parent)
         self._use, self._command = use, tuple(command)
         self._folder = folder or user_classifiers_folder()
         self.setup = ClassSetup(settings, self)
+        self.step_times = step_times or StepTimes(settings, self)
+        self._timing = PatientTiming(self.step_times, self._to_be_timed, self)
         self.setup.changed.connect(self.changed)
+        self.setup.changed.connect(self._timing.wait)
+        self.step_times.changed.connect(self.changed)
         self._run: ClassRun | None = None
         self._runs: tuple[KnownRun, ...] = ()
         self._watched = False
@@ -122,6 +130,16 @@ class ClassTraining(QObject):
         return f"{busy} is under way. Wait for it, or stop it." if busy else self.setup.problem
 
     @property
+    def step(self) -> StepTime | None:
+        """What a step of the training takes here; None until that is known."""
+        return self.step_times.of(self.setup.step_key)
+
+    @property
+    def estimate_s(self) -> float | None:
+        """How long the training will take once the data has been read; None: not known."""
+        return None if self.step is None else self.step.seconds * self.setup.value("steps")
+
+    @property
     def command(self) -> str:
         """What is set up, as a command for a terminal."""
         return quoted(self.setup.train_arguments(Path(MODEL_NAME)))
@@ -134,6 +152,11 @@ class ClassTraining(QObject):
         if watched:
             self.setup.refresh()
             self.refresh()
+        self._timing.look()
+
+    def _to_be_timed(self) -> StepKey | None:
+        wanted = self._watched and self._run is None and not self.why_not_train
+        return self.setup.step_key if wanted else None
 
     def look_for_runs(self) -> None:
         """At the start of the program: find what is under way."""
@@ -175,7 +198,8 @@ class ClassTraining(QObject):
             raise Sd2Error(self.why_not_train)
         path = self._new_folder(str(self.setup.value("model")))
         words = self.setup.train_arguments(path / MODEL_NAME)
-        self._start(path, [*words, "--progress-json"], {"what": "train"})
+        timed_as = list(self.setup.step_key.words)
+        self._start(path, [*words, "--progress-json"], {"what": "train", "timed_as": timed_as})
 
     def compare(self) -> None:
         """Begin to compare the radar alone with synthetic data added; raises as :meth:`train`."""
@@ -224,6 +248,7 @@ class ClassTraining(QObject):
 
     def close(self) -> None:
         """Look no more; what is under way goes on."""
+        self._timing.stop()
         self.setup.close()
         if self._run is not None:
             self._run.close()
@@ -231,6 +256,7 @@ class ClassTraining(QObject):
     # --- starting and following -----------------------------------------------------------
 
     def _start(self, path: Path, arguments: list[str], about: dict[str, Any]) -> None:
+        self.step_times.stop()
         pid = CommandFolder(path).start(arguments, about, self._command)
         self.select(None)
         self._follow(ClassRun(path, self, pid=pid))
@@ -254,6 +280,7 @@ class ClassTraining(QObject):
         run = self._run
         if run is None:
             return
+        self._learn_step_time(run)
         self.refresh()
         if run.phase == "gone":
             self.select(None)
@@ -263,6 +290,12 @@ class ClassTraining(QObject):
                 self.noted.emit(f"{name} is done. The Train panel shows what came of it.")
             elif run.phase in ("failed", "died"):
                 self.failed.emit(f"{name} did not come to its end. The Train panel says more.")
+
+    def _learn_step_time(self, run: ClassRun) -> None:
+        """What a step took here is the best estimate for the next training."""
+        step_s, words = run.history.step_s, run.about.get("timed_as")
+        if step_s is not None and isinstance(words, list):
+            self.step_times.learn(StepKey(tuple(map(str, words))), step_s)
 
     def _new_folder(self, what: str) -> Path:
         """A name that is free: what it is, of which data, and when."""

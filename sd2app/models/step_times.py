@@ -5,18 +5,20 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject, QTimer, Signal
 
 from sd2app.jobs.line_process import Ending, LineProcess
+from sd2app.jobs.step_time import CLASSIFIER
 from sd2app.settings import Settings
 
 COMMAND = (sys.executable, "-u", "-m", "sd2app.jobs.step_time")
 _STORED = "training/step_times"
 _MOST = 40
+_PATIENCE_MS = 500
 
 
 @dataclass(frozen=True)
@@ -25,17 +27,26 @@ class StepKey:
 
     Parameters
     ----------
-    model : str
-    batch_size : int
+    words : tuple of str
+        As :mod:`sd2app.jobs.step_time` takes them.
     """
 
-    model: str
-    batch_size: int
+    words: tuple[str, ...]
+
+    @classmethod
+    def of_denoiser(cls, model: str, batch_size: int) -> StepKey:
+        """Of training a denoiser."""
+        return cls((model, str(batch_size)))
+
+    @classmethod
+    def of_classifier(cls, model: str, features: str) -> StepKey:
+        """Of training a classifier."""
+        return cls((CLASSIFIER, model, features))
 
     @property
     def text(self) -> str:
         """As it is stored."""
-        return f"{self.model}/{self.batch_size}"
+        return "/".join(self.words)
 
 
 @dataclass(frozen=True)
@@ -111,7 +122,7 @@ class StepTimes(QObject):
         self._process = LineProcess(self)
         self._process.line.connect(self._read_line)
         self._process.ended.connect(self._end)
-        self._process.start([*self._command, key.model, str(key.batch_size)])
+        self._process.start([*self._command, *key.words])
         self.changed.emit()
 
     def stop(self) -> None:
@@ -149,6 +160,45 @@ class StepTimes(QObject):
         content = {name: [one.seconds, one.source, one.unix_s] for name, one in self._times.items()}
         self._settings.set_value(_STORED, json.dumps(content))
         self.changed.emit()
+
+
+class PatientTiming(QObject):
+    """Has a step timed when it has been wanted for a while: not while somebody turns a number.
+
+    Parameters
+    ----------
+    times : StepTimes
+    wanted : callable
+        What is to be timed now; None where nobody looks, or nothing can be started.
+    """
+
+    def __init__(
+        self,
+        times: StepTimes,
+        wanted: Callable[[], StepKey | None],
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._times, self._wanted = times, wanted
+        self._timer = QTimer(self)
+        self._timer.setSingleShot(True)
+        self._timer.setInterval(_PATIENCE_MS)
+        self._timer.timeout.connect(self.look)
+
+    def wait(self) -> None:
+        """Something else was chosen."""
+        self._timer.start()
+
+    def look(self) -> None:
+        """Have it timed at once, where it is wanted."""
+        key = self._wanted()
+        if key is not None:
+            self._times.measure(key)
+
+    def stop(self) -> None:
+        """Time nothing more."""
+        self._timer.stop()
+        self._times.stop()
 
 
 def _read(settings: Settings) -> dict[str, StepTime]:

@@ -12,7 +12,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from sd2app.jobs.detached import launch
 from sd2app.models.pair_maker import PairMaker
 from sd2app.models.step_times import COMMAND as TIMING_COMMAND
-from sd2app.models.step_times import StepKey, StepTimes
+from sd2app.models.step_times import PatientTiming, StepKey, StepTimes
 from sd2app.models.training_command import (
     new_run_folder,
     output_of,
@@ -34,7 +34,6 @@ COMMAND = (sys.executable, "-u", "-m", "sd2app.jobs.background")
 CLOSING: tuple[Closing, ...] = ("ask", "keep", "stop")
 """What happens to a run when the window is closed."""
 _LIBRARY_MS = 3000
-_PATIENCE_MS = 500
 
 
 class TrainingModel(QObject):
@@ -94,12 +93,8 @@ class TrainingModel(QObject):
         self.library.changed.connect(self.changed)
         self.library.refreshed.connect(self._take_up)
         self.setup.changed.connect(self.changed)
-        # Not while somebody still turns a number.
-        self._patience = QTimer(self)
-        self._patience.setSingleShot(True)
-        self._patience.setInterval(_PATIENCE_MS)
-        self._patience.timeout.connect(self._time_a_step)
-        self.setup.changed.connect(self._patience.start)
+        self._timing = PatientTiming(self.step_times, self._to_be_timed, self)
+        self.setup.changed.connect(self._timing.wait)
 
     # --- what is known --------------------------------------------------------------------
 
@@ -174,11 +169,11 @@ class TrainingModel(QObject):
         if watched:
             self.setup.refresh()
             self.library.refresh()
-        self._time_a_step()
+        self._timing.look()
 
-    def _time_a_step(self) -> None:
-        if self._watched and self._follower is None and not self.why_not_start:
-            self.step_times.measure(self.setup.step_key)
+    def _to_be_timed(self) -> StepKey | None:
+        wanted = self._watched and self._follower is None and not self.why_not_start
+        return self.setup.step_key if wanted else None
 
     # --- one run after another ------------------------------------------------------------
 
@@ -269,8 +264,7 @@ class TrainingModel(QObject):
     def close(self) -> None:
         """Look no more; what is being trained goes on."""
         self._timer.stop()
-        self._patience.stop()
-        self.step_times.stop()
+        self._timing.stop()
         self.pair_maker.close()
         self.setup.close()
         self.library.close()
@@ -335,7 +329,8 @@ class TrainingModel(QObject):
         """What a step takes here is the best estimate for the next run."""
         step_s, config = run.history.step_s, run.config
         if step_s is not None and config is not None:
-            self.step_times.learn(StepKey(config.model.name, config.training.batch_size), step_s)
+            key = StepKey.of_denoiser(config.model.name, config.training.batch_size)
+            self.step_times.learn(key, step_s)
 
     def _take_up(self) -> None:
         """After the first look at all runs."""

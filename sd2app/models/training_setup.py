@@ -240,7 +240,7 @@ class TrainingSetupModel(QObject):
     @property
     def step_key(self) -> StepKey:
         """What the time of a step depends on."""
-        return StepKey(self._values["model"], self._values["batch_size"])
+        return StepKey.of_denoiser(self._values["model"], self._values["batch_size"])
 
     @property
     def estimate(self) -> Estimate:

@@ -10,10 +10,9 @@ from sd2app.models.training_history import EpochPoint
 from sd2app.models.training_phase import Phase
 
 if TYPE_CHECKING:
-    from sd2app.models.step_times import StepKey, StepTimes
+    from sd2app.models.step_times import StepKey, StepTime, StepTimes
     from sd2app.models.training_follower import TrainingFollower
     from sd2app.models.training_history import TrainingHistory
-    from sd2app.models.training_setup import Estimate
     from sd2app.models.training_use import Gain
     from sd2core.pair_facts import PairFacts
     from sd2core.train.data import Split
@@ -129,18 +128,20 @@ def store_text(facts: PairFacts | None) -> str:
     return " · ".join(parts)
 
 
-def division_text(division: Split) -> str:
-    """Who is learnt from, and who is not."""
+def division_text(
+    division: Split, judged_by: str = "sd2 eval", kept_takes: str = "the last takes"
+) -> str:
+    """Who is learnt from, and who is not; ``kept_takes`` choose where there is one person."""
     if division.by_take:
         return (
-            "All of it is of one person: the last takes choose the best model, and how good it is"
+            f"All of it is of one person: {kept_takes} choose the best model, and how good it is"
             " with other people stays unknown."
         )
     count = len(division.training)
     text = f"Learns from {count} {'person' if count == 1 else 'people'}"
     text += f"; the best model is chosen by {_listed(division.validation)}"
     if division.test:
-        text += f"; {_listed(division.test)} kept for sd2 eval"
+        text += f"; {_listed(division.test)} kept for {judged_by}"
     return text + "."
 
 
@@ -150,18 +151,13 @@ def _listed(names: tuple[str, ...]) -> str:
     return " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
 
 
-def estimate_text(estimate: Estimate) -> str:
+def estimate_text(seconds: float | None) -> str:
     """How long it will take."""
-    if estimate.seconds is None:
-        return "Time: not known yet"
-    return f"Takes {about(estimate.seconds)}"
+    return "Time: not known yet" if seconds is None else f"Takes {about(seconds)}"
 
 
-def estimate_source_text(estimate: Estimate, key: StepKey, times: StepTimes, epochs: int) -> str:
-    """Where that is known from."""
-    steps = epochs * estimate.steps_per_epoch
-    count = f"{estimate.segments:,} segments, {steps:,} {'step' if steps == 1 else 'steps'}"
-    step = estimate.step
+def estimate_source_text(count: str, step: StepTime | None, key: StepKey, times: StepTimes) -> str:
+    """Where that is known from; ``count`` says of what, and ends with the number of steps."""
     if step is not None:
         known = "as in the last run here" if step.source == "run" else "timed here"
         return f"{count} of about {step_text(step.seconds)}, {known}."
@@ -169,6 +165,11 @@ def estimate_source_text(estimate: Estimate, key: StepKey, times: StepTimes, epo
         return f"{count}. Timing a few of them…"
     why_not = times.why_not(key)
     return f"{count}. They could not be timed: {why_not}" if why_not else f"{count}."
+
+
+def steps_text(steps: int) -> str:
+    """Such as ``160 steps``."""
+    return f"{steps:,} {'step' if steps == 1 else 'steps'}"
 
 
 def step_text(seconds: float) -> str:

@@ -12,7 +12,7 @@ class ClassAsks(Protocol):
         """Let the user choose a folder with labelled data."""
 
     def add_file(self) -> None:
-        """Let the user choose a labelled radar file."""
+        """Let the user choose a data set or a labelled radar file."""
 
     def add_this(self) -> None:
         """Learn from the recording that is open."""

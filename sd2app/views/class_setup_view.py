@@ -14,12 +14,17 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from sd2app.models.class_setup import FEATURES, MAPS, MODELS, DataSource
+from sd2app.models.class_data import DataSource
+from sd2app.models.class_setup import FEATURES, MAPS, MODELS
 from sd2app.models.class_training import ClassTraining
 from sd2app.models.classify_words import FEATURE_WORDS, MODEL_WORDS
+from sd2app.models.training_words import division_text, steps_text
 from sd2app.views.class_asks import ClassAsks
+from sd2app.views.estimate_lines import EstimateLines
 from sd2app.views.inputs import Choice, NumberBox
 from sd2app.views.panel_parts import data_row, outlined, rule, sentence, side_by_side, title
+from sd2app.views.typed_line import TypedLine
+from sd2core.train.data import Split
 
 _MAP_TIPS = {
     "radar": "What a radar saw, simulated or real",
@@ -58,8 +63,13 @@ class ClassSetupView(QWidget):
         add = outlined("Add data", "Choose labelled data to learn from", None, self)
         add.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         menu = QMenu(add)
-        menu.addAction("Campaign, pairs or recordings…").triggered.connect(self._asks.add_folder)
-        menu.addAction("Radar file…").triggered.connect(self._asks.add_file)
+        menu.setToolTipsVisible(True)
+        folder = menu.addAction("Folder…")
+        folder.setToolTip("A campaign or pairs, a data set (.zarr), a recording, or several")
+        folder.triggered.connect(self._asks.add_folder)
+        file = menu.addAction("File…")
+        file.setToolTip("A data set (.h5, .npz), or a labelled radar file (.h5)")
+        file.triggered.connect(self._asks.add_file)
         self._this = menu.addAction("This recording")
         self._this.triggered.connect(self._asks.add_this)
         menu.aboutToShow.connect(lambda: self._this.setEnabled(self._asks.has_this()))
@@ -70,13 +80,15 @@ class ClassSetupView(QWidget):
         head.addWidget(add)
         layout.addLayout(head)
         self._nothing = sentence(
-            "A classifier learns from labelled maps: of a simulated campaign, or of recordings"
-            " and radar files in which gestures are labelled."
+            "A classifier learns from labelled maps: of a simulated campaign, of an exported data"
+            " set, or of recordings and radar files in which gestures are labelled."
         )
         layout.addWidget(self._nothing)
         self._rows = QVBoxLayout()
-        self._rows.setSpacing(4)
+        self._rows.setSpacing(8)
         layout.addLayout(self._rows)
+        self._division = sentence("")
+        layout.addWidget(self._division)
 
     def _add_network(self, layout: QVBoxLayout) -> None:
         grid = QGridLayout()
@@ -145,6 +157,8 @@ class ClassSetupView(QWidget):
         self._copy = outlined(
             "Copy command", "The same as a command for a terminal", asks.copy_command, self
         )
+        self._estimate = EstimateLines(self._training.step_times, self)
+        layout.addWidget(self._estimate)
         layout.addWidget(self._problem)
         layout.addLayout(side_by_side(self._start, self._copy, spacing_px=6))
 
@@ -178,6 +192,9 @@ class ClassSetupView(QWidget):
         if setup.data != self._shown_data:
             self._list_data()
         self._nothing.setVisible(not setup.data)
+        division = setup.division
+        self._division.setText("" if division is None else _division_text(division))
+        self._division.setVisible(division is not None)
         for name, box in self._boxes.items():
             with QSignalBlocker(box):
                 box.setChecked(name in setup.maps)
@@ -188,6 +205,12 @@ class ClassSetupView(QWidget):
             number.show_value(setup.value(name))
         with QSignalBlocker(self._quick):
             self._quick.setChecked(setup.value("quick") == "yes")
+        self._estimate.setVisible(not setup.problem)
+        steps = steps_text(setup.value("steps"))
+        self._estimate.show_estimate(
+            training.estimate_s, f"The data is read first; then {steps}", training.step,
+            setup.step_key,
+        )  # fmt: skip
         why_not = training.why_not_train
         # What is wrong with the data, or that there is none, is said above.
         said = not setup.data or any(one.problem for one in setup.data)
@@ -205,10 +228,36 @@ class ClassSetupView(QWidget):
                 widget.hide()
                 widget.deleteLater()
         for one in self._setup.data:
-            path = one.path
-            row = data_row(
-                path.name, str(path), one.text, one.problem,
-                lambda path=path: self._setup.remove(path), self,
-            )  # fmt: skip
+            row = self._data_row(one)
             self._rows.addWidget(row)
             row.show()
+
+    def _data_row(self, one: DataSource) -> QWidget:
+        path = one.path
+        return data_row(
+            path.name, str(path), one.text, one.problem,
+            lambda: self._setup.remove(path), self, self._person(one) if one.nameable else None,
+        )  # fmt: skip
+
+    def _person(self, one: DataSource) -> QWidget:
+        """Who it is of, to be typed."""
+        line = TypedLine(
+            f"Who {one.path.name} is of",
+            "Who it is of: whoever is learnt from is neither chosen by nor judged on.\nThe same"
+            " name for everything of one person.",
+        )
+        line.setText(one.person)
+        itself = one.people[0] if len(one.people) == 1 else "everyone another"
+        line.setPlaceholderText("" if one.person else itself)
+        line.ended.connect(lambda: self._setup.name_person(one.path, line.text()))
+        field = QWidget(self)
+        row = QHBoxLayout(field)
+        row.setContentsMargins(0, 2, 0, 2)
+        row.setSpacing(8)
+        row.addWidget(QLabel("Person", field))
+        row.addWidget(line, 1)
+        return field
+
+
+def _division_text(division: Split) -> str:
+    return division_text(division, "judging, with sd2 classify eval", "some of the movements")

@@ -49,7 +49,13 @@ def outlined(text: str, tip: str, run: Callable[[], object] | None, parent: QWid
 
 
 def data_row(
-    name: str, path: str, about: str, problem: str, remove: Callable[[], None], parent: QWidget
+    name: str,
+    path: str,
+    about: str,
+    problem: str,
+    remove: Callable[[], None],
+    parent: QWidget,
+    below: QWidget | None = None,
 ) -> QWidget:
     """Something to learn from: its name, what is known of it, and a button that removes it."""
     row = QWidget(parent)
@@ -69,6 +75,8 @@ def data_row(
     grid.addWidget(heading, 0, 0)
     grid.addWidget(button, 0, 1, 2, 1, Qt.AlignmentFlag.AlignTop)
     grid.addWidget(facts, 1, 0)
+    if below is not None:
+        grid.addWidget(below, 2, 0)
     grid.setColumnStretch(0, 1)
     return row
 

@@ -22,11 +22,11 @@ from sd2app.models.training_setup import MODELS, Store
 from sd2app.models.training_words import (
     MODEL_WORDS,
     division_text,
-    estimate_source_text,
-    estimate_text,
+    steps_text,
     store_text,
 )
 from sd2app.views.elided import ElidedLabel
+from sd2app.views.estimate_lines import EstimateLines
 from sd2app.views.inputs import Choice, NumberBox
 from sd2app.views.panel_parts import data_row, outlined, sentence, title
 
@@ -198,11 +198,7 @@ class TrainingSetupView(QWidget):
     def _add_start(
         self, layout: QVBoxLayout, start: Callable[[], None], copy_command: Callable[[], None]
     ) -> None:
-        self._estimate = QLabel(self)
-        self._estimate.setObjectName("title")
-        self._estimate.setWordWrap(True)
-        self._estimate.setAccessibleName("How long it will take")
-        self._source = sentence("")
+        self._estimate = EstimateLines(self._training.step_times, self)
         self._problem = sentence("", "warning")
         self._start = outlined("Start training", "Train beside the window", start, self)
         self._start.setObjectName("primary")
@@ -214,7 +210,7 @@ class TrainingSetupView(QWidget):
         row.addWidget(self._start)
         row.addWidget(self._copy)
         row.addStretch(1)
-        for widget in (self._estimate, self._source, self._problem):
+        for widget in (self._estimate, self._problem):
             layout.addWidget(widget)
         layout.addLayout(row)
 
@@ -248,11 +244,12 @@ class TrainingSetupView(QWidget):
         setup, why_not = self._setup, self._training.why_not_start
         estimate = setup.estimate
         self._estimate.setVisible(bool(estimate.segments))
-        self._source.setVisible(bool(estimate.segments))
-        self._estimate.setText(estimate_text(estimate))
-        times = self._training.step_times
-        self._source.setText(
-            estimate_source_text(estimate, setup.step_key, times, setup.value("epochs"))
+        steps = steps_text(setup.value("epochs") * estimate.steps_per_epoch)
+        self._estimate.show_estimate(
+            estimate.seconds,
+            f"{estimate.segments:,} segments, {steps}",
+            estimate.step,
+            setup.step_key,
         )
         # That there are no pairs is said above.
         self._problem.setText(why_not if setup.stores else "")

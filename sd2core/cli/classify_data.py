@@ -5,13 +5,14 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal
 
 from sd2core.cli.recording_maps import MAP_NAMES, MapName, maps_of, parsed_maps, usual_maps
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
     from sd2core.classify.data import ClipSet
+    from sd2core.datasets.labelled import LabelledSource
     from sd2core.denoise.live import TrainedDenoiser
     from sd2core.spectrum import MapKind
 
@@ -25,31 +26,18 @@ DATA_HELP = (
     "are background."
 )
 
-_ONE = "one person"
 _WITH_SUBJECTS = ("pairs", "dataset")
 _RADARS = ("simulated", "real")
 
 
-class Source(NamedTuple):
-    """What one argument names.
-
-    Parameters
-    ----------
-    path : Path
-    subject : str
-        Empty where nothing was said.
-    """
-
-    path: Path
-    subject: str
-
-
-def source(text: str) -> Source:
+def source(text: str) -> LabelledSource:
     """Parse ``PATH`` or ``PERSON=PATH``."""
+    from sd2core.datasets.labelled import LabelledSource
+
     name, sign, path = text.partition("=")
     if sign and name and path and "/" not in name and not Path(text).exists():
-        return Source(Path(path), name)
-    return Source(Path(text), "")
+        return LabelledSource(Path(path), name)
+    return LabelledSource(Path(text), "")
 
 
 def add_data(parser: argparse.ArgumentParser) -> None:
@@ -76,7 +64,7 @@ def add_sources(parser: argparse.ArgumentParser) -> None:
 
 
 def clips_of(
-    sources: Sequence[Source],
+    sources: Sequence[LabelledSource],
     maps: Sequence[MapName] | None,
     denoiser: TrainedDenoiser | None = None,
 ) -> ClipSet:
@@ -84,7 +72,7 @@ def clips_of(
 
     Parameters
     ----------
-    sources : sequence of Source
+    sources : sequence of LabelledSource
     maps : sequence of str, optional
         None: the radar's and, where there are some, synthetic ones.
     denoiser : TrainedDenoiser, optional
@@ -96,12 +84,13 @@ def clips_of(
         When one cannot be read, holds no labels, or they cannot be mixed.
     """
     from sd2core.classify.data import clips_of_pairs, merged
+    from sd2core.datasets.labelled import unfolded
     from sd2core.io.kinds import kind_of
     from sd2core.train.data import read_mixed
 
     stores: list[Path] = []
     sets: list[ClipSet] = []
-    for one in _unfolded(sources):
+    for one in unfolded(sources):
         kind = kind_of(one.path)
         if kind not in _WITH_SUBJECTS:
             sets += _single(one, maps, sets[0].frame_rate_hz if sets else None)
@@ -134,7 +123,9 @@ def asked_maps(options: argparse.Namespace) -> tuple[MapName, ...]:
     return parsed_maps(options.maps)
 
 
-def split_of(sources: Sequence[Source], part: Literal["validation", "test"]) -> list[str] | None:
+def split_of(
+    sources: Sequence[LabelledSource], part: Literal["validation", "test"]
+) -> list[str] | None:
     """Who validates or tests, where all sources are data sets: they say so themselves."""
     from sd2core.datasets.reading import open_dataset
     from sd2core.io.kinds import is_dataset
@@ -163,34 +154,12 @@ def _of_dataset(path: Path, maps: Sequence[MapName] | None) -> list[ClipSet]:
         return [clips_of_dataset(dataset, kind) for kind in wanted]
 
 
-def _unfolded(sources: Sequence[Source]) -> list[Source]:
-    """Folders of recordings or radar files as what they hold."""
-    found: list[Source] = []
-    for one in sources:
-        if not one.path.exists():
-            raise Sd2Error(f"{one.path} does not exist", "labelled data", "Check the path")
-        inside = _inside(one.path)
-        found += [Source(path, one.subject) for path in inside] if inside else [one]
-    return found
-
-
-def _inside(folder: Path) -> list[Path]:
-    from sd2core.io.kinds import RADAR_MAP_SUFFIXES
-
-    if not folder.is_dir() or folder.suffix in (".sd2", ".zarr"):
-        return []
-    return sorted(
-        path
-        for path in folder.iterdir()
-        if (path.suffix == ".sd2" and path.is_dir()) or path.suffix.lower() in RADAR_MAP_SUFFIXES
-    )
-
-
 def _single(
-    one: Source, maps: Sequence[MapName] | None, frame_rate_hz: float | None
+    one: LabelledSource, maps: Sequence[MapName] | None, frame_rate_hz: float | None
 ) -> list[ClipSet]:
     """Of a recording, or of a radar's own file; at the frame rate of the first map."""
     from sd2core.classify.data import clips_of_map
+    from sd2core.datasets.labelled import ONE_PERSON
     from sd2core.io.radar import holds_map, load_recorded_map
     from sd2core.recording import is_recording, open_recording
 
@@ -202,7 +171,7 @@ def _single(
             clips_of_map(
                 recorded.doppler,
                 recorded.labels,
-                subject=one.subject or _ONE,
+                subject=one.subject or ONE_PERSON,
                 movement=one.path.stem,
                 frame_rate_hz=frame_rate_hz,
             )

@@ -61,10 +61,7 @@ def labels_at(
     if file_format is not None:
         return read_labels(path, timebase, file_format, observation=observation)
     if is_recording(path):
-        recording = open_recording(path)
-        if recording.unlabelled and recording.holds_radar_map:
-            return recording.load_radar_map().labels.shifted(recording.radar_offset_s)
-        return recording.labelled
+        return open_recording(path).effective_labels()
     if holds_map(path):
         return load_recorded_map(path).labels
     if path.suffix.lower() == ".json":

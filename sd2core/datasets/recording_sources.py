@@ -180,9 +180,7 @@ class _Opened:
         self._plan: dict[str, Any] = {}
         self._target_m: Vector | None = None
         self._radar: DopplerMap | None = None
-        labels = recording.labelled
-        if recording.unlabelled and recording.holds_radar_map:
-            labels = recording.load_radar_map().labels.shifted(recording.radar_offset_s)
+        labels = recording.effective_labels()
         self._names, self._classes = labels_and_classes(labels)
         self._spans = [span for span in labels.spans if span.origin != "suggestion"]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import signal
 import sys
 from pathlib import Path
@@ -11,12 +12,19 @@ import fake_class_command
 import pytest
 from small_pairs import write_pairs
 
+from sd2app.command_line import main
 from sd2app.jobs.command_folder import CommandFolder
 from sd2app.models.class_run_words import facts, headline, note, time_text
 from sd2app.models.class_training import ClassTraining
+from sd2app.models.step_times import StepKey, StepTimes
+from sd2app.models.training_words import division_text
 from sd2app.settings import Settings
 from sd2core.errors import Sd2Error
+from sd2core.recording import open_recording
+from sd2core.resources import resource_path
 
+SAMPLE = resource_path("swipes.sd2")
+TIMING = (sys.executable, "-c", "import sys; print('{\"step_s\": 0.5}')")
 FAKE = (sys.executable, "-u", fake_class_command.__file__)
 
 
@@ -27,7 +35,9 @@ def set_up(qtbot, tmp_path):
 
     def training(*more: str) -> ClassTraining:
         command = (*FAKE, *more)
-        made.append(ClassTraining(settings, used.append, None, tmp_path / "classifiers", command))
+        folder = tmp_path / "classifiers"
+        times = StepTimes(settings, command=TIMING)
+        made.append(ClassTraining(settings, used.append, None, folder, command, step_times=times))
         return made[-1]
 
     def ready(model: ClassTraining) -> None:
@@ -50,7 +60,7 @@ def test_what_is_set_up_is_the_command(set_up):
     assert model.why_not_train == "Add labelled data to learn from."
     set_up.ready(model)
     (source,) = model.setup.data
-    assert source.text.startswith("simulated · 3 people")
+    assert source.text.startswith("pairs (simulated) · 3 people")
     out = Path("m.safetensors")
     data = str(set_up.data)
     assert model.setup.train_arguments(out) == [
@@ -96,6 +106,87 @@ def test_the_command_is_one_that_the_program_has(set_up):
         model.setup.table_arguments(Path("t")),
     ):
         full_parser().parse_args([*words, "--progress-json"])
+
+
+def known(model, qtbot) -> None:
+    qtbot.waitUntil(lambda: all(one.facts for one in model.setup.data), timeout=10_000)
+
+
+def test_recordings_have_persons_who_can_be_named(set_up, tmp_path, qtbot):
+    setup = (model := set_up.training()).setup
+    for name in ("a.sd2", "b.sd2"):
+        shutil.copytree(SAMPLE, tmp_path / name)
+        setup.add(tmp_path / name)
+    known(model, qtbot)
+    assert [one.nameable for one in setup.data] == [True, True]
+    assert "labels" in setup.data[0].text
+    # Both copies call themselves the same: that is one person.
+    assert setup.division.by_take
+    setup.name_person(tmp_path / "b.sd2", " be=n ")
+    known(model, qtbot)
+    title = open_recording(SAMPLE).title
+    assert (setup.division.training, setup.division.validation) == ((title,), ("be-n",))
+    words = setup.train_arguments(Path("m.safetensors"))
+    assert words[2:4] == [str(tmp_path / "a.sd2"), f"be-n={tmp_path / 'b.sd2'}"]
+    again = set_up.training().setup
+    assert [one.person for one in again.data] == ["", "be-n"]
+    setup.name_person(tmp_path / "b.sd2", "")
+    known(model, qtbot)
+    assert setup.division.by_take
+
+
+def test_who_is_learnt_from_is_who_the_command_learns_from(set_up, tmp_path, qtbot):
+    from sd2core.classify.splitting import split_clips
+    from sd2core.cli.classify_data import clips_of, source
+
+    setup = (model := set_up.training()).setup
+    for path in (set_up.data, write_pairs(tmp_path / "more.zarr", ("s3", "s4"))):
+        setup.add(path)
+    known(model, qtbot)
+    parts = split_clips(clips_of([source(one) for one in setup._sources], ("radar",))).to_json()
+    division = setup.division
+    assert parts["training"] == list(division.training)
+    assert parts["validation"] == list(division.validation)
+    assert parts["test"] == list(division.test)
+    words = division_text(division, "sd2 classify eval")
+    assert words.endswith("s4 kept for sd2 classify eval.")
+
+
+def test_what_does_not_go_together_is_named(set_up, tmp_path, qtbot):
+    setup = (model := set_up.training()).setup
+    set_up.ready(model)
+    setup.add(write_pairs(tmp_path / "faster.zarr", rate_hz=60.0))
+    known(model, qtbot)
+    assert "60 frames/s" in setup.problem
+    assert setup.division is None
+    setup.remove(tmp_path / "faster.zarr")
+    out = tmp_path / "set.zarr"
+    export = ["export", str(set_up.data), "--kinds", "simulated", "--out", str(out)]
+    assert main(export) == 0
+    setup.remove(set_up.data)
+    setup.add(out)
+    known(model, qtbot)
+    assert not model.why_not_train
+    setup.set_map("denoised", True)
+    assert model.why_not_train == "set.zarr has no denoised maps: choose others, or leave it out."
+    assert not model.why_not_compare
+
+
+def test_how_long_it_takes_is_timed_and_then_learnt(set_up, qtbot):
+    model = set_up.training()
+    set_up.ready(model)
+    assert model.estimate_s is None
+    model.set_watched(True)
+    qtbot.waitUntil(lambda: model.estimate_s is not None, timeout=10_000)
+    assert model.step.source == "timed"
+    assert model.estimate_s == pytest.approx(0.5 * 160)
+    model.train()
+    set_up.ended(model)
+    model.select(None)
+    # The command says two seconds a step.
+    assert model.step.source == "run"
+    assert model.estimate_s == pytest.approx(2.0 * 160)
+    assert model.step_times.of(StepKey.of_classifier("s4", "columns")) is None
 
 
 def test_what_cannot_be_learnt_from_is_named(set_up, tmp_path, qtbot):

@@ -89,11 +89,12 @@ def test_what_sd2_refuses_is_told_in_its_words(model, qtbot, tmp_path) -> None:
 
 
 def test_a_step_is_timed(qtbot) -> None:
-    times, key = StepTimes(Settings.forgetful()), StepKey("gru", 8)
-    times.measure(key)
+    times = StepTimes(Settings.forgetful())
+    for key in (StepKey.of_denoiser("gru", 8), StepKey.of_classifier("lstm", "peak")):
+        times.measure(key)
+        qtbot.waitUntil(lambda: times.timing is None, timeout=120_000)
+        assert times.why_not(key) == ""
+        assert 0 < times.of(key).seconds < 60
+    times.measure(StepKey.of_denoiser("no such model", 8))
     qtbot.waitUntil(lambda: times.timing is None, timeout=120_000)
-    assert times.why_not(key) == ""
-    assert 0 < times.of(key).seconds < 60
-    times.measure(StepKey("no such model", 8))
-    qtbot.waitUntil(lambda: times.timing is None, timeout=120_000)
-    assert "no such model" in times.why_not(StepKey("no such model", 8))
+    assert "no such model" in times.why_not(StepKey.of_denoiser("no such model", 8))

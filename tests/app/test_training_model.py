@@ -327,7 +327,7 @@ def test_the_command_is_one_that_sd2_takes(made) -> None:
 def test_a_step_is_timed_once_and_remembered(qtbot) -> None:
     settings = Settings.forgetful()
     times = StepTimes(settings, None, TIMING)
-    key = StepKey("s4", 64)
+    key = StepKey.of_denoiser("s4", 64)
     with qtbot.waitSignal(times.changed):
         times.measure(key)
     qtbot.waitUntil(lambda: times.timing is None, timeout=10_000)
@@ -340,7 +340,7 @@ def test_a_step_is_timed_once_and_remembered(qtbot) -> None:
 
 def test_a_step_that_cannot_be_timed_is_not_tried_again(qtbot) -> None:
     times = StepTimes(Settings.forgetful(), None, ("no such program",))
-    key = StepKey("s4", 64)
+    key = StepKey.of_denoiser("s4", 64)
     times.measure(key)
     qtbot.waitUntil(lambda: bool(times.why_not(key)), timeout=10_000)
     times.measure(key)

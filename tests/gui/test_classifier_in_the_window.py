@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
 from dataclasses import replace
 
@@ -27,6 +28,8 @@ from sd2app.views.confusion_view import ConfusionView
 from sd2app.views.inputs import Choice
 from sd2app.views.label_timeline import LabelTimeline
 from sd2app.views.suggestion_bar import SuggestionBar
+from sd2app.views.typed_line import TypedLine
+from sd2core.resources import resource_path
 
 
 @pytest.fixture
@@ -302,6 +305,32 @@ def test_trained_by_clicks_watched_and_used(trainable, fake_classes, qtbot):
     answer(qtbot, "Discard")
     press(panel, "Delete…", qtbot)
     assert training.run is None
+
+
+def test_a_person_is_typed_and_who_does_what_is_said(trainable, tmp_path, qtbot):
+    training, panel = trainable.context.class_training, trainable.findChild(ClassPanel)
+    setup = training.setup
+    shutil.copytree(resource_path("swipes.sd2"), copy := tmp_path / "copy.sd2")
+    setup.remove(tmp_path / "campaign.zarr")
+    setup.add(resource_path("swipes.sd2"))
+    setup.add(copy)
+    qtbot.waitUntil(lambda: not setup.problem, timeout=10_000)
+
+    def said() -> str:
+        return " ".join(one.text() for one in panel.findChildren(QLabel) if one.isVisible())
+
+    assert "All of it is of one person" in said()
+    lines = [one for one in panel.findChildren(TypedLine) if "copy.sd2" in one.accessibleName()]
+    lines[-1].setFocus()
+    qtbot.keyClicks(lines[-1], "ben")
+    qtbot.keyClick(lines[-1], Qt.Key.Key_Return)
+    qtbot.waitUntil(lambda: setup.division is not None, timeout=10_000)
+    assert [one.person for one in setup.data] == ["", "ben"]
+    assert "Learns from 1 person; the best model is chosen by ben." in said()
+    # A step is timed while the page is looked at.
+    qtbot.waitUntil(lambda: training.estimate_s is not None, timeout=60_000)
+    assert "Takes " in said()
+    assert "timed here" in said()
 
 
 def test_stopped_by_a_click(trainable, qtbot):

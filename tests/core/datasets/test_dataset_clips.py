@@ -10,8 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_sources import AXIS, source
 
-from sd2core.cli.classify_data import Source, clips_of, split_of
+from sd2core.cli.classify_data import clips_of, split_of
 from sd2core.datasets.clips import clips_of_dataset
+from sd2core.datasets.labelled import LabelledSource
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.writing import write_dataset
@@ -99,12 +100,12 @@ def test_classifiers_take_the_split_of_data_sets(tmp_path: Path) -> None:
     people = [source(subject=name, kinds=("synthetic", "simulated")) for name in "abcd"]
     options = DatasetOptions(length=24, overlap=4, validation=("b",), test=("a",))
     write_dataset(out, people, options)
-    given = [Source(out, "")]
+    given = [LabelledSource(out, "")]
     assert (split_of(given, "validation"), split_of(given, "test")) == (["b"], ["a"])
-    assert split_of([*given, Source(tmp_path / "other", "")], "test") is None
+    assert split_of([*given, LabelledSource(tmp_path / "other", "")], "test") is None
     assert {clip.kind for clip in clips_of(given, ("radar",)).clips} == {"simulated"}
     assert {clip.kind for clip in clips_of(given, None).clips} == {"synthetic", "simulated"}
     with pytest.raises(Sd2Error, match="holds no denoised maps"):
         clips_of(given, ("denoised",))
     with pytest.raises(Sd2Error, match="data sets say whose they are"):
-        clips_of([Source(out, "anna")], ("radar",))
+        clips_of([LabelledSource(out, "anna")], ("radar",))

@@ -1,0 +1,218 @@
+"""What labelled data holds, and of whom, told without making a map."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+from sd2core.datasets.reading import open_dataset
+from sd2core.errors import Sd2Error
+from sd2core.io.kinds import RADAR_MAP_SUFFIXES, kind_of
+from sd2core.io.radar import holds_map, load_recorded_map
+from sd2core.pair_facts import pair_facts
+from sd2core.recording import SUFFIX, is_recording, open_recording
+
+LabelledKind = Literal["pairs", "data set", "recording", "radar file"]
+
+ONE_PERSON = "one person"
+"""Who a radar file is of, where that is not said."""
+
+_EXPECTED = "a campaign or other pairs, a data set, a labelled recording, or a labelled radar file"
+
+
+class LabelledSource(NamedTuple):
+    """What is to be learnt from.
+
+    Parameters
+    ----------
+    path : Path
+    subject : str
+        Empty where nothing was said.
+    """
+
+    path: Path
+    subject: str = ""
+
+
+class Grid(NamedTuple):
+    """What maps that are learnt from together must share."""
+
+    bins: int
+    v_max_mps: float
+    frame_rate_hz: float
+
+
+@dataclass(frozen=True)
+class LabelledFacts:
+    """What one of them holds.
+
+    Parameters
+    ----------
+    path : Path
+    kind : {"pairs", "data set", "recording", "radar file"}
+    subjects : tuple of str
+        As the source itself calls them.
+    maps : tuple of str
+        Of ``synthetic``, ``denoised`` and ``radar`` those that there are, or can be made.
+    duration_s : float or None
+        Of the movements, each counted once; None where only reading the maps would tell.
+    simulated : bool
+        Whether its radar is.
+    placements : int
+    spans : int
+        Labelled ones; 0 where labels stand by frames.
+    grid : Grid or None
+        None where it depends on what it is learnt from with.
+    splits : dict of str to tuple of str
+        Who trains, validates and tests, where the source says so.
+    """
+
+    path: Path
+    kind: LabelledKind
+    subjects: tuple[str, ...]
+    maps: tuple[str, ...]
+    duration_s: float | None = None
+    simulated: bool = False
+    placements: int = 1
+    spans: int = 0
+    grid: Grid | None = None
+    splits: dict[str, tuple[str, ...]] = field(default_factory=dict)
+
+
+def unfolded(sources: Sequence[LabelledSource]) -> list[LabelledSource]:
+    """Folders of recordings or radar files as what they hold.
+
+    Raises
+    ------
+    Sd2Error
+        When one is not there.
+    """
+    found: list[LabelledSource] = []
+    for one in sources:
+        if not one.path.exists():
+            raise Sd2Error(f"{one.path} does not exist", "labelled data", "Check the path")
+        inside = inside_of(one.path)
+        found += [LabelledSource(path, one.subject) for path in inside] if inside else [one]
+    return found
+
+
+def inside_of(folder: Path) -> list[Path]:
+    """Recordings and radar files right in a folder; none where it is a recording or store."""
+    if not folder.is_dir() or folder.suffix in (SUFFIX, ".zarr"):
+        return []
+    return sorted(
+        path
+        for path in folder.iterdir()
+        if (path.suffix == SUFFIX and path.is_dir()) or path.suffix.lower() in RADAR_MAP_SUFFIXES
+    )
+
+
+def labelled_facts(source: LabelledSource) -> LabelledFacts:
+    """Look into one that is no folder of several.
+
+    Raises
+    ------
+    Sd2Error
+        When it cannot be read, holds no labels, or is nothing to learn from.
+    """
+    path = source.path
+    kind = kind_of(path)
+    if kind == "pairs":
+        return _of_pairs(path)
+    if kind == "dataset":
+        return _of_dataset(path)
+    if is_recording(path):
+        return _of_recording(source)
+    if holds_map(path):
+        return _of_radar_file(source)
+    raise Sd2Error(f"{path} is a {kind}", _EXPECTED)
+
+
+def people_of(facts: Sequence[LabelledFacts]) -> tuple[str, ...]:
+    """Everybody, as a classifier's training calls them, in its order.
+
+    Pairs come last. People of the same name in several stores of pairs are different ones,
+    and called ``STORE:NAME``; in recordings, radar files and data sets they are the same.
+    """
+    stores = [one for one in facts if one.kind == "pairs"]
+    names = [name for one in stores for name in one.subjects]
+    others = [name for one in facts if one.kind != "pairs" for name in one.subjects]
+    in_stores = [
+        f"{one.path.stem}:{name}" if names.count(name) > 1 else name
+        for one in stores
+        for name in one.subjects
+    ]
+    return tuple(dict.fromkeys([*others, *in_stores]))
+
+
+def _of_pairs(path: Path) -> LabelledFacts:
+    facts = pair_facts(path)
+    return LabelledFacts(
+        path,
+        "pairs",
+        facts.subjects,
+        ("synthetic", "denoised", "radar"),
+        facts.duration_s,
+        facts.kind == "simulated",
+        facts.placements,
+        grid=Grid(facts.bins, facts.v_max_mps, facts.frame_rate_hz),
+    )
+
+
+def _of_dataset(path: Path) -> LabelledFacts:
+    with open_dataset(path) as dataset:
+        header = dataset.header
+        kinds = {"radar" if kind in ("simulated", "real") else kind for kind in header.kinds}
+        own = int((dataset["placement"][:] == 0).sum())
+        placements = len(set(dataset["placement"][:].tolist()))
+    step_s = (header.length - header.overlap) / header.frame_rate_hz
+    return LabelledFacts(
+        path,
+        "data set",
+        header.subjects,
+        tuple(name for name in ("synthetic", "denoised", "radar") if name in kinds),
+        own * step_s,
+        header.simulated,
+        placements,
+        grid=Grid(header.axis.bins, header.axis.v_max_mps, header.frame_rate_hz),
+        splits=header.splits,
+    )
+
+
+def _of_recording(source: LabelledSource) -> LabelledFacts:
+    recording = open_recording(source.path)
+    spans = [one for one in recording.effective_labels().spans if one.origin != "suggestion"]
+    if not spans:
+        raise Sd2Error(
+            f"{source.path} has no labels",
+            "a recording in which gestures are labelled",
+            "Label it in the window, or leave it out",
+        )
+    maps: list[str] = []
+    if recording.mesh is not None:
+        shown_without = recording.denoiser is None and recording.bundled_denoiser == ""
+        maps += ["synthetic"] if shown_without else ["synthetic", "denoised"]
+    if recording.radar is not None:
+        maps.append("radar")
+    return LabelledFacts(
+        source.path,
+        "recording",
+        (source.subject or recording.title,),
+        tuple(maps),
+        simulated=recording.simulated and recording.radar is not None,
+        spans=len(spans),
+    )
+
+
+def _of_radar_file(source: LabelledSource) -> LabelledFacts:
+    recorded = load_recorded_map(source.path)
+    return LabelledFacts(
+        source.path,
+        "radar file",
+        (source.subject or ONE_PERSON,),
+        ("radar",),
+        recorded.timebase.duration_s,
+        spans=len(recorded.labels.spans),
+    )
