@@ -42,6 +42,11 @@ def files_of_pattern(path: Path) -> list[Path]:
     return [path.parent / name for name in glob.glob(path.name, root_dir=path.parent)]
 
 
+def files_at(path: Path) -> list[Path]:
+    """The files of a pattern in order, or the path itself."""
+    return sorted(files_of_pattern(path)) if is_pattern(path) else [path]
+
+
 def is_there(path: Path) -> bool:
     """Whether a file, a folder, or any file of a pattern exists."""
     return bool(files_of_pattern(path)) if is_pattern(path) else path.exists()

@@ -7,15 +7,17 @@ import json
 import shutil
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.atomic import atomic_write_text
 from sd2core.batch.folder import BatchFolder
-from sd2core.batch.keys import file_digest, key_of
+from sd2core.batch.keys import key_of
 from sd2core.batch.plan import Export
 from sd2core.batch.stretches import LONGEST_FRAMES
+from sd2core.contents import file_digest
 from sd2core.errors import Sd2Error
 from sd2core.progress import Progress
 from sd2core.sensor import VirtualSensor
@@ -110,7 +112,7 @@ def _is_stale(out: Path, folder: BatchFolder, export: Export) -> bool:
 
     if not out.exists():
         return False
-    wanted = {(*one.key,): one.fingerprint for one in _sources(folder, export)}
+    wanted = {(*one.key,): one.fingerprint() for one in _sources(folder, export)}
     try:
         with open_dataset(out) as dataset:
             return any(
@@ -157,7 +159,8 @@ def _sources(folder: BatchFolder, export: Export) -> Iterator[LazySource]:
             key = SourceKey(rows[0]["subject"], name, rows[0]["placement"])
             load = _loader(folder, rows, key, (start, stop), opened)
             told = json.dumps([rows, start, stop], sort_keys=True)
-            yield LazySource(key, load, hashlib.sha256(told.encode()).hexdigest()[:32])
+            fingerprint = hashlib.sha256(told.encode()).hexdigest()[:32]
+            yield LazySource(key, load, partial(str, fingerprint))
 
 
 def _parts(frames: int, export: Export) -> list[tuple[int, int]]:

@@ -13,10 +13,11 @@ from sd2core.batch.exporting import dataset_key, dataset_path, is_exported, rows
 from sd2core.batch.fitting import fit_choices, fitted
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.inputs import Inspection, MeshInput, Origin, VideoInput, known_inspection
-from sd2core.batch.keys import file_digest, key_of
+from sd2core.batch.keys import key_of
 from sd2core.batch.plan import STEPS, BatchPlan, Simulate, Step
 from sd2core.batch.stretches import Stretch, stretches_of
 from sd2core.batch.tasks import Task
+from sd2core.contents import file_digest
 from sd2core.errors import Sd2Error
 from sd2core.sensor import VirtualSensor
 

@@ -5,17 +5,18 @@ from __future__ import annotations
 import glob
 import json
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
 from sd2core.atomic import atomic_write_text
 from sd2core.batch.folder import BatchFolder
-from sd2core.batch.keys import code_digest, file_digest, key_of
+from sd2core.batch.keys import code_digest, key_of
 from sd2core.batch.plan import Recordings
+from sd2core.contents import Digests, signature
 from sd2core.errors import Sd2Error
-from sd2core.relative_paths import files_of_pattern, is_pattern, is_there
+from sd2core.relative_paths import files_at, is_there
 from sd2core.sensor import Vector, VirtualSensor
 
 if TYPE_CHECKING:
@@ -24,9 +25,6 @@ if TYPE_CHECKING:
 
 LARGEST_IN_MEMORY_BYTES = 256 << 20
 """Of a mesh: what is larger is streamed."""
-
-Signature = list[list[Any]]
-"""Per file or folder: path, size, time of the last change in ns, inode."""
 
 
 @dataclass(frozen=True)
@@ -190,7 +188,7 @@ def subject_of(recordings: Recordings, path: Path, name: str) -> str:
 def known_inspection(folder: BatchFolder, origin: Origin) -> Inspection | None:
     """What was found, where nothing has changed since; only names and times are looked at."""
     record = _record(folder, origin)
-    if record is None or _signature(entry[0] for entry in record["files"]) != record["files"]:
+    if record is None or signature(entry[0] for entry in record["files"]) != record["files"]:
         return None
     found = Inspection.from_dict(record["inspection"])
     # A mesh of ours may have been deleted.
@@ -208,12 +206,12 @@ def inspect(folder: BatchFolder, origin: Origin) -> Inspection:
         When it cannot be used.
     """
     before = _record(folder, origin) or {"files": [], "digests": {}}
-    look = _Look(folder, {str(entry[0]): entry for entry in before["files"]}, before["digests"])
-    found = look.at(Path(origin.path))
+    digests = Digests(before["files"], before["digests"])
+    found = _Look(folder, digests).at(Path(origin.path))
     content = {
         "code": code_digest("inspect"),
-        "files": look.files,
-        "digests": look.digests,
+        "files": digests.files,
+        "digests": digests.digests,
         "inspection": asdict(found),
     }
     path = _record_path(folder, origin)
@@ -230,21 +228,17 @@ def glance(origin: Origin) -> Inspection:
     Sd2Error
         When it cannot be used.
     """
-    return _Look(None, {}, {}).at(Path(origin.path))
+    return _Look(None, Digests([], {})).at(Path(origin.path))
 
 
 class _Look:
-    """One look at a recording; keeps which files it depends on.
+    """One look at a recording; notes which files it depends on.
 
     Without a folder nothing is hashed and nothing written.
     """
 
-    def __init__(
-        self, folder: BatchFolder | None, before: dict[str, list[Any]], digests: dict[str, str]
-    ) -> None:
-        self._folder, self._before, self._known = folder, before, digests
-        self.files: Signature = []
-        self.digests: dict[str, str] = {}
+    def __init__(self, folder: BatchFolder | None, digests: Digests) -> None:
+        self._folder, self._digests = folder, digests
 
     def at(self, path: Path) -> Inspection:
         from sd2core.io.kinds import kind_of
@@ -256,7 +250,7 @@ class _Look:
         if kind == "recording":
             recording = open_recording(path)
             for name in (FILE_NAME, LABELS_NAME):
-                self.files += _signature([recording.folder / name])
+                self._digests.look_at(recording.folder / name)
         elif kind == "mesh":
             recording = Recording(path.parent, mesh=path)
         elif kind == "video":
@@ -277,7 +271,7 @@ class _Look:
         assert path is not None
         reading = recording.mesh_options()
         faces = reading.pop("faces", None)
-        parts = [self._digest(file) for file in _files_of(path)]
+        parts = [self._digest(file) for file in files_at(path)]
         identity = [parts, {key: str(value) for key, value in reading.items()}]
         if faces is not None:
             identity.append(self._digest(faces))
@@ -293,7 +287,7 @@ class _Look:
         from sd2core.io.unpacking import unpack_npz
 
         assert self._folder is not None
-        out = self._folder.result("meshes", self.digests[str(path)][:32], ".zarr")
+        out = self._folder.result("meshes", self._digests.digests[str(path)][:32], ".zarr")
         if not out.exists():
             out.parent.mkdir(parents=True, exist_ok=True)
             unpack_npz(path, out)
@@ -326,15 +320,7 @@ class _Look:
         )
 
     def _digest(self, path: Path) -> str:
-        entries = _signature(_tree(path))
-        self.files += entries
-        if self._folder is None:
-            return ""
-        known = self._known.get(str(path))
-        if known is None or any(self._before.get(entry[0]) != entry for entry in entries):
-            known = file_digest(path)
-        self.digests[str(path)] = known
-        return known
+        return "" if self._folder is None else self._digests.of(path)
 
 
 def open_mesh(path: Path, faces: str | None, reading: Mapping[str, Any]) -> MeshSequence:
@@ -347,7 +333,7 @@ def open_mesh(path: Path, faces: str | None, reading: Mapping[str, Any]) -> Mesh
     """
     from sd2core.io.mesh import load_mesh
 
-    files = _files_of(path)
+    files = files_at(path)
     size = 0 if ".zarr" in path.name.lower() else sum(map(_bytes_in_memory, files))
     if size > LARGEST_IN_MEMORY_BYTES:
         raise Sd2Error(
@@ -395,29 +381,6 @@ def mesh_input_of(
     rate = mesh.timebase.frames_per_s
     shape = mesh.frame_count, mesh.vertex_count
     return MeshInput(str(path), identity, *shape, rate, (x, y, z), faces, reading)
-
-
-def _files_of(path: Path) -> list[Path]:
-    return sorted(files_of_pattern(path)) if is_pattern(path) else [path]
-
-
-def _tree(path: Path) -> Iterable[Path]:
-    """A file; or a folder with all that is in it, whose own time tells when something goes."""
-    yield path
-    if path.is_dir():
-        yield from sorted(path.rglob("*"))
-
-
-def _signature(paths: Iterable[Any]) -> Signature:
-    entries: Signature = []
-    for path in paths:
-        try:
-            facts = os.stat(path)
-        except OSError:
-            entries.append([str(path), -1, 0, 0])
-        else:
-            entries.append([str(path), facts.st_size, facts.st_mtime_ns, facts.st_ino])
-    return entries
 
 
 def _record_path(folder: BatchFolder, origin: Origin) -> Path:

@@ -14,7 +14,14 @@ from sd2core.batch.plan import Step
 from sd2core.resources import resource_path
 
 _CODE: dict[Step, tuple[str, ...]] = {
-    "inspect": ("batch/inputs.py", "io", "recording.py", "recording_document.py", "mesh.py"),
+    "inspect": (
+        "batch/inputs.py",
+        "contents.py",
+        "io",
+        "recording.py",
+        "recording_document.py",
+        "mesh.py",
+    ),
     "fit": ("batch/fitting.py", "body", "io", "mesh.py", "presence.py", "timebase.py"),
     "synthesise": (
         "batch/synthesis.py",
@@ -93,17 +100,6 @@ def code_digest(step: Step) -> str:
 def all_code_digest() -> str:
     """Of all steps: the same where the same program is installed."""
     return hashlib.sha256("".join(map(code_digest, _CODE)).encode()).hexdigest()[:16]
-
-
-def file_digest(path: Path) -> str:
-    """SHA-256 of a file's content; of a folder's, of the names and contents in it."""
-    if not path.is_dir():
-        with path.open("rb") as stream:
-            return hashlib.file_digest(stream, "sha256").hexdigest()
-    digest = hashlib.sha256()
-    for file in sorted(one for one in path.rglob("*") if one.is_file()):
-        digest.update(f"{file.relative_to(path).as_posix()}\n{file_digest(file)}\n".encode())
-    return digest.hexdigest()
 
 
 def _sources(path: Path) -> Iterable[Path]:

@@ -7,6 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from sd2core.contents import remembered_digest
 from sd2core.datasets.recording_sources import labels_and_classes
 from sd2core.datasets.source import LazySource, Outline, Source, SourceKey, label_per_frame
 from sd2core.io.radar import holds_map, load_recorded_map
@@ -36,15 +37,19 @@ def map_source(path: Path, subject: str, label_file: Path | None = None) -> Lazy
         When the map cannot be read, once it is its turn.
     """
     key = SourceKey(subject, path.stem, 0)
-    sums = hashlib.blake2b(digest_size=16)
-    for one in (path, label_file):
-        sums.update(b"" if one is None else one.read_bytes())
     return LazySource(
         key,
         lambda progress: _made(path, key, label_file, progress),
-        sums.hexdigest(),
+        lambda: _fingerprint(path, label_file),
         lambda: _outlined(path, label_file),
     )
+
+
+def _fingerprint(path: Path, label_file: Path | None) -> str:
+    sums = hashlib.blake2b(digest_size=16)
+    for one in (path, label_file):
+        sums.update(b"" if one is None else remembered_digest(one).encode())
+    return sums.hexdigest()
 
 
 def _read(path: Path, label_file: Path | None) -> tuple[DopplerMap, Labels]:

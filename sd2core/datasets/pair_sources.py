@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from sd2core.contents import remembered_digest
 from sd2core.datasets.denoising import Denoising
 from sd2core.datasets.source import KINDS, LazySource, Outline, Source, SourceKey
 from sd2core.denoise.files import DEFAULT_NAME, find_model
@@ -52,6 +53,9 @@ def pair_sources(
     ]
 
 
+_ROWS = ("synthetic", "radar", "times_s", "label")
+
+
 class _Store:
     def __init__(self, path: Path, kinds: tuple[MapKind, ...], model: str | None) -> None:
         self.path = path
@@ -70,13 +74,23 @@ class _Store:
     def lazy(self, number: int, subject: str) -> LazySource:
         take = self.takes[number]
         key = SourceKey(subject, take["name"], take["placement"])
-        made_of = [take, self._header["kind"], self._kinds, str(self._model or "")]
         return LazySource(
             key,
             lambda progress: self._source(key, take, progress),
-            hashlib.blake2b(json.dumps(made_of).encode(), digest_size=16).hexdigest(),
+            lambda: self._fingerprint(take),
             lambda: self._outline(take),
         )
+
+    def _fingerprint(self, take: dict[str, Any]) -> str:
+        """Of the take's own rows: a store may grow."""
+        model = "" if self._model is None else remembered_digest(self._model)
+        told = {name: value for name, value in take.items() if name not in ("start", "stop")}
+        sums = hashlib.blake2b(
+            json.dumps([told, self._header["kind"], self._kinds, model]).encode(), digest_size=16
+        )
+        for name in _ROWS:
+            sums.update(np.ascontiguousarray(self._part(name, take)).data)
+        return sums.hexdigest()
 
     def _part(self, name: str, take: dict[str, Any]) -> Any:
         return np.asarray(self._arrays[name][take["start"] : take["stop"]])

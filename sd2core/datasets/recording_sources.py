@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.contents import remembered_digest
 from sd2core.datasets.denoising import Denoising
 from sd2core.datasets.simulating import CLUTTER, Simulation, simulated_map
 from sd2core.datasets.source import (
@@ -36,6 +37,7 @@ from sd2core.mocap.recording_pairs import on_clock
 from sd2core.placements import Place, Placements
 from sd2core.progress import Progress
 from sd2core.recording import Recording, open_recording
+from sd2core.relative_paths import files_at
 from sd2core.sensor import Vector, VelocityAxis, VirtualSensor
 from sd2core.spectrum import DopplerMap, MapKind
 from sd2core.timebase import Timebase
@@ -148,7 +150,7 @@ def _lazy(shared: _Shared, recording: Recording, key: SourceKey) -> LazySource:
     def outline() -> Outline:
         return shared.opened(recording).outline(key.placement)
 
-    return LazySource(key, load, _fingerprint(recording, key, shared.making), outline)
+    return LazySource(key, load, lambda: _fingerprint(recording, key, shared.making), outline)
 
 
 class _Shared:
@@ -189,7 +191,7 @@ class _Opened:
         kinds: list[MapKind] = []
         if self._mesh is not None:
             kinds += ["synthetic"]
-            kinds += ["denoised"] if self._model() is not None else []
+            kinds += ["denoised"] if _model_of(self.recording, self._making) is not None else []
             kinds += ["simulated"] if self._simulates else []
         if radar_kind is not None and placement == 0 and radar_kind not in kinds:
             kinds.append(radar_kind)
@@ -209,7 +211,7 @@ class _Opened:
         if self._mesh is not None and {"synthetic", "denoised"} & {*wanted}:
             synthetic = self._counted(sensor, _stage(progress, 0.0, counted_share))
             maps["synthetic"] = synthetic
-            model = self._model()
+            model = _model_of(self.recording, self._making)
             if "denoised" in wanted and model is not None:
                 maps["denoised"] = self._denoising.denoised(synthetic, model)
         if key.placement == 0 and self.recording.radar is not None and {
@@ -274,19 +276,6 @@ class _Opened:
         axis = self._making.synthesis.axis
         return simulated_map(self._mesh, sensor, self._making.simulation, axis, None, progress)
 
-    def _model(self) -> Path | None:
-        """The denoiser's file; None where the recording is to be shown without."""
-        from sd2core.denoise.files import DEFAULT_NAME, find_model
-
-        recording = self.recording
-        if self._making.model is not None:
-            return find_model(self._making.model)
-        if recording.denoiser is not None:
-            return find_model(recording.denoiser)
-        if recording.bundled_denoiser == "":
-            return None
-        return find_model(recording.bundled_denoiser or DEFAULT_NAME)
-
     def _sensor(self, placement: int) -> VirtualSensor:
         if placement == 0:
             return self.recording.sensor
@@ -345,7 +334,8 @@ def _synthesizer(
 
 
 def _fingerprint(recording: Recording, key: SourceKey, making: Making) -> str:
-    """Of what the source is made of: labels and settings as they are, files by their sizes."""
+    """Of what the source is made of: labels and settings as they are, files by their contents."""
+    model = _model_of(recording, making) if "denoised" in making.kinds else None
     place = None
     if key.placement:
         place = asdict(places_of(recording, making)[key.placement - 1])
@@ -362,11 +352,10 @@ def _fingerprint(recording: Recording, key: SourceKey, making: Making) -> str:
         "synthesis": asdict(making.synthesis),
         "tolerance": making.tolerance,
         "simulation": None if making.simulation is None else making.simulation.as_json(),
-        "model": making.model or [str(recording.denoiser or ""), recording.bundled_denoiser],
         "kinds": making.kinds,
         "files": [
-            _size(path)
-            for path in (recording.mesh, recording.faces, recording.radar)
+            [remembered_digest(file) for file in files_at(path)]
+            for path in (recording.mesh, recording.faces, recording.radar, model)
             if path is not None
         ],
     }
@@ -374,7 +363,14 @@ def _fingerprint(recording: Recording, key: SourceKey, making: Making) -> str:
     return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
 
 
-def _size(path: Path) -> int:
-    if path.is_dir():
-        return sum(one.stat().st_size for one in path.rglob("*") if one.is_file())
-    return path.stat().st_size if path.exists() else -1
+def _model_of(recording: Recording, making: Making) -> Path | None:
+    """The denoiser's file; None where the recording is to be shown without."""
+    from sd2core.denoise.files import DEFAULT_NAME, find_model
+
+    if making.model is not None:
+        return find_model(making.model)
+    if recording.denoiser is not None:
+        return find_model(recording.denoiser)
+    if recording.bundled_denoiser == "":
+        return None
+    return find_model(recording.bundled_denoiser or DEFAULT_NAME)

@@ -207,16 +207,17 @@ class LazySource:
     key : SourceKey
     load : callable
         Makes the source; may raise ``Sd2Error``, which leaves out this source alone.
-    fingerprint : str
-        Of what it is made of and how. A data set that holds a source of this key and of
-        another fingerprint is not gone on with. Empty: not compared.
+    fingerprint : callable
+        Gives the hash of what it is made of and how, which may take reading files; may raise
+        ``Sd2Error``. A data set that holds a source of this key and of another fingerprint
+        is not gone on with. Empty: not compared.
     outline : callable, optional
         What it will hold, cheaply; needed for a dry run.
     """
 
     key: SourceKey
     load: Callable[[Progress], Source]
-    fingerprint: str = ""
+    fingerprint: Callable[[], str] = str
     outline: Callable[[], Outline] | None = None
 
 

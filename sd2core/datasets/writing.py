@@ -200,7 +200,7 @@ class _Writer:
         known = self._there.get(digest)
         if known is None:
             return False
-        now = one.fingerprint() if isinstance(one, Source) else one.fingerprint
+        now = one.fingerprint()
         if known and now and known != now:
             raise Sd2Error(
                 f"{self._out} holds {one.key.title} already, made of something else",
@@ -211,17 +211,16 @@ class _Writer:
 
     def _append(self, one: Source | LazySource, digest: bytes, progress: Progress) -> None:
         if isinstance(one, Source):
-            source, fingerprint = one, one.fingerprint()
+            source = one
         else:
             source = one.load(lambda done, of: progress(int(900 * done / max(of, 1)), _STEPS))
-            fingerprint = one.fingerprint
             if source.key != one.key:
                 raise Sd2Error(f"{one.key.title} turned out to be {source.key.title}")
         store = self._open_store(source)
         header = store.header
         check_fits(source, header)
         self._names.check(source)
-        entry = entry_of(source, header, fingerprint)
+        entry = entry_of(source, header, one.fingerprint())
         labels = dict(self._names.labels)
         for name in source.labels:
             labels.setdefault(name, len(labels))

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from moving_spheres import save_spheres, swinging_sphere
 
+from sd2core import contents
 from sd2core.batch import inputs
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.inputs import find_origins, inspect, known_inspection
@@ -52,10 +53,10 @@ def test_contents_are_hashed_again_only_where_a_file_changed(
 
     def counted(path: Path) -> str:
         taken.append(path)
-        return inputs_digest(path)
+        return taken_digest(path)
 
-    inputs_digest = inputs.file_digest
-    monkeypatch.setattr(inputs, "file_digest", counted)
+    taken_digest = contents.file_digest
+    monkeypatch.setattr(contents, "file_digest", counted)
     folder = BatchFolder(tmp_path / "made")
     (origin,) = find_origins(Recordings(files=(str(mesh),)), folder.path)
     assert known_inspection(folder, origin) is None

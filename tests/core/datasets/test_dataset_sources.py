@@ -18,7 +18,7 @@ from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.recording_sources import Making
 from sd2core.datasets.source import Source
 from sd2core.datasets.writing import write_dataset
-from sd2core.denoise.files import load_model
+from sd2core.denoise.files import find_model, load_model
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.processing import doppler_map
@@ -210,6 +210,37 @@ def test_a_changed_recording_is_noticed(tmp_path: Path) -> None:
     one.save()
     with pytest.raises(Sd2Error, match="made of something else"):
         write_dataset(out, gather([one.folder], making), options)
+
+
+def test_another_content_of_the_same_size_is_noticed(tmp_path: Path) -> None:
+    one = recording(tmp_path / "anna.sd2")
+    making = Making(kinds=("synthetic", "simulated", "denoised"), model=str(tmp_path / "m"))
+    (tmp_path / "m").write_bytes(find_model("denoiser").read_bytes())
+
+    def fingerprint() -> str:
+        (lazy,) = gather([one.folder], making)
+        return lazy.fingerprint()
+
+    first = fingerprint()
+    assert fingerprint() == first
+    for file in (one.folder / "mesh.npz", one.folder / "radar" / "radar.npy", tmp_path / "m"):
+        content = file.read_bytes()
+        file.write_bytes(content[:-1] + bytes([content[-1] ^ 1]))
+        assert fingerprint() != first
+        file.write_bytes(content)
+        assert fingerprint() == first
+
+
+def test_takes_stay_the_same_when_their_store_grows(tmp_path: Path) -> None:
+    few, many = tmp_path / "few.zarr", tmp_path / "many.zarr"
+    write_pairs(few, ("s1", "s2"))
+    write_pairs(many, ("s1", "s2", "s3"))
+    before, after = (
+        {one.key: one.fingerprint() for one in gather([path], Making())} for path in (few, many)
+    )
+    assert len(before) < len(after)
+    assert before.items() <= after.items()
+    assert len({*after.values()}) == len(after)
 
 
 def test_what_cannot_be_exported_is_named(tmp_path: Path) -> None:

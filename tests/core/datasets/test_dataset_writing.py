@@ -114,7 +114,7 @@ def test_writing_again_adds_only_what_is_new(tmp_path: Path, ending: str) -> Non
             loaded.append(one.key)
             return one
 
-        return LazySource(one.key, load, one.fingerprint())
+        return LazySource(one.key, load, one.fingerprint)
 
     assert write_dataset(grown, [lazily(one) for one in sources], OPTIONS).added == 3
     assert loaded == [one.key for one in sources[2:]]
