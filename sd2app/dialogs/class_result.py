@@ -19,6 +19,8 @@ from sd2app.views.inputs import Choice
 from sd2app.views.learning_curve import LearningCurve
 from sd2app.views.panel_parts import sentence, title
 
+_WIDTH_PX = 860
+
 
 class ClassResultDialog(QDialog):
     """To the left what everything is compared with, to the right what is chosen."""
@@ -44,21 +46,28 @@ class ClassResultDialog(QDialog):
         row.addWidget(self._left, 1)
         if len(result.matrices) > 1:
             self._right = _MatrixColumn(display, self)
-            self._choice = Choice("What is compared with it", self)
-            self._choice.addItems([matrix.title for matrix in result.matrices[1:]])
-            self._choice.currentIndexChanged.connect(self._choose)
-            self._right.heading.addWidget(self._choice)
+            self._right.heading.addWidget(self._what_else(result.matrices[1:]))
             self._right.heading.addStretch(1)
             row.addWidget(self._right, 1)
-            self._choice.setCurrentIndex(_usual(result.matrices[1:]))
-            self._choose(self._choice.currentIndex())
+            self._choose(_usual(result.matrices[1:]))
         layout.addLayout(row)
         if any(len(curve) > 1 for curve in result.curves):
+            layout.addSpacing(8)
             layout.addWidget(LearningCurve(result, display, self), 1)
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, self)
         buttons.rejected.connect(self.reject)
         layout.addWidget(buttons)
-        self.resize(860, 640)
+        self.resize(_WIDTH_PX, self.sizeHint().height())
+
+    def _what_else(self, matrices: tuple[Matrix, ...]) -> QWidget:
+        """A choice of what is shown to the right, or what that is where there is no other."""
+        if len(matrices) == 1:
+            return QLabel(matrices[0].title, self)
+        choice = Choice("What is compared with it", self)
+        choice.addItems([matrix.title for matrix in matrices])
+        choice.setCurrentIndex(_usual(matrices))
+        choice.currentIndexChanged.connect(self._choose)
+        return choice
 
     def _choose(self, at: int) -> None:
         self._right.show_matrix(self._result.matrices[1 + at], self._result)
@@ -85,7 +94,7 @@ class _MatrixColumn(QWidget):
         self._view.show_matrix(matrix, result.classes)
         text = f"Mean recall {matrix.recall.text()} %"
         if matrix.gain is not None:
-            text += f", {matrix.gain.text(signed=True)} points"
+            text += f": {matrix.gain.text(signed=True)} points over the radar alone"
         self._recall.setText(text)
 
 

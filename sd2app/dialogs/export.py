@@ -32,7 +32,7 @@ _FORMATS = {
     ".h5": "HDF5: one file, read in parts",
     ".npz": "NPZ: one file, read whole; for small sets",
 }
-_SIZE_PX = (680, 420)
+_SIZE_PX = (680, 360)
 _SHEET_PX = 940
 """Width of the preview sheet."""
 
@@ -106,7 +106,7 @@ class ExportDialog(QDialog):
         self._form.setHorizontalSpacing(16)
         self._form.setVerticalSpacing(8)
         self._form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
-        self._form.addRow("Of", where)
+        self._form.addRow("From", where)
         self._form.addRow("People", self._people)
         self._form.addRow("Maps", side_by_side(*self._boxes.values(), spacing_px=16))
         self._form.addRow("Sensors", side_by_side(self._sensors))
@@ -116,8 +116,7 @@ class ExportDialog(QDialog):
         self._form.addRow("Format", side_by_side(self._format))
 
     def _build_foot(self) -> None:
-        self._size, self._labels, self._splits = QLabel(self), sentence(""), sentence("")
-        self._size.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self._size, self._labels, self._splits = sentence("", "plain"), sentence(""), sentence("")
         self._message = sentence("", "warning")
         self._picture = QLabel(self)
         self._picture.setAccessibleName("Preview sheet")
@@ -129,6 +128,7 @@ class ExportDialog(QDialog):
         self._bar = QProgressBar(self)
         self._bar.setAccessibleName("How far the export is")
         self._export = outlined("Export…", "Choose a name and write", self._ask_out, self)
+        self._export.setObjectName("primary")
         self._stop = outlined(
             "Stop", "What is complete stays; the same export goes on there", self._model.stop, self
         )
@@ -219,9 +219,10 @@ class ExportDialog(QDialog):
         self._open.setVisible(written)
         if written and result is not None:
             self._size.setText(
-                f"{result.segments:,} segments are in {result.path}, with a card"
+                f"{result.segments:,} segments are in {result.path.name}, with a card"
                 f" ({result.card.name}) and this sheet:"
             )
+            self._size.setToolTip(str(result.path))
             self._show_sheet(result.sheet)
         elif not self._picture.pixmap().isNull():
             self._picture.clear()

@@ -93,6 +93,8 @@ class ClassResult:
         From small to large shares.
     by_movement : bool
         All data is of one person: nothing is said about other people.
+    notes : tuple of str
+        What else is to be said.
     """
 
     path: Path
@@ -102,11 +104,12 @@ class ClassResult:
     matrices: tuple[Matrix, ...]
     curves: tuple[tuple[CurvePoint, ...], ...] = ()
     by_movement: bool = False
+    notes: tuple[str, ...] = ()
 
     @property
     def heading(self) -> str:
         """What all of it is about."""
-        text = f"Frames of a {self.kind} radar" if self.seeds else f"On {self.kind} maps"
+        text = f"Frames of a {self.kind} radar" if self.seeds else f"Judged on {self.kind} maps"
         if self.seeds:
             text += f", mean ± standard deviation of {self.seeds} seeds"
         return text
@@ -128,6 +131,7 @@ class ClassResult:
                 parts.append(f"{curve[0].title}: {', '.join(gains)} {of}.")
         if self.by_movement:
             parts.append("All data is of one person: how it is with others stays unknown.")
+        parts += self.notes
         return "\n".join(parts)
 
 
@@ -222,7 +226,25 @@ def _of_score(path: Path, content: Mapping[str, Any]) -> ClassResult:
         recall = Spread(float(known.mean()) if known.size else math.nan, 0.0)
         matrices.append(Matrix(name.capitalize(), mean, np.zeros_like(mean), recall))
     kind = " and ".join(map(str, content["maps"]))
-    return ClassResult(path, kind, classes, 0, tuple(matrices))
+    return ClassResult(path, kind, classes, 0, tuple(matrices), notes=_notes(content))
+
+
+def _notes(content: Mapping[str, Any]) -> tuple[str, ...]:
+    """Of whom, and how soon; files of earlier versions need not say it."""
+    found = []
+    if subjects := content.get("subjects"):
+        found.append(f"People: {', '.join(map(str, subjects))}.")
+    if learnt := content.get("learnt_from"):
+        names = ", ".join(map(str, learnt))
+        found.append(f"It has learnt from {names}: this is not what it does for others.")
+    latency_s = content.get("latency_s")
+    if latency_s is not None:
+        gestures = int(np.array(content["gestures"], np.int64).sum())
+        found.append(
+            f"A gesture is recognised after {float(latency_s):.2f} s (median);"
+            f" {int(content['missed'])} of {gestures} never."
+        )
+    return tuple(found)
 
 
 def _title(condition: Mapping[str, Any]) -> str:

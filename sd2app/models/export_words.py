@@ -17,17 +17,21 @@ def size_words(forecast: Forecast, length: int) -> str:
 
 def label_words(forecast: Forecast) -> str:
     """How many segments of each label."""
-    return " · ".join(f"{name} {count:,}" for name, count in forecast.of_label.items())
+    named = " · ".join(f"{name} {count:,}" for name, count in forecast.of_label.items())
+    return f"Labels: {named}" if named else ""
 
 
 def split_words(forecast: Forecast) -> str:
     """How many segments of each split, and of whom."""
+    if not (forecast.split.validation or forecast.split.test):
+        who = _named(forecast.split.training)
+        return f"Split: all {forecast.segments:,} to train ({who}); nobody is left to judge on"
     people = {
         "train": forecast.split.training,
         "validation": forecast.split.validation,
         "test": forecast.split.test,
     }
-    return " · ".join(
+    return "Split: " + " · ".join(
         f"{name} {count:,} ({_named(people[name])})" for name, count in forecast.of_split().items()
     )
 

@@ -64,7 +64,7 @@ class ClassStrip(QWidget):
     ) -> None:
         super().__init__(parent)
         self._classify = classify
-        title = QLabel("Gestures", self)
+        title = QLabel("Classifier", self)
         title.setObjectName("title")
         self._source = Choice("The map that the classifier looks at", self)
         self._source.activated.connect(lambda at: classify.set_source(classify.sources[at]))

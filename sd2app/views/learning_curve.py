@@ -14,6 +14,8 @@ from sd2app.views.stepped_plot import SteppedPlot
 from sd2app.views.time_axis import ticks
 
 _PAD = 1.15
+_ASIDE_PX = 8
+"""Between curves, so that their bars do not cover each other."""
 _NEAR_PX = 14.0
 
 
@@ -48,7 +50,13 @@ class LearningCurve(SteppedPlot):
 
     def tip_place(self, point: CurvePoint) -> QPointF:
         """At the point."""
-        return self.place_of(point.share, point.recall.mean)
+        return self._beside(point, point.recall.mean)
+
+    def _beside(self, point: CurvePoint, recall: float) -> QPointF:
+        """A recall after learning from a point's share, a little aside of the other curves'."""
+        titles = [curve[0].title for curve in self._curves]
+        aside_px = _ASIDE_PX * (titles.index(point.title) - (len(titles) - 1) / 2)
+        return self.place_of(point.share, recall) + QPointF(aside_px, 0)
 
     def words_of(self, point: CurvePoint) -> str:
         """What a point means."""
@@ -97,8 +105,8 @@ class LearningCurve(SteppedPlot):
         painter.setBrush(Qt.BrushStyle.NoBrush)
         painter.drawPolyline(QPolygonF([self.tip_place(point) for point in curve]))
         for point in curve:
-            top = self.place_of(point.share, point.recall.mean + point.recall.sd)
-            bottom = self.place_of(point.share, point.recall.mean - point.recall.sd)
+            top = self._beside(point, point.recall.mean + point.recall.sd)
+            bottom = self._beside(point, point.recall.mean - point.recall.sd)
             painter.setPen(QPen(colour, 1))
             painter.drawLine(top, bottom)
             for end in (top, bottom):

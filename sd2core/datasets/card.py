@@ -62,7 +62,7 @@ def describe_dataset(dataset: Dataset) -> dict[str, Any]:
         "segments": len(dataset),
         "segment_s": header.length / header.frame_rate_hz,
         "sources": sources.count,
-        "recordings": len(sources.recordings),
+        "recordings": sources.recordings,
         "minutes": sources.minutes,
         "segments_of_split": _named(SPLITS, counts.split),
         "segments_of_label": by_label,
@@ -132,24 +132,34 @@ class _Sources:
         self.count = 0
         self.empty = 0
         self.simulated = 0
-        self.placements = 0
         self.minutes = 0.0
         self.frames_without_person = 0
-        self.recordings: set[int] = set()
+        self._views: Counter[int] = Counter()
         self._how: dict[str, Counter[str]] = {kind: Counter() for kind in KINDS}
 
     def add(self, entry: dict[str, Any]) -> None:
         self.count += 1
         self.empty += entry["start"] == entry["stop"]
-        self.placements = max(self.placements, entry["placement"] + 1)
-        self.recordings.add(hash((entry["subject"], entry["recording"])))
+        recording = hash((entry["subject"], entry["recording"]))
+        self._views[recording] += 1
         provenance = entry["provenance"]
-        if entry["placement"] == 0:
+        # Others show the same movement; its own sensor need not be among them.
+        if self._views[recording] == 1:
             self.minutes += entry["frames"] / entry["frame_rate_hz"] / 60
             self.frames_without_person += entry["frames"] - entry["frames_with_person"]
             self.simulated += bool(provenance.get("simulated"))
         for kind, made in provenance["maps"].items():
             self._how[kind][how_words(kind, made, provenance)] += 1
+
+    @property
+    def recordings(self) -> int:
+        """How many there are."""
+        return len(self._views)
+
+    @property
+    def placements(self) -> int:
+        """From how many places one of them is seen, at most."""
+        return max(self._views.values(), default=0)
 
     def how(self) -> dict[str, dict[str, int]]:
         """Ways in which maps of each kind were made, and of how many sources."""

@@ -86,12 +86,18 @@ def limits(card: dict[str, Any]) -> list[str]:
     return found
 
 
+def duration_words(card: dict[str, Any]) -> str:
+    """How long its recordings are, each counted once: ``15 s``, or ``12.5 minutes``."""
+    minutes = card["minutes"]
+    return f"{60 * minutes:.0f} s" if minutes < 2 else f"{minutes:,.1f} minutes"
+
+
 def _summary(card: dict[str, Any]) -> str:
     return (
         f"{card['segments']:,} segments of {card['length']} frames ({card['segment_s']:.2f} s at"
         f" {card['frame_rate_hz']:g} frames/s) × {card['bins']} velocity bins, from"
         f" {_counted(card['recordings'], 'recording')} of"
-        f" {_counted(len(card['subjects']), 'subject')}, {card['minutes']:.1f} minutes"
+        f" {_counted(len(card['subjects']), 'subject')}, {duration_words(card)}"
         + (f", each seen from up to {card['placements']} places" if card["placements"] > 1 else "")
         + f". Written by {card['made_by']}; format {card['dataset'].rsplit('.', 1)[-1]},"
         " described in docs/formats.md of SD² Studio."
@@ -110,9 +116,11 @@ def _simulated(card: dict[str, Any]) -> str:
         if kind == "real":
             said.append("Maps called *real* were measured by a radar.")
     if card["simulated_recordings"]:
+        count, of = card["simulated_recordings"], card["recordings"]
+        who = f"{count:,} of {of:,} recordings {'is' if count == 1 else 'are'}"
         said.append(
-            f"Of {_counted(card['recordings'], 'recording')}, {card['simulated_recordings']}"
-            " are simulated as a whole: no camera was there either."
+            f"{'Every recording is' if count == of else who} simulated as a whole: no camera was"
+            " there either."
         )
     return " ".join(said)
 

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, NamedTuple
 
+import numpy as np
+
 from sd2core.datasets.reading import open_dataset
 from sd2core.errors import Sd2Error
 from sd2core.io.kinds import RADAR_MAP_SUFFIXES, kind_of
@@ -165,17 +167,17 @@ def _of_dataset(path: Path) -> LabelledFacts:
     with open_dataset(path) as dataset:
         header = dataset.header
         kinds = {"radar" if kind in ("simulated", "real") else kind for kind in header.kinds}
-        own = int((dataset["placement"][:] == 0).sum())
-        placements = len(set(dataset["placement"][:].tolist()))
+        seen_from = np.unique(dataset["placement"][:], return_counts=True)[1]
     step_s = (header.length - header.overlap) / header.frame_rate_hz
     return LabelledFacts(
         path,
         "data set",
         header.subjects,
         tuple(name for name in ("synthetic", "denoised", "radar") if name in kinds),
-        own * step_s,
+        # Other places show the same movements.
+        int(seen_from.max(initial=0)) * step_s,
         header.simulated,
-        placements,
+        len(seen_from),
         grid=Grid(header.axis.bins, header.axis.v_max_mps, header.frame_rate_hz),
         splits=header.splits,
     )

@@ -67,14 +67,23 @@ def test_curves_have_the_whole_at_their_end(written):
 def test_what_eval_writes_is_shown_as_well(tmp_path):
     found = a_score(0, 70)
     path = tmp_path / "eval.json"
-    told = {"maps": ["simulated"], **found.to_json(), **found.summary()}
+    told = {"maps": ["simulated"], "subjects": ["s3"], "learnt_from": [], **found.to_json()}
+    told |= {"latencies_s": [0.1, 0.3], "latency_s": 0.2, "missed": 1}
     path.write_text(json.dumps(finite(told)))
     result = read_result(path)
-    assert result.heading == "On simulated maps"
+    assert result.heading == "Judged on simulated maps"
     assert [matrix.title for matrix in result.matrices] == ["Frames", "Gestures"]
     assert result.matrices[0].cell(1, 1) == Spread(0.7, 0.0)
     assert result.matrices[0].recall.text() == "70.0"
-    assert result.summary == ""
+    gestures = int(found.gestures.sum())
+    assert result.summary == (
+        f"People: s3.\nA gesture is recognised after 0.20 s (median); 1 of {gestures} never."
+    )
+    told |= {"learnt_from": ["s3"], "latency_s": None}
+    path.write_text(json.dumps(finite(told)))
+    assert read_result(path).summary == (
+        "People: s3.\nIt has learnt from s3: this is not what it does for others."
+    )
 
 
 def test_a_class_without_frames_has_no_share(tmp_path):

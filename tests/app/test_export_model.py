@@ -61,9 +61,9 @@ def test_choices_are_counted_at_once(made, people, qtbot) -> None:
     assert model.forecast.segments == 4
     assert size_words(model.forecast, 30).startswith("4 segments of 1.0 s from 1 view · ")
     # It swings from 1 s to 2 s.
-    assert label_words(model.forecast) == "background 3 · swing 1"
+    assert label_words(model.forecast) == "Labels: background 3 · swing 1"
     assert split_words(model.forecast) == (
-        "train 4 (anna) · validation 0 (nobody) · test 0 (nobody)"
+        "Split: all 4 to train (anna); nobody is left to judge on"
     )
     model.choose(maps=frozenset({"radar"}))
     counted(model, qtbot)
