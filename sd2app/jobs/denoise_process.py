@@ -208,18 +208,54 @@ class RemoteClassifier(_Remote):
         )
         return np.frombuffer(answer, np.float32).reshape(len(doppler.timebase), -1).copy()
 
-    def live(self) -> RemoteLive:
+    def live(self) -> RemoteClasses:
         """For frames of one stretch, all with a person, as they come."""
-        return RemoteLive(self._process, self._begin(), equals_batch=True)
+        return RemoteClasses(self._process, self._begin())
 
 
-class RemoteLive:
-    """Frames in; for each of them what the model makes of it."""
+class _RemoteSession:
+    """A clip whose frames come one after another."""
 
-    def __init__(self, process: DenoiseProcess, number: int, equals_batch: bool) -> None:
+    def __init__(self, process: DenoiseProcess, number: int) -> None:
         self._process = process
         self._number = number
         self._generation = process.generation
+
+    def _ask(self, do: str, numbers: bytes = b"", **content: int) -> NDArray[np.float32]:
+        if self._process.generation != self._generation:
+            raise Sd2Error(
+                "The process in which the models work was started again",
+                remedy="Choose the model again",
+            )
+        told, answer = self._process.ask({"do": do, "live": self._number, **content}, numbers)
+        return np.frombuffer(answer, np.float32).reshape(told["shape"]).copy()
+
+    def _advance(
+        self, energies: NDArray[np.float32], present: NDArray[np.bool_]
+    ) -> NDArray[np.float32]:
+        frames, bins = energies.shape
+        values = np.ascontiguousarray(energies, np.float32)
+        numbers = np.asarray(present, np.bool_).tobytes() + values.tobytes()
+        return self._ask("advance", numbers, frames=frames, bins=bins)
+
+
+class RemoteClasses(_RemoteSession):
+    """Frames with a person in; probabilities of the classes out, as late as the card says."""
+
+    def advance(self, energies: NDArray[np.float32]) -> NDArray[np.float32]:
+        """What became known by the next frames: (frames, bins) → (answers, classes)."""
+        return self._advance(energies, np.ones(len(energies), np.bool_))
+
+    def finish(self) -> NDArray[np.float32]:
+        """Answers that are owed, if nothing moves from now on; it goes on all the same."""
+        return self._ask("finish")
+
+
+class RemoteLive(_RemoteSession):
+    """Frames in; for each of them what the model makes of it."""
+
+    def __init__(self, process: DenoiseProcess, number: int, equals_batch: bool) -> None:
+        super().__init__(process, number)
         self.equals_batch = equals_batch
 
     def step(self, energies: NDArray[np.float32], present: bool = True) -> NDArray[np.float32]:
@@ -230,14 +266,4 @@ class RemoteLive:
         self, energies: NDArray[np.float32], present: NDArray[np.bool_]
     ) -> NDArray[np.float32]:
         """Answers to the next frames (frames, bins), one row for each."""
-        if self._process.generation != self._generation:
-            raise Sd2Error(
-                "The process in which the models work was started again",
-                remedy="Choose the model again",
-            )
-        frames, bins = energies.shape
-        content = {"do": "advance", "live": self._number, "frames": frames, "bins": bins}
-        values = np.ascontiguousarray(energies, np.float32)
-        numbers = np.asarray(present, np.bool_).tobytes() + values.tobytes()
-        _, answer = self._process.ask(content, numbers)
-        return np.frombuffer(answer, np.float32).reshape(frames, -1).copy()
+        return self._advance(energies, present)

@@ -72,17 +72,24 @@ class Worker:
         return {"live": number}, b""
 
     def _do_advance(self, content: dict[str, Any], numbers: bytes) -> Message:
-        live = self._live.get(content["live"])
-        if live is None:
-            raise Sd2Error("The model is no longer loaded", remedy="Choose it again")
+        live = self._session(content)
         frames, bins = content["frames"], content["bins"]
-        # What is used goes last, as what is forgotten goes first.
-        self._live[content["live"]] = self._live.pop(content["live"])
         present = np.frombuffer(numbers, np.bool_, frames)
         values = unpacked_values(numbers, (frames, bins), frames)
         if frames == 1:
-            return {}, live.step(values[0], bool(present[0])).tobytes()
-        return {}, np.ascontiguousarray(live.advance(values, present)).tobytes()
+            return _packed(live.step(values[0], bool(present[0])))
+        return _packed(live.advance(values, present))
+
+    def _do_finish(self, content: dict[str, Any], numbers: bytes) -> Message:
+        return _packed(self._session(content).finish())
+
+    def _session(self, content: dict[str, Any]) -> Any:
+        live = self._live.get(content["live"])
+        if live is None:
+            raise Sd2Error("The model is no longer loaded", remedy="Choose it again")
+        # What is used goes last, as what is forgotten goes first.
+        self._live[content["live"]] = self._live.pop(content["live"])
+        return live
 
     def _model(self, content: dict[str, Any]) -> Any:
         model = self._models.get(content["model"])
@@ -118,8 +125,7 @@ class _LiveClasses:
         self._memory = trained.initial_memory()
 
     def step(self, energies: NDArray[np.float32], present: bool) -> NDArray[np.float32]:
-        found: NDArray[np.float32] = self.advance(energies[None], np.array([present]))[0]
-        return found
+        return self.advance(energies[None], np.array([present]))
 
     def advance(
         self, energies: NDArray[np.float32], present: NDArray[np.bool_]
@@ -127,6 +133,16 @@ class _LiveClasses:
         found: NDArray[np.float32]
         found, self._memory = self._trained.advance(energies, self._memory)
         return found
+
+    def finish(self) -> NDArray[np.float32]:
+        found: NDArray[np.float32] = self._trained.finish(self._memory)
+        return found
+
+
+def _packed(rows: NDArray[np.float32]) -> Message:
+    """What a session answered; a denoiser's one frame is one row."""
+    shown = np.ascontiguousarray(np.atleast_2d(rows), np.float32)
+    return {"shape": list(shown.shape)}, shown.tobytes()
 
 
 def serve(source: BinaryIO, sink: BinaryIO) -> None:

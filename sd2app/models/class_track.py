@@ -60,6 +60,8 @@ class _Going(NamedTuple):
     session: LiveClasses
     start: int
     next: int
+    answered: int
+    """The answers of frames from here on may change with the next frames."""
 
 
 class _Piece(NamedTuple):
@@ -347,16 +349,16 @@ def _in_order(
 ) -> None:
     """One stretch piece by piece, from where it was left."""
     start, stop = stretch
-    if going is not None and going.start == start and going.next < stop:
-        session, at = going.session, going.next
-    else:
-        session, at = classifier.live(), start
-    while at < stop:
-        end = min(at + AT_ONCE, stop)
-        energies = np.ascontiguousarray(doppler.values[:, at:end].T)
-        shares = session.advance(energies, np.ones(end - at, bool))
-        emit(_Piece(at, shares, _Going(session, start, end)))
-        at = end
+    if going is None or going.start != start or going.next >= stop:
+        going = _Going(classifier.live(), start, start, start)
+    while going.next < stop:
+        end = min(going.next + AT_ONCE, stop)
+        shares = going.session.advance(np.ascontiguousarray(doppler.values[:, going.next : end].T))
+        answered = going.answered
+        going = _Going(going.session, start, end, answered + len(shares))
+        emit(_Piece(answered, shares, going))
+    if going.answered < stop:
+        emit(_Piece(going.answered, going.session.finish(), going))
 
 
 def _present(doppler: DopplerMap) -> NDArray[np.bool_]:

@@ -19,12 +19,13 @@ if TYPE_CHECKING:
 
 
 class LiveClasses(Protocol):
-    """Frames in, probabilities out."""
+    """Frames in, probabilities out, as late as the classifier's card says."""
 
-    def advance(
-        self, energies: NDArray[np.float32], present: NDArray[np.bool_]
-    ) -> NDArray[np.float32]:
-        """Answers to the next frames: (frames, bins) → (frames, classes)."""
+    def advance(self, energies: NDArray[np.float32]) -> NDArray[np.float32]:
+        """What became known by the next frames: (frames, bins) → (answers, classes)."""
+
+    def finish(self) -> NDArray[np.float32]:
+        """Answers that are owed, if nothing moves from now on; it goes on all the same."""
 
 
 class Classifier(Protocol):

@@ -14,7 +14,9 @@ from sd2core.labels.label_set import check_name
 from sd2core.sensor import VelocityAxis
 
 FORMAT = "sd2-classifier"
-VERSION = 1
+VERSION = 2
+
+LONGEST_DELAY_S = 5.0
 
 BACKGROUND = "background"
 """The class of frames in which there is none of the gestures."""
@@ -36,6 +38,8 @@ class ClassifierCard:
         In the order of its answers; at least two.
     trained_on : tuple of str
         Kinds of maps that it learnt from, as :data:`sd2core.spectrum.MapKind` calls them.
+    delay_frames : int
+        So many frames are seen after one before it is answered.
     title : str
         To call it in a list; the file's name where it is empty.
     about : mapping
@@ -51,6 +55,7 @@ class ClassifierCard:
     features: Features
     classes: tuple[str, ...]
     trained_on: tuple[str, ...]
+    delay_frames: int = 0
     title: str = ""
     about: Mapping[str, Any] = field(default_factory=dict)
     parameters: int = 0
@@ -65,6 +70,10 @@ class ClassifierCard:
             )
         for name in self.classes:
             check_name(name, "class")
+        if not 0 <= self.delay_s <= LONGEST_DELAY_S:
+            raise Sd2Error(
+                f"The classifier answers {self.delay_s:g} s late", f"0 to {LONGEST_DELAY_S:g} s"
+            )
 
     @property
     def name(self) -> str:
@@ -87,6 +96,11 @@ class ClassifierCard:
         return self.features.frame_rate_hz
 
     @property
+    def delay_s(self) -> float:
+        """So much later than a frame its answer is known."""
+        return self.delay_frames / self.frame_rate_hz
+
+    @property
     def background(self) -> int | None:
         """Which of the classes is the background, if one is."""
         return self.classes.index(BACKGROUND) if BACKGROUND in self.classes else None
@@ -104,6 +118,7 @@ class ClassifierCard:
             "frame_rate_hz": self.frame_rate_hz,
             "classes": list(self.classes),
             "trained_on": list(self.trained_on),
+            "delay_frames": self.delay_frames,
             "title": self.title,
             "about": dict(self.about),
             "parameters": self.parameters,
@@ -139,6 +154,8 @@ class ClassifierCard:
                 ),
                 classes=tuple(map(str, content["classes"])),
                 trained_on=tuple(map(str, content["trained_on"])),
+                # Those of version 1 answer at once.
+                delay_frames=int(content.get("delay_frames", 0)),
                 title=str(content["title"]),
                 about=dict(content["about"]),
                 parameters=int(content["parameters"]),

@@ -57,4 +57,5 @@ def judge(classifier: TrainedClassifier, clips: Sequence[Clip], known: ClipSet) 
         card.classes,
         known.frame_rate_hz,
         card.background,
+        card.delay_s,
     )

@@ -26,6 +26,8 @@ class Memory(NamedTuple):
 
     heard: Heard
     network: State
+    owed: int = 0
+    """Frames of which the answer is not known yet."""
 
 
 class TrainedClassifier:
@@ -97,11 +99,13 @@ class TrainedClassifier:
         """One stretch at the model's frame rate, (frames, bins) → (frames, classes)."""
         found = np.empty((len(energies), len(self.classes)), np.float32)
         memory = self.initial_memory()
+        known = 0
         for start in range(0, len(energies), CHUNK):
             progress(start, len(energies))
-            found[start : start + CHUNK], memory = self.advance(
-                energies[start : start + CHUNK], memory
-            )
+            answers, memory = self.advance(energies[start : start + CHUNK], memory)
+            found[known : known + len(answers)] = answers
+            known += len(answers)
+        found[known:] = self.finish(memory)
         return found
 
     def initial_memory(self) -> Memory:
@@ -112,7 +116,7 @@ class TrainedClassifier:
     def step(
         self, frame: NDArray[np.float32], memory: Memory, present: bool = True
     ) -> tuple[Probabilities, Memory]:
-        """Answer to the next frame, as :meth:`probabilities` gives it, and what to remember.
+        """Show the next frame; what became known by it, and what to remember.
 
         Parameters
         ----------
@@ -125,24 +129,40 @@ class TrainedClassifier:
 
         Returns
         -------
-        float32 array, shape (classes,), and Memory
+        float32 array, shape (answers, classes), and Memory
+            Answers as :meth:`probabilities` gives them, to the earliest frames that had
+            none. They are one row per step once the card's delay has passed, and all that
+            are owed when the person has gone.
         """
         if not present:
-            return self.nobody(), self.initial_memory()
-        found, memory = self.advance(np.asarray(frame)[None], memory)
-        return found[0], memory
+            answers = np.concatenate([self.finish(memory), self.nobody()[None]])
+            return answers, self.initial_memory()
+        return self.advance(np.asarray(frame)[None], memory)
 
     def advance(
         self, energies: NDArray[np.float32], memory: Memory
     ) -> tuple[Probabilities, Memory]:
-        """The same for some frames at once, (frames, bins) → (frames, classes)."""
+        """The same for some frames at once, (frames, bins) → (answers, classes)."""
         if not len(energies):
             return np.zeros((0, len(self.classes)), np.float32), memory
         shown, heard = self.card.features.of(energies, memory.heard)
+        answers, state = self._ask(shown, memory)
+        owed = memory.owed + len(shown) - len(answers)
+        return answers, Memory(heard, state, owed)
+
+    def finish(self, memory: Memory) -> Probabilities:
+        """Answers that are owed, if nothing moves from now on: (owed, classes)."""
+        if not memory.owed:
+            return np.zeros((0, len(self.classes)), np.float32)
+        silence = np.zeros((self.card.delay_frames, self.card.features.size), np.float32)
+        return self._ask(silence, memory)[0]
+
+    def _ask(self, shown: NDArray[np.float32], memory: Memory) -> tuple[Probabilities, State]:
+        """Answers of the network; the first ones of a clip are about nothing."""
         with torch.no_grad():
             answer, state = self.network.chunk(torch.from_numpy(shown)[None], memory.network)
             found: Probabilities = probabilities_of(answer[0]).numpy()
-        return found, Memory(heard, state)
+        return found[max(self.card.delay_frames - memory.owed, 0) :], state
 
     def nobody(self) -> Probabilities:
         """Answer to a frame without a person, (classes,).

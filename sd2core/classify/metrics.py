@@ -63,7 +63,7 @@ class Score:
     gestures : int64 array, shape (classes, classes)
         Of gestures: what most frames of a labelled gesture were taken for.
     latencies_s : float64 array, shape (gestures that were recognised,)
-        From a gesture's beginning to the end of its first frame that is right.
+        From a gesture's beginning until it is known that a frame of it shows it.
     missed : int
         Gestures without any frame that is right.
     """
@@ -133,6 +133,7 @@ def score(
     classes: tuple[str, ...],
     frame_rate_hz: float,
     background: int | None,
+    delay_s: float = 0.0,
 ) -> Score:
     """Compare classes frame by frame and gesture by gesture.
 
@@ -144,6 +145,8 @@ def score(
     frame_rate_hz : float
     background : int or None
         The class that is no gesture.
+    delay_s : float
+        So much later than a frame its answer is known.
     """
     number = len(classes)
     frames = np.zeros((number, number), np.int64)
@@ -157,7 +160,7 @@ def score(
             gestures[true, np.bincount(own, minlength=number).argmax()] += 1
             right = np.flatnonzero(own == true)
             if right.size:
-                latencies.append((right[0] + 1) / frame_rate_hz)
+                latencies.append((right[0] + 1) / frame_rate_hz + delay_s)
             else:
                 missed += 1
     return Score(classes, frames, gestures, np.array(latencies), missed)

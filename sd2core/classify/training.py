@@ -15,7 +15,7 @@ import torch
 from numpy.typing import NDArray
 from torch.nn import functional
 
-from sd2core.classify.card import ClassifierCard
+from sd2core.classify.card import LONGEST_DELAY_S, ClassifierCard
 from sd2core.classify.data import UNKNOWN, Clip, ClipSet, frame_counts
 from sd2core.classify.features import Features, Kind
 from sd2core.classify.live import TrainedClassifier
@@ -35,6 +35,8 @@ class TrainOptions:
     ----------
     model : {"lstm", "s4"}
     features : {"peak", "columns"}
+    delay_s : float
+        So much of what follows a frame is seen before it is answered.
     options : mapping
         Of the model, in place of its own.
     steps : int
@@ -58,6 +60,7 @@ class TrainOptions:
 
     model: str = "lstm"
     features: Kind = "columns"
+    delay_s: float = 0.0
     options: Mapping[str, Any] = field(default_factory=dict)
     steps: int = 160
     batch: int = 32
@@ -78,6 +81,8 @@ class TrainOptions:
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
                 raise Sd2Error(f"{name} is {value}", "a finite number above 0")
+        if not 0 <= self.delay_s <= LONGEST_DELAY_S:
+            raise Sd2Error(f"The delay is {self.delay_s} s", f"0 to {LONGEST_DELAY_S:g} s")
 
     def to_json(self) -> dict[str, Any]:
         """By name; options in full."""
@@ -108,18 +113,23 @@ class Material(NamedTuple):
     ----------
     features : list of float32 array, shape (frames, size)
         Of whole clips, so what was before a window is known.
+        After them the silence that a clip's last answers are found in.
     labels : list of int64 array, shape (frames,)
+        Those of earlier frames, where answers are late.
     """
 
     features: list[NDArray[np.float32]]
     labels: list[NDArray[np.int64]]
 
     @classmethod
-    def of(cls, clips: Sequence[Clip], features: Features) -> Material:
+    def of(cls, clips: Sequence[Clip], features: Features, delay_frames: int) -> Material:
         """Of some clips."""
         return cls(
-            [features.of(clip.energies)[0] for clip in clips],
-            [clip.label.astype(np.int64) for clip in clips],
+            [np.pad(features.of(c.energies)[0], ((0, delay_frames), (0, 0))) for c in clips],
+            [
+                np.pad(c.label.astype(np.int64), (delay_frames, 0), constant_values=UNKNOWN)
+                for c in clips
+            ],
         )
 
 
@@ -157,6 +167,7 @@ def train(
     chosen = chosen or TrainOptions()
     weights = _class_weights(training, known.classes)
     features = Features(chosen.features, known.axis, known.null_bins, known.frame_rate_hz)
+    delay_frames = round(chosen.delay_s * known.frame_rate_hz)
     events: list[dict[str, Any]] = []
 
     def say(event: str, **content: Any) -> None:
@@ -166,8 +177,10 @@ def train(
     with _one_thread(), torch.random.fork_rng(devices=[]):
         torch.manual_seed(chosen.seed)
         network = build(chosen.model, features.size, len(known.classes), **chosen.options)
-        learning = _Learning(network, Material.of(training, features), weights, chosen)
-        chosen_by = Material.of(validation, features)
+        learning = _Learning(
+            network, Material.of(training, features, delay_frames), weights, chosen
+        )
+        chosen_by = Material.of(validation, features, delay_frames)
         say("start", steps=chosen.steps, clips=len(training), frames=sum(map(len, training)))
         interrupted = False
         best, best_at, looks = -1.0, 0, 0
@@ -201,6 +214,7 @@ def train(
         features,
         known.classes,
         tuple(dict.fromkeys(clip.kind for clip in training)),
+        delay_frames,
         about={**(about or {}), "best_step": best_at, "training": chosen.to_json()},
     )
     return Trained(TrainedClassifier(network, card), events, interrupted)

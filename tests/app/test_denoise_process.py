@@ -129,8 +129,10 @@ def test_a_process_that_ends_at_once_is_an_error_in_words(folder):
     process.close()
 
 
-@pytest.mark.parametrize("kind", ["lstm", "s4"])
-def test_a_classifier_beside_the_denoisers_answers_as_the_library(process, folder, tmp_path, kind):
+@pytest.mark.parametrize(("kind", "delay"), [("lstm", 0), ("s4", 9)])
+def test_a_classifier_beside_the_denoisers_answers_as_the_library(
+    process, folder, tmp_path, kind, delay
+):
     import torch
 
     from sd2core.classify.card import ClassifierCard
@@ -142,7 +144,7 @@ def test_a_classifier_beside_the_denoisers_answers_as_the_library(process, folde
     torch.manual_seed(5)
     features = Features("columns", VelocityAxis(32, 2.0), (14, 15, 16), 30.0)
     classes = ("background", "horizontal", "vertical")
-    card = ClassifierCard(kind, {}, features, classes, ("synthetic",))
+    card = ClassifierCard(kind, {}, features, classes, ("synthetic",), delay)
     path = tmp_path / "classifier.safetensors"
     save_classifier(path, TrainedClassifier(build(kind, features.size, 3), card))
     present = np.ones(120, bool)
@@ -156,8 +158,11 @@ def test_a_classifier_beside_the_denoisers_answers_as_the_library(process, folde
     # Frame by frame and in pieces it is the same, with a denoiser asked in between.
     live, found = classifier.live(), []
     for start, stop in ((55, 56), (56, 70), (70, 71), (71, 120)):
-        found.append(live.advance(given.values.T[start:stop], np.ones(stop - start, bool)))
+        found.append(live.advance(given.values.T[start:stop]))
         denoiser.denoise(a_map())
+        owed = live.finish()
+    assert len(owed) == delay
+    found.append(owed)
     np.testing.assert_allclose(np.concatenate(found), whole[55:], atol=1e-5)
     with pytest.raises(Sd2Error, match="is a denoiser"):
         process.load_classifier(folder / "gru.safetensors")

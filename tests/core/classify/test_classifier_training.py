@@ -37,6 +37,23 @@ def test_classes_that_can_be_told_are_learnt(known: ClipSet, model: str, kind: s
     assert made.classifier.card.trained_on == ("simulated",)
 
 
+@pytest.mark.parametrize("model", MODELS)
+def test_what_only_the_future_tells_is_learnt_with_a_delay(known: ClipSet, model: str) -> None:
+    """Every frame has the class that is shown a third of a second later."""
+    early = [
+        replace(clip, label=np.append(clip.label[10:], np.full(10, UNKNOWN, np.int8)))
+        for clip in known.clips
+    ]
+    told = {}
+    for delay_s in (0.0, 0.4):
+        made = train(early[:8], early[8:12], known, replace(SHORT, model=model, delay_s=delay_s))
+        told[delay_s] = judge(made.classifier, early[12:], known)
+        assert made.classifier.card.delay_s == pytest.approx(delay_s)
+    assert told[0.4].mean_recall > 0.95
+    assert told[0.0].mean_recall < 0.8
+    assert min(told[0.4].latencies_s) > 0.4
+
+
 def test_the_same_seed_gives_the_same_classifier(known: ClipSet) -> None:
     short = replace(SHORT, steps=6)
     state = torch.random.get_rng_state()
@@ -106,7 +123,11 @@ def test_a_trained_classifier_comes_back_from_its_file(known: ClipSet, tmp_path:
 
 @pytest.mark.parametrize(
     ("change", "words"),
-    [({"steps": 0}, "steps is 0"), ({"learning_rate": 0.0}, "learning_rate is 0")],
+    [
+        ({"steps": 0}, "steps is 0"),
+        ({"learning_rate": 0.0}, "learning_rate is 0"),
+        ({"delay_s": -1.0}, "delay is -1"),
+    ],
 )
 def test_options_that_make_no_sense_are_refused(change: dict, words: str) -> None:
     with pytest.raises(Sd2Error, match=words):

@@ -18,17 +18,21 @@ from sd2core.timebase import Timebase
 SAME = 2e-5
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(("model", "delay"), [("lstm", 0), ("lstm", 11), ("s4", 0), ("s4", 11)])
 @pytest.mark.parametrize("kind", ["peak", "columns"])
-def test_frame_by_frame_equals_the_whole_map(model: str, kind: str) -> None:
-    trained = classifier(model, kind)
+def test_frame_by_frame_equals_the_whole_map(model: str, kind: str, delay: int) -> None:
+    trained = classifier(model, kind, delay_frames=delay)
     values = energies(130)
     whole = trained.probabilities(doppler(values))
     memory, found = trained.initial_memory(), []
     for frame in values:
         answer, memory = trained.step(frame, memory)
         found.append(answer)
-    np.testing.assert_allclose(np.stack(found), whole, atol=SAME)
+    # After `delay` frames every one brings one answer.
+    assert [len(one) for one in found] == [0] * delay + [1] * (130 - delay)
+    found.append(trained.finish(memory))
+    assert trained.finish(trained.initial_memory()).shape == (0, len(CLASSES))
+    np.testing.assert_allclose(np.concatenate(found), whole, atol=SAME)
     np.testing.assert_allclose(whole.sum(axis=1), 1.0, atol=1e-5)
     assert whole.dtype == np.float32
     assert whole.shape == (130, len(CLASSES))
@@ -36,38 +40,64 @@ def test_frame_by_frame_equals_the_whole_map(model: str, kind: str) -> None:
 
 @pytest.mark.parametrize("model", MODELS)
 @settings(max_examples=8, deadline=None)
-@given(sizes=st.lists(st.integers(0, 90), min_size=1, max_size=6))
-def test_pieces_of_any_length_equal_the_whole(model: str, sizes: list[int]) -> None:
-    trained = classifier(model)
+@given(
+    sizes=st.lists(st.integers(0, 90), min_size=1, max_size=6),
+    delay=st.sampled_from([0, 1, 40, 100]),
+)
+def test_pieces_of_any_length_equal_the_whole(model: str, sizes: list[int], delay: int) -> None:
+    trained = classifier(model, delay_frames=delay)
     values = energies(max(sum(sizes), 1))
     memory, found = trained.initial_memory(), []
     for start, size in zip(np.cumsum([0, *sizes]), [*sizes, len(values)], strict=False):
         answer, memory = trained.advance(values[start : start + size], memory)
         found.append(answer)
+    found.append(trained.finish(memory))
     np.testing.assert_allclose(np.concatenate(found), trained.probabilities_of(values), atol=SAME)
 
 
 @pytest.mark.parametrize("model", MODELS)
 def test_a_long_map_is_worked_out_in_pieces_that_do_not_show(model: str) -> None:
-    trained = classifier(model)
+    trained = classifier(model, delay_frames=12)
     values = energies(CHUNK + 70)
-    whole, _ = trained.advance(values, trained.initial_memory())
+    whole, memory = trained.advance(values, trained.initial_memory())
+    whole = np.concatenate([whole, trained.finish(memory)])
     np.testing.assert_allclose(trained.probabilities(doppler(values)), whole, atol=SAME)
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_what_comes_later_changes_nothing(model: str) -> None:
-    trained = classifier(model)
+@pytest.mark.parametrize("delay", [0, 20])
+def test_what_comes_later_than_the_delay_changes_nothing(model: str, delay: int) -> None:
+    trained = classifier(model, delay_frames=delay)
     values = energies(200)
     other = values.copy()
     other[120:] = energies(80, seed=9) * 50
-    before = trained.probabilities(doppler(values))[:120]
-    np.testing.assert_allclose(trained.probabilities(doppler(other))[:120], before, atol=SAME)
+    before = trained.probabilities(doppler(values))[: 120 - delay]
+    after = trained.probabilities(doppler(other))
+    np.testing.assert_allclose(after[: 120 - delay], before, atol=SAME)
+    if delay:
+        assert (
+            np.abs(
+                after[120 - delay : 120] - trained.probabilities(doppler(values))[120 - delay : 120]
+            ).max()
+            > SAME
+        )
+
+
+@pytest.mark.parametrize("delay", [1, 20])
+def test_the_answer_is_that_of_the_network_so_many_frames_on(delay: int) -> None:
+    at_once, late = classifier(), classifier(delay_frames=delay)
+    values = energies(90)
+    np.testing.assert_allclose(
+        late.probabilities_of(values)[: 90 - delay],
+        at_once.probabilities_of(values)[delay:],
+        atol=SAME,
+    )
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_without_a_person_it_is_background_and_begins_anew(model: str) -> None:
-    trained = classifier(model)
+@pytest.mark.parametrize("delay", [0, 15])
+def test_without_a_person_it_is_background_and_begins_anew(model: str, delay: int) -> None:
+    trained = classifier(model, delay_frames=delay)
     values = energies(150)
     present = np.ones(150, bool)
     present[60:70] = False
@@ -75,10 +105,12 @@ def test_without_a_person_it_is_background_and_begins_anew(model: str) -> None:
     np.testing.assert_array_equal(found[60:70], np.tile([1.0, 0.0, 0.0], (10, 1)))
     np.testing.assert_allclose(found[:60], trained.probabilities_of(values[:60]), atol=SAME)
     np.testing.assert_allclose(found[70:], trained.probabilities_of(values[70:]), atol=SAME)
-    memory = trained.initial_memory()
-    for frame, there, wanted in zip(values, present, found, strict=True):
+    memory, stepped = trained.initial_memory(), []
+    for frame, there in zip(values, present, strict=True):
         answer, memory = trained.step(frame, memory, bool(there))
-        np.testing.assert_allclose(answer, wanted, atol=SAME)
+        stepped.append(answer)
+    stepped.append(trained.finish(memory))
+    np.testing.assert_allclose(np.concatenate(stepped), found, atol=SAME)
 
 
 def test_gain_changes_nothing() -> None:
