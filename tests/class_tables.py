@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sd2core.classify.experiment import Condition
+from sd2core.classify.experiment import Condition, Network
 from sd2core.classify.metrics import Score
 from sd2core.classify.table import Run, Table, TableOptions
 
@@ -23,7 +23,7 @@ def a_score(seed: int, right: int) -> Score:
 
 def a_table(seeds: int = 3) -> Table:
     conditions = [
-        Condition(model="s4"),
+        Condition(network=Network("s4")),
         Condition(),
         Condition(added="synthetic"),
         Condition(added="denoised"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -165,8 +165,7 @@ def read_result(path: Path) -> ClassResult:
 def _of_table(path: Path, content: Mapping[str, Any]) -> ClassResult:
     classes = tuple(map(str, content["classes"]))
     conditions = list(content["conditions"])
-    network = _network(conditions)
-    own = [one for one in conditions if (one["model"], one["features"]) == network]
+    own = [one for one in conditions if one["network"] == content["network"]]
     whole = [one for one in own if one["share"] == 1.0]
     matrices = tuple(_matrix(one, len(classes)) for one in whole)
     if not matrices:
@@ -189,13 +188,6 @@ def _of_table(path: Path, content: Mapping[str, Any]) -> ClassResult:
         curves,
         bool(content["by_movement"]),
     )
-
-
-def _network(conditions: Sequence[Mapping[str, Any]]) -> tuple[str, str]:
-    """Network and features that are compared with and without what is added."""
-    varied = [one for one in conditions if one["added"] != "nothing" or one["share"] < 1.0]
-    first = (varied or list(conditions))[0]
-    return str(first["model"]), str(first["features"])
 
 
 def _matrix(condition: Mapping[str, Any], classes: int) -> Matrix:

@@ -13,11 +13,11 @@ from sd2app.jobs.latest import LatestRunner
 from sd2app.models.class_data import DataSource, division_of, looked_into, why_not_together
 from sd2app.models.step_times import StepKey
 from sd2app.settings import Settings
+from sd2core.classify.defaults import MODELS
 from sd2core.relative_paths import plain_path
 from sd2core.train.data import Split
 
 MAPS = ("radar", "synthetic", "denoised")
-MODELS = ("lstm", "s4")
 FEATURES = ("columns", "peak")
 _DEFAULTS: dict[str, Any] = {
     "model": "lstm",

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from sd2core.classify.defaults import LONGEST_DELAY_S
 from sd2core.classify.features import Features
 from sd2core.errors import Sd2Error
 from sd2core.labels.label_set import check_name
@@ -15,8 +16,6 @@ from sd2core.sensor import VelocityAxis
 
 FORMAT = "sd2-classifier"
 VERSION = 2
-
-LONGEST_DELAY_S = 5.0
 
 BACKGROUND = "background"
 """The class of frames in which there is none of the gestures."""
@@ -29,7 +28,7 @@ class ClassifierCard:
     Parameters
     ----------
     model : str
-        A name of :data:`sd2core.classify.models.MODELS`.
+        A name of :data:`sd2core.classify.defaults.MODELS`.
     options : mapping
         What it was built with.
     features : Features

@@ -11,16 +11,20 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any, Literal, get_args
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
 from sd2core.classify.data import Clip, ClipSet, frame_counts
+from sd2core.classify.defaults import DELAY_S, WIDTH
 from sd2core.classify.features import Kind
 from sd2core.classify.splitting import Parts, fold, movements
 from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    from sd2core.classify.training import TrainOptions
 
 Added = Literal["nothing", "synthetic", "denoised", "radar"]
 ADDED: tuple[Added, ...] = get_args(Added)
@@ -36,6 +40,41 @@ Denoise = Callable[[Clip], Clip]
 
 
 @dataclass(frozen=True)
+class Network:
+    """What is trained; a table compares several.
+
+    Parameters
+    ----------
+    model : {"lstm", "s4"}
+    features : {"peak", "columns"}
+    width : int
+        Units or channels of its layers.
+    delay_s : float
+        So much later than a frame its answer is known.
+    """
+
+    model: str = "lstm"
+    features: Kind = "columns"
+    width: int = WIDTH
+    delay_s: float = DELAY_S
+
+    def of(self, training: TrainOptions, seed: int) -> TrainOptions:
+        """How it is trained, all else being equal."""
+        return replace(
+            training,
+            model=self.model,
+            features=self.features,
+            delay_s=self.delay_s,
+            options={**training.options, "width": self.width},
+            seed=seed,
+        )
+
+
+PAPER = Network("lstm", "peak", 16, 0.0)
+"""Two layers of 16 units that look at the strongest bin and answer at once."""
+
+
+@dataclass(frozen=True)
 class Condition:
     """One way to train.
 
@@ -48,15 +87,13 @@ class Condition:
         is what synthetic maps are at best.
     moved : bool
         Range synthesis: the added ones also as other placements of the sensor see them.
-    model : {"lstm", "s4"}
-    features : {"peak", "columns"}
+    network : Network
     """
 
     share: float = 1.0
     added: Added = "nothing"
     moved: bool = False
-    model: str = "lstm"
-    features: Kind = "columns"
+    network: Network = field(default_factory=Network)
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.share <= 1.0 or (self.share == 0.0 and self.added == "nothing"):
@@ -70,6 +107,11 @@ class Condition:
     def to_json(self) -> dict[str, Any]:
         """By name."""
         return asdict(self)
+
+    @classmethod
+    def from_json(cls, content: Mapping[str, Any]) -> Condition:
+        """Read what :meth:`to_json` gave; raises TypeError."""
+        return cls(**{**content, "network": Network(**content["network"])})
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,6 +8,7 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
+from sd2core.classify.defaults import MODELS, WIDTH
 from sd2core.denoise.s4 import S4Layer
 from sd2core.errors import Sd2Error
 
@@ -60,7 +61,7 @@ class Classifier(nn.Module):
 
 
 class LstmClassifier(Classifier):
-    """The paper's: two stateful LSTM layers.
+    """The paper's: two stateful LSTM layers (there of 16 units).
 
     Parameters
     ----------
@@ -74,7 +75,7 @@ class LstmClassifier(Classifier):
     """
 
     def __init__(
-        self, size: int, classes: int, *, width: int = 16, depth: int = 2, dropout: float = 0.2
+        self, size: int, classes: int, *, width: int = WIDTH, depth: int = 2, dropout: float = 0.2
     ) -> None:
         super().__init__(width, classes, dropout)
         self.layers = nn.LSTM(size, width, depth, batch_first=True)
@@ -123,7 +124,7 @@ class S4Classifier(Classifier):
         size: int,
         classes: int,
         *,
-        width: int = 16,
+        width: int = WIDTH,
         depth: int = 2,
         state_size: int = 16,
         dropout: float = 0.2,
@@ -163,10 +164,9 @@ class S4Classifier(Classifier):
 
 _MODELS: Mapping[str, type[Classifier]] = {"lstm": LstmClassifier, "s4": S4Classifier}
 _OPTIONS: Mapping[str, Mapping[str, Any]] = {
-    "lstm": {"width": 16, "depth": 2, "dropout": 0.2},
-    "s4": {"width": 16, "depth": 2, "state_size": 16, "dropout": 0.2},
+    "lstm": {"width": WIDTH, "depth": 2, "dropout": 0.2},
+    "s4": {"width": WIDTH, "depth": 2, "state_size": 16, "dropout": 0.2},
 }
-MODELS = tuple(_MODELS)
 
 _LARGEST = 1024
 """No option is a larger number: a damaged file must not ask for all the memory."""

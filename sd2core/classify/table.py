@@ -16,16 +16,17 @@ from numpy.typing import NDArray
 from sd2core.atomic import atomic_write_text
 from sd2core.classify.data import Clip, ClipSet
 from sd2core.classify.experiment import (
+    PAPER,
     RADAR,
     Added,
     Condition,
     Denoise,
+    Network,
     choose,
     counts_of,
     digest,
     has_synthetic,
 )
-from sd2core.classify.features import Kind
 from sd2core.classify.judging import judge
 from sd2core.classify.metrics import Score
 from sd2core.classify.training import TrainOptions, train
@@ -36,7 +37,7 @@ from sd2core.errors import Sd2Error
 from sd2core.progress import Progress, silent
 
 FORMAT = "sd2-classifier-run"
-VERSION = 1
+VERSION = 2
 
 SHARES = (0.01, 0.02, 0.05, 0.1, 0.25, 0.5, 1.0)
 """Of the real data, for the learning curve."""
@@ -53,22 +54,22 @@ class TableOptions:
         Each is another split of people, another draw and another network.
     shares : tuple of float
         Of the learning curve, ascending, up to 1.
-    model, features
+    network : Network
         Of all trainings but those that compare networks.
-    networks : tuple of (model, features)
-        Compared with all real data.
+    others : tuple of Network
+        Compared with it on all real data.
     training : TrainOptions
-        Equal for all; its model, features and seed are not looked at.
+        Equal for all; what a network says, and the seed, are not looked at.
     """
 
     seeds: int = 5
     shares: tuple[float, ...] = SHARES
-    model: str = "lstm"
-    features: Kind = "columns"
-    networks: tuple[tuple[str, Kind], ...] = (
-        ("lstm", "peak"),
-        ("lstm", "columns"),
-        ("s4", "columns"),
+    network: Network = field(default_factory=Network)
+    others: tuple[Network, ...] = (
+        PAPER,
+        replace(PAPER, features="columns"),
+        Network(delay_s=0.0),
+        Network("s4"),
     )
     training: TrainOptions = field(default_factory=TrainOptions)
 
@@ -133,7 +134,7 @@ class Run:
         if content["format"] != FORMAT or content["version"] != VERSION:
             raise ValueError(f"format {content['format']!r} version {content['version']!r}")
         return cls(
-            Condition(**content["condition"]),
+            Condition.from_json(content["condition"]),
             int(content["seed"]),
             tuple(content["subjects"]),
             dict(content["real"]),
@@ -186,8 +187,8 @@ def conditions_of(known: ClipSet, options: TableOptions, denoised: bool) -> list
     denoised : bool
         Whether there is a denoiser for these maps.
     """
-    base = Condition(model=options.model, features=options.features)
-    found = [replace(base, model=model, features=shown) for model, shown in options.networks]
+    base = Condition(network=options.network)
+    found = [replace(base, network=other) for other in options.others]
     found.append(base)
     added: list[Added] = []
     if has_synthetic(known):
@@ -258,7 +259,7 @@ def run_one(
 ) -> Run:
     """Train once and judge."""
     chosen = choose(known, condition, seed, denoise)
-    options = replace(training, model=condition.model, features=condition.features, seed=seed)
+    options = condition.network.of(training, seed)
     begun_s = time.process_time()
     made = train([*chosen.real, *chosen.added], chosen.validation, known, options)
     if made.interrupted:
@@ -324,9 +325,7 @@ def _key(
         for tensor in denoiser.network.state_dict().values():
             sums.update(np.ascontiguousarray(tensor.cpu().numpy()).data)
         model = sums.hexdigest()
-    training = replace(
-        options.training, model=condition.model, features=condition.features, seed=seed
-    )
+    training = condition.network.of(options.training, seed)
     told = [VERSION, data, model, condition.to_json(), seed, training.to_json()]
     return hashlib.blake2b(json.dumps(told).encode(), digest_size=12).hexdigest()
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -28,9 +29,11 @@ def title_of(condition: Condition) -> str:
 
 
 def network_of(condition: Condition) -> str:
-    """The network and what it is shown."""
-    shown = "columns" if condition.features == "columns" else "strongest bin"
-    return f"{condition.model.upper()}, {shown}"
+    """The network, what it is shown, and when it answers."""
+    network = condition.network
+    shown = "columns" if network.features == "columns" else "strongest bin"
+    late = f"after {network.delay_s:g} s" if network.delay_s else "at once"
+    return f"{network.model.upper()} {network.width}, {shown}, {late}"
 
 
 def as_json(table: Table) -> dict[str, Any]:
@@ -40,6 +43,7 @@ def as_json(table: Table) -> dict[str, Any]:
         "by_movement": table.by_movement,
         "classes": list(table.classes),
         "seeds": table.options.seeds,
+        "network": asdict(table.options.network),
         "conditions": [
             {
                 **condition.to_json(),
@@ -174,8 +178,7 @@ def _lines(table: Table, lines_of: Callable[[Rows], list[str]]) -> list[str]:
 
 def main_conditions(table: Table) -> list[Condition]:
     """Conditions of the network that all data are compared with."""
-    chosen = (table.options.model, table.options.features)
-    return [one for one in table.conditions if (one.model, one.features) == chosen]
+    return [one for one in table.conditions if one.network == table.options.network]
 
 
 def curve_conditions(table: Table) -> list[Condition]:

@@ -15,8 +15,9 @@ import torch
 from numpy.typing import NDArray
 from torch.nn import functional
 
-from sd2core.classify.card import LONGEST_DELAY_S, ClassifierCard
+from sd2core.classify.card import ClassifierCard
 from sd2core.classify.data import UNKNOWN, Clip, ClipSet, frame_counts
+from sd2core.classify.defaults import DELAY_S, LONGEST_DELAY_S
 from sd2core.classify.features import Features, Kind
 from sd2core.classify.live import TrainedClassifier
 from sd2core.classify.metrics import mean_recall
@@ -60,7 +61,7 @@ class TrainOptions:
 
     model: str = "lstm"
     features: Kind = "columns"
-    delay_s: float = 0.0
+    delay_s: float = DELAY_S
     options: Mapping[str, Any] = field(default_factory=dict)
     steps: int = 160
     batch: int = 32

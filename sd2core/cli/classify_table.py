@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.classify_data import DATA_HELP, add_sources, clips_of
+from sd2core.cli.classify_network import add_network, network_of
 from sd2core.cli.options import add_command, add_json, positive_int, share
 from sd2core.cli.output import finite, print_json, progress_bar
 
@@ -57,15 +58,7 @@ def add_table(kinds: argparse._SubParsersAction) -> None:
         " quick: 10%%,100%%)",
     )
     parser.add_argument("--quick", action="store_true", help="few trainings, to see how it looks")
-    parser.add_argument(
-        "--model", choices=("lstm", "s4"), default="lstm", help="of the curves (default: lstm)"
-    )
-    parser.add_argument(
-        "--features",
-        choices=("columns", "peak"),
-        default="columns",
-        help="of the curves: whole columns (the default), or the strongest bin",
-    )
+    add_network(parser)
     parser.add_argument("--steps", type=positive_int, metavar="N", help="batches per training")
     parser.add_argument(
         "--progress-json",
@@ -122,8 +115,7 @@ def _options(options: argparse.Namespace) -> TableOptions:
     return TableOptions(
         seeds=options.seeds or (2 if options.quick else 5),
         shares=options.shares or (QUICK_SHARES if options.quick else SHARES),
-        model=options.model,
-        features=options.features,
+        network=network_of(options),
         training=training,
     )
 

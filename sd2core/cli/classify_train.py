@@ -19,6 +19,7 @@ from sd2core.cli.classify_data import (
     denoiser_for,
     split_of,
 )
+from sd2core.cli.classify_network import add_network, network_of
 from sd2core.cli.options import add_command, add_json, positive_float, positive_int
 from sd2core.cli.output import finite, print_facts, print_json
 
@@ -51,18 +52,7 @@ def add_train(kinds: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--out", type=Path, required=True, metavar="FILE", help="to write (.safetensors)"
     )
-    parser.add_argument(
-        "--model",
-        choices=("lstm", "s4"),
-        default="lstm",
-        help="two LSTM layers (the paper's), or two S4 layers (default: lstm)",
-    )
-    parser.add_argument(
-        "--features",
-        choices=("columns", "peak"),
-        default="columns",
-        help="what it is shown: whole columns (the default), or the strongest bin (the paper's)",
-    )
+    add_network(parser)
     parser.add_argument(
         "--placements",
         choices=("all", "first"),
@@ -143,7 +133,7 @@ def _options(options: argparse.Namespace) -> TrainOptions:
         for name in ("steps", "patience", "learning_rate")
         if getattr(options, name) is not None
     }
-    return TrainOptions(model=options.model, features=options.features, seed=options.seed, **given)
+    return network_of(options).of(TrainOptions(**given), options.seed)
 
 
 def _names(text: str | None) -> tuple[str, ...] | None:

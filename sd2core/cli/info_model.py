@@ -30,6 +30,7 @@ def describe_classifier_card(path: Path, card: ClassifierCard) -> Description:
     facts = {
         "model": f"{card.model}, shown {shown}; learnt from {' and '.join(card.trained_on)} maps",
         "classes": ", ".join(card.classes),
+        "answers": f"{card.delay_s:g} s late" if card.delay_frames else "at once",
         **_axis_facts(card),
         "parameters": f"{card.parameters:,}",
         **dict(_about(card.about)),

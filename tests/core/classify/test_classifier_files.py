@@ -17,8 +17,9 @@ from classifiers import CLASSES, classifier, energies, features
 from safetensors.torch import save
 
 from sd2core.classify.card import ClassifierCard
+from sd2core.classify.defaults import MODELS
 from sd2core.classify.files import describe_classifier, load_classifier, save_classifier
-from sd2core.classify.models import MODELS, build
+from sd2core.classify.models import build
 from sd2core.denoise.files import describe_model
 from sd2core.errors import Sd2Error
 from sd2core.resources import resource_path

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from labelled_clips import clip_set
 
-from sd2core.classify.experiment import AMOUNT, Condition, choose, digest
+from sd2core.classify.experiment import AMOUNT, PAPER, Condition, Network, choose, digest
 from sd2core.classify.splitting import movements
 from sd2core.classify.table import TableOptions, conditions_of, gains, make_table
 from sd2core.classify.table_plots import draw_confusions, draw_curve
@@ -24,10 +24,12 @@ from sd2core.progress import Cancelled
 BOTH = ("simulated", "synthetic")
 KNOWN = clip_set(4, 5, frames=30, kinds=BOTH, placements=2)
 ADDED = st.sampled_from(["nothing", "synthetic", "radar", "denoised"])
+SMALL = Network(width=4)
 OPTIONS = TableOptions(
     seeds=2,
     shares=(0.5, 1.0),
-    networks=(("lstm", "peak"),),
+    network=SMALL,
+    others=(PAPER,),
     training=TrainOptions(steps=2, batch=4, check_steps=2),
 )
 ONCE = replace(OPTIONS, seeds=1, shares=(1.0,))
@@ -98,10 +100,10 @@ def test_every_condition_is_there_once() -> None:
     assert len(found) == len(set(found))
     for added in ("synthetic", "denoised"):
         for moved in (False, True):
-            assert Condition(added=added, moved=moved) in found
-    assert Condition(added="radar") in found
-    assert Condition(share=0.5, added="denoised") in found
-    assert Condition(features="peak") in found
+            assert Condition(network=SMALL, added=added, moved=moved) in found
+    assert Condition(network=SMALL, added="radar") in found
+    assert Condition(network=SMALL, share=0.5, added="denoised") in found
+    assert Condition(network=PAPER) in found
 
 
 def test_a_table_that_was_stopped_goes_on(tmp_path: Path) -> None:
@@ -150,11 +152,11 @@ def test_words_and_pictures_of_a_table(tmp_path: Path) -> None:
     plain = next(
         one for one in told["conditions"] if one["share"] == 0.5 and one["added"] == "nothing"
     )
-    runs = table.of(Condition(share=0.5))
+    runs = table.of(Condition(network=SMALL, share=0.5))
     assert plain["mean_recall_frames"]["mean"] == pytest.approx(
         np.mean([run.score.mean_recall for run in runs])
     )
-    extra = Condition(share=0.5, added="synthetic")
+    extra = Condition(network=SMALL, share=0.5, added="synthetic")
     expected = [
         run.score.mean_recall - base.score.mean_recall
         for run, base in zip(table.of(extra), runs, strict=True)

@@ -8,8 +8,8 @@ from classifiers import CLASSES, classifier, doppler, energies
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from sd2core.classify.defaults import MODELS
 from sd2core.classify.live import CHUNK
-from sd2core.classify.models import MODELS
 from sd2core.errors import Sd2Error
 from sd2core.sensor import VelocityAxis
 from sd2core.spectrum import DopplerMap

@@ -68,7 +68,7 @@ def model(store: Path) -> Path:
     from sd2app.command_line import main
 
     path = store.parent / "model.safetensors"
-    learnt = ("--steps", "60", "--learning-rate", "0.03")
+    learnt = ("--steps", "60", "--learning-rate", "0.03", "--delay-s", "0.1")
     assert main(["classify", "train", str(store), "--out", str(path), *learnt]) == 0
     return path
 
