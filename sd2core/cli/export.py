@@ -123,7 +123,8 @@ def _add_content(parser: argparse.ArgumentParser) -> None:
         "--test",
         type=_names,
         metavar="NAMES",
-        help="subjects to test with (default: a sixth of all, and as many to validate)",
+        help="subjects to test with (default: about a sixth of all, and as many to validate, by"
+        " their names: more people do not move the others)",
     )
     people.add_argument(
         "--labels",

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from sd2core.datasets.splitting import RULE, borrowed, split_people
+
 _WHAT = {
     "synthetic": "counted from the vertices of a mesh, by their velocity towards the sensor",
     "denoised": "what a trained model makes of the synthetic map: an estimate of a radar's",
@@ -158,6 +160,27 @@ def _splits(card: dict[str, Any]) -> str:
     return (
         _table(("split", "segments", "subjects"), rows)
         + f"\n\nNo subject is in two splits. Segments of each: {people}."
+        + f"\n\n{_rule(card)}"
+    )
+
+
+def _rule(card: dict[str, Any]) -> str:
+    """How the splits came about."""
+    splits = {name: tuple(people) for name, people in card["splits"].items()}
+    by_name = split_people(card["subjects"])
+    if splits != {
+        "train": by_name.training,
+        "validation": by_name.validation,
+        "test": by_name.test,
+    }:
+        return "Whoever validates or tests was named when the data set was written."
+    moved = borrowed(splits)
+    if not moved:
+        return RULE
+    goes = "goes" if len(moved) == 1 else "go"
+    return (
+        f"{RULE} Here {' and '.join(moved)} {goes} for that reason, and may be elsewhere when there"
+        " are more people: name who validates and tests where results are to be compared."
     )
 
 

@@ -41,8 +41,8 @@ class DatasetOptions:
     min_share : float
         0 to 1.
     validation, test : tuple of str, optional
-        Subjects that validate and test; None: chosen as
-        :func:`sd2core.train.data.split_subjects` does.
+        Subjects that validate and test; None: chosen by their names, see
+        :mod:`sd2core.datasets.splitting`.
     title : str
     provenance : dict
         How the data set was made; kept as JSON.

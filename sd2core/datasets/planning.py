@@ -9,11 +9,12 @@ from sd2core.datasets.cutting import count_segments
 from sd2core.datasets.layout import bytes_per_segment
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.source import KINDS, LazySource, Outline, Source
+from sd2core.datasets.splitting import split_people
 from sd2core.errors import Sd2Error
 from sd2core.progress import Progress, silent
 from sd2core.spectrum import MapKind
 from sd2core.timebase import Timebase
-from sd2core.train.data import Split, split_subjects
+from sd2core.train.data import Split
 
 
 @dataclass(frozen=True)
@@ -122,7 +123,7 @@ class Counting:
         segments = sum(of_subject.values())
         split = Split((), (), ())
         if segments:
-            split = split_subjects(list(of_subject), options.validation, options.test)
+            split = split_people(list(of_subject), options.validation, options.test)
         return Forecast(
             sources=len(self.outlines),
             segments=segments,

@@ -25,12 +25,13 @@ from sd2core.datasets.layout import SPLITS, FileFormat, Header, format_of
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.source import KINDS, LazySource, Source, SourceKey
+from sd2core.datasets.splitting import split_people
 from sd2core.datasets.store import LOCK_NAME, SegmentStore, open_arrays
 from sd2core.errors import Sd2Error
 from sd2core.file_lock import FileLock
 from sd2core.io.kinds import is_dataset
 from sd2core.progress import Progress, silent
-from sd2core.train.data import Split, split_subjects
+from sd2core.train.data import Split
 
 _STEPS = 1000
 """Of progress per source."""
@@ -293,7 +294,7 @@ class _Writer:
 
     def _final(self, header: Header) -> Header:
         names = self._names
-        split: Split = split_subjects(
+        split: Split = split_people(
             list(names.subjects), self._options.validation, self._options.test
         )
         return replace(

@@ -42,11 +42,13 @@ def test_a_folder_of_recordings_becomes_a_data_set_with_card_and_sheet(
         assert list(card["frames_of_label"].values()) == frames.tolist()
         assert card["range_m"] == pytest.approx([dataset["range_m"][:].min()] * 2, abs=1e-3)
     assert card["segments_of_kind"] == {"synthetic": 15, "simulated": 15}
-    assert card["splits"] == {"train": ["anna"], "validation": ["ben"], "test": ["carla"]}
+    assert card["splits"] == {"train": ["ben"], "validation": ["anna"], "test": ["carla"]}
     words = Path(said["card"]).read_text(encoding="utf-8")
     assert words.startswith("# Swings\n\n15 segments of 30 frames")
     assert "of a radar whose signal was computed; no radar was there" in words
     assert "No real radar is in it." in words
+    assert "the SHA-256 of their name" in words
+    assert "Here anna and carla go for that reason" in words
     sheet = imread(said["sheet"])
     assert sheet.shape[0] > 200
     assert len(np.unique(sheet.reshape(-1, sheet.shape[2]), axis=0)) > 100

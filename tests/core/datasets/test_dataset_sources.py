@@ -192,7 +192,7 @@ def test_what_was_counted_is_what_is_written(tmp_path: Path) -> None:
         assert forecast.of_label == {name: count for name, count in counts.items() if count}
         available = dataset["available"][:].sum(axis=0).tolist()
         assert forecast.of_kind == {"synthetic": available[0], "simulated": available[2]}
-        assert forecast.split.validation == dataset.header.splits["validation"] == ("ben",)
+        assert forecast.split.validation == dataset.header.splits["validation"] == ("anna",)
         assert sum(forecast.of_split().values()) == forecast.segments
     assert forecast.total_bytes >= sum(
         array.size * array.dtype.itemsize for array in dataset.arrays.values()

@@ -1,0 +1,81 @@
+"""Who of a data set is learnt from, who validates and who tests: by name, whoever else is in it."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+
+from sd2core.train.data import Split, split_subjects
+
+RULE = (
+    "Everybody has a number from 0 to 1, the first eight bytes of the SHA-256 of their name: below"
+    " a sixth they test, below a third they validate, otherwise they are learnt from. So a person"
+    " who is added moves nobody else. But at least one person tests (where there are three) and"
+    " one validates, and at most a third of all each: where numbers alone would have it otherwise,"
+    " the nearest ones go."
+)
+
+_SHARE = 1 / 6
+
+
+def split_people(
+    subjects: Sequence[str],
+    validation: Sequence[str] | None = None,
+    test: Sequence[str] | None = None,
+) -> Split:
+    """Who is learnt from and who is kept out; :data:`RULE` says how those not named are chosen.
+
+    Raises
+    ------
+    Sd2Error
+        As :func:`~sd2core.train.data.split_subjects`, which does it for trainings.
+    """
+    free = [name for name in subjects if name not in {*(validation or ()), *(test or ())}]
+    most = max(1, len(subjects) // 3)
+    if test is None:
+        # Two people are needed to learn and to choose.
+        spare = len(free) - (2 if validation is None else 1)
+        test = _chosen(free, lambda number: (_SHARE - number) % 1.0, min(most, spare))
+        free = [name for name in free if name not in test]
+    if validation is None:
+        validation = _chosen(free, lambda number: (number - _SHARE) % 1.0, min(most, len(free) - 1))
+    return split_subjects(subjects, validation, test)
+
+
+def borrowed(splits: Mapping[str, Sequence[str]]) -> list[str]:
+    """People who are where the rule alone would not have them, in its order."""
+    own = {name: [one for one in names if _own(one) == name] for name, names in splits.items()}
+    return sorted(
+        (one for name, names in splits.items() for one in names if one not in own[name]),
+        key=number_of,
+    )
+
+
+def number_of(name: str) -> float:
+    """A number from 0 to 1 that is a person's own, evenly spread over names."""
+    digest = hashlib.sha256(name.encode("utf-8")).digest()
+    return int.from_bytes(digest[:8], "big") / 2.0**64
+
+
+def _own(name: str) -> str:
+    number = number_of(name)
+    if number < _SHARE:
+        return "test"
+    return "validation" if number < 2 * _SHARE else "train"
+
+
+def _chosen(people: Sequence[str], away: Callable[[float], float], most: int) -> list[str]:
+    """Those within a sixth; at least the nearest one, at most the ``most`` nearest.
+
+    Parameters
+    ----------
+    people : sequence of str
+    away : callable
+        How far a number is from a split's far end, counted so that who is learnt from comes
+        before the other split that is kept out.
+    most : int
+    """
+    far = {name: away(number_of(name)) for name in people}
+    count = max(sum(one < _SHARE for one in far.values()), 1)
+    chosen = sorted(people, key=far.__getitem__)[: max(0, min(count, most))]
+    return [name for name in people if name in chosen]
