@@ -1,7 +1,8 @@
-"""Speaks as ``sd2 export --progress-json`` does, and writes nothing.
+"""Speaks as ``sd2 export --progress-json`` in a folder of its own does, and writes no data set.
 
-``fake_export.py HOW export PLACE --out OUT …``; HOW is ``done``, ``refused``, ``silent`` or
-``slow``, which goes on until it is stopped. What it was asked for is in ``OUT.asked``.
+``fake_export.py HOW FOLDER export PLACE --out OUT …``; HOW is ``done``, ``refused``,
+``silent`` or ``slow``, which goes on until it is stopped, or until there is ``OUT.go``. What
+it was asked for is in ``OUT.asked``.
 """
 
 from __future__ import annotations
@@ -11,13 +12,23 @@ import sys
 import time
 from pathlib import Path
 
+from sd2app.jobs.command_folder import CommandFolder
+
 
 def say(**content: object) -> None:
     print(json.dumps(content), flush=True)
 
 
 def main() -> int:
-    how, words = sys.argv[1], sys.argv[2:]
+    how, folder, words = sys.argv[1], CommandFolder(Path(sys.argv[2])), sys.argv[3:]
+    lock = folder.lock()
+    assert lock.take()
+    folder.note_end(code := work(how, folder, words))
+    lock.release()
+    return code
+
+
+def work(how: str, folder: CommandFolder, words: list[str]) -> int:
     out = Path(words[words.index("--out") + 1])
     out.with_name(f"{out.name}.asked").write_text(json.dumps(words))
     if how == "silent":
@@ -28,8 +39,10 @@ def main() -> int:
     if how == "refused":
         say(event="error", text="It cannot be.")
         return 1
-    while how == "slow":
+    while how == "slow" and not out.with_name(f"{out.name}.go").exists():
         time.sleep(0.05)
+        if folder.stop_wanted:
+            return 130
     say(event="something new", whatever=1)
     say(event="progress", done=2000, total=2000, stage="segments")
     say(

@@ -38,7 +38,7 @@ _SHEET_PX = 940
 
 
 class ExportDialog(QDialog):
-    """A view of :class:`ExportModel`; the writing goes on when it is closed."""
+    """A view of :class:`ExportModel`; the writing goes on when it, or the window, is closed."""
 
     def __init__(self, model: ExportModel, opened: Path | None, parent: QWidget | None) -> None:
         super().__init__(parent)
@@ -213,6 +213,7 @@ class ExportDialog(QDialog):
         self._bar.setRange(0, total)
         self._bar.setValue(done)
         self._stop.setVisible(model.exporting)
+        self._stop.setEnabled(not model.stopping)
         self._export.setEnabled(model.ready)
         result = model.result
         written = result is not None and not model.exporting

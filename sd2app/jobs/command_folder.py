@@ -86,8 +86,21 @@ class CommandFolder:
         arguments: Sequence[str],
         about: Mapping[str, Any],
         command: Sequence[str] = COMMAND,
+        environment: Mapping[str, str] = ONE_THREAD,
     ) -> int:
         """Start it, or start it again in the same folder; returns its process number.
+
+        Parameters
+        ----------
+        arguments : sequence of str
+            Of ``sd2``.
+        about : mapping
+            To be known of it; fits into JSON.
+        command : sequence of str
+            What runs it.
+        environment : mapping
+            In addition to what this process has. By default it gets by with one processor:
+            what moves on the screen comes first.
 
         Raises
         ------
@@ -106,9 +119,8 @@ class CommandFolder:
             **about,
         }
         atomic_write_text(self.path / _ABOUT, json.dumps(told, indent=1) + "\n")
-        # What moves on the screen comes first: it gets by with one processor.
         words = [*command, str(self.path), *arguments]
-        return launch(words, self.path / _OUTPUT, ONE_THREAD)
+        return launch(words, self.path / _OUTPUT, environment)
 
     def stop(self) -> None:
         """Tell it to stop, as Ctrl-C does."""

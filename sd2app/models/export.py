@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from PySide6.QtCore import QObject, Signal
 
+from sd2app.jobs.command_folder import COMMAND, CommandFolder, folders_in
 from sd2app.jobs.latest import Emit, LatestRunner
-from sd2app.jobs.line_process import Ending, LineProcess
-from sd2app.models.export_messages import Exported, Progressed, Refused, message_of
+from sd2app.models.export_messages import Exported
+from sd2app.models.export_run import ExportRun, user_exports_folder
 from sd2app.models.jobs import Job, JobsModel
 from sd2core.datasets.inputs import gather, recordings_in
 from sd2core.datasets.options import DatasetOptions
@@ -24,8 +24,6 @@ from sd2core.recording import is_recording, open_recording
 from sd2core.segments import LENGTH, OVERLAP
 from sd2core.sensor import VelocityAxis
 from sd2core.spectrum import MapKind
-
-COMMAND = (sys.executable, "-u", "-m", "sd2app.jobs.background")
 
 ENDINGS = (".zarr", ".h5", ".npz")
 
@@ -75,6 +73,32 @@ class ExportChoice:
         """What decides which sources there are."""
         return self.place, self.maps, self.planned, self.subjects
 
+    def to_json(self) -> dict[str, Any]:
+        """By name."""
+        return {
+            "place": str(self.place),
+            "maps": sorted(self.maps),
+            "planned": self.planned,
+            "subjects": list(self.subjects),
+            "length": self.length,
+            "overlap": self.overlap,
+            "ending": self.ending,
+        }
+
+    @classmethod
+    def from_json(cls, content: Mapping[str, Any]) -> ExportChoice:
+        """Read what :meth:`to_json` gave; raises KeyError, TypeError or ValueError."""
+        ending = str(content["ending"])
+        return cls(
+            Path(content["place"]),
+            frozenset(MAPS) & frozenset(map(str, content["maps"])),
+            bool(content["planned"]),
+            tuple(map(str, content["subjects"])),
+            int(content["length"]),
+            int(content["overlap"]),
+            ENDINGS[ENDINGS.index(ending)],
+        )
+
 
 class _Counted(NamedTuple):
     sources: tuple[object, ...]
@@ -85,11 +109,15 @@ class _Counted(NamedTuple):
 class ExportModel(QObject):
     """Counts while choices are made, and has one data set written at a time.
 
+    The writing outlives the window, and is found again by the next one.
+
     Parameters
     ----------
     jobs : JobsModel
     command : sequence of str
-        What runs ``sd2`` commands.
+        What runs ``sd2`` commands in a folder.
+    folder : Path, optional
+        Where exports under way are noted.
 
     Signals
     -------
@@ -110,9 +138,11 @@ class ExportModel(QObject):
         jobs: JobsModel,
         parent: QObject | None = None,
         command: Sequence[str] = COMMAND,
+        folder: Path | None = None,
     ) -> None:
         super().__init__(parent)
         self._jobs, self._command = jobs, tuple(command)
+        self._folder = folder or user_exports_folder()
         self._choice = ExportChoice()
         self._counted: _Counted | None = None
         self._problem = ""
@@ -120,11 +150,10 @@ class ExportModel(QObject):
         self._runner = LatestRunner("count segments", self)
         self._runner.finished.connect(self._receive)
         self._runner.failed.connect(self._refuse)
-        self._process: LineProcess | None = None
+        self._run: ExportRun | None = None
         self._job: Job | None = None
-        self._refused = ""
         self._result: Exported | None = None
-        self._stopped = False
+        self._over: set[Path] = set()
 
     @property
     def choice(self) -> ExportChoice:
@@ -154,7 +183,7 @@ class ExportModel(QObject):
     @property
     def exporting(self) -> bool:
         """Whether a data set is being written."""
-        return self._process is not None
+        return self._run is not None
 
     @property
     def progress(self) -> tuple[int, int]:
@@ -171,6 +200,11 @@ class ExportModel(QObject):
         """Whether there is something to write, and nothing being written."""
         forecast = self.forecast
         return forecast is not None and forecast.segments > 0 and not self.exporting
+
+    @property
+    def stopping(self) -> bool:
+        """Whether the writing was told to stop."""
+        return self._run is not None and self._run.phase == "stopping"
 
     def begin(self, place: Path | None) -> None:
         """Start anew with a recording or a folder, keeping other choices; looks at it again."""
@@ -198,33 +232,55 @@ class ExportModel(QObject):
         if not self.ready or self._choice.place is None:
             return
         choice = self._choice
-        self._result, self._refused, self._stopped = None, "", False
-        self._job = self._jobs.start(f"Exporting {out.name}", self.stop)
-        self._process = LineProcess(self)
-        self._process.line.connect(self._follow)
-        self._process.ended.connect(self._end)
         words = [
             "export", str(choice.place), "--out", str(out), "--kinds", ",".join(choice.kinds),
             "--length", str(choice.length), "--overlap", str(choice.overlap), "--progress-json",
         ]  # fmt: skip
         words += ["--placements", "planned"] if choice.planned else []
         words += ["--subjects", ",".join(choice.subjects)] if choice.subjects else []
-        self._process.start([*self._command, *words])
-        self.changed.emit()
+        about = {"what": "export", "out": str(out), "choice": choice.to_json()}
+        path = self._new_folder(out)
+        try:
+            # It may use all processors: it gives way to whatever else wants them.
+            pid = CommandFolder(path).start(words, about, self._command, {})
+        except (Sd2Error, OSError) as error:
+            CommandFolder(path).delete()
+            self.failed.emit(str(error))
+            return
+        self._result = None
+        self._follow(ExportRun(path, self, pid=pid))
 
     def stop(self) -> None:
         """Stop writing; what is complete stays, and the same export goes on from there."""
-        if self._process is not None:
-            self._stopped = True
-            self._process.stop()
-            self.changed.emit()
+        if self._run is not None:
+            self._run.stop()
+
+    def look_for_export(self) -> None:
+        """At the start of the program: find what is being written, or has been meanwhile."""
+        # One that has ended is there again where its folder could not be deleted.
+        found = [one for one in folders_in(self._folder) if one.path not in self._over]
+        one = next((folder for folder in found if folder.live), next(iter(found), None))
+        if one is None or self.exporting:
+            return
+        run = ExportRun(one.path, self)
+        try:
+            self._choice = ExportChoice.from_json(run.choice)
+        except (KeyError, TypeError, ValueError):
+            pass  # of another version: it is followed all the same
+        else:
+            self._places = _places(self._choice.place)
+            self._count()
+        self._follow(run)
+        if one.live:
+            self.noted.emit(
+                f"{run.out.name} is being written. File → Export data set… shows how far it is."
+            )
 
     def close(self) -> None:
-        """End everything at once."""
+        """Look no more; what is being written goes on."""
         self._runner.close()
-        if self._process is not None:
-            self._process.close()
-            self._finish()
+        if self._run is not None:
+            self._run.close()
 
     # --- inside ---------------------------------------------------------------------------
 
@@ -271,19 +327,43 @@ class ExportModel(QObject):
         self._problem = str(error)
         self.changed.emit()
 
-    def _follow(self, line: str) -> None:
-        message = message_of(line)
-        if isinstance(message, Progressed) and self._job is not None:
-            self._jobs.report(self._job, message.done, message.total)
-        elif isinstance(message, Exported):
-            self._result = message
-        elif isinstance(message, Refused):
-            self._refused = message.text
+    def _new_folder(self, out: Path) -> Path:
+        """A name that is free."""
+        path, number = self._folder / out.name, 2
+        while path.exists() or path in self._over:
+            path, number = path.with_name(f"{out.name} {number}"), number + 1
+        return path
+
+    def _follow(self, run: ExportRun) -> None:
+        self._run = run
+        self._job = self._jobs.start(f"Exporting {run.out.name}", self.stop)
+        run.changed.connect(self._tell)
+        run.ended.connect(self._end)
         self.changed.emit()
 
-    def _end(self, ending: Ending) -> None:
-        self._finish()
-        result = self._result
+    def _tell(self) -> None:
+        if self._run is not None and self._job is not None:
+            self._jobs.report(self._job, self._run.done, self._run.total)
+            self.changed.emit()
+
+    def _end(self) -> None:
+        run = self._run
+        if run is None:
+            return
+        self._run = None
+        if self._job is not None:
+            self._jobs.finish(self._job)
+            self._job = None
+        run.close()
+        run.folder.delete()
+        self._over.add(run.folder.path)
+        run.deleteLater()
+        self._say_ended(run)
+        self.changed.emit()
+        self.look_for_export()  # several may have ended while no window was there
+
+    def _say_ended(self, run: ExportRun) -> None:
+        self._result = result = run.written
         if result is not None:
             self.noted.emit(
                 f"{result.segments:,} segment{'s' * (result.segments != 1)} from {result.sources:,}"
@@ -291,16 +371,13 @@ class ExportModel(QObject):
             )
             if result.left_out:
                 self.failed.emit("\n".join(f"Left out: {one}" for one in result.left_out))
-        elif not self._stopped:
-            said = self._refused or "\n".join(ending.errors.splitlines()[-1:])
-            self.failed.emit(said or "The export ended by itself, nobody said why.")
-        self.changed.emit()
-
-    def _finish(self) -> None:
-        self._process = None
-        if self._job is not None:
-            self._jobs.finish(self._job)
-            self._job = None
+        elif run.phase == "died":
+            self.failed.emit(
+                f"{run.out.name} was not written to its end: its process is gone. Export it again;"
+                " what is complete is kept."
+            )
+        elif run.phase not in ("stopped", "gone"):
+            self.failed.emit(run.refused or run.text.splitlines()[-1])
 
 
 def _places(place: Path | None) -> int:

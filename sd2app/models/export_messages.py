@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -45,10 +46,9 @@ class Refused:
 Message = Progressed | Exported | Refused
 
 
-def message_of(line: str) -> Message | None:
+def message_of(told: Mapping[str, Any]) -> Message | None:
     """Read a line; None for one that says nothing that is known."""
     try:
-        told = json.loads(line)
         event = told["event"]
         if event == "progress":
             return Progressed(int(told["done"]), int(told["total"]))

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QVBoxLayout, QWidget
 
-from sd2app.models.class_run import UNDER_WAY, ClassRun
+from sd2app.models.class_run import ClassRun
 from sd2app.models.class_run_words import facts, headline, note, time_text
 from sd2app.models.class_training import ClassTraining
+from sd2app.models.command_run import UNDER_WAY
 from sd2app.models.display import DisplayModel
 from sd2app.views.class_asks import ClassAsks
 from sd2app.views.class_curve import ClassCurve

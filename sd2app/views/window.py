@@ -206,6 +206,7 @@ class MainWindow(QMainWindow):
         context.training.look_for_runs()
         context.batch.look_for_batch()
         context.class_training.look_for_runs()
+        context.export.look_for_export()
         # VTK last, imported in a thread: everything else is usable while it loads.
         self._importer = LatestRunner("import", self)
         self._importer.finished.connect(self._add_scene)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 import sys
 from pathlib import Path
 
@@ -10,6 +12,7 @@ import pytest
 from PySide6.QtCore import QObject
 from swinging_recordings import recording
 
+from sd2app.jobs.command_folder import folders_in
 from sd2app.models.export import ExportModel
 from sd2app.models.export_messages import Exported, message_of
 from sd2app.models.export_words import bytes_words, label_words, size_words, split_words
@@ -20,18 +23,21 @@ FAKE = Path(__file__).parents[1] / "fake_export.py"
 
 
 @pytest.fixture
-def made(qtbot):
+def made(qtbot, tmp_path: Path):
     parent = QObject()
     models = []
 
     def make(how: str = "done") -> ExportModel:
-        model = ExportModel(JobsModel(parent), parent, [sys.executable, str(FAKE), how])
-        models.append(model)
-        return model
+        command = [sys.executable, str(FAKE), how]
+        models.append(ExportModel(JobsModel(parent), parent, command, tmp_path / "exports"))
+        return models[-1]
 
     yield make
     for model in models:
         model.close()
+    for folder in folders_in(tmp_path / "exports"):
+        folder.stop()
+        qtbot.waitUntil(lambda folder=folder: not folder.live, timeout=20_000)
     parent.deleteLater()
 
 
@@ -137,7 +143,7 @@ def test_it_is_written_by_another_process(made, people, qtbot) -> None:
 
 
 @pytest.mark.parametrize(
-    ("how", "why"), [("refused", "It cannot be."), ("silent", "sd2: the disk is full")]
+    ("how", "why"), [("refused", "It cannot be."), ("silent", "the disk is full")]
 )
 def test_what_goes_wrong_is_said(made, people, qtbot, how: str, why: str) -> None:
     model = made(how)
@@ -163,9 +169,76 @@ def test_it_can_be_stopped(made, people, qtbot) -> None:
     assert model.ready
 
 
+def begun(model: ExportModel, people: Path, qtbot) -> None:
+    model.begin(people)
+    model.choose(length=30, overlap=5, maps=frozenset({"synthetic"}), subjects=("a", "b"))
+    counted(model, qtbot)
+    model.start(people / "set.h5")
+    qtbot.waitUntil(lambda: model.progress == (500, 2000), timeout=20_000)
+
+
+def test_it_outlives_the_window_and_is_found_by_the_next(made, people, qtbot) -> None:
+    first, second = made("slow"), made()
+    begun(first, people, qtbot)
+    choice = first.choice
+    first.close()
+    with qtbot.waitSignal(second.noted, timeout=20_000) as noted:
+        second.look_for_export()
+    assert noted.args[0].startswith("set.h5 is being written.")
+    assert second.exporting
+    assert second.choice == choice
+    qtbot.waitUntil(lambda: second.progress == (500, 2000), timeout=20_000)
+    counted(second, qtbot)
+    assert second.forecast is not None
+    assert not second.ready
+    (people / "set.h5.go").touch()
+    qtbot.waitUntil(lambda: not second.exporting, timeout=20_000)
+    assert second.result.segments == 7
+    third = made()
+    third.look_for_export()
+    assert not third.exporting
+
+
+def test_what_was_written_meanwhile_is_said(made, people, qtbot, tmp_path) -> None:
+    first, second = made("slow"), made()
+    begun(first, people, qtbot)
+    first.close()
+    (people / "set.h5.go").touch()
+    (folder,) = folders_in(tmp_path / "exports")
+    qtbot.waitUntil(lambda: folder.code is not None, timeout=20_000)
+    said: list[str] = []
+    second.noted.connect(said.append)
+    second.look_for_export()
+    qtbot.waitUntil(lambda: not second.exporting, timeout=20_000)
+    assert said == [f"7 segments from 2 views are in {people / 'set.h5'}."]
+
+
+def test_one_that_was_killed_is_said(made, people, qtbot) -> None:
+    model = made("slow")
+    begun(model, people, qtbot)
+    os.kill(model._run._pid, signal.SIGKILL)
+    with qtbot.waitSignal(model.failed, timeout=20_000) as failed:
+        pass
+    assert failed.args[0].startswith("set.h5 was not written to its end")
+    assert model.ready
+
+
+def test_one_that_cannot_be_started_is_said(made, people, qtbot) -> None:
+    model = made()
+    model._command = ("/no/such/program",)
+    model.begin(people)
+    counted(model, qtbot)
+    with qtbot.waitSignal(model.failed, timeout=20_000) as failed:
+        model.start(people / "set.h5")
+    assert "cannot be started" in failed.args[0]
+    assert not model.exporting
+    model.look_for_export()
+    assert not model.exporting
+
+
 def test_lines_that_say_nothing_are_left_alone() -> None:
-    for line in ("", "no JSON", "[1]", '{"event": "else"}', '{"event": "done"}', '{"event": []}'):
-        assert message_of(line) is None
+    for told in ({}, {"event": "else"}, {"event": "done"}, {"event": []}):
+        assert message_of(told) is None
 
 
 def test_bytes_in_words() -> None:

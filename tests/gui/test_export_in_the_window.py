@@ -36,8 +36,10 @@ def dialog(window, qtbot):
     assert isinstance(found, ExportDialog)
     qtbot.waitUntil(lambda: not window.context.export.counting, timeout=20_000)
     yield found
-    if window.context.export.exporting:
-        window.context.export.close()
+    model = window.context.export
+    if model.exporting:
+        model.stop()
+        qtbot.waitUntil(lambda: not model.exporting, timeout=20_000)
 
 
 def button(dialog: ExportDialog, text: str) -> QToolButton:
