@@ -23,7 +23,7 @@ _DEFAULTS: dict[str, Any] = {
     "model": "lstm",
     "features": "columns",
     "maps": "radar",
-    "steps": 160,
+    "steps": 300,
     "seed": 0,
     "quick": "yes",
 }

@@ -22,6 +22,7 @@ from sd2core.classify.features import Features, Kind
 from sd2core.classify.live import TrainedClassifier
 from sd2core.classify.metrics import mean_recall
 from sd2core.classify.models import Classifier, build, options, parameter_groups
+from sd2core.classify.noise import some_noisy
 from sd2core.errors import Sd2Error
 
 Watch = Callable[[dict[str, Any]], None]
@@ -40,6 +41,9 @@ class TrainOptions:
         So much of what follows a frame is seen before it is answered.
     options : mapping
         Of the model, in place of its own.
+    noisy_share : float
+        Of the clips that are learnt from, so many get a noise floor
+        (:mod:`sd2core.classify.noise`).
     steps : int
         Batches that are learnt from.
     batch : int
@@ -63,14 +67,15 @@ class TrainOptions:
     features: Kind = "columns"
     delay_s: float = DELAY_S
     options: Mapping[str, Any] = field(default_factory=dict)
-    steps: int = 160
+    noisy_share: float = 0.5
+    steps: int = 300
     batch: int = 32
     window_frames: int = 300
     piece_frames: int = 50
     learning_rate: float = 0.01
     ssm_learning_rate: float = 0.003
     weight_decay: float = 0.01
-    check_steps: int = 16
+    check_steps: int = 20
     patience: int = 10
     seed: int = 0
 
@@ -82,6 +87,8 @@ class TrainOptions:
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
                 raise Sd2Error(f"{name} is {value}", "a finite number above 0")
+        if not 0 <= self.noisy_share <= 1:
+            raise Sd2Error(f"The share of noisy clips is {self.noisy_share}", "0 to 1")
         if not 0 <= self.delay_s <= LONGEST_DELAY_S:
             raise Sd2Error(f"The delay is {self.delay_s} s", f"0 to {LONGEST_DELAY_S:g} s")
 
@@ -178,9 +185,9 @@ def train(
     with _one_thread(), torch.random.fork_rng(devices=[]):
         torch.manual_seed(chosen.seed)
         network = build(chosen.model, features.size, len(known.classes), **chosen.options)
-        learning = _Learning(
-            network, Material.of(training, features, delay_frames), weights, chosen
-        )
+        shown = some_noisy(training, known.null_bins, chosen.noisy_share, chosen.seed)
+        material = Material.of(shown, features, delay_frames)
+        learning = _Learning(network, material, weights, chosen)
         chosen_by = Material.of(validation, features, delay_frames)
         say("start", steps=chosen.steps, clips=len(training), frames=sum(map(len, training)))
         interrupted = False

@@ -64,7 +64,7 @@ def test_what_is_set_up_is_the_command(set_up):
     out = Path("m.safetensors")
     data = str(set_up.data)
     assert model.setup.train_arguments(out) == [
-        "classify", "train", data, "--model", "lstm", "--steps", "160", "--out", "m.safetensors",
+        "classify", "train", data, "--model", "lstm", "--steps", "300", "--out", "m.safetensors",
     ]  # fmt: skip
     model.setup.set_value("model", "s4")
     model.setup.set_value("features", "peak")
@@ -179,13 +179,13 @@ def test_how_long_it_takes_is_timed_and_then_learnt(set_up, qtbot):
     model.set_watched(True)
     qtbot.waitUntil(lambda: model.estimate_s is not None, timeout=10_000)
     assert model.step.source == "timed"
-    assert model.estimate_s == pytest.approx(0.5 * 160)
+    assert model.estimate_s == pytest.approx(0.5 * 300)
     model.train()
     set_up.ended(model)
     model.select(None)
     # The command says two seconds a step.
     assert model.step.source == "run"
-    assert model.estimate_s == pytest.approx(2.0 * 160)
+    assert model.estimate_s == pytest.approx(2.0 * 300)
     assert model.step_times.of(StepKey.of_classifier("s4", "columns")) is None
 
 

@@ -17,7 +17,9 @@ from sd2core.classify.judging import judge
 from sd2core.classify.training import TrainOptions, train
 from sd2core.errors import Sd2Error
 
-SHORT = TrainOptions(steps=24, batch=8, check_steps=6, piece_frames=30, learning_rate=0.02)
+SHORT = TrainOptions(
+    delay_s=0.0, steps=24, batch=8, check_steps=6, piece_frames=30, learning_rate=0.02
+)
 
 
 @pytest.fixture(scope="module")
@@ -127,6 +129,7 @@ def test_a_trained_classifier_comes_back_from_its_file(known: ClipSet, tmp_path:
         ({"steps": 0}, "steps is 0"),
         ({"learning_rate": 0.0}, "learning_rate is 0"),
         ({"delay_s": -1.0}, "delay is -1"),
+        ({"noisy_share": 2.0}, "noisy clips is 2"),
     ],
 )
 def test_options_that_make_no_sense_are_refused(change: dict, words: str) -> None:
