@@ -58,6 +58,11 @@ def add_table(kinds: argparse._SubParsersAction) -> None:
         " quick: 10%%,100%%)",
     )
     parser.add_argument("--quick", action="store_true", help="few trainings, to see how it looks")
+    parser.add_argument(
+        "--radar-only",
+        action="store_true",
+        help="add nothing synthetic: networks and how much data they need, on all of the radar's",
+    )
     add_network(parser)
     parser.add_argument("--steps", type=positive_int, metavar="N", help="batches per training")
     parser.add_argument(
@@ -79,7 +84,7 @@ def _table(options: argparse.Namespace) -> None:
     from sd2core.classify.table import make_table
     from sd2core.classify.table_words import as_json, as_text
 
-    known = clips_of(options.data, None)
+    known = clips_of(options.data, ("radar",) if options.radar_only else None)
     chosen = _options(options)
     folder: Path = options.out
     with _lines() if options.progress_json else progress_bar("Training", "run") as progress:

@@ -202,6 +202,16 @@ def test_a_table_is_made_once(sd2: Sd2, store: Path, tmp_path: Path) -> None:
         assert (tmp_path / name).stat().st_size
 
 
+def test_networks_are_compared_on_the_radar_alone(sd2: Sd2, store: Path, tmp_path: Path) -> None:
+    how = ("--radar-only", "--seeds", 1, "--steps", 2, "--shares", "100%", "--width", 4)
+    told = json.loads(sd2("classify", "table", store, "--out", tmp_path, *how, "--json").out)
+    assert {one["added"] for one in told["conditions"]} == {"nothing"}
+    assert told["network"] in [one["network"] for one in told["conditions"]]
+    assert told["network"]["width"] == 4
+    # Nothing may be added, so all of the two people's takes are there as the radar saw them.
+    assert {sum(run["real"].values()) for c in told["conditions"] for run in c["runs"]} == {360}
+
+
 def test_real_radar_files_have_classes_of_their_own(
     sd2: Sd2, shared_data: Path, tmp_path: Path
 ) -> None:
