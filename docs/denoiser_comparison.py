@@ -9,12 +9,24 @@ cores, one thread each. The real pairs are left out where the recordings are not
 from __future__ import annotations
 
 import argparse
+import math
 import os
 from collections.abc import Mapping
 from pathlib import Path
 
 from matplotlib.figure import Figure
-from runs import PILOT_EPOCHS, Job, TimedJob, campaign_of, sd2, settings, tables, timed, train
+from runs import (
+    PILOT_EPOCHS,
+    Job,
+    TimedJob,
+    campaign_of,
+    epoch_ends_s,
+    sd2,
+    settings,
+    tables,
+    timed,
+    train,
+)
 
 from sd2core.atomic import atomic_write_text
 from sd2core.denoise.registry import options as options_of
@@ -35,10 +47,10 @@ ALL = {
     "unet-step": ("unet", *settings(options_of("unet", "time"))),
     "swin-step": ("swin", *settings(options_of("swin", "time"))),
     "s4-both": ("s4", *settings({"bidirectional": "true"})),
-    "s4-serial": ("s4-serial",),
     "s4-range": ("s4", "--range-factor", "2"),
 }
 """What follows ``--model`` of every run."""
+SERIAL = "s4-serial"
 DROPOUT = 0.1
 
 PAGE = """\
@@ -51,8 +63,8 @@ This page is made by
 make denoiser-comparison
 ```
 
-here with `--campaign-minutes {campaign_minutes:g} --minutes {minutes:g} --seeds {seeds}`, on
-{machine}.
+here with `--campaign-minutes {campaign_minutes:g} --minutes {minutes:g} --seeds {seeds}
+--real-minutes {real_minutes:g}`, on {machine}.
 The people that are judged were seen neither in training nor in choosing the best epoch. What the
 errors are is written in `sd2core/denoise/metrics.py`.
 
@@ -83,7 +95,8 @@ a step takes as long (one run each):
 VARIANTS = """\
 ### Variants of the S4
 
-`s4-serial` is the paper's literal form, 2,304 samples of one channel.
+`s4-serial` is the paper's literal form, 2,304 samples of one channel; it had one epoch, which took
+{serial_minutes:.1f} minutes of processor time.
 `bidirectional` also looks ahead, as the U-Net and the Swin transformer do, and cannot run live.
 Judged on the same takes.
 
@@ -120,6 +133,8 @@ def main() -> None:
     jobs = {name: _timed(folder, campaign, name, options) for name in ALL}
     compared = [jobs[name].seeded(seed) for seed in range(options.seeds) for name in COMPARED]
     alone = {name: jobs[name].seeded(0) for name in ALL if name not in COMPARED}
+    # A pilot of several epochs would take longer than all runs of another model.
+    alone[SERIAL] = TimedJob(_job(campaign, SERIAL, (SERIAL,)), math.nan, epochs=1).seeded(0)
     mars = _mars(folder)
     real = _real_jobs(folder, mars, options) if mars is not None else {}
     train(folder, [*compared, *alone.values(), *(job for part in real.values() for job in part)])
@@ -135,13 +150,15 @@ def main() -> None:
         campaign_minutes=options.campaign_minutes,
         seeds=options.seeds,
         minutes=options.minutes,
+        real_minutes=options.real_minutes,
         dropout=DROPOUT,
         pilot=PILOT_EPOCHS,
         epochs=_epochs(jobs),
         same_step=beside("unet-step", "swin-step"),
         tables=tables(folder, runs, campaign, "--plot", IMAGES / "denoiser-campaign.png"),
         variants=VARIANTS.format(
-            tables=beside("s4-both", "s4-serial"),
+            tables=beside("s4-both", SERIAL),
+            serial_minutes=epoch_ends_s(folder / alone[SERIAL].name)[0] / 60.0,
             # Alone: beside the other one it would count as a second seed of it.
             range_tables=tables(folder, [folder / alone["s4-range"].name], campaign),
         ),
@@ -151,8 +168,11 @@ def main() -> None:
 
 
 def _timed(folder: Path, campaign: Path, name: str, options: argparse.Namespace) -> TimedJob:
-    how = ("--model", *ALL[name], *settings({"dropout": DROPOUT}))
-    return timed(folder, Job(name, campaign, how), options.minutes)
+    return timed(folder, _job(campaign, name, ALL[name]), options.minutes)
+
+
+def _job(campaign: Path, name: str, model: tuple[str, ...]) -> Job:
+    return Job(name, campaign, ("--model", *model, *settings({"dropout": DROPOUT})))
 
 
 def _epochs(jobs: Mapping[str, TimedJob]) -> str:

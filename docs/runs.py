@@ -64,11 +64,16 @@ def timed(folder: Path, job: Job, minutes: float) -> TimedJob:
     """As many epochs as take these minutes of processor time, by a short run."""
     pilots = folder / "pilots"
     train(pilots, [replace(job, options=(*job.options, "--epochs", str(PILOT_EPOCHS)))])
-    events = standing(read_events(RunFolder(pilots / job.name).progress))
-    ends_s = [event["processor_s"] for event in events if event["event"] == "epoch"]
+    ends_s = epoch_ends_s(pilots / job.name)
     # The first epoch has the start in it; the shortest has least of what else went on.
     epoch_s = min(after - before for before, after in pairwise(ends_s))
     return TimedJob(job, epoch_s, max(1, round(60.0 * minutes / epoch_s)))
+
+
+def epoch_ends_s(run: Path) -> list[float]:
+    """Processor time that a run had used by the end of each epoch."""
+    events = standing(read_events(RunFolder(run).progress))
+    return [event["processor_s"] for event in events if event["event"] == "epoch"]
 
 
 def train(folder: Path, jobs: Iterable[Job]) -> None:
