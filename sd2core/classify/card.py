@@ -142,9 +142,11 @@ class ClassifierCard:
                     f"a classifier up to version {VERSION}",
                     "Use the version of SD² Studio that made it, or a newer one",
                 )
+            # Those of version 1 are of 16 units where they do not say, and answer at once.
+            before = {"width": 16} if content["version"] < 2 else {}
             return cls(
                 model=str(content["model"]),
-                options=dict(content["options"]),
+                options={**before, **content["options"]},
                 features=Features(
                     content["features"],
                     VelocityAxis(int(content["axis"]["bins"]), float(content["axis"]["v_max_mps"])),
@@ -153,7 +155,6 @@ class ClassifierCard:
                 ),
                 classes=tuple(map(str, content["classes"])),
                 trained_on=tuple(map(str, content["trained_on"])),
-                # Those of version 1 answer at once.
                 delay_frames=int(content.get("delay_frames", 0)),
                 title=str(content["title"]),
                 about=dict(content["about"]),

@@ -218,7 +218,7 @@ def train(
             network.load_state_dict(kept)
     card = ClassifierCard(
         chosen.model,
-        dict(chosen.options),
+        {**options(chosen.model), **chosen.options},
         features,
         known.classes,
         tuple(dict.fromkeys(clip.kind for clip in training)),

@@ -19,6 +19,7 @@ from safetensors.torch import save
 from sd2core.classify.card import ClassifierCard
 from sd2core.classify.defaults import MODELS
 from sd2core.classify.files import describe_classifier, load_classifier, save_classifier
+from sd2core.classify.live import TrainedClassifier
 from sd2core.classify.models import build
 from sd2core.denoise.files import describe_model
 from sd2core.errors import Sd2Error
@@ -111,6 +112,8 @@ def test_a_denoiser_is_no_classifier_and_the_other_way_round(model: Path) -> Non
         (lambda card: card.update(options={"colour": 1}), "no option 'colour'"),
         (lambda card: card.update(options={"dropout": 1.5}), "a share"),
         (lambda card: card.update(axis={"bins": 32}), "damaged"),
+        (lambda card: card.update(delay_frames=-1), "0 to 5 s"),
+        (lambda card: card.update(delay_frames=10_000), "0 to 5 s"),
     ],
 )
 def test_a_changed_description_is_refused(
@@ -119,6 +122,24 @@ def test_a_changed_description_is_refused(
     change_card(model, change)
     with pytest.raises(Sd2Error, match=words):
         load_classifier(model)
+
+
+def test_a_file_of_the_first_version_is_the_same_classifier(tmp_path: Path) -> None:
+    """It did not say how wide it is, nor when it answers."""
+    path = tmp_path / "old.safetensors"
+    network = build("lstm", 32, len(CLASSES), width=16)
+    card = ClassifierCard("lstm", {"width": 16}, features(), CLASSES, ("simulated",))
+    save_classifier(path, TrainedClassifier(network, card))
+    before = load_classifier(path).probabilities_of(energies(50))
+
+    def aged(told: dict[str, Any]) -> None:
+        told.update(version=1, options={})
+        del told["delay_frames"]
+
+    change_card(path, aged)
+    old = load_classifier(path)
+    assert old.card.delay_s == 0.0
+    np.testing.assert_array_equal(old.probabilities_of(energies(50)), before)
 
 
 def test_other_files_are_refused(tmp_path: Path) -> None:
