@@ -33,7 +33,7 @@ def main() -> int:
     parser.add_argument("--out", type=Path)
     for name in ("--quick", "--progress-json"):
         parser.add_argument(name, action="store_true")
-    for name in ("--model", "--features", "--maps", "--steps", "--seed"):
+    for name in ("--model", "--features", "--maps", "--steps", "--seed", "--width", "--delay-s"):
         parser.add_argument(name)
     options = parser.parse_args()
     folder = CommandFolder(options.folder)

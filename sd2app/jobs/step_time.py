@@ -1,7 +1,7 @@
 """Time a few steps of training on random values, as a run beside the window would take them.
 
 Run as ``python -u -m sd2app.jobs.step_time MODEL BATCH_SIZE`` for a denoiser, and as
-``… classifier MODEL FEATURES`` for a classifier; prints one JSON line.
+``… classifier MODEL FEATURES WIDTH`` for a classifier; prints one JSON line.
 """
 
 from __future__ import annotations
@@ -25,7 +25,11 @@ def main() -> int:
     """Give way, then time."""
     give_way()
     first, *rest = sys.argv[1:]
-    took_s = _of_classifier(*rest) if first == CLASSIFIER else _of_denoiser(first, int(rest[0]))
+    took_s = (
+        _of_classifier(*rest[:2], int(rest[2]))
+        if first == CLASSIFIER
+        else _of_denoiser(first, int(rest[0]))
+    )
     median_s = sorted(took_s)[_TIMED // 2]
     print(json.dumps({"step_s": _VALIDATION * median_s}), flush=True)
     return 0
@@ -58,7 +62,7 @@ def _of_denoiser(model: str, batch_size: int) -> Sequence[float]:
     return took_s[_WARM_UP:]
 
 
-def _of_classifier(model: str, features: str) -> Sequence[float]:
+def _of_classifier(model: str, features: str, width: int) -> Sequence[float]:
     """The same; of the training itself, on a batch of clips as long as its windows."""
     import numpy as np
 
@@ -69,6 +73,7 @@ def _of_classifier(model: str, features: str) -> Sequence[float]:
     options = TrainOptions(
         model=model,
         features=features,  # type: ignore[arg-type]
+        options={"width": width},
         steps=_WARM_UP + _TIMED + 1,
     )
     classes = ("background", "horizontal", "vertical")

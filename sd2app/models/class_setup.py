@@ -13,7 +13,7 @@ from sd2app.jobs.latest import LatestRunner
 from sd2app.models.class_data import DataSource, division_of, looked_into, why_not_together
 from sd2app.models.step_times import StepKey
 from sd2app.settings import Settings
-from sd2core.classify.defaults import MODELS
+from sd2core.classify.defaults import DELAY_S, LONGEST_DELAY_S, MODELS, WIDTH
 from sd2core.relative_paths import plain_path
 from sd2core.train.data import Split
 
@@ -22,6 +22,8 @@ FEATURES = ("columns", "peak")
 _DEFAULTS: dict[str, Any] = {
     "model": "lstm",
     "features": "columns",
+    "width": WIDTH,
+    "delay_s": DELAY_S,
     "maps": "radar",
     "steps": 300,
     "seed": 0,
@@ -47,6 +49,8 @@ class ClassSetup(QObject):
         for name, known in _CHOICES.items():
             if self._values[name] not in known:
                 self._values[name] = _DEFAULTS[name]
+        if not 0 <= self._values["delay_s"] <= LONGEST_DELAY_S:
+            self._values["delay_s"] = DELAY_S
         people = _people(settings.stored(_PEOPLE, "{}"))
         self._data = tuple(
             DataSource(path, people.get(str(path), "")) for path in settings.paths(_DATA)
@@ -168,7 +172,8 @@ class ClassSetup(QObject):
     @property
     def step_key(self) -> StepKey:
         """What the time of a step depends on."""
-        return StepKey.of_classifier(self._values["model"], self._values["features"])
+        values = self._values
+        return StepKey.of_classifier(values["model"], values["features"], values["width"])
 
     def train_arguments(self, out: Path) -> list[str]:
         """``sd2 classify train`` with what is not as it is by default."""
@@ -176,21 +181,26 @@ class ClassSetup(QObject):
         # Network and steps are named even where they are the default: one looks for them.
         words = ["classify", "train", *self._sources]
         words += ["--model", values["model"], "--steps", f"{values['steps']}"]
-        for name in ("features", "maps", "seed"):
-            if values[name] != _DEFAULTS[name]:
-                words += [f"--{name}", f"{values[name]}"]
+        words += self._others("features", "width", "delay_s", "maps", "seed")
         return [*words, "--out", str(out)]
 
     def table_arguments(self, out: Path) -> list[str]:
         """``sd2 classify table`` with the network that is chosen."""
         values = self._values
         words = ["classify", "table", *self._sources, "--steps", f"{values['steps']}"]
-        for name in ("model", "features"):
-            if values[name] != _DEFAULTS[name]:
-                words += [f"--{name}", f"{values[name]}"]
+        words += self._others("model", "features", "width", "delay_s")
         if values["quick"] == "yes":
             words.append("--quick")
         return [*words, "--out", str(out)]
+
+    def _others(self, *names: str) -> list[str]:
+        """Options for what is not as it is by default."""
+        return [
+            word
+            for name in names
+            if self._values[name] != _DEFAULTS[name]
+            for word in (f"--{name.replace('_', '-')}", f"{self._values[name]}")
+        ]
 
     @property
     def _sources(self) -> list[str]:

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 _LATE_S = 0.2
 """While a map grows frame by frame, what is known is that much behind the clock at most."""
+_LATER_S = 0.5
+"""The same besides the delay of a classifier that answers late: there the time is named."""
 
 _BETWEEN_MS = 120
 """While a long map is painted piece by piece, it is looked at so often at most."""
@@ -41,12 +43,16 @@ class ClassReading:
         False while the map is another than the one that this was read from.
     nobody : bool
         Whether there is no person in the frame.
+    ago_s : float
+        So much earlier than the time that was asked for: of a map that still grows, a
+        classifier which answers late knows no later frame.
     """
 
     classes: tuple[str, ...]
     shares: tuple[float, ...]
     current: bool
     nobody: bool
+    ago_s: float = 0.0
 
     @property
     def best(self) -> int:
@@ -168,22 +174,26 @@ class ClassTrack(QObject):
         frame = self._source.frame_at(time_s) if self._source is not None else None
         if frame is None or self._card is None or frame >= len(self._shares):
             return None
-        frame = self._newest(frame)
+        asked, frame = frame, self._newest(frame)
         shares = self._shares[frame]
         if np.isnan(shares).any():
             return None
-        present = self._given.present if self._given is not None else None
+        assert self._given is not None
+        present, times_s = self._given.present, self._given.times_s
         return ClassReading(
             self._card.classes,
             tuple(map(float, shares)),
             bool(self._done[frame]) and self.current,
             present is not None and not present[frame],
+            float(times_s[asked] - times_s[frame]) if self._card.delay_frames else 0.0,
         )
 
     def _newest(self, frame: int) -> int:
         """The newest frame up to this one that is done, if it is hardly earlier."""
         assert self._given is not None
-        late = round(_LATE_S * self._given.timebase.frames_per_s)
+        assert self._card is not None
+        late_s = self._card.delay_s + _LATER_S if self._card.delay_frames else _LATE_S
+        late = round(late_s * self._given.timebase.frames_per_s)
         done = np.flatnonzero(self._done[max(frame - late, 0) : frame + 1])
         return max(frame - late, 0) + int(done[-1]) if done.size else frame
 
@@ -262,7 +272,9 @@ class ClassTrack(QObject):
             first = start + int(differs.argmax()) if differs.any() else len(known)
             values = before.values
         self._problem = ""
-        self._done[first:] = False
+        # What was known of this frame and is another now has been seen by earlier answers.
+        seen = first < len(known) and before is not None and bool(self._known[first])
+        self._done[first - (min(self._card.delay_frames, first) if seen else 0) :] = False
         # What is under way is still right where the map only grew behind it.
         self._again = self._runner.busy and first >= self._until
         if self._runner.busy and not self._again:
@@ -309,12 +321,16 @@ class ClassTrack(QObject):
             for start, stop in stretches(there, rate_hz):
                 if not waiting[start:stop].any():
                     continue
+                # What follows is still to come: the last frames have no answer until then.
+                grows = stop < len(known) and not known[stop]
                 if is_regular(doppler.times_s[start:stop], rate_hz):
-                    _in_order(classifier, doppler, (start, stop), going, emit)
+                    _in_order(classifier, doppler, (start, stop), grows, going, emit)
                 else:
                     cut = cut_out(doppler, start, doppler.values[:, start:stop])
                     cut = replace(cut, present=None)
-                    emit(_Piece(start, classifier.probabilities(cut), None))
+                    owed = round(card.delay_s * cut.timebase.frames_per_s) if grows else 0
+                    shares = classifier.probabilities(cut)
+                    emit(_Piece(start, shares[: max(len(shares) - owed, 0)], None))
 
         self._runner.submit(work)
 
@@ -344,12 +360,13 @@ def _in_order(
     classifier: Classifier,
     doppler: DopplerMap,
     stretch: tuple[int, int],
+    grows: bool,
     going: _Going | None,
     emit: Emit,
 ) -> None:
-    """One stretch piece by piece, from where it was left."""
+    """One stretch piece by piece, from where it was left; ``grows`` where it has no end yet."""
     start, stop = stretch
-    if going is None or going.start != start or going.next >= stop:
+    if going is None or going.start != start or going.next > stop:
         going = _Going(classifier.live(), start, start, start)
     while going.next < stop:
         end = min(going.next + AT_ONCE, stop)
@@ -357,7 +374,7 @@ def _in_order(
         answered = going.answered
         going = _Going(going.session, start, end, answered + len(shares))
         emit(_Piece(answered, shares, going))
-    if going.answered < stop:
+    if going.answered < stop and not grows:
         emit(_Piece(going.answered, going.session.finish(), going))
 
 

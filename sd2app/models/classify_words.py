@@ -48,6 +48,7 @@ def classifier_page(card: ClassifierCard) -> ModelPage:
         ("Kind", f"{network_text(card)}, {card.parameters:,} parameters"),
         ("Learned from", f"{kinds_text(card.trained_on)} maps"),
         ("Classes", ", ".join(card.classes)),
+        ("Answers", delay_text(card) + (", having seen what follows" * bool(card.delay_frames))),
         *map_and_file_rows(card.axis, card.frame_rate_hz, card.path),
     ]
     simulated = "real" not in card.trained_on
@@ -61,4 +62,15 @@ def reading_text(reading: ClassReading | None) -> str:
     if reading.nobody:
         return "no person"
     best = reading.best
-    return f"{reading.classes[best]} {100 * reading.shares[best]:.0f} %"
+    text = f"{reading.classes[best]} {100 * reading.shares[best]:.0f} %"
+    return f"{text}, {ago_text(reading.ago_s)}" if reading.ago_s else text
+
+
+def ago_text(seconds: float) -> str:
+    """How much earlier something was."""
+    return f"{seconds:.1f} s ago"
+
+
+def delay_text(card: ClassifierCard) -> str:
+    """When it answers."""
+    return f"{card.delay_s:.2g} s late" if card.delay_frames else "at once"

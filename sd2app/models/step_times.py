@@ -39,9 +39,9 @@ class StepKey:
         return cls((model, str(batch_size)))
 
     @classmethod
-    def of_classifier(cls, model: str, features: str) -> StepKey:
+    def of_classifier(cls, model: str, features: str, width: int) -> StepKey:
         """Of training a classifier."""
-        return cls((CLASSIFIER, model, features))
+        return cls((CLASSIFIER, model, features, str(width)))
 
     @property
     def text(self) -> str:

@@ -24,6 +24,7 @@ from sd2app.views.estimate_lines import EstimateLines
 from sd2app.views.inputs import Choice, NumberBox
 from sd2app.views.panel_parts import data_row, outlined, rule, sentence, side_by_side, title
 from sd2app.views.typed_line import TypedLine
+from sd2core.classify.defaults import LONGEST_DELAY_S
 from sd2core.train.data import Split
 
 _MAP_TIPS = {
@@ -113,20 +114,27 @@ class ClassSetupView(QWidget):
             ),
         }
         self._numbers = {
+            "width": self._number("width", 1, 512, 8, "Units of every layer; the paper's: 16"),
+            "delay_s": self._number(
+                "delay_s",
+                0,
+                LONGEST_DELAY_S,
+                0.1,
+                "A frame is answered so much later, when what follows it has been seen; the"
+                " paper's: 0, at once",
+                " s late",
+                2,
+            ),
             "steps": self._number("steps", 1, 100_000, 50, "Batches that are learnt from"),
             "seed": self._number("seed", 0, 2**31 - 1, 1, "Of weights, order and dropout"),
         }
-        numbers = QHBoxLayout()
-        numbers.setSpacing(8)
-        numbers.addWidget(self._numbers["steps"], 1)
-        numbers.addWidget(QLabel("Seed", self))
-        numbers.addWidget(self._numbers["seed"], 1)
         for row, (text, part) in enumerate(
             (
                 ("Maps", boxes),
                 ("Network", self._choices["model"]),
                 ("Shown", self._choices["features"]),
-                ("Steps", numbers),
+                ("Answers", self._beside("delay_s", "Width", "width")),
+                ("Steps", self._beside("steps", "Seed", "seed")),
             )
         ):
             grid.addWidget(QLabel(text, self), row, 0)
@@ -143,11 +151,29 @@ class ClassSetupView(QWidget):
         choice.activated.connect(lambda at: self._setup.set_value(name, known[at]))
         return choice
 
-    def _number(self, name: str, low: int, high: int, step: int, tip: str) -> NumberBox:
-        box = NumberBox(low, high, "", tip, decimals=0, step=step, parent=self)
+    def _number(
+        self,
+        name: str,
+        low: float,
+        high: float,
+        step: float,
+        tip: str,
+        suffix: str = "",
+        decimals: int = 0,
+    ) -> NumberBox:
+        box = NumberBox(low, high, suffix, tip, decimals=decimals, step=step, parent=self)
         box.setMinimumWidth(56)
-        box.valueChanged.connect(lambda value: self._setup.set_value(name, int(value)))
+        box.valueChanged.connect(lambda value: self._setup.set_value(name, value))
         return box
+
+    def _beside(self, left: str, text: str, right: str) -> QHBoxLayout:
+        """Two numbers in a row, the second one with its name."""
+        row = QHBoxLayout()
+        row.setSpacing(8)
+        row.addWidget(self._numbers[left], 1)
+        row.addWidget(QLabel(text, self))
+        row.addWidget(self._numbers[right], 1)
+        return row
 
     def _add_start(self, layout: QVBoxLayout) -> None:
         asks = self._asks

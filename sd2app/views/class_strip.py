@@ -20,7 +20,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWi
 
 from sd2app.models.class_track import ClassReading
 from sd2app.models.classify import ClassifyModel
-from sd2app.models.classify_words import reading_text
+from sd2app.models.classify_words import ago_text, delay_text, reading_text
 from sd2app.models.display import DisplayModel
 from sd2app.models.labels import LabelsModel
 from sd2app.models.playback import PlaybackModel
@@ -109,8 +109,10 @@ class ClassStrip(QWidget):
         elif model.loading or model.track.card is None:
             self._status.setText("Loading the classifier…")
         else:
-            kind = "" if model.knows_source else "It has learned from other maps than this"
-            self._status.setText(kind)
+            card = model.track.card
+            late = f"answers {delay_text(card)}" if card.delay_frames else ""
+            other = "It has learned from other maps than this"
+            self._status.setText(late if model.knows_source else other)
 
 
 class ClassReadout(QWidget):
@@ -146,7 +148,8 @@ class ClassReadout(QWidget):
         names = card.classes if card is not None else ()
         bold = QFont(self.font())
         bold.setBold(True)
-        longest = ["no person", *(f"{name} 100 %" for name in names)]
+        ago = f", {ago_text(card.delay_s)}" if card is not None and card.delay_frames else ""
+        longest = ["no person", *(f"{name} 100 %{ago}" for name in names)]
         words = max(map(QFontMetrics(bold).horizontalAdvance, longest))
         bars = sum(metrics.horizontalAdvance(name) for name in names)
         self._bars_px = bars + len(names) * (_BAR_PX[0] + 4 + _GAP_PX)

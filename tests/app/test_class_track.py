@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from fake_classifiers import FakeClassifier, FakeClassifiers, class_card, expected
+from fake_classifiers import CLASSES, FakeClassifier, FakeClassifiers, class_card, expected
 
 from sd2app.models.class_track import ClassTrack
+from sd2app.models.classify_words import reading_text
 from sd2app.models.denoise_pieces import AT_ONCE
 from sd2app.models.tracks import TrackModel
 from sd2core.errors import Sd2Error
@@ -92,6 +94,54 @@ def test_a_map_that_grows_is_read_where_it_has_got_to(set_up):
     assert set_up.track.at(42 / RATE).shares == pytest.approx(told[39])
     assert set_up.track.at(42 / RATE).current
     assert set_up.track.at(60 / RATE) is None
+
+
+@pytest.fixture
+def late(set_up):
+    """One that answers six frames late."""
+    set_up.fake.delay_frames = 6
+    card = replace(class_card("/late.safetensors"), delay_frames=6)
+    set_up.track.use(FakeClassifier(set_up.fake), card)
+    return set_up
+
+
+def test_a_late_answer_is_of_its_own_frame(late):
+    doppler, covered = a_map(), np.arange(90) < 40
+    truth = expected(doppler.values.T)
+    late.source.set_map(doppler, covered)
+    late.settle()
+    assert np.flatnonzero(late.track.done).tolist() == list(range(34))
+    reading = late.track.at(39 / RATE)
+    assert reading.current
+    assert reading.shares == pytest.approx(truth[33])
+    assert reading.ago_s == pytest.approx(6 / RATE)
+    best = CLASSES[int(truth[33].argmax())]
+    assert reading_text(reading) == f"{best} {100 * truth[33].max():.0f} %, 0.2 s ago"
+    # Nothing is asked twice when nothing is new, and what was owed comes at the end.
+    for count in (40, 41, 60, 90):
+        late.source.set_map(doppler, np.arange(90) < count if count < 90 else None)
+        late.settle()
+        known = count if count == 90 else count - 6
+        assert np.flatnonzero(late.track.done).tolist() == list(range(known))
+    assert late.fake.frames == 90
+    np.testing.assert_allclose(late.track.shares, truth, rtol=1e-6)
+    reading = late.track.at(39 / RATE)
+    assert reading.ago_s == 0.0
+    assert "ago" not in reading_text(reading)
+    assert reading.shares == pytest.approx(truth[39])
+
+
+def test_who_answers_late_has_seen_what_changed(late):
+    late.source.set_map(a_map())
+    late.settle()
+    changed = a_map()
+    changed.values[:, 50] *= 3.0
+    late.fake.gate.clear()
+    late.source.set_map(changed)
+    assert np.flatnonzero(late.track.done).tolist() == list(range(44))
+    late.fake.gate.set()
+    late.settle()
+    np.testing.assert_allclose(late.track.shares, expected(changed.values.T), rtol=1e-6)
 
 
 def test_growing_while_something_is_under_way_gives_the_same(set_up):

@@ -68,18 +68,21 @@ def test_what_is_set_up_is_the_command(set_up):
     ]  # fmt: skip
     model.setup.set_value("model", "s4")
     model.setup.set_value("features", "peak")
+    model.setup.set_value("width", 16)
+    model.setup.set_value("delay_s", 0.25)
     model.setup.set_value("steps", 50)
     model.setup.set_value("seed", 7)
     model.setup.set_map("denoised", True)
     words = model.setup.train_arguments(out)
     assert words[3:] == [
-        "--model", "s4", "--steps", "50", "--features", "peak", "--maps", "radar,denoised",
-        "--seed", "7", "--out", "m.safetensors",
+        "--model", "s4", "--steps", "50", "--features", "peak", "--width", "16",
+        "--delay-s", "0.25", "--maps", "radar,denoised", "--seed", "7", "--out", "m.safetensors",
     ]  # fmt: skip
     assert model.command.startswith("sd2 classify train")
     # A comparison takes its seeds and maps itself.
     assert model.setup.table_arguments(Path("t"))[3:] == [
-        "--steps", "50", "--model", "s4", "--features", "peak", "--quick", "--out", "t",
+        "--steps", "50", "--model", "s4", "--features", "peak", "--width", "16",
+        "--delay-s", "0.25", "--quick", "--out", "t",
     ]  # fmt: skip
     model.setup.set_value("quick", "no")
     assert "--quick" not in model.setup.table_arguments(Path("t"))
@@ -186,7 +189,7 @@ def test_how_long_it_takes_is_timed_and_then_learnt(set_up, qtbot):
     # The command says two seconds a step.
     assert model.step.source == "run"
     assert model.estimate_s == pytest.approx(2.0 * 300)
-    assert model.step_times.of(StepKey.of_classifier("s4", "columns")) is None
+    assert model.step_times.of(StepKey.of_classifier("s4", "columns", 32)) is None
 
 
 def test_what_cannot_be_learnt_from_is_named(set_up, tmp_path, qtbot):

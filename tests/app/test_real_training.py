@@ -90,7 +90,7 @@ def test_what_sd2_refuses_is_told_in_its_words(model, qtbot, tmp_path) -> None:
 
 def test_a_step_is_timed(qtbot) -> None:
     times = StepTimes(Settings.forgetful())
-    for key in (StepKey.of_denoiser("gru", 8), StepKey.of_classifier("lstm", "peak")):
+    for key in (StepKey.of_denoiser("gru", 8), StepKey.of_classifier("lstm", "peak", 8)):
         times.measure(key)
         qtbot.waitUntil(lambda: times.timing is None, timeout=120_000)
         assert times.why_not(key) == ""
