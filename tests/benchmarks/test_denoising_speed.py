@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
 import pytest
 import torch
 from pytest_benchmark.fixture import BenchmarkFixture
+from timing import spent_s
 
 from sd2core.denoise.card import ModelCard
 from sd2core.denoise.live import TrainedDenoiser
@@ -42,16 +42,6 @@ def denoiser(name: str) -> TrainedDenoiser:
 def synthetic_map() -> DopplerMap:
     values = np.random.default_rng(0).exponential(0.01, (32, FRAMES)).astype(np.float32)
     return DopplerMap(values, VelocityAxis(), Timebase.regular(FRAMES, 30.0), "synthetic")
-
-
-def spent_s(work: Callable[[], object], rounds: int) -> float:
-    """Shortest of several, of the processor's time: others may be at work."""
-    spent = []
-    for _ in range(rounds):
-        start = time.process_time()
-        work()
-        spent.append(time.process_time() - start)
-    return min(spent)
 
 
 def test_a_clip_at_once(benchmark: BenchmarkFixture, capsys: pytest.CaptureFixture[str]) -> None:
