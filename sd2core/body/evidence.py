@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.camera import PinholeCamera
-from sd2core.body.lifted import CENTRE, LiftedTrack
+from sd2core.body.lifted import CENTRE, Lifted, LiftedTrack
 from sd2core.body.rotations import Floats
-from sd2core.body.track import LandmarkTrack
+from sd2core.body.track import Landmarks, LandmarkTrack, parts
 
 _PICTURE_SD = 0.006
 """Of a landmark that is well visible, in apparent statures: 3 pixels of 480."""
@@ -95,3 +96,48 @@ def evidence_of(
         velocity_mps=stature_m * (lifted.velocity - trunk),
         velocity_sd_mps=VELOCITY_CAUTION * stature_m * lifted.velocity_sigma,
     )
+
+
+class EvidenceInParts:
+    """What a fit goes by in a clip of any length.
+
+    Parameters
+    ----------
+    track, lifted
+        Of the same frames.
+    camera : PinholeCamera
+    stature_m : float
+    """
+
+    def __init__(
+        self, track: Landmarks, lifted: Lifted, camera: PinholeCamera, stature_m: float
+    ) -> None:
+        self._track, self._lifted = track, lifted
+        self._camera, self._stature_m = camera, stature_m
+
+    def part(self, start: int, stop: int) -> tuple[Evidence, LandmarkTrack, LiftedTrack]:
+        """Evidence of frames ``start`` to ``stop``, and what it was made of."""
+        track, lifted = self._track.part(start, stop), self._lifted.part(start, stop)
+        return evidence_of(track, lifted, self._camera, self._stature_m), track, lifted
+
+    def chosen(
+        self, frames: NDArray[np.intp], looked: Callable[[int], None]
+    ) -> tuple[Evidence, Floats]:
+        """Evidence of some frames (ascending) of the clip, and their visibility (n, 33).
+
+        ``looked`` is called with the number of parts that have been gone through.
+        """
+        pieces, trust = [], []
+        for number, (start, stop) in enumerate(parts(len(self._track))):
+            looked(number)
+            rows = frames[(frames >= start) & (frames < stop)] - start
+            if len(rows):
+                evidence, track, _ = self.part(start, stop)
+                pieces.append(evidence[rows])
+                trust.append(track.visibility[rows].astype(np.float64))
+        joined = {
+            field.name: np.concatenate([getattr(piece, field.name) for piece in pieces])
+            for field in fields(Evidence)
+            if field.name != "trunk"
+        }
+        return Evidence(trunk=pieces[0].trunk, **joined), np.concatenate(trust)

@@ -5,42 +5,41 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.camera import PinholeCamera
-from sd2core.body.evidence import Evidence, evidence_of
-from sd2core.body.fitted import BodyFit
-from sd2core.body.initial import Pose, initial_pose
+from sd2core.body.evidence import EvidenceInParts
+from sd2core.body.fit_windows import Windows
+from sd2core.body.fitted import PER_FRAME, BodyFit, FittedMotion, of_limbs
+from sd2core.body.initial import initial_pose
 from sd2core.body.keypoints import KeypointSpace
-from sd2core.body.landmark_files import read_arrays, write_arrays
 from sd2core.body.leaning import with_leaning_arms
-from sd2core.body.lifted import LiftedTrack
+from sd2core.body.lifted import Lifted
 from sd2core.body.lifter import Lifter
-from sd2core.body.rig import JOINTS, Rig
-from sd2core.body.rotations import Floats, from_vector, to_vector, transposed
+from sd2core.body.lifting import LiftedInParts
+from sd2core.body.limbs import LIMBS
+from sd2core.body.rig import Rig
+from sd2core.body.rotations import Floats
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.shaping import shape_of_lengths, shape_of_outlines
 from sd2core.body.solve import ROUNDS, solve, solve_stills
-from sd2core.body.track import LandmarkTrack
+from sd2core.body.track import PART_FRAMES, Landmarks, parts
 from sd2core.errors import Sd2Error
-from sd2core.presence import runs
 from sd2core.progress import Progress, silent
 
-Lift = Callable[[LandmarkTrack, PinholeCamera], LiftedTrack]
+Lift = Callable[[Landmarks, PinholeCamera], Lifted]
 
 DEFAULT_STATURE_M = 1.72
 """Where nobody says how tall the person is; distances and speeds scale with it."""
 
 STATURES_M = (0.5, 2.6)
 
-_WINDOW_FRAMES = 600
-_OVERLAP_FRAMES = 60
+_FINISHED_FRAMES = 600
 _MASK_SURE = 128
 _OUTLINES = 16
-_TOLD_BY = ("slopes", "depth_m", "trunk_m")
-"""What tells that a kept window was fitted to the same evidence."""
 
 # Measured on simulated people (docs/decisions/0022): what the lifter says of its
 # velocities, and the fit's error across the view per error of a landmark there.
@@ -52,7 +51,7 @@ _UNSEEN_MPS = 0.3
 
 
 def fit_body(
-    track: LandmarkTrack,
+    track: Landmarks,
     camera: PinholeCamera,
     *,
     stature_m: float | None = None,
@@ -60,11 +59,11 @@ def fit_body(
     workspace: Path | None = None,
     progress: Progress = silent,
 ) -> BodyFit:
-    """Fit a body to landmarks.
+    """Fit a body to landmarks, with all that is known of it in memory.
 
     Parameters
     ----------
-    track : LandmarkTrack
+    track : Landmarks
     camera : PinholeCamera
     stature_m : float, optional
         The person's height, which fixes the scale; :data:`DEFAULT_STATURE_M` without.
@@ -85,38 +84,190 @@ def fit_body(
     Sd2Error
         When the height is none of a person, or no frame shows one.
     """
-    stature_m = DEFAULT_STATURE_M if stature_m is None else stature_m
-    if not STATURES_M[0] <= stature_m <= STATURES_M[1]:
-        raise Sd2Error(
-            f"a body height of {stature_m} m", f"metres, from {STATURES_M[0]} to {STATURES_M[1]}"
+    fitting = Fitting(track, camera, stature_m, lift, workspace)
+    found = list(fitting.finished(progress))
+
+    def joined(name: str) -> NDArray[Any]:
+        return np.concatenate([getattr(part, name) for part in found])
+
+    return BodyFit(
+        timebase=track.timebase,
+        shape=found[0].shape,
+        **{name: joined(name) for name in PER_FRAME},
+    )
+
+
+def fit_motion(
+    track: Landmarks,
+    camera: PinholeCamera,
+    *,
+    stature_m: float | None = None,
+    workspace: Path,
+    progress: Progress = silent,
+) -> FittedMotion:
+    """The same for a clip of any length, with the poses in the workspace.
+
+    Parameters and errors are those of :func:`fit_body`; the workspace is needed as
+    long as the poses are.
+    """
+    fitting = Fitting(track, camera, stature_m, None, workspace)
+    along_mps, across_mps = np.zeros((2, len(track), len(LIMBS)), np.float32)
+    done = residuals = 0
+    residual_m = quality = 0.0
+    for part in fitting.finished(progress):
+        frames = slice(done, done + len(part))
+        along_mps[frames] = of_limbs(part.along_sd_mps)
+        across_mps[frames] = of_limbs(part.across_sd_mps)
+        residuals += int(part.present.sum()) * part.residual_m.shape[1]
+        residual_m += float(np.nansum(part.residual_m))
+        quality += float(part.quality[part.present].sum())
+        done = frames.stop
+    return FittedMotion(
+        timebase=track.timebase,
+        shape=part.shape,
+        poses=fitting.windows.poses,
+        present=track.present,
+        along_sd_mps=along_mps,
+        across_sd_mps=across_mps,
+        residual_m=residual_m / residuals,
+        quality=quality / int(track.present.sum()),
+    )
+
+
+class Fitting:
+    """A fit under way, of which a window of frames is in memory at a time.
+
+    Parameters
+    ----------
+    track, camera, stature_m, lift, workspace
+        See :func:`fit_body`.
+
+    Attributes
+    ----------
+    windows : Windows
+        The poses, as far as they have been found.
+    """
+
+    def __init__(
+        self,
+        track: Landmarks,
+        camera: PinholeCamera,
+        stature_m: float | None,
+        lift: Lift | None,
+        workspace: Path | None,
+    ) -> None:
+        stature_m = DEFAULT_STATURE_M if stature_m is None else stature_m
+        if not STATURES_M[0] <= stature_m <= STATURES_M[1]:
+            raise Sd2Error(
+                f"a body height of {stature_m} m",
+                f"metres, from {STATURES_M[0]} to {STATURES_M[1]}",
+            )
+        if not track.present.any():
+            raise Sd2Error("No frame of the video shows a person", "at least one")
+        self._track, self._camera, self._stature_m = track, camera, stature_m
+        lifted = (
+            LiftedInParts(Lifter.load(), track, camera) if lift is None else lift(track, camera)
         )
-    if not track.present.any():
-        raise Sd2Error("No frame of the video shows a person", "at least one")
-    lifted = (lift or Lifter.load().lift)(track, camera)
-    evidence = evidence_of(track, lifted, camera, stature_m)
-    trust = track.visibility.astype(np.float64)
-    people = _People()
-    shape = _shape(people, track, evidence, trust, camera, stature_m)
-    rig = people.rig(shape)
-    windows = [window for stretch in runs(track.present) for window in _windows(*stretch)]
-    total = len(windows) * ROUNDS
-    pose = Pose(np.tile(np.eye(3), (len(track), len(JOINTS), 1, 1)), np.zeros((len(track), 3)))
-    for number, (start, stop, overlap) in enumerate(windows):
-        progress(number * ROUNDS, total)
-        part = evidence[slice(start, stop)]
+        self._evidence = EvidenceInParts(track, lifted, camera, stature_m)
+        self.windows = Windows(track.present, workspace)
 
-        def tick(done: int, number: int = number) -> None:
-            progress(number * ROUNDS + done, total)
+    def finished(self, progress: Progress) -> Iterator[BodyFit]:
+        """The fit of ever later frames, each as soon as its pose is final."""
+        spans = self.windows.spans
+        looked = sum(1 for _ in parts(len(self._track)))
+        total = looked + len(spans) * ROUNDS
+        people = _People()
+        shape = self._shape(people, lambda number: progress(number, total))
+        rig = people.rig(shape)
+        done = 0
+        for number in range(len(spans)):
+            progress(looked + number * ROUNDS, total)
 
-        found = _kept(workspace, number, part)
-        if found is None:
-            leaning = with_leaning_arms(part, rig)
-            first = initial_pose(rig, leaning.points_m, trust[start:stop])
-            found = solve(rig, leaning, first, tick)
-            _keep(workspace, number, part, found)
-        _blend(pose, found, start, overlap)
-    progress(total, total)
-    return _finished(track, lifted, evidence, rig, shape, pose)
+            def tick(rounds: int, number: int = number) -> None:
+                progress(looked + number * ROUNDS + rounds, total)
+
+            self._solve(rig, number, tick)
+            final = spans[number + 1][0] if number + 1 < len(spans) else len(self._track)
+            for start in range(done, final, _FINISHED_FRAMES):
+                yield self._finished(rig, shape, start, min(start + _FINISHED_FRAMES, final))
+            done = final
+        progress(total, total)
+
+    def _solve(self, rig: Rig, number: int, tick: Callable[[int], None]) -> None:
+        start, stop, _ = self.windows.spans[number]
+        part, track, _ = self._evidence.part(start, stop)
+        if self.windows.is_kept(number, part):
+            return
+        leaning = with_leaning_arms(part, rig)
+        first = initial_pose(rig, leaning.points_m, track.visibility.astype(np.float64))
+        self.windows.keep(number, part, solve(rig, leaning, first, tick))
+
+    def _shape(self, people: _People, looked: Callable[[int], None]) -> BodyShape:
+        """Bone lengths from all frames, then girth from those whose outlines are kept.
+
+        Of long clips the bone lengths are from frames that are evenly spread.
+        """
+        track = self._track
+        there = track.present & ~track.bridged
+        there = there if there.any() else track.present
+        outlined = _outlined(track, there)
+        outlined_frames = track.silhouette_frames[outlined]
+        frames = _thinned(np.flatnonzero(there), PART_FRAMES)
+        known = np.union1d(frames, outlined_frames)
+        evidence, trust = self._evidence.chosen(known, looked)
+        rows = np.searchsorted(known, frames)
+        shape, spread = shape_of_lengths(
+            people.space, people.keypoints, evidence[rows].points_m, trust[rows], self._stature_m
+        )
+        if not len(outlined):
+            return shape
+        rig = people.rig(shape)
+        rows = np.searchsorted(known, outlined_frames)
+        stills = evidence[rows]
+        pose = solve_stills(rig, stills, initial_pose(rig, stills.points_m, trust[rows]))
+        root = rig.skeleton.heads_m[0]
+
+        def transforms_of(other: BodyShape) -> Floats:
+            changed = people.rig(other)
+            # The pelvis stays where it is when the legs grow.
+            moved = pose.translation_m + root - changed.skeleton.heads_m[0]
+            whole = people.space.skeleton(other)
+            return whole.transforms(changed.body_rotations(pose.turns), moved)
+
+        outlines = [mask >= _MASK_SURE for mask in track.silhouettes[outlined]]
+        return shape_of_outlines(people.space, shape, spread, transforms_of, self._camera, outlines)
+
+    def _finished(self, rig: Rig, shape: BodyShape, start: int, stop: int) -> BodyFit:
+        evidence, track, lifted = self._evidence.part(start, stop)
+        pose = self.windows.poses(np.arange(start, stop))
+        keypoints_m = rig.keypoints.positions(rig.transforms(*pose))
+        # A landmark lies on its ray; how far the trunk is, is the fit's own finding.
+        trunk_m = keypoints_m[:, evidence.trunk, 2].mean(axis=1)
+        seen_m = replace(evidence, trunk_m=trunk_m).points_m
+        residual_m = np.linalg.norm(keypoints_m - seen_m, axis=-1)
+        residual_m[~track.present] = np.nan
+        unseen = 1.0 - np.clip(track.visibility.astype(np.float64), 0.0, 1.0)
+        return BodyFit(
+            timebase=track.timebase,
+            shape=shape,
+            turns=pose.turns,
+            translation_m=pose.translation_m,
+            present=track.present,
+            keypoints_m=keypoints_m,
+            residual_m=residual_m,
+            along_sd_mps=_there(
+                np.hypot(_ALONG * shape.stature_m * lifted.velocity_sigma, _UNSEEN_MPS * unseen**4),
+                track.present,
+            ),
+            across_sd_mps=_there(
+                _ACROSS_PER_S * evidence.slopes_sd * keypoints_m[..., 2], track.present
+            ),
+        )
+
+
+def _lift(track: Landmarks, camera: PinholeCamera) -> Lifted:
+    """As the bundled lifter does it."""
+    return LiftedInParts(Lifter.load(), track, camera)
 
 
 class _People:
@@ -130,136 +281,18 @@ class _People:
         return Rig(self.space.skeleton(shape), self.keypoints.of(shape))
 
 
-def _windows(start: int, stop: int) -> Iterator[tuple[int, int, int]]:
-    """Windows (start, stop, frames shared with the one before) of one stretch."""
-    step = _WINDOW_FRAMES - _OVERLAP_FRAMES
-    count = max(-(-(stop - start - _OVERLAP_FRAMES) // step), 1)
-    size = -(-(stop - start + (count - 1) * _OVERLAP_FRAMES) // count)
-    for number in range(count):
-        first = start + number * (size - _OVERLAP_FRAMES)
-        yield first, min(first + size, stop), _OVERLAP_FRAMES if number else 0
-
-
-def _shape(
-    people: _People,
-    track: LandmarkTrack,
-    evidence: Evidence,
-    trust: Floats,
-    camera: PinholeCamera,
-    stature_m: float,
-) -> BodyShape:
-    """Bone lengths from all frames, then girth from those whose outlines are kept."""
-    there = track.present & ~track.bridged
-    there = there if there.any() else track.present
-    shape, spread = shape_of_lengths(
-        people.space,
-        people.keypoints,
-        evidence[np.flatnonzero(there)].points_m,
-        trust[there],
-        stature_m,
-    )
+def _outlined(track: Landmarks, there: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Numbers of the outlines that the girth is taken from, evenly spread."""
     seen = (track.silhouettes >= _MASK_SURE).any(axis=(1, 2))
-    outlined = np.flatnonzero(there[track.silhouette_frames] & seen)
-    outlined = outlined[
-        np.linspace(0, len(outlined) - 1, min(_OUTLINES, len(outlined))).astype(int)
-    ]
-    if not len(outlined):
-        return shape
-    frames = track.silhouette_frames[outlined]
-    rig = people.rig(shape)
-    stills = evidence[frames]
-    pose = solve_stills(rig, stills, initial_pose(rig, stills.points_m, trust[frames]))
-    root = rig.skeleton.heads_m[0]
-
-    def transforms_of(other: BodyShape) -> Floats:
-        changed = people.rig(other)
-        # The pelvis stays where it is when the legs grow.
-        moved = pose.translation_m + root - changed.skeleton.heads_m[0]
-        whole = people.space.skeleton(other)
-        return whole.transforms(changed.body_rotations(pose.turns), moved)
-
-    outlines = [mask >= _MASK_SURE for mask in track.silhouettes[outlined]]
-    return shape_of_outlines(people.space, shape, spread, transforms_of, camera, outlines)
+    return _thinned(np.flatnonzero(there[track.silhouette_frames] & seen), _OUTLINES)
 
 
-def _blend(pose: Pose, found: Pose, start: int, overlap: int) -> None:
-    """Write a window's pose, going over from the one before where they overlap."""
-    stop = start + len(found.turns)
-    if overlap:
-        shared = slice(start, start + overlap)
-        share = np.linspace(0.0, 1.0, overlap + 2)[1:-1]
-        share = share**3 * (10.0 + share * (6.0 * share - 15.0))  # no kink in velocity
-        between = to_vector(transposed(pose.turns[shared]) @ found.turns[:overlap])
-        pose.turns[shared] = pose.turns[shared] @ from_vector(share[:, None, None] * between)
-        pose.translation_m[shared] += share[:, None] * (
-            found.translation_m[:overlap] - pose.translation_m[shared]
-        )
-    rest = slice(start + overlap, stop)
-    pose.turns[rest], pose.translation_m[rest] = (
-        found.turns[overlap:],
-        found.translation_m[overlap:],
-    )
-
-
-def _finished(
-    track: LandmarkTrack,
-    lifted: LiftedTrack,
-    evidence: Evidence,
-    rig: Rig,
-    shape: BodyShape,
-    pose: Pose,
-) -> BodyFit:
-    known = np.flatnonzero(track.present)
-    frames = np.arange(len(track))
-    # Empty frames hold the last known pose, those before it the first.
-    held = known[np.clip(np.searchsorted(known, frames, side="right") - 1, 0, None)]
-    turns, translation_m = pose.turns[held], pose.translation_m[held]
-    keypoints_m = rig.keypoints.positions(rig.transforms(turns, translation_m))
-    # A landmark lies on its ray; how far the trunk is, is the fit's own finding.
-    trunk_m = keypoints_m[:, evidence.trunk, 2].mean(axis=1)
-    residual_m = np.linalg.norm(keypoints_m - replace(evidence, trunk_m=trunk_m).points_m, axis=-1)
-    residual_m[~track.present] = np.nan
-    unseen = 1.0 - np.clip(track.visibility.astype(np.float64), 0.0, 1.0)
-    return BodyFit(
-        timebase=track.timebase,
-        shape=shape,
-        turns=turns,
-        translation_m=translation_m,
-        present=track.present.copy(),
-        keypoints_m=keypoints_m,
-        residual_m=residual_m,
-        along_sd_mps=_there(
-            np.hypot(_ALONG * shape.stature_m * lifted.velocity_sigma, _UNSEEN_MPS * unseen**4),
-            track.present,
-        ),
-        across_sd_mps=_there(
-            _ACROSS_PER_S * evidence.slopes_sd * keypoints_m[..., 2], track.present
-        ),
-    )
+def _thinned(rows: NDArray[np.intp], most: int) -> NDArray[np.intp]:
+    """At most so many of them, evenly spread."""
+    if not len(rows):
+        return rows
+    return rows[np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(int)]
 
 
 def _there(values: Floats, present: NDArray[np.bool_]) -> Floats:
     return np.where(present[:, None], values, 0.0)
-
-
-def _kept(workspace: Path | None, number: int, part: Evidence) -> Pose | None:
-    """A finished window of an earlier run with the same evidence."""
-    if workspace is None:
-        return None
-    try:
-        arrays, _ = read_arrays(_window_file(workspace, number))
-        if all(np.array_equal(arrays[name], getattr(part, name)) for name in _TOLD_BY):
-            return Pose(arrays["turns"], arrays["translation_m"])
-    except (Sd2Error, KeyError):
-        pass  # Missing or damaged: it is made again.
-    return None
-
-
-def _keep(workspace: Path | None, number: int, part: Evidence, found: Pose) -> None:
-    if workspace is not None:
-        told = {name: getattr(part, name) for name in _TOLD_BY}
-        write_arrays(_window_file(workspace, number), told | found._asdict(), {})
-
-
-def _window_file(workspace: Path, number: int) -> Path:
-    return workspace / f"pose-{number:05d}.npz"

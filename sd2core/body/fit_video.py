@@ -6,30 +6,33 @@ import hashlib
 import json
 import os
 import shutil
-import sys
 import zipfile
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import IO, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sd2core import __version__
-from sd2core.atomic import atomic_write_text
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.camera_metadata import Source, camera_of
 from sd2core.body.choosing import Rectangle
-from sd2core.body.fit import DEFAULT_STATURE_M, fit_body
-from sd2core.body.fitted import BodyFit
+from sd2core.body.fit import DEFAULT_STATURE_M, fit_motion
+from sd2core.body.fit_folder import (
+    LANDMARKS,
+    PARTIAL,
+    check_fit_output,
+    claimed,
+    left_only_with_work,
+)
+from sd2core.body.fitted import FittedMotion
 from sd2core.body.landmark_files import save_track
 from sd2core.body.landmark_models import landmark_models
-from sd2core.body.landmarks import DEFAULT_MAX_GAP_S, SIGHTINGS, OnFrame, find_landmarks
+from sd2core.body.landmarks import DEFAULT_MAX_GAP_S, OnFrame, find_landmarks
 from sd2core.body.model import Resolution
-from sd2core.body.track import LandmarkTrack
-from sd2core.errors import Sd2Error
+from sd2core.body.track import Landmarks, parts
 from sd2core.io.mesh import save_mesh
 from sd2core.io.video import VideoReader, open_video
 from sd2core.progress import Progress
@@ -39,11 +42,6 @@ Stage = Literal["models", "find", "refine", "fit", "write"]
 
 STAGES: tuple[Stage, ...] = ("find", "refine", "fit", "write")
 """What is done to every video, in order; ``models`` comes before, where they are missing."""
-
-PARTIAL = ".partial"
-_MARKER = "sd2-fit.json"
-_LOCK = "lock"
-_LANDMARKS = "landmarks"
 
 
 @dataclass(frozen=True)
@@ -98,18 +96,28 @@ class FittedVideo:
 
     Parameters
     ----------
-    fit : BodyFit
-    track : LandmarkTrack
     camera : PinholeCamera
     camera_source : {"user", "metadata", "default"}
+    frames : int
+    frames_per_s : float
+    present, bridged : int
+        Frames with the person, and those of them that were interpolated.
+    residual_m : float
+        How far from the body the lifted landmarks are, on average.
+    quality : float
+        From 0 to 1, on average over the frames with the person.
     notes : tuple of str
         Sentences on the video and what was repaired.
     """
 
-    fit: BodyFit
-    track: LandmarkTrack
     camera: PinholeCamera
     camera_source: Source
+    frames: int
+    frames_per_s: float
+    present: int
+    bridged: int
+    residual_m: float
+    quality: float
     notes: tuple[str, ...]
 
 
@@ -153,8 +161,8 @@ def fit_video(
     with open_video(path) as video:
         camera, camera_source = camera_of(video, choices.focal_px, choices.field_of_view_deg)
         found_models = landmark_models(models, report.progress_of("models"))
-        with _claimed(partial, restart), _left_only_with_work(partial):
-            report.started(video, (partial / _LANDMARKS).is_dir())
+        with claimed(partial, restart), left_only_with_work(partial):
+            report.started(video, (partial / LANDMARKS).is_dir())
             stages = _Stages(report)
             track = find_landmarks(
                 video,
@@ -164,17 +172,27 @@ def fit_video(
                 progress=stages.progress,
                 on_stage=stages.begin,
                 on_frame=stages.on_frame,
-                workspace=partial / _LANDMARKS,
+                workspace=partial / LANDMARKS,
             )
-            fit = fit_body(
+            motion = fit_motion(
                 track,
                 camera,
                 stature_m=choices.stature_m,
                 workspace=_fit_folder(partial, track, choices, camera),
                 progress=report.progress_of("fit"),
             )
-            made = FittedVideo(fit, track, camera, camera_source, (*video.notes, *track.notes))
-            _write(fit, out, partial, choices.resolution, report.progress_of("write"))
+            made = FittedVideo(
+                camera,
+                camera_source,
+                len(track),
+                track.timebase.frames_per_s,
+                int(track.present.sum()),
+                int(track.bridged.sum()),
+                motion.residual_m,
+                motion.quality,
+                (*video.notes, *track.notes),
+            )
+            _write(motion, out, partial, choices.resolution, report.progress_of("write"))
             _describe(partial / _new(out), provenance(made, path, choices))
             if landmarks_out is not None:
                 save_track(track, landmarks_out)
@@ -223,126 +241,22 @@ class _Stages:
         return lambda frame, points, seen: self._report.on_frame(self._stage, frame, points, seen)
 
 
-# -- The folder of a fit under way --------------------------------------------------------------
-
-
-def check_fit_output(out: Path) -> None:
-    """Refuse a mesh's name that cannot be written, or that is something else, before the work.
-
-    Raises
-    ------
-    Sd2Error
-    """
-    if out.suffix.lower() not in (".zarr", ".npz"):
-        raise Sd2Error(
-            f"The mesh is to be written as {out.name}", "a name that ends in .zarr or .npz"
-        )
-    if not out.absolute().parent.is_dir():
-        raise Sd2Error(
-            f"The folder {out.absolute().parent} does not exist", "an existing folder for the mesh"
-        )
-    # `mktemp` leaves an empty file to be filled.
-    if out.exists() and not (_is_mesh(out) or (out.is_file() and not out.stat().st_size)):
-        raise Sd2Error(
-            f"{out} exists and is no mesh",
-            "a new name, or a mesh to replace",
-            "Choose another name, or delete it first",
-        )
-    partial = out.with_name(out.name + PARTIAL)
-    if partial.exists() and not _is_ours(partial):
-        raise Sd2Error(
-            f"{partial} exists and is not what a stopped fit has left",
-            "that name free for the work",
-            "Choose another name, or move it away",
-        )
-
-
-def _is_mesh(path: Path) -> bool:
-    """Whether a file or folder holds vertices by that name."""
-    if path.is_dir():
-        return (path / "vertices").is_dir()
-    try:
-        with zipfile.ZipFile(path) as archive:
-            return "vertices.npy" in archive.namelist()
-    except (OSError, zipfile.BadZipFile):
-        return False
-
-
-def _is_ours(partial: Path) -> bool:
-    if not partial.is_dir():
-        return False
-    names = {path.name for path in partial.iterdir()}
-    return _MARKER in names or names <= {_LOCK}
-
-
-@contextmanager
-def _claimed(partial: Path, restart: bool) -> Iterator[None]:
-    """Make the folder of the work, or take it over; nobody else's until the end.
-
-    Raises
-    ------
-    Sd2Error
-        When another process is at it.
-    """
-    partial.mkdir(exist_ok=True)
-    with (partial / _LOCK).open("ab") as lock:
-        try:
-            _lock(lock)
-        except OSError as error:
-            raise Sd2Error(
-                f"{partial} is in use: another process fits the same mesh",
-                "one at a time",
-                "Wait until it is done, or write another mesh",
-            ) from error
-        if restart:
-            for path in partial.iterdir():
-                if path.is_dir():
-                    shutil.rmtree(path)
-                elif path.name != _LOCK:
-                    path.unlink()
-        text = json.dumps({"format": "sd2-fit-partial", "version": 1, "made_by": __version__})
-        atomic_write_text(partial / _MARKER, text + "\n")
-        yield
-
-
-@contextmanager
-def _left_only_with_work(partial: Path) -> Iterator[None]:
-    """Remove the folder when the video turns out not to be one of a person."""
-    try:
-        yield
-    except Sd2Error:
-        if not (partial / _LANDMARKS / SIGHTINGS).exists():
-            shutil.rmtree(partial, ignore_errors=True)
-        raise
-
-
-def _lock(stream: IO[bytes]) -> None:
-    """Lock an open file against other processes; it is unlocked when closed, also by a kill."""
-    if sys.platform == "win32":
-        import msvcrt
-
-        msvcrt.locking(stream.fileno(), msvcrt.LK_NBLCK, 1)
-    else:
-        import fcntl
-
-        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-
-
 def _fit_folder(
-    partial: Path, track: LandmarkTrack, choices: FitChoices, camera: PinholeCamera
+    partial: Path, track: Landmarks, choices: FitChoices, camera: PinholeCamera
 ) -> Path:
     """Where the fit of these landmarks with these choices keeps what it has done."""
+    landmarks = hashlib.sha256()
+    for start, stop in parts(len(track)):
+        part = track.part(start, stop)
+        for each in (part.image_px, part.world_m, part.visibility):
+            landmarks.update(np.ascontiguousarray(each).tobytes())
+    landmarks.update(np.ascontiguousarray(track.silhouettes).tobytes())
     about = {
         "choices": asdict(choices) | {"resolution": None},
         "camera": asdict(camera),
         "version": __version__,
         "lifter": hashlib.sha256(resource_path("lifter.npz").read_bytes()).hexdigest(),
-        "landmarks": hashlib.sha256(
-            b"".join(
-                np.ascontiguousarray(each).tobytes()
-                for each in (track.image_px, track.world_m, track.visibility, track.silhouettes)
-            )
-        ).hexdigest(),
+        "landmarks": landmarks.hexdigest(),
     }
     key = hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()[:16]
     folder = partial / f"fit-{key}"
@@ -355,12 +269,12 @@ def _new(out: Path) -> str:
 
 
 def _write(
-    fit: BodyFit, out: Path, partial: Path, resolution: Resolution, progress: Progress
+    motion: FittedMotion, out: Path, partial: Path, resolution: Resolution, progress: Progress
 ) -> None:
     new = partial / _new(out)
     if new.is_dir():
         shutil.rmtree(new)
-    save_mesh(fit.mesh(resolution), new, progress)
+    save_mesh(motion.mesh(resolution), new, progress)
 
 
 def _describe(mesh: Path, about: Mapping[str, Any]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +21,20 @@ from sd2core.body.track import LANDMARKS
 from sd2core.mesh import MeshSequence
 from sd2core.timebase import Timebase
 from sd2core.uncertainty import VelocityUncertainty
+
+Poses = Callable[[NDArray[np.intp]], Pose]
+"""Gives the pose in each of some frames (n,)."""
+
+PER_FRAME = (
+    "turns",
+    "translation_m",
+    "present",
+    "keypoints_m",
+    "residual_m",
+    "along_sd_mps",
+    "across_sd_mps",
+)
+"""Arrays of a fit that have a row for every frame, besides its times."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +59,6 @@ class BodyFit:
     along_sd_mps, across_sd_mps : float64 arrays, shape (T, 33)
         Standard deviation of each landmark's velocity along the line of sight, and in
         any direction at right angles to it; 0 in empty frames.
-    source : str
-        For provenance.
     """
 
     timebase: Timebase
@@ -57,7 +70,6 @@ class BodyFit:
     residual_m: Floats
     along_sd_mps: Floats
     across_sd_mps: Floats
-    source: str = ""
 
     def __len__(self) -> int:
         return len(self.timebase)
@@ -70,22 +82,14 @@ class BodyFit:
         resolution : {"high", "medium", "low"}
             13,348, 5,000 or 1,229 vertices.
         """
-        space = ShapeSpace()
-        body = space.load(resolution, self.shape)
-        rig = Rig(body.skeleton, KeypointSpace(space).of(self.shape))
-        vertices = FittedVertices(body, rig, Pose(self.turns, self.translation_m))
-        return MeshSequence(
-            vertices,
-            body.faces,
+        return surface(
+            self.shape,
             self.timebase,
-            self.source,
-            present=self.present.copy(),
-            uncertainty=VelocityUncertainty(
-                LIMBS,
-                vertex_limbs(body),
-                _of_limbs(self.along_sd_mps),
-                _of_limbs(self.across_sd_mps),
-            ),
+            Pose(self.turns, self.translation_m).at,
+            self.present,
+            of_limbs(self.along_sd_mps),
+            of_limbs(self.across_sd_mps),
+            resolution,
         )
 
     @property
@@ -95,25 +99,97 @@ class BodyFit:
         return np.asarray(np.exp(-np.median(residual, axis=1) / 0.05))
 
 
-class FittedVertices:
-    """Vertices (T, V, 3) of a body in a pose, float32, made when they are asked for."""
+@dataclass(frozen=True, eq=False)
+class FittedMotion:
+    """A person's shape and motion in a clip of any length; poses are read as they are needed.
 
-    def __init__(self, body: Body, rig: Rig, pose: Pose) -> None:
-        self._body, self._rig, self._pose = body, rig, pose
-        self.shape = (len(pose.turns), len(body.vertices_m), 3)
+    Parameters
+    ----------
+    timebase : Timebase
+    shape : BodyShape
+    poses : callable
+        Gives the pose of frames (n,).
+    present : bool array, shape (T,)
+    along_sd_mps, across_sd_mps : float32 arrays, shape (T, L)
+        Of :class:`BodyFit`, the mean over each limb's landmarks.
+    residual_m : float
+        Mean of :attr:`BodyFit.residual_m`.
+    quality : float
+        Mean of :attr:`BodyFit.quality` over frames with the person.
+    """
+
+    timebase: Timebase
+    shape: BodyShape
+    poses: Poses
+    present: NDArray[np.bool_]
+    along_sd_mps: NDArray[np.float32]
+    across_sd_mps: NDArray[np.float32]
+    residual_m: float
+    quality: float
+
+    def mesh(self, resolution: Resolution = "high") -> MeshSequence:
+        """The moving surface, as :meth:`BodyFit.mesh`."""
+        return surface(
+            self.shape,
+            self.timebase,
+            self.poses,
+            self.present,
+            self.along_sd_mps,
+            self.across_sd_mps,
+            resolution,
+        )
+
+
+def surface(
+    shape: BodyShape,
+    timebase: Timebase,
+    poses: Poses,
+    present: NDArray[np.bool_],
+    along_sd_mps: NDArray[np.float32],
+    across_sd_mps: NDArray[np.float32],
+    resolution: Resolution,
+) -> MeshSequence:
+    """The moving surface of a body; standard deviations are those of limbs, (T, L)."""
+    space = ShapeSpace()
+    body = space.load(resolution, shape)
+    rig = Rig(body.skeleton, KeypointSpace(space).of(shape))
+    return MeshSequence(
+        FittedVertices(body, rig, len(timebase), poses),
+        body.faces,
+        timebase,
+        present=present.copy(),
+        uncertainty=VelocityUncertainty(LIMBS, vertex_limbs(body), along_sd_mps, across_sd_mps),
+    )
+
+
+class FittedVertices:
+    """Vertices (T, V, 3) of a body in a pose, float32, made when they are asked for.
+
+    Parameters
+    ----------
+    body : Body
+    rig : Rig
+    frames : int
+    poses : callable
+        Gives the pose of frames (n,).
+    """
+
+    def __init__(self, body: Body, rig: Rig, frames: int, poses: Poses) -> None:
+        self._body, self._rig, self._poses = body, rig, poses
+        self.shape = (frames, len(body.vertices_m), 3)
         self.dtype = np.dtype(np.float32)
 
     def __getitem__(self, key: Any) -> NDArray[np.float32]:
         frames, rest = (key[0], key[1:]) if isinstance(key, tuple) else (key, ())
         rows = np.arange(self.shape[0])[frames]
-        several = np.atleast_1d(rows)
-        rotations = self._rig.body_rotations(self._pose.turns[several])
-        transforms = self._body.skeleton.transforms(rotations, self._pose.translation_m[several])
+        pose = self._poses(np.atleast_1d(rows))
+        rotations = self._rig.body_rotations(pose.turns)
+        transforms = self._body.skeleton.transforms(rotations, pose.translation_m)
         vertices = pose_vertices(self._body, transforms)
         return vertices[(slice(None) if rows.ndim else 0, *rest)]
 
 
-def _of_limbs(landmarks: Floats) -> NDArray[np.float32]:
+def of_limbs(landmarks: Floats) -> NDArray[np.float32]:
     """Mean over the landmarks of each limb, (T, L)."""
     rows = [[LANDMARKS.index(name) for name in LIMB_LANDMARKS[limb]] for limb in LIMBS]
     return np.stack([landmarks[:, row].mean(axis=1) for row in rows], axis=1).astype(np.float32)

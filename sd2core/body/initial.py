@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sd2core.body.rig import JOINT, JOINTS, Rig
 from sd2core.body.rotations import Floats, aligning, applied, from_vector, to_vector, transposed
@@ -24,6 +25,10 @@ class Pose(NamedTuple):
 
     turns: Floats
     translation_m: Floats
+
+    def at(self, frames: NDArray[np.intp] | slice) -> Pose:
+        """The pose of some frames."""
+        return Pose(self.turns[frames], self.translation_m[frames])
 
 
 def initial_pose(rig: Rig, seen_m: Floats, trust: Floats) -> Pose:

@@ -6,34 +6,24 @@ import json
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.atomic import atomic_write
-from sd2core.body.track import LandmarkTrack
+from sd2core.body.track import PER_FRAME, Landmarks, LandmarkTrack, parts
 from sd2core.errors import Sd2Error
 from sd2core.timebase import Timebase
 
 FORMAT = "sd2-landmarks"
 VERSION = 1
 
-_ARRAYS = (
-    "image_px",
-    "depth_px",
-    "world_m",
-    "visibility",
-    "confidence",
-    "present",
-    "bridged",
-    "silhouette_frames",
-    "silhouettes",
-)
+_ARRAYS = (*PER_FRAME, "silhouette_frames", "silhouettes")
 
 
-def save_track(track: LandmarkTrack, path: Path | str) -> None:
-    """Write landmarks to one file (.npz), in one step."""
+def save_track(track: Landmarks, path: Path | str) -> None:
+    """Write landmarks to one file (.npz), part by part and in one step."""
     meta = {
         "format": FORMAT,
         "version": VERSION,
@@ -41,8 +31,33 @@ def save_track(track: LandmarkTrack, path: Path | str) -> None:
         "height": track.height,
         "notes": list(track.notes),
     }
-    arrays = {name: getattr(track, name) for name in _ARRAYS}
-    write_arrays(Path(path), arrays | {"times_s": track.timebase.times_s}, meta)
+    small = {
+        "meta": np.array(json.dumps(meta, ensure_ascii=False)),
+        "times_s": track.timebase.times_s,
+        "silhouette_frames": track.silhouette_frames,
+        "silhouettes": track.silhouettes,
+    }
+    with (
+        atomic_write(Path(path)) as stream,
+        zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive,
+    ):
+        for name, array in small.items():
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                np.lib.format.write_array(member, array, allow_pickle=False)
+        for name in PER_FRAME:
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                _write_parts(member, track, name)
+
+
+def _write_parts(member: IO[bytes], track: Landmarks, name: str) -> None:
+    """One array of a track as ``.npy``."""
+    for start, stop in parts(len(track)):
+        values = getattr(track.part(start, stop), name)
+        if start == 0:
+            shape = (len(track), *values.shape[1:])
+            header = {"descr": values.dtype.str, "fortran_order": False, "shape": shape}
+            np.lib.format.write_array_header_1_0(member, header)
+        member.write(np.ascontiguousarray(values).tobytes())
 
 
 def load_track(path: Path | str) -> LandmarkTrack:

@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
-import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.blazepose import Pose, PoseDetector, PoseLandmarker
 from sd2core.body.choosing import Rectangle, Start, choose, chosen_by
-from sd2core.body.landmark_files import load_track, read_arrays, save_track, write_arrays
+from sd2core.body.landmark_files import load_track, save_track
 from sd2core.body.landmark_models import LandmarkModels
-from sd2core.body.refining import Refiner, Stretch
-from sd2core.body.repair import Found, repaired
+from sd2core.body.refining import Refiner
 from sd2core.body.roi import Roi
-from sd2core.body.roi_path import Sightings, roi_numbers, roi_path
-from sd2core.body.track import LandmarkTrack
+from sd2core.body.roi_path import Sightings, roi_numbers, roi_of, roi_path
+from sd2core.body.search_store import SearchStore
+from sd2core.body.track_in_parts import RefinedStretches, TrackInParts
 from sd2core.body.tracking import Follower, Search
 from sd2core.compiled import worker_count
 from sd2core.errors import Sd2Error
@@ -38,7 +34,6 @@ DEFAULT_SILHOUETTES = 24
 SIGHTINGS = "sightings.npz"
 """In a workspace: what the first pass found."""
 
-_WORKSPACE_VERSION = 1
 _STRETCH_FRAMES = 256
 _SAVE_EVERY = 300
 _MOST_THREADS = 8
@@ -56,7 +51,7 @@ def find_landmarks(
     on_stage: Callable[[str], None] | None = None,
     on_frame: OnFrame | None = None,
     workspace: Path | None = None,
-) -> LandmarkTrack:
+) -> TrackInParts:
     """Find the landmarks of one person in every frame.
 
     The person is followed from a first frame both ways; the path of the square around
@@ -88,7 +83,8 @@ def find_landmarks(
 
     Returns
     -------
-    LandmarkTrack
+    TrackInParts
+        In the workspace; without one in memory.
 
     Raises
     ------
@@ -103,13 +99,19 @@ def find_landmarks(
         raise Sd2Error(f"the longest gap to bridge is {max_gap_s} s", "0 s or more")
     if threads is None:
         threads = min(worker_count(), _MOST_THREADS)
-    store = _Store(workspace, video, person, silhouettes)
+    store = SearchStore(workspace, video, person, silhouettes)
     begin = on_stage or (lambda stage: None)
     begin("find")
     sightings = _found(video, models, person, threads, progress, on_frame, store)
     begin("refine")
-    stretches = _refined(video, models, sightings, silhouettes, threads, progress, on_frame, store)
-    return _track(video, stretches, max_gap_s)
+    refined = _refined(video, models, sightings, silhouettes, threads, progress, on_frame, store)
+    if not refined.confidence.any():
+        raise Sd2Error(
+            f"Nobody could be followed through {video.path}",
+            "a person who is seen in some frames in succession",
+            "Say where the person is: --person X,Y,WIDTH,HEIGHT --person-frame FRAME",
+        )
+    return TrackInParts(store, video.timebase, video.width, video.height, refined, max_gap_s)
 
 
 def _found(
@@ -119,7 +121,7 @@ def _found(
     threads: int,
     progress: Progress,
     on_frame: OnFrame | None,
-    store: _Store,
+    store: SearchStore,
 ) -> Sightings:
     """The first pass."""
     kept = store.read(SIGHTINGS)
@@ -161,117 +163,38 @@ def _refined(
     threads: int,
     progress: Progress,
     on_frame: OnFrame | None,
-    store: _Store,
-) -> list[Stretch]:
+    store: SearchStore,
+) -> RefinedStretches:
     """The second pass."""
     frames = len(video)
-    rois = roi_path(sightings, video.timebase.times_s)
-    kept = _spread([frame for frame in range(frames) if rois[frame] is not None], silhouettes)
+    path = roi_path(sightings, video.timebase.times_s)
+    kept = _spread(np.flatnonzero(np.isfinite(path[:, 0])), silhouettes)
 
     def seen(frame: int, pose: Pose | None) -> None:
         _show(frame, pose, on_frame)
         progress(frame + 1, frames)
 
-    stretches = []
+    refined = RefinedStretches(store, video, _STRETCH_FRAMES)
     landmarkers = [PoseLandmarker(models.landmarker) for _ in range(threads)]
     with Refiner(landmarkers) as refiner:
         for start in range(0, frames, _STRETCH_FRAMES):
-            name = f"refined-{start:07d}.npz"
-            arrays = store.read(name)
-            if arrays is None:
-                part = rois[start : start + _STRETCH_FRAMES]
-                stretch = refiner.stretch(video, start, part, kept, seen)
-                store.write(name, vars(stretch))
-            else:
-                stretch = Stretch(**arrays)
-                progress(start + len(stretch.confidence), frames)
-            stretches.append(stretch)
-    return stretches
+            if refined.resumed(start):
+                progress(min(start + _STRETCH_FRAMES, frames), frames)
+                continue
+            rois = [roi_of(row) for row in path[start : start + _STRETCH_FRAMES]]
+            refined.add(start, refiner.stretch(video, start, rois, kept, seen))
+    return refined
 
 
-def _spread(frames: list[int], count: int | None) -> frozenset[int]:
+def _spread(frames: NDArray[np.intp], count: int | None) -> frozenset[int]:
     """``count`` of the frames, evenly spread."""
     if count is None or count >= len(frames):
-        return frozenset(frames)
-    return frozenset(frames[round(k)] for k in np.linspace(0, len(frames) - 1, count))
+        return frozenset(frames.tolist())
+    rows = [round(k) for k in np.linspace(0, len(frames) - 1, count)]
+    return frozenset(frames[rows].tolist())
 
 
 def _show(frame: int, pose: Pose | None, on_frame: OnFrame | None) -> None:
     if pose is not None and on_frame is not None:
         visibility = pose.visibility * pose.presence
         on_frame(frame, pose.image_px[:33].astype(np.float32), visibility.astype(np.float32))
-
-
-def _track(video: VideoReader, stretches: list[Stretch], max_gap_s: float) -> LandmarkTrack:
-    """Everything together, mended."""
-    joined = {
-        name: np.concatenate([getattr(stretch, name) for stretch in stretches])
-        for name in vars(stretches[0])
-    }
-    confidence = joined["confidence"]
-    if not confidence.any():
-        raise Sd2Error(
-            f"Nobody could be followed through {video.path}",
-            "a person who is seen in some frames in succession",
-            "Say where the person is: --person X,Y,WIDTH,HEIGHT --person-frame FRAME",
-        )
-    found = Found(
-        times_s=video.timebase.times_s,
-        present=confidence > 0.0,
-        bridged=np.zeros(len(confidence), bool),
-        **{name: joined[name] for name in ("image_px", "depth_px", "world_m", "visibility")},
-    )
-    found, notes = repaired(found, max_gap_s)
-    return LandmarkTrack(
-        timebase=video.timebase,
-        width=video.width,
-        height=video.height,
-        image_px=found.image_px,
-        depth_px=found.depth_px,
-        world_m=found.world_m,
-        visibility=found.visibility,
-        confidence=confidence,
-        present=found.present,
-        bridged=found.bridged,
-        silhouette_frames=joined["silhouette_frames"],
-        silhouettes=joined["silhouettes"],
-        notes=notes,
-    )
-
-
-class _Store:
-    """What is kept of a search; files of another search are as if not there."""
-
-    def __init__(
-        self,
-        folder: Path | None,
-        video: VideoReader,
-        person: Rectangle | None,
-        silhouettes: int | None,
-    ) -> None:
-        self._folder = folder
-        if folder is None:
-            return
-        folder.mkdir(parents=True, exist_ok=True)
-        about = os.stat(video.path)
-        identity = {
-            "version": _WORKSPACE_VERSION,
-            "video": [str(video.path.resolve()), about.st_size, about.st_mtime_ns],
-            "frames": [len(video), video.width, video.height],
-            "person": None if person is None else list(vars(person).values()),
-            "silhouettes": silhouettes,
-        }
-        self._key = hashlib.sha256(json.dumps(identity).encode()).hexdigest()
-
-    def read(self, name: str) -> dict[str, Any] | None:
-        if self._folder is None or not (self._folder / name).is_file():
-            return None
-        try:
-            arrays, meta = read_arrays(self._folder / name)
-        except Sd2Error:
-            return None
-        return arrays if meta.get("key") == self._key else None
-
-    def write(self, name: str, arrays: Mapping[str, Any]) -> None:
-        if self._folder is not None:
-            write_arrays(self._folder / name, arrays, {"key": self._key})

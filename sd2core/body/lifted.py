@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +52,20 @@ class LiftedTrack:
     depth_sigma: Floats
     velocity: Floats
     velocity_sigma: Floats
+
+    def part(self, start: int, stop: int) -> LiftedTrack:
+        """Frames ``start`` to ``stop``."""
+        frames = slice(start, stop)
+        arrays = {name: values[frames] for name, values in vars(self).items() if name != "timebase"}
+        return LiftedTrack(Timebase(self.timebase.times_s[frames]), **arrays)
+
+
+class Lifted(Protocol):
+    """A lifted track that need not be in memory as a whole."""
+
+    def part(self, start: int, stop: int) -> LiftedTrack:
+        """Frames ``start`` to ``stop``."""
+        ...
 
 
 def lifted_by_world(track: LandmarkTrack, camera: PinholeCamera) -> LiftedTrack:

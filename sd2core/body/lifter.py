@@ -16,14 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.bundled_file import open_arrays
-from sd2core.body.camera import PinholeCamera
-from sd2core.body.lifted import LiftedTrack
-from sd2core.body.lifter_features import RATE_HZ, Seen, features, mirrored, rate, typical_size
-from sd2core.body.track import LANDMARKS, MIRRORED, LandmarkTrack
-from sd2core.errors import Sd2Error
-from sd2core.presence import runs
+from sd2core.body.lifter_features import (
+    Seen,
+    features,
+    mirrored,
+    rate,
+    scale_of,
+    typical_size,
+)
+from sd2core.body.track import LANDMARKS, MIRRORED
 from sd2core.resources import resource_path
-from sd2core.timebase import Timebase
 
 Singles = NDArray[np.float32]
 Floats = NDArray[np.float64]
@@ -45,7 +47,6 @@ LOG_SIGMA = (-6.0, 1.5)
 
 _WINDOW = 600
 _FAR = 8.0
-_SAME_RATE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,53 +132,25 @@ class Lifter:
         network = Network(tuple(meta["dilations"]), arrays, meta.get("beyond_rates", False))
         return cls(network, calibration, meta["provenance"])
 
-    def lift(self, track: LandmarkTrack, camera: PinholeCamera) -> LiftedTrack:
-        """Depth and motion along the line of sight of every frame with a person.
-
-        Parameters
-        ----------
-        track : LandmarkTrack
-        camera : PinholeCamera
-            Of the same picture.
-
-        Returns
-        -------
-        LiftedTrack
-
-        Raises
-        ------
-        Sd2Error
-            When the camera's picture has another size than the track's.
-        """
-        if (camera.width, camera.height) != (track.width, track.height):
-            raise Sd2Error(
-                f"The camera takes pictures of {camera.width} × {camera.height}",
-                f"{track.width} × {track.height}, as the landmarks were found in",
-            )
-        raw = np.full((len(track), OUTPUTS), np.nan)
-        size = np.full(len(track), np.nan)
-        for start, stop in runs(track.present):
-            seen, place = _at_rate(_seen(track, camera, start, stop), track.timebase, start, stop)
-            size[start:stop] = typical_size(seen.slopes)
-            raw[start:stop] = _interpolated(self.outputs(seen), place)
-        return _lifted(track.timebase, raw, size)
-
-    def outputs(self, seen: Seen) -> Singles:
+    def outputs(self, seen: Seen, sample: Seen | None = None) -> Singles:
         """Calibrated outputs (T, OUTPUTS) of one stretch, velocities in full.
 
         The mean of what the network says of the stretch, of its mirror image, and of
         both played backwards, so that it treats sides and directions of time alike.
+        What a person measures is taken from ``sample``, by default the stretch itself.
         """
-        return symmetric(self.network, seen) + self.calibration
+        return symmetric(self.network, seen, sample) + self.calibration
 
 
-def symmetric(network: Network, seen: Seen) -> Singles:
+def symmetric(network: Network, seen: Seen, sample: Seen | None = None) -> Singles:
     """Mean of the outputs over a stretch's mirror image and reversal, velocities in full."""
-    size = float(typical_size(seen.slopes))
+    sample = seen if sample is None else sample
+    size = float(typical_size(sample.slopes))
     total = np.zeros((len(seen.sure), OUTPUTS), np.float32)
-    for view in (seen, mirrored(seen)):
-        told = features(view)
-        backwards = features(Seen(*(np.asarray(part)[::-1] for part in view)))
+    for view, known in ((seen, sample), (mirrored(seen), mirrored(sample))):
+        scale = scale_of(known)
+        told = features(view, scale)
+        backwards = features(Seen(*(np.asarray(part)[::-1] for part in view)), scale)
         ahead, back = network(told), network(backwards)
         if network.beyond_rates:
             ahead, back = with_rates(ahead, size), with_rates(back, size)
@@ -200,71 +173,6 @@ def with_rates(out: Singles, size: float) -> Singles:
     centre = np.exp(out[:, :1]) / np.float32(size) * rate(out[:, :1], 0)
     full[:, _VELOCITIES] += rate(out[:, 2 : 2 + POINTS], 0) + centre
     return full
-
-
-def _seen(track: LandmarkTrack, camera: PinholeCamera, start: int, stop: int) -> Seen:
-    part = slice(start, stop)
-    return Seen(
-        camera.slopes(track.image_px[part].astype(np.float64)),
-        track.depth_px[part] / camera.focal_px,
-        track.world_m[part].astype(np.float64),
-        track.visibility[part].astype(np.float64),
-        np.where(track.bridged[part], 0.0, track.confidence[part]),
-    )
-
-
-def _at_rate(seen: Seen, timebase: Timebase, start: int, stop: int) -> tuple[Seen, Floats]:
-    """A stretch resampled to :data:`RATE_HZ`, and where its frames are in the result."""
-    times = timebase.times_s[start:stop]
-    step = np.diff(times) * RATE_HZ
-    if not len(step) or (np.abs(step - 1.0) < _SAME_RATE).all():
-        return seen, np.arange(len(times), dtype=np.float64)
-    place = (times - times[0]) * RATE_HZ
-    return Seen(*(_resampled(np.asarray(part), place) for part in seen)), place
-
-
-def _resampled(values: Floats, place: Floats) -> Floats:
-    """Values (T, ...) at increasing places, at every whole number from 0 to the last.
-
-    Where frames are closer than a tick each tick is their mean, weighted by a
-    triangle of one tick to each side; elsewhere a monotone cubic goes through them.
-    """
-    from scipy.interpolate import PchipInterpolator
-
-    flat = values.reshape(len(values), -1)
-    grid = np.arange(int(place[-1] + 1e-6) + 1)
-    result = PchipInterpolator(place, flat, axis=0)(np.minimum(grid, place[-1]))
-    low = np.minimum(place.astype(np.intp), grid[-1])
-    total, weight = np.zeros((len(grid) + 1, flat.shape[1])), np.zeros(len(grid) + 1)
-    for row, share in ((low, 1.0 - (place - low)), (low + 1, place - low)):
-        share = np.clip(share, 0.0, 1.0)
-        np.add.at(total, row, share[:, None] * flat)
-        np.add.at(weight, row, share)
-    crowded = weight[:-1] > 1.3
-    result[crowded] = total[:-1][crowded] / weight[:-1][crowded, None]
-    return np.asarray(result.reshape(len(grid), *values.shape[1:]))
-
-
-def _interpolated(outputs: Singles, place: Floats) -> Floats:
-    """Rows of outputs at fractional places."""
-    low = np.clip(place.astype(np.intp), 0, max(len(outputs) - 2, 0))
-    share = np.clip(place - low, 0.0, 1.0)[:, None]
-    high = np.minimum(low + 1, len(outputs) - 1)
-    return np.asarray((1.0 - share) * outputs[low] + share * outputs[high])
-
-
-def _lifted(timebase: Timebase, raw: Floats, size: Floats) -> LiftedTrack:
-    root, root_spread, rest = raw[:, 0], raw[:, 1], raw[:, 2:].reshape(len(raw), 4, POINTS)
-    centre = np.exp(root) / size
-    return LiftedTrack(
-        timebase,
-        centre,
-        centre * spread(root_spread),
-        rest[:, 0],
-        spread(rest[:, 1]),
-        rest[:, 2],
-        spread(rest[:, 3]),
-    )
 
 
 def spread(logarithm: NDArray[np.floating]) -> Floats:

@@ -95,25 +95,49 @@ def typical_size(slopes: Floats) -> Floats:
     return np.asarray(np.median(apparent_size(slopes), axis=-1))
 
 
-def features(seen: Seen) -> Singles:
+class Scale(NamedTuple):
+    """What a whole stretch is measured in.
+
+    Parameters
+    ----------
+    size : array, shape (...,)
+        See :func:`typical_size`.
+    torso_m : array, shape (...,)
+        Median length of the torso in the landmark model's own metres.
+    longest : array, shape (..., 1, bones)
+        How long each bone looks at its longest, nearly: 95 % are shorter.
+    """
+
+    size: Floats
+    torso_m: Floats
+    longest: Floats
+
+
+def scale_of(seen: Seen) -> Scale:
+    """What a stretch is measured in, from all its frames or a sample of them."""
+    size = typical_size(np.asarray(seen.slopes))
+    world = np.asarray(seen.world_m)
+    torso = world[..., _SHOULDERS, :].mean(axis=-2) - world[..., _HIPS, :].mean(axis=-2)
+    torso_m = np.median(np.sqrt((torso**2).sum(axis=-1)), axis=-1)
+    length, _, _ = _foreshortening(*_measured(seen, size, torso_m))
+    return Scale(size, torso_m, np.quantile(length, 0.95, axis=-2, keepdims=True))
+
+
+def features(seen: Seen, scale: Scale | None = None) -> Singles:
     """What the network is told of every frame, (..., T, C).
 
     All but the direction of the body and its size is free of where the person
-    stands and how far away.
+    stands and how far away. ``scale`` is that of a longer stretch that this is part of.
     """
+    scale = scale_of(seen) if scale is None else scale
     slopes = np.asarray(seen.slopes)
     size = apparent_size(slopes)  # (..., T)
-    unit = typical_size(slopes)[..., None]  # (..., 1)
+    unit = scale.size[..., None]  # (..., 1)
     centre = slopes[..., list(CENTRE), :].mean(axis=-2)  # (..., T, 2)
-    around = (slopes - centre[..., None, :]) / unit[..., None, None]
+    around, world = _measured(seen, scale.size, scale.torso_m)
     depth = seen.depth / unit[..., None]
-    world = np.asarray(seen.world_m)
-    torso = world[..., _SHOULDERS, :].mean(axis=-2) - world[..., _HIPS, :].mean(axis=-2)
-    length = np.median(np.sqrt((torso**2).sum(axis=-1)), axis=-1)
-    world = world * (_TORSO_M / np.maximum(length, 0.05))[..., None, None, None]
     apparent = np.log(size / unit)[..., None]
     length, ahead, signed = _foreshortening(around, world)
-    longest = np.quantile(length, 0.95, axis=-2, keepdims=True)
     flat = (*slopes.shape[:-2], -1)
     columns = [
         around.reshape(flat),
@@ -124,7 +148,7 @@ def features(seen: Seen) -> Singles:
         rate(world[..., 2], -2),
         length,
         rate(length, -2),
-        np.broadcast_to(longest, length.shape),
+        np.broadcast_to(scale.longest, length.shape),
         ahead,
         signed,
         rate(signed, -2),
@@ -137,6 +161,15 @@ def features(seen: Seen) -> Singles:
         np.broadcast_to(np.log(unit)[..., None], apparent.shape),
     ]
     return np.concatenate(columns, axis=-1).astype(np.float32)
+
+
+def _measured(seen: Seen, size: Floats, torso_m: Floats) -> tuple[Floats, Floats]:
+    """Slopes around the body's centre and the model's own places, in a stretch's measures."""
+    slopes = np.asarray(seen.slopes)
+    centre = slopes[..., list(CENTRE), :].mean(axis=-2)
+    around = (slopes - centre[..., None, :]) / size[..., None][..., None, None]
+    metres = (_TORSO_M / np.maximum(torso_m, 0.05))[..., None, None, None]
+    return around, np.asarray(seen.world_m) * metres
 
 
 def _foreshortening(around: Floats, world_m: Floats) -> tuple[Floats, Floats, Floats]:

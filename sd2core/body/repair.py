@@ -1,6 +1,7 @@
 """What the landmark model gets wrong, found and mended: swapped sides, outliers, gaps.
 
-Pure functions of arrays. Limits are in seconds and metres, so that they mean the same at
+Pure functions of arrays; :mod:`sd2core.body.mending` has them follow one another, over clips
+of any length. Limits are in seconds and metres, so that they mean the same at
 every frame rate and size of picture.
 """
 
@@ -19,7 +20,9 @@ Singles = NDArray[np.float32]
 ARMS = tuple(range(13, 23))
 LEGS = tuple(range(25, 33))
 TRUNK = tuple(number for number in range(33) if number not in ARMS + LEGS)
-_PARTS = {"head and trunk": TRUNK, "the arms": ARMS, "the legs": LEGS}
+SIDED_PARTS = {"head and trunk": TRUNK, "the arms": ARMS, "the legs": LEGS}
+"""What is swapped as one, and its landmarks."""
+
 _PARTNERS = np.array(MIRRORED)
 
 MAX_ACCELERATION_MPS2 = 250.0
@@ -66,42 +69,9 @@ class Found:
             changed[name] = values
         return replace(self, **changed)
 
-
-def repaired(found: Found, max_gap_s: float) -> tuple[Found, tuple[str, ...]]:
-    """Everything mended, and sentences about it.
-
-    Parameters
-    ----------
-    found : Found
-    max_gap_s : float
-        The longest gap that is bridged, from the last frame before to the first after.
-    """
-    notes = []
-    found, swaps = unswapped(found)
-    for part, frames in swaps.items():
-        if frames.any():
-            notes.append(f"Left and right of {part} swapped back in {_count(int(frames.sum()))}.")
-    found, replaced = without_outliers(found)
-    if replaced.any():
-        notes.append(
-            "Replaced from the frames around them:"
-            f" {_count(int(replaced.sum()), 'outlying landmark')} in"
-            f" {_count(int(replaced.any(axis=1).sum()))}."
-        )
-    found = bridged(found, max_gap_s)
-    if found.bridged.any():
-        notes.append(
-            f"Interpolated, in gaps of up to {max_gap_s:g} s without the person:"
-            f" {_count(int(found.bridged.sum()))}."
-        )
-    missing = int((~found.present).sum())
-    if missing:
-        notes.append(f"Left empty, without the person: {_count(missing)}.")
-    return found, tuple(notes)
-
-
-def _count(number: int, what: str = "frame") -> str:
-    return f"{number} {what}" if number == 1 else f"{number} {what}s"
+    def part(self, start: int, stop: int) -> Found:
+        """Frames ``start`` to ``stop``."""
+        return Found(**{name: values[start:stop] for name, values in vars(self).items()})
 
 
 # -- Left and right ------------------------------------------------------------------------------
@@ -123,7 +93,7 @@ def unswapped(found: Found) -> tuple[Found, dict[str, NDArray[np.bool_]]]:
     swaps: dict[str, NDArray[np.bool_]] = {}
     rows = np.flatnonzero(found.present)
     times = found.times_s[rows]
-    for part, members in _PARTS.items():
+    for part, members in SIDED_PARTS.items():
         swapped = np.zeros(len(found.times_s), bool)
         if len(rows) >= 3:
             scale = metre_px(found)[rows, None]
@@ -134,11 +104,17 @@ def unswapped(found: Found) -> tuple[Found, dict[str, NDArray[np.bool_]]]:
             switch = np.abs(np.diff(np.indices((2, 2, 2)), axis=0)).sum(axis=0)  # (a, b, c)
             cost += 0.5 * len(members) * _SWITCH_M**2 * switch[..., None]
             swapped[rows] = _smoothest(cost)
-        order = np.arange(len(LANDMARKS))
-        order[list(members)] = _PARTNERS[list(members)]
-        found = found.picked(order, swapped)
+        found = resided(found, part, swapped)
         swaps[part] = swapped
     return found, swaps
+
+
+def resided(found: Found, part: str, frames: NDArray[np.bool_]) -> Found:
+    """Left and right of one of :data:`SIDED_PARTS` swapped in some frames (T,)."""
+    members = list(SIDED_PARTS[part])
+    order = np.arange(len(LANDMARKS))
+    order[members] = _PARTNERS[members]
+    return found.picked(order, frames)
 
 
 def _pair(landmark: int) -> tuple[int, int]:

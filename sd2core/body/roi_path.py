@@ -40,7 +40,14 @@ def roi_numbers(roi: Roi) -> Floats:
     return np.array([roi.centre_x_px, roi.centre_y_px, roi.size_px, roi.angle_rad])
 
 
-def roi_path(sightings: Sightings, times_s: Floats) -> list[Roi | None]:
+def roi_of(row: Floats) -> Roi | None:
+    """The square of such a row; None where it is NaN."""
+    if np.isnan(row[0]):
+        return None
+    return Roi(*(float(number) for number in row))
+
+
+def roi_path(sightings: Sightings, times_s: Floats) -> Floats:
     """A smooth path of the square through every frame, without lag.
 
     Parameters
@@ -51,10 +58,11 @@ def roi_path(sightings: Sightings, times_s: Floats) -> list[Roi | None]:
 
     Returns
     -------
-    list of Roi, length T
-        None where the person was not found in the sightings before and after.
+    float64 array, shape (T, 4)
+        Squares as rows, see :func:`roi_of`; NaN where the person was not found in the
+        sightings before and after.
     """
-    path: list[Roi | None] = [None] * len(times_s)
+    path = np.full((len(times_s), 4), np.nan)
     found = np.isfinite(sightings.rois[:, 0])
     # Stretches of sightings in which the person was never lost.
     for start, stop in runs(found):
@@ -72,9 +80,11 @@ def roi_path(sightings: Sightings, times_s: Floats) -> list[Roi | None]:
             axis=1,
         )
         inside = np.arange(frames[0], frames[-1] + 1)
-        rows = [np.interp(times_s[inside], times, column) for column in smooth.T]
-        for frame, x, y, size, angle in zip(inside, *rows, strict=True):
-            path[frame] = Roi(x, y, math.exp(size), math.remainder(angle, math.tau))
+        for number, column in enumerate(smooth.T):
+            path[inside, number] = np.interp(times_s[inside], times, column)
+        for frame in inside:
+            path[frame, 2] = math.exp(path[frame, 2])
+            path[frame, 3] = math.remainder(path[frame, 3], math.tau)
     return path
 
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,6 +56,84 @@ MIRRORED = tuple(
     for name in LANDMARKS
 )
 """For every landmark the one on the other side."""
+
+
+PER_FRAME = (
+    "image_px",
+    "depth_px",
+    "world_m",
+    "visibility",
+    "confidence",
+    "present",
+    "bridged",
+)
+"""Arrays of a track that have a row for every frame, besides its times."""
+
+PART_FRAMES = 3600
+"""Longer clips (two minutes at 30 frames/s) are worked on in parts of this length.
+
+What has to be known of the whole clip is then taken from so many frames of it.
+"""
+
+
+def parts(frames: int) -> Iterator[tuple[int, int]]:
+    """Start and stop of the parts of a clip, of nearly equal length."""
+    count = max(-(-frames // PART_FRAMES), 1)
+    edges = [frames * number // count for number in range(count + 1)]
+    yield from pairwise(edges)
+
+
+class Landmarks(Protocol):
+    """A track of landmarks that need not be in memory as a whole.
+
+    What it has is that of :class:`LandmarkTrack`; the landmarks themselves are read in
+    stretches of frames.
+    """
+
+    @property
+    def timebase(self) -> Timebase:
+        """When each frame is shown."""
+        ...
+
+    @property
+    def width(self) -> int:
+        """Of the upright picture, in pixels."""
+        ...
+
+    @property
+    def height(self) -> int:
+        """Of the upright picture, in pixels."""
+        ...
+
+    @property
+    def present(self) -> NDArray[np.bool_]:
+        """Frames with the person, (T,)."""
+        ...
+
+    @property
+    def bridged(self) -> NDArray[np.bool_]:
+        """Frames that were interpolated, (T,)."""
+        ...
+
+    @property
+    def silhouette_frames(self) -> NDArray[np.intp]:
+        """Frames of which the model's mask is kept, (K,)."""
+        ...
+
+    @property
+    def silhouettes(self) -> NDArray[np.uint8]:
+        """The masks, (K, h, w)."""
+        ...
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was found and repaired."""
+        ...
+
+    def __len__(self) -> int: ...
+    def part(self, start: int, stop: int) -> LandmarkTrack:
+        """Frames ``start`` to ``stop`` as a track of their own."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,3 +187,16 @@ class LandmarkTrack:
 
     def __len__(self) -> int:
         return len(self.timebase)
+
+    def part(self, start: int, stop: int) -> LandmarkTrack:
+        """Frames ``start`` to ``stop`` as a track of their own, with the same notes."""
+        frames = slice(start, stop)
+        kept = (self.silhouette_frames >= start) & (self.silhouette_frames < stop)
+        cut = {name: getattr(self, name)[frames] for name in PER_FRAME}
+        return replace(
+            self,
+            timebase=Timebase(self.timebase.times_s[frames]),
+            silhouette_frames=self.silhouette_frames[kept] - start,
+            silhouettes=self.silhouettes[kept],
+            **cut,
+        )

@@ -155,7 +155,8 @@ def _make(options: argparse.Namespace, lines: FitLines | None) -> None:
         from sd2core.cli.reading import check_output
 
         check_output(options.landmarks, ".npz")
-    from sd2core.body.fit_video import check_fit_output, fit_video
+    from sd2core.body.fit_folder import check_fit_output
+    from sd2core.body.fit_video import fit_video
 
     check_fit_output(options.out)
     begun_s = time.perf_counter()
@@ -216,20 +217,17 @@ def _bars(stack: ExitStack) -> FitReport:
 
 
 def _summary(options: argparse.Namespace, made: FittedVideo, seconds: float) -> dict[str, Any]:
-    import numpy as np
-
     from sd2core.body.fit_video import provenance
 
     about = provenance(made, options.video, _choices(options))
-    track = made.track
     return about | {
         "out": str(options.out),
-        "frames": len(track),
-        "frames_per_s": track.timebase.frames_per_s,
-        "present": int(track.present.sum()),
-        "bridged": int(track.bridged.sum()),
-        "residual_m": float(np.nanmean(made.fit.residual_m)),
-        "quality": float(made.fit.quality[track.present].mean()),
+        "frames": made.frames,
+        "frames_per_s": made.frames_per_s,
+        "present": made.present,
+        "bridged": made.bridged,
+        "residual_m": made.residual_m,
+        "quality": made.quality,
         "seconds": seconds,
     }
 

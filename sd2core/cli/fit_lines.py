@@ -61,8 +61,8 @@ class FitLines:
         _say(
             "done",
             out=str(self._out),
-            frames=len(made.track),
-            present=int(made.track.present.sum()),
+            frames=made.frames,
+            present=made.present,
             seconds=round(seconds, 2),
         )
 

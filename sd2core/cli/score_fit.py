@@ -165,7 +165,8 @@ def _scored_real(video: Path, source: _Source) -> RealScore:
     name = f"real-{video.stem}"
     path, _ = source.fitted(name, video, [])
     with progress_bar(f"Looking at {video.name}") as progress, open_video(video) as reader:
-        track = find_landmarks(reader, landmark_models(), silhouettes=None, progress=progress)
+        found = find_landmarks(reader, landmark_models(), silhouettes=None, progress=progress)
+    track = found.part(0, len(found))
     camera = PinholeCamera.default(track.width, track.height)
     return score_real(name, load_mesh(path), track, camera)
 

@@ -100,7 +100,7 @@ class DrivenClip:
         body = space.load(resolution, self.puppet.shape)
         rig = Rig(body.skeleton, self.puppet.keypoints)
         pose = resampled(self.pose, self.clip.times_s, times_s)
-        vertices = FittedVertices(body, rig, pose)
+        vertices = FittedVertices(body, rig, len(times_s), pose.at)
         return MeshSequence(vertices, body.faces, Timebase(times_s), "body driven by a skeleton")
 
 

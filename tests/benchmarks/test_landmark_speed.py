@@ -78,7 +78,8 @@ def test_the_second_pass(benchmark: object, video: VideoReader, models: Landmark
         pose = landmarker.in_picture(video.read(frame), roi)
         single[frame], roi = pose.image_px[:33], pose.next_roi
     spent, processor = time.perf_counter(), time.process_time()
-    track = find_landmarks(video, models)
+    found = find_landmarks(video, models)
+    track = found.part(0, len(found))
     spent, processor = time.perf_counter() - spent, time.process_time() - processor
     frames = len(video)
     print(f"\nboth passes {1e3 * spent / frames:.0f} ms per frame,", end="")

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from sd2core.body import fit as fitting
+from sd2core.body import fit_windows
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.fit import fit_body
 from sd2core.body.fitted import BodyFit
@@ -14,7 +15,7 @@ from sd2core.body.lifted import CENTRE, LiftedTrack, lifted_by_world
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.silhouette import overlap, silhouette
 from sd2core.body.skinning import pose_vertices
-from sd2core.body.track import LANDMARKS, LandmarkTrack
+from sd2core.body.track import LANDMARKS, Landmarks, LandmarkTrack
 from sd2core.errors import Sd2Error
 from sd2core.progress import Cancelled
 from sd2core.simulate.gestures import swipes
@@ -43,7 +44,7 @@ class Known:
             velocity_sigma=np.full(depth.shape, 0.1) / stature_m,
         )
 
-    def __call__(self, track: LandmarkTrack, camera: PinholeCamera) -> LiftedTrack:
+    def __call__(self, track: Landmarks, camera: PinholeCamera) -> LiftedTrack:
         return self.lifted
 
 
@@ -204,8 +205,8 @@ def test_the_shortest_clips(frames: int) -> None:
 
 
 def test_windows_join_without_a_step(scene: Scene, fitted: BodyFit, monkeypatch) -> None:
-    monkeypatch.setattr(fitting, "_WINDOW_FRAMES", 30)
-    monkeypatch.setattr(fitting, "_OVERLAP_FRAMES", 12)
+    monkeypatch.setattr(fit_windows, "_WINDOW_FRAMES", 30)
+    monkeypatch.setattr(fit_windows, "_OVERLAP_FRAMES", 12)
     found = scene.fit()
     away = np.linalg.norm(found.keypoints_m - fitted.keypoints_m, axis=-1)
     assert away.mean() < 0.01
@@ -217,7 +218,7 @@ def test_windows_join_without_a_step(scene: Scene, fitted: BodyFit, monkeypatch)
 def test_windows_cover_a_stretch(frames: int) -> None:
     covered = np.zeros(frames + 7, int)
     end = 7
-    for start, stop, shared in fitting._windows(7, 7 + frames):
+    for start, stop, shared in fit_windows._windows(7, 7 + frames):
         assert start + shared == end
         covered[start + shared : stop] += 1
         end = stop
@@ -226,8 +227,8 @@ def test_windows_cover_a_stretch(frames: int) -> None:
 
 
 def test_a_stopped_fit_goes_on(scene: Scene, fitted: BodyFit, tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr(fitting, "_WINDOW_FRAMES", 30)
-    monkeypatch.setattr(fitting, "_OVERLAP_FRAMES", 12)
+    monkeypatch.setattr(fit_windows, "_WINDOW_FRAMES", 30)
+    monkeypatch.setattr(fit_windows, "_OVERLAP_FRAMES", 12)
     whole = scene.fit()
 
     def stop_late(done: int, total: int) -> None:
@@ -241,7 +242,7 @@ def test_a_stopped_fit_goes_on(scene: Scene, fitted: BodyFit, tmp_path: Path, mo
     real = fitting.solve
     monkeypatch.setattr(fitting, "solve", lambda *a: calls.append(1) or real(*a))
     resumed = scene.fit(workspace=tmp_path)
-    assert len(calls) < len(list(fitting._windows(0, 60)))
+    assert len(calls) < len(list(fit_windows._windows(0, 60)))
     np.testing.assert_array_equal(resumed.turns, whole.turns)
     # What another clip left there is not used, nor what is damaged.
     file = next(iter(tmp_path.glob("pose-*.npz")))

@@ -11,9 +11,10 @@ import pytest
 
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.keypoints import KeypointSpace
-from sd2core.body.lifted import CENTRE
+from sd2core.body.lifted import CENTRE, LiftedTrack
 from sd2core.body.lifter import OUTPUTS, Lifter, Network
 from sd2core.body.lifter_features import Seen, features
+from sd2core.body.lifting import LiftedInParts
 from sd2core.body.shape import ShapeSpace
 from sd2core.body.track import LANDMARKS, MIRRORED, LandmarkTrack
 from sd2core.errors import Sd2Error
@@ -60,6 +61,10 @@ def _moving(
     motion = random_motion(rng, skeleton, shape.stature_m, times, deed)
     places = KeypointSpace(space).of(shape).positions(skeleton.transforms(*motion))
     return places + np.array([0.0, 1.1, DISTANCE_M]), shape.stature_m
+
+
+def lifted_by(lifter: Lifter, track: LandmarkTrack, camera: PinholeCamera) -> LiftedTrack:
+    return LiftedInParts(lifter, track, camera).part(0, len(track))
 
 
 def _track(places_m: np.ndarray, rate_hz: float = 30.0) -> LandmarkTrack:
@@ -133,8 +138,8 @@ def test_a_still_person_is_still(lifter: Lifter) -> None:
     noisy = _track(places)
     rng = np.random.default_rng(0)
     jitter = 0.15 * rng.standard_normal(noisy.image_px.shape)
-    lifted = lifter.lift(
-        replace(noisy, image_px=noisy.image_px + jitter.astype(np.float32)), CAMERA
+    lifted = lifted_by(
+        lifter, replace(noisy, image_px=noisy.image_px + jitter.astype(np.float32)), CAMERA
     )
     assert np.sqrt(np.mean((stature_m * lifted.velocity) ** 2)) < 0.06
 
@@ -144,7 +149,7 @@ def test_unseen_motion_is_followed_along_the_line_of_sight(lifter: Lifter) -> No
     elbow = LANDMARKS.index("elbow.R")
     for seed in range(20, 26):
         places, stature_m = _moving(seed, 2.0, still=False, style="quick", natural=True)
-        lifted = lifter.lift(_track(places), CAMERA)
+        lifted = lifted_by(lifter, _track(places), CAMERA)
         wanted.append(np.gradient(places[:, elbow, 2], 1.0 / 30.0))
         found.append(stature_m * lifted.velocity[:, elbow])
         sigma_mps = stature_m * lifted.velocity_sigma[:, elbow]
@@ -160,12 +165,12 @@ def test_unseen_motion_is_followed_along_the_line_of_sight(lifter: Lifter) -> No
 def test_sides_and_directions_of_time_are_treated_alike(lifter: Lifter) -> None:
     places, _ = _moving(3, 1.5, still=False)
     track = _track(places)
-    plain = lifter.lift(track, CAMERA)
+    plain = lifted_by(lifter, track, CAMERA)
     sides = list(MIRRORED)
-    mirror = lifter.lift(_track(places[:, sides] * [-1.0, 1.0, 1.0]), CAMERA)
+    mirror = lifted_by(lifter, _track(places[:, sides] * [-1.0, 1.0, 1.0]), CAMERA)
     np.testing.assert_allclose(mirror.velocity[:, sides], plain.velocity, atol=2e-3)
     np.testing.assert_allclose(mirror.centre_depth, plain.centre_depth, rtol=1e-3)
-    backwards = lifter.lift(_track(places[::-1]), CAMERA)
+    backwards = lifted_by(lifter, _track(places[::-1]), CAMERA)
     np.testing.assert_allclose(-backwards.velocity[::-1], plain.velocity, atol=2e-3)
     np.testing.assert_allclose(backwards.depth_sigma[::-1], plain.depth_sigma, rtol=1e-2)
 
@@ -177,17 +182,17 @@ def test_empty_frames_stay_empty_and_part_the_clip(lifter: Lifter) -> None:
     present[25:31] = False
     image = track.image_px.copy()
     image[25:31] = np.nan
-    lifted = lifter.lift(replace(track, present=present, image_px=image), CAMERA)
+    lifted = lifted_by(lifter, replace(track, present=present, image_px=image), CAMERA)
     assert np.isnan(lifted.velocity[25:31]).all()
     assert np.isfinite(lifted.velocity[present]).all()
 
 
 def test_the_frame_rate_does_not_matter(lifter: Lifter) -> None:
     places, _ = _moving(7, 2.0, still=False)
-    plain = lifter.lift(_track(places), CAMERA)
+    plain = lifted_by(lifter, _track(places), CAMERA)
     often = np.repeat(places, 2, axis=0)[:-1].copy()
     often[1::2] = 0.5 * (places[1:] + places[:-1])
-    twice = lifter.lift(_track(often, 60.0), CAMERA)
+    twice = lifted_by(lifter, _track(often, 60.0), CAMERA)
     inner = slice(5, -5)
     difference = twice.velocity[::2][inner] - plain.velocity[inner]
     assert np.sqrt(np.mean(difference**2)) < 0.25 * plain.velocity[inner].std()
@@ -197,14 +202,14 @@ def test_the_frame_rate_does_not_matter(lifter: Lifter) -> None:
 def test_clips_of_few_frames(lifter: Lifter, frames: int) -> None:
     places, _ = _moving(8, 0.5, still=False)
     for rate_hz in (10.0, 30.0):
-        lifted = lifter.lift(_track(places[:frames], rate_hz), CAMERA)
+        lifted = lifted_by(lifter, _track(places[:frames], rate_hz), CAMERA)
         assert np.isfinite(lifted.depth).all()
 
 
 def test_the_picture_must_be_the_camera_s(lifter: Lifter) -> None:
     places, _ = _moving(9, 0.2, still=True)
     with pytest.raises(Sd2Error, match="640"):
-        lifter.lift(_track(places), PinholeCamera(320, 240, 300.0))
+        lifted_by(lifter, _track(places), PinholeCamera(320, 240, 300.0))
 
 
 def test_a_damaged_or_later_file_is_refused(tmp_path: Path) -> None:

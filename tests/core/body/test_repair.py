@@ -8,13 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from sd2core.body.mending import mended
 from sd2core.body.repair import (
     ARMS,
     LEGS,
     Found,
     bridged,
     metre_px,
-    repaired,
     spikes,
     unswapped,
     without_outliers,
@@ -70,6 +70,14 @@ def waving(times_s: NDArray[np.float64]) -> Found:
         points[:, LANDMARKS.index(name), 2] -= 0.5 * share * swing
     points[..., 0] += 0.05 * np.sin(2 * np.pi * 0.4 * times_s)[:, None]
     return found_from(points, times_s)
+
+
+def repaired(found: Found, max_gap_s: float) -> tuple[Found, tuple[str, ...]]:
+    """Everything mended, and the sentences about it."""
+    parts: list[Found] = []
+    notes = mended(found.part, found.times_s, found.present, max_gap_s, parts.append)
+    arrays = {name: [getattr(part, name) for part in parts] for name in vars(found)}
+    return Found(**{name: np.concatenate(each) for name, each in arrays.items()}), notes
 
 
 def same(one: Found, two: Found) -> bool:

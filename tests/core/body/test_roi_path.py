@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sd2core.body.appearance import similarity
-from sd2core.body.roi_path import Sightings, roi_path, smoothed
+from sd2core.body.roi_path import Sightings, roi_of, roi_path, smoothed
 
 
 class TestSmoothing:
@@ -50,7 +50,8 @@ class TestPath:
             [10.0 * frames, 100.0 - frames, np.full(11, 50.0), np.full(11, 0.1)], axis=1
         ).astype(float)
         rois[5:8] = np.nan
-        path = roi_path(Sightings(frames, rois, np.ones(11)), np.arange(21) / 30.0)
+        rows = roi_path(Sightings(frames, rois, np.ones(11)), np.arange(21) / 30.0)
+        path = [roi_of(row) for row in rows]
         there = [k for k, roi in enumerate(path) if roi is not None]
         assert there == [*range(9), *range(16, 21)]
         for frame in there:
@@ -66,8 +67,7 @@ class TestPath:
         rois = np.stack([np.full(21, 9.0), np.full(21, 9.0), np.full(21, 5.0), angles], axis=1)
         rois[:, 3] = np.remainder(angles + np.pi, 2 * np.pi) - np.pi
         path = roi_path(Sightings(np.arange(21), rois, np.ones(21)), np.arange(21) / 15.0)
-        given = np.array([roi.angle_rad for roi in path if roi is not None])
-        np.testing.assert_allclose(np.remainder(given, 2 * np.pi), angles, atol=1e-9)
+        np.testing.assert_allclose(np.remainder(path[:, 3], 2 * np.pi), angles, atol=1e-9)
 
 
 def test_likeness() -> None:

@@ -1,0 +1,128 @@
+"""The windows in which a long clip is fitted, and the poses that go over from one to the next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.body.evidence import Evidence
+from sd2core.body.initial import Pose
+from sd2core.body.landmark_files import read_arrays, write_arrays
+from sd2core.body.rig import JOINTS
+from sd2core.body.rotations import from_vector, to_vector, transposed
+from sd2core.errors import Sd2Error
+from sd2core.presence import runs
+
+_WINDOW_FRAMES = 600
+_OVERLAP_FRAMES = 60
+"""Less than half of any window: no frame is in three of them."""
+
+_TOLD_BY = ("slopes", "depth_m", "trunk_m")
+"""What tells that a kept window was fitted to the same evidence."""
+
+
+class Windows:
+    """Poses of a clip, fitted window by window.
+
+    Parameters
+    ----------
+    present : bool array, shape (T,)
+        Frames with a person, at least one.
+    workspace : Path, optional
+        An existing folder for the poses; without one they are kept in memory.
+
+    Attributes
+    ----------
+    spans : list of (int, int, int)
+        Of each window where it starts and stops, and how many frames it shares with
+        the one before.
+    """
+
+    def __init__(self, present: NDArray[np.bool_], workspace: Path | None) -> None:
+        self.spans = [span for stretch in runs(present) for span in _windows(*stretch)]
+        self._known = np.flatnonzero(present)
+        self._starts = np.array([start for start, _, _ in self.spans])
+        self._workspace = workspace
+        self._in_memory: dict[int, Pose] = {}
+        self._recent = lru_cache(maxsize=2)(self._read)
+
+    def keep(self, number: int, part: Evidence, found: Pose) -> None:
+        """Keep the pose that was found for a window's evidence."""
+        if self._workspace is None:
+            self._in_memory[number] = found
+        else:
+            told = {name: getattr(part, name) for name in _TOLD_BY}
+            write_arrays(self._file(number), told | found._asdict(), {})
+
+    def is_kept(self, number: int, part: Evidence) -> bool:
+        """Whether an earlier run has finished a window, with the same evidence."""
+        if self._workspace is None:
+            return False
+        try:
+            arrays, _ = read_arrays(self._file(number))
+            _pose_in(arrays)
+            return all(np.array_equal(arrays[name], getattr(part, name)) for name in _TOLD_BY)
+        except (Sd2Error, KeyError):
+            return False  # Missing or damaged: it is made again.
+
+    def poses(self, frames: NDArray[np.intp]) -> Pose:
+        """The pose in each of some frames (n,), of windows that are kept.
+
+        Empty frames hold the last known pose, those before it the first.
+        """
+        before = np.searchsorted(self._known, frames, side="right") - 1
+        held, place = np.unique(self._known[np.clip(before, 0, None)], return_inverse=True)
+        pose = Pose(np.empty((len(held), len(JOINTS), 3, 3)), np.empty((len(held), 3)))
+        first = int(np.searchsorted(self._starts, held[0], side="right")) - 1
+        last = int(np.searchsorted(self._starts, held[-1], side="right"))
+        # A window that the first frame shares with the one after it is needed as well.
+        for number in range(max(first - 1, 0), last):
+            self._lay(pose, held, number)
+        return pose.at(place)
+
+    def _lay(self, pose: Pose, frames: NDArray[np.intp], number: int) -> None:
+        """Write a window's pose, going over from the one before where they overlap."""
+        start, stop, overlap = self.spans[number]
+        low, middle, high = np.searchsorted(frames, [start, start + overlap, stop])
+        if low == high:
+            return
+        found = self._recent(number).at(frames[low:high] - start)
+        if middle > low:
+            shared = slice(int(low), int(middle))
+            share = np.linspace(0.0, 1.0, overlap + 2)[1:-1][frames[shared] - start]
+            share = share**3 * (10.0 + share * (6.0 * share - 15.0))  # no kink in velocity
+            other = found.at(slice(0, int(middle - low)))
+            between = to_vector(transposed(pose.turns[shared]) @ other.turns)
+            pose.turns[shared] = pose.turns[shared] @ from_vector(share[:, None, None] * between)
+            pose.translation_m[shared] += share[:, None] * (
+                other.translation_m - pose.translation_m[shared]
+            )
+        pose.turns[middle:high] = found.turns[middle - low :]
+        pose.translation_m[middle:high] = found.translation_m[middle - low :]
+
+    def _read(self, number: int) -> Pose:
+        if self._workspace is None:
+            return self._in_memory[number]
+        return _pose_in(read_arrays(self._file(number))[0])
+
+    def _file(self, number: int) -> Path:
+        assert self._workspace is not None
+        return self._workspace / f"pose-{number:05d}.npz"
+
+
+def _pose_in(arrays: dict[str, NDArray[np.float64]]) -> Pose:
+    return Pose(arrays["turns"], arrays["translation_m"])
+
+
+def _windows(start: int, stop: int) -> Iterator[tuple[int, int, int]]:
+    """Windows (start, stop, frames shared with the one before) of one stretch."""
+    step = _WINDOW_FRAMES - _OVERLAP_FRAMES
+    count = max(-(-(stop - start - _OVERLAP_FRAMES) // step), 1)
+    size = -(-(stop - start + (count - 1) * _OVERLAP_FRAMES) // count)
+    for number in range(count):
+        first = start + number * (size - _OVERLAP_FRAMES)
+        yield first, min(first + size, stop), _OVERLAP_FRAMES if number else 0

@@ -1,0 +1,180 @@
+"""A track of landmarks of any length, of which a part is in memory at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.body.mending import mended
+from sd2core.body.refining import Stretch
+from sd2core.body.repair import Found
+from sd2core.body.search_store import SearchStore
+from sd2core.body.track import PER_FRAME, LandmarkTrack, parts
+from sd2core.errors import Sd2Error
+from sd2core.io.video import VideoReader
+from sd2core.timebase import Timebase
+
+_PLACES = ("image_px", "depth_px", "world_m", "visibility")
+
+
+class TrackInParts:
+    """Landmarks in a store; see :class:`~sd2core.body.track.Landmarks`.
+
+    Parameters
+    ----------
+    store : SearchStore
+    timebase : Timebase
+    width, height : int
+    refined : RefinedStretches
+    max_gap_s : float
+        The longest gap that is bridged.
+
+    Attributes
+    ----------
+    present, bridged : bool arrays, shape (T,)
+    silhouette_frames, silhouettes : arrays, shapes (K,) and (K, h, w)
+    notes : tuple of str
+        As :class:`~sd2core.body.track.LandmarkTrack` has them.
+    """
+
+    def __init__(
+        self,
+        store: SearchStore,
+        timebase: Timebase,
+        width: int,
+        height: int,
+        refined: RefinedStretches,
+        max_gap_s: float,
+    ) -> None:
+        self.timebase, self.width, self.height = timebase, width, height
+        self.silhouette_frames, self.silhouettes = refined.silhouettes()
+        self._store = store
+        self._starts = [start for start, _ in parts(len(timebase))]
+        self._kept = lru_cache(maxsize=2)(self._read)
+        self.present, self.bridged = np.zeros((2, len(timebase)), bool)
+        written = 0
+
+        def write(found: Found) -> None:
+            nonlocal written
+            frames = slice(written, written + len(found.present))
+            confidence = refined.confidence[frames]
+            store.write(
+                _name(written),
+                {name: getattr(found, name) for name in PER_FRAME if name != "confidence"}
+                | {"confidence": confidence},
+            )
+            self.present[frames], self.bridged[frames] = found.present, found.bridged
+            written = frames.stop
+
+        self.notes = mended(
+            refined.found, timebase.times_s, refined.confidence > 0.0, max_gap_s, write
+        )
+
+    def __len__(self) -> int:
+        return len(self.timebase)
+
+    def part(self, start: int, stop: int) -> LandmarkTrack:
+        """Frames ``start`` to ``stop`` as a track of their own."""
+        first = int(np.searchsorted(self._starts, start, side="right")) - 1
+        last = max(int(np.searchsorted(self._starts, stop)), first + 1)
+        pieces = [self._kept(begin) for begin in self._starts[first:last]]
+        cut = slice(start - self._starts[first], stop - self._starts[first])
+        kept = (self.silhouette_frames >= start) & (self.silhouette_frames < stop)
+        return LandmarkTrack(
+            timebase=Timebase(self.timebase.times_s[start:stop]),
+            width=self.width,
+            height=self.height,
+            silhouette_frames=self.silhouette_frames[kept] - start,
+            silhouettes=self.silhouettes[kept],
+            notes=self.notes,
+            **{name: _joined(pieces, name)[cut] for name in PER_FRAME},
+        )
+
+    def _read(self, start: int) -> Mapping[str, NDArray[Any]]:
+        arrays = self._store.read(_name(start))
+        if arrays is None:
+            raise Sd2Error(
+                f"The landmarks of frames {start} and on have gone from the folder of the work",
+                "a folder that nobody else changes",
+                "Start the same command again; it goes on from what is there",
+            )
+        return arrays
+
+
+class RefinedStretches:
+    """What the second pass found, stretch by stretch in a store.
+
+    Attributes
+    ----------
+    confidence : float32 array, shape (T,)
+    """
+
+    def __init__(self, store: SearchStore, video: VideoReader, stretch_frames: int) -> None:
+        self._store, self._frames_each = store, stretch_frames
+        self._times_s = video.timebase.times_s
+        self.confidence = np.zeros(len(video), np.float32)
+        self._masks: list[tuple[NDArray[np.intp], NDArray[np.uint8]]] = []
+
+    def add(self, start: int, stretch: Stretch) -> None:
+        """Keep a stretch that has been looked at."""
+        self._store.write(self._name(start), vars(stretch))
+        self._count(start, stretch)
+
+    def resumed(self, start: int) -> bool:
+        """Whether the stretch that begins with a frame has been looked at already."""
+        stretch = self._read(start)
+        if stretch is not None:
+            self._count(start, stretch)
+        return stretch is not None
+
+    def silhouettes(self) -> tuple[NDArray[np.intp], NDArray[np.uint8]]:
+        """All frames with a mask, and the masks."""
+        frames, masks = zip(*self._masks, strict=True)
+        return np.concatenate(frames), np.concatenate(masks)
+
+    def found(self, start: int, stop: int) -> Found:
+        """Frames ``start`` to ``stop``, not mended."""
+        step = self._frames_each
+        begin = start // step * step
+        stretches = []
+        for first in range(begin, stop, step):
+            stretch = self._read(first)
+            if stretch is None:
+                raise Sd2Error(
+                    f"What was found in frame {first} and on has gone from the folder of the work",
+                    "a folder that nobody else changes",
+                    "Start the same command again; it goes on from what is there",
+                )
+            stretches.append(vars(stretch))
+        cut = slice(start - begin, stop - begin)
+        return Found(
+            times_s=self._times_s[start:stop],
+            present=self.confidence[start:stop] > 0.0,
+            bridged=np.zeros(stop - start, bool),
+            **{name: _joined(stretches, name)[cut] for name in _PLACES},
+        )
+
+    def _count(self, start: int, stretch: Stretch) -> None:
+        """Remember what has to be known of the whole clip."""
+        self.confidence[start : start + len(stretch.confidence)] = stretch.confidence
+        self._masks.append((stretch.silhouette_frames, stretch.silhouettes))
+
+    def _read(self, start: int) -> Stretch | None:
+        arrays = self._store.read(self._name(start))
+        return None if arrays is None else Stretch(**arrays)
+
+    @staticmethod
+    def _name(start: int) -> str:
+        return f"refined-{start:07d}.npz"
+
+
+def _name(start: int) -> str:
+    return f"mended-{start:07d}.npz"
+
+
+def _joined(pieces: Sequence[Mapping[str, NDArray[Any]]], name: str) -> NDArray[Any]:
+    return np.concatenate([piece[name] for piece in pieces])

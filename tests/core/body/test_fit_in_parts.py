@@ -1,0 +1,368 @@
+"""Clips longer than what is in memory at a time: as if they were fitted whole."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sd2core.body import evidence, fit_windows, lifting, mending, track
+from sd2core.body import fit as fitting
+from sd2core.body.camera import PinholeCamera
+from sd2core.body.fit import fit_body, fit_motion
+from sd2core.body.keypoints import KeypointSpace
+from sd2core.body.landmark_files import load_track, save_track
+from sd2core.body.lifter import Lifter
+from sd2core.body.lifting import LiftedInParts
+from sd2core.body.refining import Stretch
+from sd2core.body.repair import Found, resided
+from sd2core.body.search_store import SearchStore
+from sd2core.body.shape import ShapeSpace
+from sd2core.body.track import LANDMARKS, PER_FRAME, LandmarkTrack
+from sd2core.body.track_in_parts import RefinedStretches, TrackInParts
+from sd2core.errors import Sd2Error
+from sd2core.simulate.gestures import swipes
+from sd2core.timebase import Timebase
+
+CAMERA = PinholeCamera()
+HIPS = [LANDMARKS.index(f"hip.{side}") for side in "LR"]
+STATURE_M = 1.7
+
+
+def swiping(frames: int, frames_per_s: float = 30.0, *, uneven: bool = False) -> LandmarkTrack:
+    """Somebody who swipes on and on, seen as the landmark model sees people."""
+    rng = np.random.default_rng(3)
+    times_s = np.arange(frames) / frames_per_s
+    if uneven:
+        times_s = times_s + 0.3 * rng.uniform(-1.0, 1.0, frames) / frames_per_s
+    space = ShapeSpace()
+    motion = swipes(space.base_skeleton, 1.2 + times_s % 9.0)
+    shape = replace(space.random(rng), stature_m=STATURE_M)
+    place = np.stack([0.3 * np.sin(0.5 * times_s), 1.1 + 0.0 * times_s, 2.4 + 0.2 * times_s / 9.0])
+    transforms = space.skeleton(shape).transforms(motion.rotations, motion.translation_m + place.T)
+    points_m = KeypointSpace(space).of(shape).positions(transforms)
+    around = points_m - points_m[:, HIPS].mean(axis=1, keepdims=True)
+    noise = rng.standard_normal((frames, 33, 2))
+    return LandmarkTrack(
+        timebase=Timebase(times_s - times_s[0]),
+        width=CAMERA.width,
+        height=CAMERA.height,
+        image_px=(CAMERA.project(points_m) + noise).astype(np.float32),
+        depth_px=(0.8 * around[..., 2] * CAMERA.focal_px / 2.4).astype(np.float32),
+        world_m=(around * [1.0, 1.0, 0.8]).astype(np.float32),
+        visibility=np.full((frames, 33), 0.9, np.float32),
+        confidence=np.full(frames, 0.9, np.float32),
+        present=np.ones(frames, bool),
+        bridged=np.zeros(frames, bool),
+        silhouette_frames=np.zeros(0, np.intp),
+        silhouettes=np.zeros((0, 8, 8), np.uint8),
+    )
+
+
+def without(known: LandmarkTrack, *gaps: tuple[int, int]) -> LandmarkTrack:
+    """The same, but with nobody there in some frames."""
+    arrays = {name: getattr(known, name).copy() for name in PER_FRAME}
+    for start, stop in gaps:
+        for name in ("image_px", "depth_px", "world_m"):
+            arrays[name][start:stop] = np.nan
+        for name in ("visibility", "confidence", "present"):
+            arrays[name][start:stop] = 0
+    return replace(known, **arrays)
+
+
+@dataclass
+class Video:
+    """What of a video is needed when all has been looked at."""
+
+    timebase: Timebase
+    width: int
+    height: int
+    path: Path
+
+    def __len__(self) -> int:
+        return len(self.timebase)
+
+
+def stored(known: LandmarkTrack, folder: Path | None, max_gap_s: float = 0.5) -> TrackInParts:
+    """These landmarks as a search leaves them, and mended."""
+    path = Path(__file__)  # any file
+    video: Any = Video(known.timebase, known.width, known.height, path)
+    store = SearchStore(folder, video, None, None)
+    refined = RefinedStretches(store, video, 32)
+    for start in range(0, len(known), 32):
+        part = known.part(start, min(start + 32, len(known)))
+        names = ("image_px", "depth_px", "world_m", "visibility", "confidence")
+        refined.add(
+            start,
+            Stretch(
+                **{name: getattr(part, name) for name in names},
+                silhouette_frames=part.silhouette_frames + start,
+                silhouettes=part.silhouettes,
+            ),
+        )
+    return TrackInParts(store, known.timebase, known.width, known.height, refined, max_gap_s)
+
+
+@pytest.fixture
+def short_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(track, "PART_FRAMES", 50)
+    monkeypatch.setattr(mending, "_MARGIN_FRAMES", 30)
+
+
+@settings(max_examples=200)
+@given(st.integers(1, 100_000))
+def test_parts_follow_one_another(frames: int) -> None:
+    found = list(track.parts(frames))
+    assert found[0][0] == 0
+    assert found[-1][1] == frames
+    assert all(stop == start for (_, stop), (start, _) in pairwise(found))
+    lengths = [stop - start for start, stop in found]
+    assert max(lengths) <= track.PART_FRAMES
+    assert max(lengths) - min(lengths) <= 1
+
+
+class TestMending:
+    FRAMES = 150
+
+    def both(self, spoilt: Found, max_gap_s: float = 0.5) -> list[tuple[Found, tuple[str, ...]]]:
+        """Mended as a whole, and in parts of 50 frames."""
+        outcomes = []
+        for part_frames in (self.FRAMES, 50):
+            parts: list[Found] = []
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setattr(track, "PART_FRAMES", part_frames)
+                patch.setattr(mending, "_MARGIN_FRAMES", 30)
+                notes = mending.mended(
+                    spoilt.part, spoilt.times_s, spoilt.present, max_gap_s, parts.append
+                )
+            joined = {n: np.concatenate([getattr(p, n) for p in parts]) for n in vars(spoilt)}
+            outcomes.append((Found(**joined), notes))
+        return outcomes
+
+    def found(self, known: LandmarkTrack) -> Found:
+        names = ("present", "bridged", "image_px", "depth_px", "world_m", "visibility")
+        arrays = {name: getattr(known, name).copy() for name in names}
+        return Found(times_s=known.timebase.times_s, **arrays)
+
+    @settings(max_examples=4)
+    @given(
+        st.lists(st.tuples(st.integers(0, 140), st.integers(1, 9)), max_size=4),
+        st.lists(st.tuples(st.integers(3, 146), st.integers(0, 32)), max_size=4),
+        st.lists(st.tuples(st.integers(5, 135), st.integers(1, 9)), max_size=3),
+        st.sampled_from(["head and trunk", "the arms", "the legs"]),
+    )
+    def test_parts_are_mended_as_the_whole(
+        self,
+        swaps: list[tuple[int, int]],
+        jumps: list[tuple[int, int]],
+        gaps: list[tuple[int, int]],
+        part: str,
+    ) -> None:
+        known = without(swiping(self.FRAMES), *((at, at + length) for at, length in gaps))
+        wrong = np.zeros(self.FRAMES, bool)
+        for start, length in swaps:
+            wrong[start : start + length] = True
+        spoilt = resided(self.found(known), part, wrong & known.present)
+        for frame, landmark in jumps:
+            spoilt.image_px[frame, landmark] += 90.0
+        (whole, notes), (parts, other) = self.both(spoilt)
+        assert notes == other
+        for name, values in vars(whole).items():
+            np.testing.assert_allclose(
+                getattr(parts, name).astype(float), values.astype(float), atol=1e-4, err_msg=name
+            )
+
+    @pytest.mark.parametrize(("first", "last"), [(0, 60), (0, 90), (95, 150)])
+    def test_the_right_side_is_what_most_of_the_clip_says(self, first: int, last: int) -> None:
+        """Also where a whole part, or two, are the other way round."""
+        true = self.found(swiping(self.FRAMES))
+        wrong = np.zeros(self.FRAMES, bool)
+        wrong[first:last] = True
+        (whole, notes), (parts, other) = self.both(resided(true, "the arms", wrong))
+        assert notes == other
+        np.testing.assert_array_equal(parts.image_px, whole.image_px)
+
+    @pytest.mark.parametrize("start", [48, 60])
+    def test_a_long_gap_is_bridged_across_parts(self, start: int) -> None:
+        known = without(swiping(self.FRAMES), (start, start + 45))
+        (whole, notes), (parts, other) = self.both(self.found(known), max_gap_s=3.0)
+        assert notes == other
+        assert whole.bridged.sum() == parts.bridged.sum() == 45
+        np.testing.assert_allclose(parts.image_px, whole.image_px, atol=1e-3)
+
+
+class TestTrack:
+    @pytest.mark.usefixtures("short_parts")
+    @pytest.mark.parametrize("on_disk", [True, False])
+    def test_any_part_is_that_of_the_whole(self, tmp_path: Path, on_disk: bool) -> None:
+        known = without(swiping(170), (40, 61))
+        kept = stored(known, tmp_path if on_disk else None)
+        whole = kept.part(0, 170)
+        assert whole.notes == ("Left empty, without the person: 21 frames.",)
+        np.testing.assert_array_equal(kept.present, known.present)
+        for start, stop in ((0, 1), (30, 90), (49, 50), (101, 170)):
+            part, cut = kept.part(start, stop), whole.part(start, stop)
+            np.testing.assert_array_equal(part.timebase.times_s, cut.timebase.times_s)
+            for name in PER_FRAME:
+                np.testing.assert_array_equal(getattr(part, name), getattr(cut, name))
+
+    @pytest.mark.usefixtures("short_parts")
+    def test_it_is_saved_as_a_whole(self, tmp_path: Path) -> None:
+        kept = stored(without(swiping(170), (40, 61)), None)
+        save_track(kept, tmp_path / "track.npz")
+        loaded, whole = load_track(tmp_path / "track.npz"), kept.part(0, 170)
+        for name in PER_FRAME:
+            np.testing.assert_array_equal(getattr(loaded, name), getattr(whole, name))
+        assert loaded.notes == whole.notes
+
+    def test_a_part_that_has_gone(self, tmp_path: Path) -> None:
+        kept = stored(swiping(40), tmp_path)
+        for path in tmp_path.glob("mended-*"):
+            path.unlink()
+        with pytest.raises(Sd2Error, match="have gone from the folder of the work"):
+            kept.part(0, 10)
+
+
+@pytest.mark.usefixtures("short_parts")
+@pytest.mark.parametrize(
+    ("frames_per_s", "uneven"), [(30.0, False), (12.5, False), (60.0, False), (50.0, True)]
+)
+def test_a_track_is_lifted_in_parts_as_a_whole(frames_per_s: float, uneven: bool) -> None:
+    known = without(swiping(260, frames_per_s, uneven=uneven), (120, 123))
+    lifter = Lifter.load()
+    in_parts = LiftedInParts(lifter, known, CAMERA)
+    pieces = [in_parts.part(start, stop) for start, stop in ((0, 70), (70, 71), (71, 260))]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(track, "PART_FRAMES", 1000)
+        whole = LiftedInParts(lifter, known, CAMERA).part(0, 260)
+    for name, values in vars(whole).items():
+        if name != "timebase":
+            joined = np.concatenate([getattr(piece, name) for piece in pieces])
+            near = 1e-4 * np.nanmax(np.abs(values))
+            np.testing.assert_allclose(joined, values, rtol=0.0, atol=near)
+
+
+def velocity_mps(points_m: np.ndarray, times_s: np.ndarray) -> np.ndarray:
+    """Of all landmarks, (T, 33, 3)."""
+    return np.asarray(np.gradient(points_m, times_s, axis=0))
+
+
+class TestFit:
+    FRAMES = 150
+
+    def test_short_parts_change_nothing(self) -> None:
+        """Windows are the same: only rounding differs."""
+        few = swiping(60)
+        whole = fit_body(few, CAMERA, stature_m=STATURE_M)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(track, "PART_FRAMES", 25)
+            patch.setattr(fitting, "_FINISHED_FRAMES", 17)
+            parts = fit_body(few, CAMERA, stature_m=STATURE_M)
+        np.testing.assert_allclose(parts.keypoints_m, whole.keypoints_m, atol=2e-4)
+        np.testing.assert_allclose(parts.along_sd_mps, whole.along_sd_mps, atol=1e-4)
+
+    def test_velocities_go_on_across_seams(self) -> None:
+        """Fitted in windows, they differ little from those of one window, seams or not."""
+        known = swiping(self.FRAMES)
+        found = []
+        for frames in (self.FRAMES, 90):
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setattr(fit_windows, "_OVERLAP_FRAMES", 30)
+                patch.setattr(fit_windows, "_WINDOW_FRAMES", frames)
+                patch.setattr(track, "PART_FRAMES", frames)
+                found.append(fit_body(known, CAMERA, stature_m=STATURE_M).keypoints_m)
+                seams = [span[0] for span in fit_windows._windows(0, self.FRAMES)][1:]
+        times_s = known.timebase.times_s
+        true = velocity_mps(found[0], times_s)
+        apart = velocity_mps(found[1], times_s) - true
+        shared = np.zeros(self.FRAMES, bool)
+        for seam in seams:
+            shared[seam - 1 : seam + 30 + 1] = True
+        assert len(seams) == 1
+        typical = np.sqrt((true**2).sum(axis=-1).mean())
+        at_seams, elsewhere = (
+            np.sqrt((apart[frames] ** 2).sum(axis=-1).mean()) for frames in (shared, ~shared)
+        )
+        assert elsewhere < 0.02 * typical
+        assert at_seams < 0.05 * typical
+
+
+class TestMotion:
+    def test_the_mesh_is_that_of_a_fit_in_memory(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(fit_windows, "_WINDOW_FRAMES", 30)
+        monkeypatch.setattr(fit_windows, "_OVERLAP_FRAMES", 10)
+        known = without(swiping(75), (0, 3), (40, 48))
+        whole = fit_body(known, CAMERA, stature_m=STATURE_M)
+        reports: list[tuple[int, int]] = []
+        motion = fit_motion(
+            known,
+            CAMERA,
+            stature_m=STATURE_M,
+            workspace=tmp_path,
+            progress=lambda *report: reports.append(report),
+        )
+        one, other = whole.mesh("low"), motion.mesh("low")
+        np.testing.assert_array_equal(other.read(0, 75), one.read(0, 75))
+        some = [60, 2, 44, 60]
+        np.testing.assert_array_equal(other.vertices[some], one.read(0, 75)[some])
+        for name in ("along_mps", "across_mps"):
+            np.testing.assert_array_equal(
+                getattr(other.uncertainty, name), getattr(one.uncertainty, name)
+            )
+        assert motion.residual_m == pytest.approx(np.nanmean(whole.residual_m))
+        assert motion.quality == pytest.approx(whole.quality[known.present].mean())
+        assert reports == sorted(reports)
+        assert reports[-1][0] == reports[-1][1]
+
+    @pytest.mark.usefixtures("short_parts")
+    def test_no_more_than_a_part_is_in_memory(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """From landmarks on disk to a mesh that is read through; the solver is left out."""
+        for name, frames in (("_WINDOW_FRAMES", 50), ("_OVERLAP_FRAMES", 10)):
+            monkeypatch.setattr(fit_windows, name, frames)
+        for module, name in ((fitting, "_FINISHED_FRAMES"), (fitting, "PART_FRAMES")):
+            monkeypatch.setattr(module, name, 50)
+        monkeypatch.setattr(lifting, "PART_FRAMES", 50)
+        monkeypatch.setattr(fitting, "solve", lambda rig, part, start, tick: start)
+        longest: dict[str, int] = {}
+
+        def watched(owner: Any, name: str) -> None:
+            real = getattr(owner, name)
+
+            def watching(*arguments: Any, **named: Any) -> Any:
+                made = real(*arguments, **named)
+                arrays = vars(made) if hasattr(made, "__dict__") else made._asdict()
+                rows = [len(each) for each in arrays.values() if isinstance(each, np.ndarray)]
+                longest[name] = max(longest.get(name, 0), *rows)
+                return made
+
+            monkeypatch.setattr(owner, name, watching)
+
+        watched(TrackInParts, "part")
+        watched(RefinedStretches, "found")
+        watched(LiftedInParts, "part")
+        watched(LiftedInParts, "_sampled")
+        watched(fit_windows.Windows, "poses")
+        watched(evidence, "evidence_of")
+        known = swiping(400)
+        kept = stored(known, tmp_path)
+        motion = fit_motion(kept, CAMERA, stature_m=STATURE_M, workspace=tmp_path)
+        mesh = motion.mesh("low")
+        for start in range(0, 400, 50):
+            mesh.read(start, start + 50)
+        assert set(longest) == {"part", "found", "_sampled", "poses", "evidence_of"}
+        # A part, and what around it matters.
+        assert max(longest.values()) <= 50 + 2 * 30
+        # What is left is small: a number or two per frame and limb.
+        held = [each for each in vars(kept).values() if isinstance(each, np.ndarray)]
+        held += [motion.along_sd_mps, motion.across_sd_mps]
+        assert sum(each.nbytes for each in held) / 400 < 200
