@@ -66,7 +66,8 @@ def timed(folder: Path, job: Job, minutes: float) -> TimedJob:
     train(pilots, [replace(job, options=(*job.options, "--epochs", str(PILOT_EPOCHS)))])
     ends_s = epoch_ends_s(pilots / job.name)
     # The first epoch has the start in it; the shortest has least of what else went on.
-    epoch_s = min(after - before for before, after in pairwise(ends_s))
+    # Where it was broken off and went on, the processor time began anew.
+    epoch_s = min(after - before for before, after in pairwise(ends_s) if after > before)
     return TimedJob(job, epoch_s, max(1, round(60.0 * minutes / epoch_s)))
 
 
