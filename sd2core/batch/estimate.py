@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import hashlib
-import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
-from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from sd2core.batch.fitting import fitted
-from sd2core.batch.flow import Flow, simulation_of
+from sd2core.batch.flow import Flow
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.inputs import (
     Inspection,
@@ -25,19 +23,20 @@ from sd2core.batch.inputs import (
     known_inspection,
 )
 from sd2core.batch.plan import BatchPlan
-from sd2core.batch.rates import known_rates
+from sd2core.batch.probing import TaskRate, export_s, task_rates
+from sd2core.batch.rates import known_fit_rate
 from sd2core.batch.tasks import Task
 from sd2core.errors import Sd2Error
 from sd2core.progress import Progress, silent
+from sd2core.spectrum import MapKind
+
+if TYPE_CHECKING:
+    pass
 
 _LOOKED_AT = 100
 _TIMED_MESHES = 2
-_SHORT_FRAMES, _LONG_FRAMES = 120, 480
-_SIMULATED_FRAMES = 60
 _FIT_S_PER_FRAME = 0.08
-"""Where no batch has fitted anything on this machine: processor time in docs/fitting.md."""
-_EXPORT_S_PER_SOURCE = 0.05
-"""Likewise: one in docs/scale.md."""
+"""Where nothing has been fitted on this machine yet: processor time in docs/fitting.md."""
 _MESH_BYTES_PER_FRAME = {"low": 11_000, "medium": 42_000, "high": 112_000}
 """Of fitted meshes, compressed: some three quarters of 12 bytes per vertex."""
 _TASK_S = 0.005
@@ -60,6 +59,8 @@ class StepEstimate:
         That they would write.
     basis : str
         How the seconds are known.
+    assumed : bool
+        Whether they are of another machine, and neither measured now nor before.
     """
 
     there: int = 0
@@ -68,6 +69,12 @@ class StepEstimate:
     seconds: float = 0.0
     bytes: int = 0
     basis: str = ""
+    assumed: bool = False
+
+    def add(self, rate: TaskRate, frames: int, tasks: int) -> None:
+        """Add so many tasks, which work on so many frames altogether."""
+        self.seconds += tasks * (rate.seconds + _TASK_S) + frames * rate.frame_s
+        self.bytes += round(tasks * rate.bytes + frames * rate.frame_bytes)
 
 
 @dataclass
@@ -97,28 +104,21 @@ class BatchEstimate:
         return sum(one.seconds for one in self.steps.values()) / self.workers / 3600
 
     @property
+    def assumed_share(self) -> float:
+        """Of the hours: what rests on figures of another machine."""
+        assumed = sum(one.seconds for one in self.steps.values() if one.assumed)
+        return assumed / self.workers / 3600 / self.hours if assumed else 0.0
+
+    @property
     def bytes(self) -> int:
         """That would be written."""
         return sum(one.bytes for one in self.steps.values())
 
     def to_json(self) -> dict[str, Any]:
         """As JSON can hold it."""
-        return asdict(self) | {"hours": self.hours, "bytes": self.bytes, "estimate": True}
-
-
-@dataclass(frozen=True)
-class TaskRate:
-    """Seconds and bytes of a task: so many, and so many per frame."""
-
-    seconds: float
-    frame_s: float
-    bytes: float
-    frame_bytes: float
-
-    def apply(self, step: StepEstimate, frames: int, tasks: int) -> None:
-        """Add so many tasks, which work on so many frames altogether, to a step."""
-        step.seconds += tasks * (self.seconds + _TASK_S) + frames * self.frame_s
-        step.bytes += round(tasks * self.bytes + frames * self.frame_bytes)
+        return asdict(self) | {"hours": self.hours, "bytes": self.bytes} | {
+            "assumed_share": self.assumed_share, "estimate": True
+        }  # fmt: skip
 
 
 def estimate(plan: BatchPlan, workers: int, progress: Progress = silent) -> BatchEstimate:
@@ -162,18 +162,32 @@ def estimate(plan: BatchPlan, workers: int, progress: Progress = silent) -> Batc
     _time(flow, steps, meshes, plan)
     if "export" in steps:
         sources = steps["synthesise"].to_do + steps["synthesise"].there
-        rates = known_rates()
-        steps["export"].to_do = 1
-        steps["export"].seconds = sources * rates.get("export", _EXPORT_S_PER_SOURCE)
-        steps["export"].basis = "as in earlier batches" if "export" in rates else "assumed"
         frames = steps["synthesise"].frames
-        steps["export"].bytes = round(frames * 32 * 4 * len(_kinds(plan)))
+        kinds = _kinds(plan)
+        assert plan.export is not None
+        assert plan.synthesise is not None
+        mean_frames = _mean_frames(meshes)
+        steps["export"].to_do = 1
+        steps["export"].seconds = sources * export_s(plan, mean_frames, kinds)
+        steps["export"].basis = f"measured on maps of {mean_frames:,} frames"
+        bins = plan.synthesise.options().axis.bins
+        steps["export"].bytes = round(frames * bins * 4 * len(kinds))
     return made
 
 
-def _kinds(plan: BatchPlan) -> list[str]:
-    made = {"denoised": plan.denoise, "simulated": plan.simulate}
-    return ["synthetic", *(kind for kind, told in made.items() if told is not None)]
+def _kinds(plan: BatchPlan) -> tuple[MapKind, ...]:
+    made: dict[MapKind, Any] = {
+        "synthetic": plan.synthesise,
+        "denoised": plan.denoise,
+        "simulated": plan.simulate,
+    }
+    return tuple(kind for kind, told in made.items() if told is not None)
+
+
+def _mean_frames(found: Sequence[Inspection]) -> int:
+    """Of the clips, fitted or not."""
+    clips = [one.mesh or one.video for one in found]
+    return round(np.mean([one.frames for one in clips if one is not None])) if clips else 1
 
 
 def _sorted(
@@ -265,12 +279,13 @@ def _time(
     flow: Flow, steps: dict[str, StepEstimate], found: Sequence[Inspection], plan: BatchPlan
 ) -> None:
     if "fit" in steps:
-        rates = known_rates()
-        rate = rates.get("fit", _FIT_S_PER_FRAME)
         assert plan.fit is not None
+        rate = known_fit_rate(plan.fit.resolution)
         each = _MESH_BYTES_PER_FRAME[plan.fit.resolution]
-        TaskRate(1.0, rate, 0.0, each).apply(steps["fit"], steps["fit"].frames, steps["fit"].to_do)
-        steps["fit"].basis = "as in earlier batches" if "fit" in rates else "assumed"
+        one = steps["fit"]
+        one.add(TaskRate(1.0, rate or _FIT_S_PER_FRAME, 0.0, each), one.frames, one.to_do)
+        one.assumed = rate is None and one.to_do > 0
+        one.basis = "assumed: nothing was fitted here yet" if one.assumed else "as fitted here"
     if plan.synthesise is None:
         return
     timed = [task_rates(flow, one) for one in _sample(found)]
@@ -278,7 +293,7 @@ def _time(
         here = [one[step] for one in timed if step in one]
         if step in steps and here and steps[step].to_do:
             mean = TaskRate(*np.mean([list(asdict(one).values()) for one in here], axis=0).tolist())
-            mean.apply(steps[step], steps[step].frames, steps[step].to_do)
+            steps[step].add(mean, steps[step].frames, steps[step].to_do)
             if step == "synthesise":
                 opened = steps[step].to_do / max(plan.placement_count, 1)
                 steps[step].seconds += opened * float(
@@ -295,115 +310,3 @@ def _sample(found: Sequence[Inspection]) -> list[Inspection]:
     usable.sort(key=lambda one: one.mesh.frames if one.mesh is not None else 0)
     middle = max(0, (len(usable) - _TIMED_MESHES) // 2)
     return usable[middle : middle + _TIMED_MESHES]
-
-
-def task_rates(flow: Flow, found: Inspection) -> dict[str, TaskRate]:
-    """What a map of this mesh costs, by making some of a few frames.
-
-    Parameters
-    ----------
-    flow : Flow
-        Of a plan that synthesises.
-    found : Inspection
-        With a mesh.
-
-    Returns
-    -------
-    dict
-        ``synthesise``, ``denoise`` and ``simulate`` per task, and ``open``, once per
-        recording.
-    """
-    from sd2core.batch.denoising import denoise
-
-    maps = _TimedMaps(flow.plan, found)
-    rates = {}
-    with tempfile.TemporaryDirectory(prefix="sd2-batch-") as name:
-        folder = Path(name)
-        first_s = _seconds(lambda: maps.make(maps.long, folder / "first.npz", None))
-        again_s = _seconds(lambda: maps.make(maps.long, folder / "again.npz", None))
-        rates["open"] = TaskRate(max(first_s - again_s, 0.0), 0.0, 0.0, 0.0)
-        choosing_s, chosen = 0.0, None
-        if maps.told.tolerance is not None:
-            chosen = folder / "plan.json"
-            choosing_s = _seconds(lambda: maps.make(maps.long, folder / "chosen.npz", chosen))
-            choosing_s -= _seconds(lambda: maps.make(maps.long, folder / "chosen.npz", chosen))
-        outs = {count: folder / f"{count}.npz" for count in (maps.long, maps.short)}
-        rate = _rate(lambda count: maps.make(count, outs[count], chosen), outs)
-        rates["synthesise"] = replace(rate, seconds=rate.seconds + max(choosing_s, 0.0))
-        if flow.plan.denoise is not None:
-            model, digest = flow.model
-            cleaned = {count: folder / f"denoised-{count}.npz" for count in outs}
-
-            def clean(count: int) -> None:
-                denoise([outs[count]], model, digest, [cleaned[count]])
-
-            for count in outs:
-                clean(count)
-            rates["denoise"] = _rate(clean, cleaned)
-        if flow.plan.simulate is not None:
-            seen = {count: folder / f"simulated-{count}.npz" for count in maps.simulated}
-            rates["simulate"] = _rate(lambda count: maps.simulate(count, seen[count]), seen)
-    return rates
-
-
-class _TimedMaps:
-    """Makes maps of frames in the middle of a mesh, each from a place of its own."""
-
-    def __init__(self, plan: BatchPlan, found: Inspection) -> None:
-        assert found.mesh is not None
-        assert plan.synthesise is not None
-        self._mesh, self.told = found.mesh, plan.synthesise
-        sensors = list(plan.sensors(found.sensor, found.mesh.target_m).values())
-        self._sensor = sensors[len(sensors) // 2]
-        self.long = min(_LONG_FRAMES, found.mesh.frames)
-        self.short = max(1, min(_SHORT_FRAMES, self.long // 2))
-        few = min(_SIMULATED_FRAMES, self.long)
-        self.simulated = few, max(1, few // 4)
-        self._simulation = None if plan.simulate is None else simulation_of(plan.simulate)
-        self._made = 0
-
-    def make(self, count: int, out: Path, chosen: Path | None) -> None:
-        """Make one; without a plan as the options say."""
-        from sd2core.batch.synthesis import synthesise
-
-        # Moved a little: what is visible from a place is kept, and would cost nothing.
-        self._made += 1
-        x, y, z = self._sensor.position_m
-        sensor = replace(self._sensor, position_m=(x + 1e-3 * self._made, y, z))
-        first = (self._mesh.frames - self.long) // 2
-        synthesise(self._mesh, sensor, self.told, (first, first + count), chosen, out)
-
-    def simulate(self, count: int, out: Path) -> None:
-        """Simulate one."""
-        from sd2core.batch.simulation import simulate
-
-        assert self._simulation is not None
-        first = (self._mesh.frames - count) // 2
-        axis = self.told.options().axis
-        simulate(self._mesh, self._sensor, self._simulation, axis, (first, first + count), out)
-
-
-def _rate(work: Callable[[int], None], outs: Mapping[int, Path]) -> TaskRate:
-    """From the same done to many frames and to few."""
-    long, short = outs
-    seconds = {}
-    for count in outs:
-        seconds[count] = min(_seconds(partial(work, count)) for _ in range(2))
-    sizes = {count: out.stat().st_size for count, out in outs.items()}
-    per_frame_s, fixed_s = _line(seconds, long, short)
-    per_frame, fixed = _line(sizes, long, short)
-    return TaskRate(fixed_s, per_frame_s, fixed, per_frame)
-
-
-def _line(values: dict[int, Any], long: int, short: int) -> tuple[float, float]:
-    """Slope and start, neither below 0."""
-    if long == short:
-        return values[long] / long, 0.0
-    slope = max((values[long] - values[short]) / (long - short), 0.0)
-    return slope, max(values[short] - slope * short, 0.0)
-
-
-def _seconds(work: Callable[[], None]) -> float:
-    begun_s = time.perf_counter()
-    work()
-    return time.perf_counter() - begun_s

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from sd2core.batch.exporting import dataset_key, dataset_path, is_exported, rows_of
 from sd2core.batch.fitting import fit_choices, fitted
@@ -247,9 +247,12 @@ class Flow:
         own : VirtualSensor
         """
         stretches = tuple(stretches_of(mesh.frames))
-        for placement, sensor in self.plan.sensors(own, mesh.target_m).items():
+        sensors = self.plan.sensors(own, mesh.target_m)
+        choosing = self._choosing(mesh, list(sensors.values()))
+        for placement, sensor in sensors.items():
             synthesis = tuple(
-                self._synthesis_task(origin, mesh, placement, sensor, one) for one in stretches
+                self._synthesis_task(origin, mesh, placement, sensor, one, choosing)
+                for one in stretches
             )
             denoising = None if self._model is None else self._denoising_task(synthesis)
             simulation = (
@@ -261,6 +264,17 @@ class Flow:
             )
             yield PlannedMap(placement, sensor, stretches, synthesis, denoising, simulation)
 
+    def _choosing(self, mesh: MeshInput, sensors: Sequence[VirtualSensor]) -> dict[str, Any] | None:
+        """Which plan holds the tolerance, for all maps of a mesh; None where there is none."""
+        if self._scene["tolerance"] is None:
+            return None
+        from sd2core.ladder.places import spread
+
+        places = [asdict(one) for one in spread(sensors)]
+        about = {"places": places, "frames": mesh.frames * len(sensors)}
+        key = key_of("synthesise", {"mesh": mesh.identity, **self._scene, **about})
+        return about | {"path": str(self.folder.result("plans", key, ".json"))}
+
     def _synthesis_task(
         self,
         origin: Origin,
@@ -268,11 +282,9 @@ class Flow:
         placement: int,
         sensor: VirtualSensor,
         stretch: Stretch,
+        choosing: dict[str, Any] | None,
     ) -> Task:
         scene = {"mesh": mesh.identity, "sensor": asdict(sensor), **self._scene}
-        chosen = None
-        if self._scene["tolerance"] is not None:
-            chosen = str(self.folder.result("plans", key_of("synthesise", scene), ".json"))
         key = key_of("synthesise", scene | {"stretch": stretch})
         out = str(self.folder.result("synthetic", key, ".npz"))
         details = {
@@ -280,7 +292,7 @@ class Flow:
             "sensor": asdict(sensor),
             "told": self._told,
             "stretch": list(stretch),
-            "chosen": chosen,
+            "choosing": choosing,
             "out": out,
         }
         frames = stretch[1] - stretch[0]

@@ -106,8 +106,9 @@ class Synthesise(_Section):
     ----------
     preset : {"paper", "vid2doppler"}
     tolerance : float, optional
-        Error that is allowed, as a share: the cheapest plan within it is chosen, for each
-        recording and placement. Without it the options say how.
+        Error that is allowed, as a share: the cheapest plan within it is chosen once for each
+        mesh, and held to from the first, the middle and the last of its placements. Without
+        it the options say how.
     others
         As :class:`~sd2core.doppler.options.SynthesisOptions` has them; those that are not
         given come from the preset.

@@ -1,48 +1,50 @@
-"""How long steps take on this machine, from the batches it has done."""
+"""How long fitting takes on this machine, from what was fitted on it."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 from sd2core.atomic import atomic_write_text
-from sd2core.batch.plan import Step
+from sd2core.body.model import Resolution
 
-_FEWEST = {"fit": 100, "export": 1}
-"""Frames, or sources, from which a rate is worth keeping."""
-
-
-def known_rates() -> dict[str, float]:
-    """Seconds per frame of ``fit``, and per source of ``export``, as far as they are known."""
-    try:
-        content: dict[str, Any] = json.loads(_place().read_text(encoding="utf-8"))
-        return {step: float(content[step]) for step in _FEWEST if step in content}
-    except (OSError, ValueError, TypeError, AttributeError):
-        return {}
+_FEWEST_FRAMES = 100
+"""From which a rate is worth keeping."""
 
 
-def remember_rate(step: Step, seconds: float, count: int) -> None:
-    """Keep how long a step took; where nothing can be written it is not kept.
+def known_fit_rate(resolution: Resolution) -> float | None:
+    """Processor seconds per frame of the last fit, by `sd2 fit` or a batch, if there was one."""
+    return _known().get(resolution)
+
+
+def remember_fit_rate(resolution: Resolution, seconds: float, frames: int) -> None:
+    """Keep how long a fit took; where nothing can be written it is not kept.
 
     Parameters
     ----------
-    step : Step
-        ``fit`` or ``export``; the others are measured when they are asked for.
+    resolution : {"low", "medium", "high"}
     seconds : float
-    count : int
-        Frames, or sources.
+        Of one core.
+    frames : int
     """
-    if step not in _FEWEST or count < _FEWEST[step]:
+    if frames < _FEWEST_FRAMES:
         return
     try:
         _place().parent.mkdir(parents=True, exist_ok=True)
-        atomic_write_text(_place(), json.dumps(known_rates() | {step: seconds / count}) + "\n")
+        atomic_write_text(_place(), json.dumps(_known() | {resolution: seconds / frames}) + "\n")
     except OSError:
         return
+
+
+def _known() -> dict[str, float]:
+    try:
+        content = json.loads(_place().read_text(encoding="utf-8"))
+        return {str(name): float(rate) for name, rate in content.items()}
+    except (OSError, ValueError, TypeError, AttributeError):
+        return {}
 
 
 def _place() -> Path:
     import platformdirs
 
-    return Path(platformdirs.user_cache_dir("sd2-studio", appauthor=False)) / "batch-rates.json"
+    return Path(platformdirs.user_cache_dir("sd2-studio", appauthor=False)) / "fit-rates.json"

@@ -22,7 +22,7 @@ from sd2core.batch.leftovers import remove_old_leftovers
 from sd2core.batch.plan import BatchPlan
 from sd2core.batch.plan_file import plan_text
 from sd2core.batch.pool import Pool, local_pool, scheduler_pool
-from sd2core.batch.rates import remember_rate
+from sd2core.batch.rates import remember_fit_rate
 from sd2core.batch.tasks import BEGUN
 from sd2core.errors import Sd2Error
 from sd2core.train.control import Control, signals_kept, write_control
@@ -286,17 +286,17 @@ class _Run:
             "dataset": str(dataset) if dataset is not None and dataset.exists() else None,
             "error": told,
         }
-        self._remember_rates()
+        self._remember_rate()
         self._write_report(facts)
         self._folder.set_state(outcome)  # type: ignore[arg-type]
         self._lines.say("end", **facts)
         return facts
 
-    def _remember_rates(self) -> None:
-        if self._driver is not None:
+    def _remember_rate(self) -> None:
+        fit = self._flow.plan.fit
+        if self._driver is not None and fit is not None and self._scheduler is None:
             tally = self._driver.tally
-            remember_rate("fit", tally.seconds["fit"], tally.frames["fit"])
-            remember_rate("export", tally.seconds["export"], tally.frames["export"])
+            remember_fit_rate(fit.resolution, tally.seconds["fit"], tally.frames["fit"])
 
     def _write_report(self, facts: dict[str, Any]) -> None:
         """All facts, then one failure after the other: there may be many."""

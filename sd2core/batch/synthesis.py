@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,6 +23,31 @@ if TYPE_CHECKING:
 
 PREPARED_BYTES = 128 << 20
 """For what is prepared of a mesh; with less a block would be made twice."""
+
+
+@dataclass(frozen=True)
+class Choosing:
+    """What a plan is chosen for: once for all maps of a mesh.
+
+    Parameters
+    ----------
+    path : Path
+        Where the plan is kept.
+    places : sequence of VirtualSensor
+        Some of all, see :func:`sd2core.ladder.places.spread`.
+    frames : int
+        Of all maps together.
+    """
+
+    path: Path
+    places: Sequence[VirtualSensor]
+    frames: int
+
+
+def choosing_of(content: Mapping[str, Any]) -> Choosing:
+    """From what a task holds as JSON."""
+    places = [VirtualSensor(**one) for one in content["places"]]
+    return Choosing(Path(content["path"]), places, content["frames"])
 
 
 @dataclass
@@ -43,7 +69,7 @@ def synthesise(
     sensor: VirtualSensor,
     told: Synthesise,
     stretch: Stretch,
-    chosen: Path | None,
+    choosing: Choosing | None,
     out: Path,
 ) -> None:
     """Make the map of some frames and write it.
@@ -56,18 +82,17 @@ def synthesise(
     stretch : (int, int)
         Equal to these columns of the map of the whole clip: smoothing and the reuse of
         masks look beyond the stretch.
-    chosen : Path, optional
-        Where it is kept which plan holds the tolerance of this mesh and sensor.
+    choosing : Choosing, optional
+        Where the plan is told a tolerance.
     out : Path
 
     Raises
     ------
     Sd2Error
-        When the mesh cannot be read, the sensor stands in the body, or nothing holds the
-        tolerance.
+        When the mesh cannot be read, or the sensor stands in the body.
     """
     refuse_inside(mesh, sensor)
-    plan = None if chosen is None else _plan(mesh, sensor, told, chosen)
+    plan = None if choosing is None else chosen_plan(mesh, told, choosing)
     synthesizer = _synthesizer(mesh, told, plan)
     doppler = synthesizer.map(sensor, frames=stretch)
     if plan is not None:
@@ -135,27 +160,31 @@ def _synthesizer(mesh: MeshInput, told: Synthesise, plan: dict[str, Any] | None)
     return _kept.synthesizer
 
 
-def _plan(mesh: MeshInput, sensor: VirtualSensor, told: Synthesise, path: Path) -> dict[str, Any]:
-    """The plan that was chosen, by whoever was first: costs are measured, and never twice alike."""
+def chosen_plan(mesh: MeshInput, told: Synthesise, choosing: Choosing) -> dict[str, Any]:
+    """The plan that was chosen, by whoever was first: costs are measured, and never twice alike.
+
+    Raises
+    ------
+    Sd2Error
+        When the mesh cannot be read.
+    """
+    path = choosing.path
     if (known := read_plan_of(path)) is not None:
         return known
-    from sd2core.ladder import choose
+    from sd2core.ladder.places import choose_for_places
 
-    choice = choose(
-        kept_mesh(mesh), sensor, tolerance=told.tolerance, options=told.options(), dragging=False
+    assert told.tolerance is not None
+    found = choose_for_places(
+        kept_mesh(mesh), choosing.places, choosing.frames, told.tolerance, told.options()
     )
-    if not choice.holds:
-        raise Sd2Error(choice.summary, "a tolerance that can be held", "Allow more of it")
-    origin = choice.plan.provenance(choice.errors.l1)
-    origin["plan_reasons"] = [reason.text for reason in choice.reasons]
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(prefix=".sd2-", suffix=".tmp", dir=path.parent)
     try:
         with os.fdopen(handle, "w", encoding="utf-8") as stream:
-            json.dump({"plan": choice.plan.to_json(), "provenance": origin}, stream)
+            json.dump({"plan": found.plan.to_json(), "provenance": found.provenance()}, stream)
         os.link(temporary, path)
     except FileExistsError:
-        pass  # another stretch of the same clip was first
+        pass  # another process was first
     finally:
         os.unlink(temporary)
     known = read_plan_of(path)

@@ -198,17 +198,17 @@ def _synthesise(
     sensor: Mapping[str, Any],
     told: Mapping[str, Any],
     stretch: list[int],
-    chosen: str | None,
+    choosing: Mapping[str, Any] | None,
     out: str,
 ) -> None:
-    from sd2core.batch.synthesis import synthesise
+    from sd2core.batch.synthesis import choosing_of, synthesise
 
     synthesise(
         mesh_input(mesh),
         VirtualSensor(**sensor),
         Synthesise.model_validate(dict(told), strict=False),
         (stretch[0], stretch[1]),
-        None if chosen is None else Path(chosen),
+        None if choosing is None else choosing_of(choosing),
         Path(out),
     )
 

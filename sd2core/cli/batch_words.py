@@ -37,6 +37,11 @@ def print_estimate(made: BatchEstimate, plan: BatchPlan) -> None:
         f"Estimated: {duration(made.hours * 3600)} on {workers}, {bytes_words(made.bytes)};"
         " some seconds more to start them"
     )
+    if made.assumed_share > 0:
+        print(
+            f"{made.assumed_share:.0%} of that rests on another machine's figures: `sd2 fit` on a"
+            " video of yours gives your own."
+        )
     if made.looked_at < made.recordings:
         print(f"From {made.looked_at:,} recordings; the others are taken to be like them.")
     if made.unusable:

@@ -155,11 +155,13 @@ def _make(options: argparse.Namespace, lines: FitLines | None) -> None:
         from sd2core.cli.reading import check_output
 
         check_output(options.landmarks, ".npz")
-    from sd2core.body.fit_folder import check_fit_output
+    from sd2core.batch.rates import remember_fit_rate
+    from sd2core.body.fit_folder import PARTIAL, check_fit_output
     from sd2core.body.fit_video import fit_video
 
     check_fit_output(options.out)
-    begun_s = time.perf_counter()
+    goes_on = options.out.with_name(options.out.name + PARTIAL).exists() and not options.restart
+    begun_s, begun_core_s = time.perf_counter(), time.process_time()
     with ExitStack() as stack:
         report = _bars(stack) if lines is None else lines.report()
         made = fit_video(
@@ -172,6 +174,9 @@ def _make(options: argparse.Namespace, lines: FitLines | None) -> None:
             restart=options.restart,
         )
     seconds = time.perf_counter() - begun_s
+    if not goes_on:
+        core_s = time.process_time() - begun_core_s
+        remember_fit_rate(options.resolution, core_s, made.frames)
     if lines is not None:
         lines.done(made, seconds)
     elif options.json:

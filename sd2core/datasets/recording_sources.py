@@ -31,7 +31,7 @@ from sd2core.errors import Sd2Error
 from sd2core.fmcw.processing import doppler_map
 from sd2core.labels.spans import Labels
 from sd2core.ladder.carry_out import synthesizer_for
-from sd2core.ladder.choosing import choose
+from sd2core.ladder.places import choose_for_places, spread
 from sd2core.mesh import MeshSequence
 from sd2core.mocap.recording_pairs import on_clock
 from sd2core.placements import Place, Placements
@@ -60,7 +60,8 @@ class Making:
         Its axis is that of the radar's map, too.
     tolerance : float, optional
         Error of a synthetic map that is allowed, as a share; the cheapest plan within it is
-        chosen once per recording. None: as ``synthesis`` says.
+        chosen once per recording, see :mod:`sd2core.ladder.places`. None: as ``synthesis``
+        says.
     placements : Placements or "planned", optional
         Where else sensors stand around the body, besides the recording's own; each gives
         synthetic and denoised maps. ``"planned"``: where each recording itself plans them.
@@ -291,8 +292,9 @@ class _Opened:
     def _counted(self, sensor: VirtualSensor, progress: Progress) -> DopplerMap:
         if self._synthesizer is None:
             assert self._mesh is not None
+            places = range(1 + len(places_of(self.recording, self._making)))
             self._synthesizer, self._plan = _synthesizer(
-                self._mesh, self.recording.sensor, self._making
+                self._mesh, [self._sensor(place) for place in places], self._making
             )
         return self._synthesizer.map(sensor, progress=progress)
 
@@ -319,18 +321,14 @@ def places_of(recording: Recording, making: Making) -> tuple[Place, ...]:
 
 
 def _synthesizer(
-    mesh: MeshSequence, sensor: VirtualSensor, making: Making
+    mesh: MeshSequence, sensors: Sequence[VirtualSensor], making: Making
 ) -> tuple[Synthesizer, dict[str, Any]]:
     """What counts the mesh, and the plan that was chosen, for provenance."""
     if making.tolerance is None:
         return Synthesizer(mesh, making.synthesis), {}
-    choice = choose(
-        mesh, sensor, tolerance=making.tolerance, dragging=False, options=making.synthesis
-    )
-    if not choice.holds:
-        raise Sd2Error(choice.summary, "a tolerance that can be held", "Allow more of it")
-    made = synthesizer_for(choice.plan, mesh, making.synthesis)
-    return made, choice.plan.provenance(choice.errors.l1)
+    frames = mesh.frame_count * len(sensors)
+    found = choose_for_places(mesh, spread(sensors), frames, making.tolerance, making.synthesis)
+    return synthesizer_for(found.plan, mesh, making.synthesis), found.provenance()
 
 
 def _fingerprint(recording: Recording, key: SourceKey, making: Making) -> str:

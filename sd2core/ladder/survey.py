@@ -87,6 +87,7 @@ def survey_scene(
     progress: Progress = silent,
     *,
     like: Survey | None = None,
+    trial: Trial | None = None,
 ) -> Survey:
     """Take down each rung alone.
 
@@ -101,11 +102,13 @@ def survey_scene(
     like : Survey, optional
         Of the same mesh with the same options from another place: saves sampling and
         decimating again.
+    trial : Trial, optional
+        Of this very scene, where plans have been tried on it already.
     """
     surface = mesh.faces is not None
-    if like is not None:
+    if trial is None and like is not None:
         trial = like.trial.at(sensor)
-    else:
+    elif trial is None:
         trial = Trial(mesh, sensor, options, take_sample(mesh, options))
     base = Plan(visibility="exact" if surface else "none", weight=options.weight)
     single = [replace(sight, weight=options.weight) for sight in sights(surface=surface)]

@@ -21,9 +21,10 @@ from sd2core.batch.plan_file import plan_from_text
 from sd2core.batch.run import BatchEnd, run_batch
 from sd2core.batch.tasks import Task
 from sd2core.denoise.files import find_model
-from sd2core.doppler import Synthesizer
+from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.io.mesh import load_mesh, save_mesh
+from sd2core.ladder.rungs import reference_plan
 from sd2core.recording import Recording
 from sd2core.sensor import VirtualSensor
 from sd2core.spectrum import DopplerMap
@@ -90,6 +91,31 @@ def test_maps_are_those_of_synth_and_denoise(run: Runs) -> None:
         np.testing.assert_allclose(
             denoised.values, model.denoise(made).values, rtol=1e-5, atol=1e-7
         )
+
+
+def test_a_tolerance_is_one_plan_per_mesh_for_all_its_places(
+    run: Runs, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sd2core.ladder.places._FEWEST_FRAMES", 1)
+    monkeypatch.setattr("sd2core.ladder.places._Search.reference_s", lambda _: 0.0)
+    paths = save_spheres(run.folder / "meshes", 2)
+    end = run(MAPS + "tolerance = 0.1\n")
+    assert (end.outcome, end.failed) == ("finished", 0)
+    plans = {path.name: json.loads(path.read_text()) for path in run.out.glob("plans/*/*.json")}
+    assert len(plans) == len(paths)
+    told = {plan["provenance"]["plan"]["text"] for plan in plans.values()}
+    rows = [json.loads(line) for line in BatchFolder(run.out).results.read_text().splitlines()]
+    for row in rows:
+        made = DopplerMap.load(run.out / row["synthetic"])
+        assert made.meta["plan"]["text"] in told
+        assert 0 <= made.meta["plan_error_l1"] <= 0.1
+        best = Synthesizer(
+            load_mesh(paths[int(row["recording"][1])]),
+            reference_plan("histogram").options(PRESETS["paper"]),
+        ).map(VirtualSensor(**row["sensor"]))
+        assert np.abs(made.values - best.values).sum() <= 0.15 * best.values.sum()
+    run(MAPS + "tolerance = 0.1\n")
+    assert not run.pool.submitted
 
 
 def test_the_same_again_does_nothing(run: Runs) -> None:

@@ -25,8 +25,9 @@ from sd2core.fmcw.processing import doppler_map
 from sd2core.labels.files import write_labels
 from sd2core.labels.label_set import Label, LabelSet
 from sd2core.labels.spans import Labels, Span, Track
-from sd2core.ladder import Choice, choosing
 from sd2core.ladder.carry_out import synthesizer_for
+from sd2core.ladder.places import PlacedPlan
+from sd2core.ladder.rungs import Plan
 from sd2core.pairs import read_pairs
 from sd2core.placements import PlacementGrid
 from sd2core.progress import silent
@@ -95,20 +96,22 @@ def test_a_tolerance_chooses_a_plan_and_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     one = recording(tmp_path / "anna.sd2", radar=False)
-    chosen = []
+    asked: list[tuple[int, int, float]] = []
+    plan = Plan(visibility="facing", beyond="drop")
 
-    def choose(*scene: Any, **wish: Any) -> Choice:
-        chosen.append(choosing.choose(*scene, **wish))
-        return chosen[-1]
+    def choose(mesh: Any, places: Any, frames: int, tolerance: float, _: Any) -> PlacedPlan:
+        asked.append((len(places), frames, tolerance))
+        return PlacedPlan(plan, 0.01, ("Nothing is hidden",))
 
-    monkeypatch.setattr("sd2core.datasets.recording_sources.choose", choose)
+    monkeypatch.setattr("sd2core.datasets.recording_sources.choose_for_places", choose)
     making = Making(kinds=("synthetic",), tolerance=0.05, placements=GRID)
     sources = made(one.folder, making=making)
-    (choice,) = chosen  # once per recording, however many placements
-    assert choice.tolerance == 0.05
+    # Once per recording, however many placements.
+    assert asked == [(3, FRAMES * 5, 0.05)]
     for source in sources:
-        assert source.made_of()["plan"]["text"] == choice.plan.provenance(0.0)["plan"]["text"]
-        planned = synthesizer_for(choice.plan, one.load_mesh(), PRESETS["paper"])
+        assert source.made_of()["plan"]["text"] == str(plan)
+        assert source.made_of()["plan_error_l1"] == 0.01
+        planned = synthesizer_for(plan, one.load_mesh(), PRESETS["paper"])
         expected = planned.map(source.sensor).values
         assert np.array_equal(source.maps["synthetic"].values, expected)
 

@@ -1,0 +1,102 @@
+"""Maps within a tolerance: for few frames as dear as the most accurate ones, for many cheaper.
+
+Processor time, so that other programs do not disturb it.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import pytest
+from scaling import body
+
+from sd2core.compiled import warm_up
+from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
+from sd2core.ladder import places
+from sd2core.ladder.carry_out import synthesizer_for
+from sd2core.ladder.choosing import choose
+from sd2core.ladder.places import PlacedPlan, choose_for_places, spread
+from sd2core.ladder.rungs import reference_plan
+from sd2core.mesh import MeshSequence
+from sd2core.progress import silent
+from sd2core.recording import open_recording
+from sd2core.resources import resource_path
+from sd2core.sensor import VirtualSensor
+
+PAPER = PRESETS["paper"]
+TOLERANCE = 0.05
+MOST_OF_FEW, MOST_OF_MANY = 1.5, 1.0
+CLIPS = {
+    "sample": lambda: open_recording(resource_path("swipes.sd2")).load_mesh(),
+    "ellipsoid of 1,000 vertices": lambda: body(1000, 450),
+    "ellipsoid of 300 vertices": lambda: body(300, 100),
+}
+
+
+def around(count: int) -> list[VirtualSensor]:
+    return [VirtualSensor((0.02 * number - 0.5, 0.0, 0.0)) for number in range(count)]
+
+
+def maps_s(mesh: MeshSequence, options: SynthesisOptions, sensors: list[VirtualSensor]) -> float:
+    begun_s = time.process_time()
+    synthesizer = Synthesizer(mesh, options, threads=1)
+    for sensor in sensors:
+        synthesizer.map(sensor)
+    return time.process_time() - begun_s
+
+
+@pytest.mark.benchmark(group="tolerance")
+@pytest.mark.parametrize("name", CLIPS)
+@pytest.mark.parametrize(
+    ("count", "most"), [(1, MOST_OF_FEW), (9, MOST_OF_FEW), (60, MOST_OF_MANY)]
+)
+def test_maps_of_many_places(
+    benchmark: Any, name: str, count: int, most: float, capsys: pytest.CaptureFixture[str]
+) -> None:
+    warm_up()
+    mesh, sensors = CLIPS[name](), around(count)
+    choose(mesh, sensors[0], tolerance=TOLERANCE)
+    plain_s = maps_s(mesh, PAPER, sensors)
+    best_s = maps_s(mesh, reference_plan("histogram").options(PAPER), sensors)
+
+    def work() -> tuple[float, PlacedPlan]:
+        begun_s = time.process_time()
+        frames = mesh.frame_count * count
+        found = choose_for_places(mesh, spread(sensors), frames, TOLERANCE, PAPER)
+        chosen = synthesizer_for(found.plan, mesh, PAPER)
+        for sensor in sensors:
+            chosen.map(sensor)
+        return time.process_time() - begun_s, found
+
+    spent_s, found = benchmark.pedantic(work, rounds=1)
+    with capsys.disabled():
+        print(
+            f"\n{name}, {count} maps of {mesh.frame_count} frames: {spent_s:.2f} s within"
+            f" {TOLERANCE:.0%}, {spent_s / best_s:.2f} times the most accurate ones and"
+            f" {spent_s / plain_s:.2f} times the preset's; {found.plan}"
+        )
+    assert spent_s / best_s <= most
+
+
+@pytest.mark.benchmark(group="tolerance")
+@pytest.mark.parametrize("name", CLIPS)
+def test_the_estimate_of_choosing(
+    benchmark: Any, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It is from a few frames of the reference: right to a factor of two."""
+    warm_up()
+    mesh, sensor = CLIPS[name](), VirtualSensor()
+    choose(mesh, sensor, tolerance=TOLERANCE)
+
+    def work() -> float:
+        search = places._Search(mesh, [sensor], TOLERANCE, PAPER, silent)
+        estimated_s = places._CHOOSING_FRAMES * search.reference_s()
+        begun_s = time.process_time()
+        choose(mesh, sensor, tolerance=TOLERANCE)
+        return estimated_s / (time.process_time() - begun_s)
+
+    found = benchmark.pedantic(work, rounds=1)
+    with capsys.disabled():
+        print(f"\n{name}: choosing was estimated to take {found:.2f} times what it took")
+    assert 0.5 <= found <= 2.0
