@@ -77,6 +77,8 @@ class Windows:
         before = np.searchsorted(self._known, frames, side="right") - 1
         held, place = np.unique(self._known[np.clip(before, 0, None)], return_inverse=True)
         pose = Pose(np.empty((len(held), len(JOINTS), 3, 3)), np.empty((len(held), 3)))
+        if not len(held):
+            return pose
         first = int(np.searchsorted(self._starts, held[0], side="right")) - 1
         last = int(np.searchsorted(self._starts, held[-1], side="right"))
         # A window that the first frame shares with the one after it is needed as well.

@@ -25,6 +25,8 @@ SILHOUETTE_PX = 256
 """Longer side of a silhouette."""
 
 _STRAYED = 0.25
+_AHEAD_BYTES = 128 * 2**20
+"""Of pictures that wait for a thread."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,14 +130,16 @@ class Refiner:
     def _poses(
         self, video: VideoReader, start: int, rois: Sequence[Roi | None]
     ) -> Iterator[Pose | None]:
-        """In order; few pictures are in memory at once."""
+        """In order; few pictures are in memory at once, and fewer where they are large."""
+        room = _AHEAD_BYTES // (3 * video.width * video.height)
+        ahead = max(min(2 * self._threads, room), 1)
         waiting: deque[Future[Pose | None] | None] = deque()
         for number, roi in enumerate(rois):
             if roi is None:
                 waiting.append(None)
             else:
                 waiting.append(self._pool.submit(self._look, video.read(start + number), roi))
-            if len(waiting) > 2 * self._threads:
+            if len(waiting) > ahead:
                 yield _outcome(waiting.popleft())
         while waiting:
             yield _outcome(waiting.popleft())

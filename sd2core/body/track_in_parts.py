@@ -61,12 +61,8 @@ class TrackInParts:
         def write(found: Found) -> None:
             nonlocal written
             frames = slice(written, written + len(found.present))
-            confidence = refined.confidence[frames]
-            store.write(
-                _name(written),
-                {name: getattr(found, name) for name in PER_FRAME if name != "confidence"}
-                | {"confidence": confidence},
-            )
+            known = vars(found) | {"confidence": refined.confidence[frames]}
+            store.write(_name(written), {name: known[name] for name in PER_FRAME})
             self.present[frames], self.bridged[frames] = found.present, found.bridged
             written = frames.stop
 

@@ -219,7 +219,10 @@ if __name__ == "__main__":
         _fit_in_this_process(*sys.argv[2:])
     elif sys.argv[1] == "seams":
         with tempfile.TemporaryDirectory() as name:
-            print(seams(sample_landmarks(Path(name)), 150, 210))
+            known = sample_landmarks(Path(name))
+            for part_frames, window_frames in ((150, 210), (150, len(known)), (len(known), 210)):
+                apart = seams(known, part_frames, window_frames)
+                print(f"parts of {part_frames}, windows of {window_frames}: {apart}", flush=True)
     else:
         with tempfile.TemporaryDirectory() as name:
             known = sample_landmarks(Path(name))

@@ -311,6 +311,7 @@ class TestMotion:
         )
         one, other = whole.mesh("low"), motion.mesh("low")
         np.testing.assert_array_equal(other.read(0, 75), one.read(0, 75))
+        assert other.vertices[5:5].shape == (0, 1229, 3)
         some = [60, 2, 44, 60]
         np.testing.assert_array_equal(other.vertices[some], one.read(0, 75)[some])
         for name in ("along_mps", "across_mps"):
