@@ -11,6 +11,7 @@ from typing import Any, Literal, get_args
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.jobs.latest import LatestRunner
+from sd2app.models.stored_choices import StoredChoices
 from sd2app.settings import Settings
 from sd2core.batch.plan import BatchPlan, Denoise, Export, Fit, Recordings, Synthesise
 from sd2core.compiled import worker_count
@@ -73,15 +74,8 @@ class BatchSetupModel(QObject):
     def __init__(self, settings: Settings, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._settings = settings
-        self._values: dict[str, Any] = {
-            name: settings.flag(f"batch/{name}", default)
-            if isinstance(default, bool)
-            else settings.stored(f"batch/{name}", default)
-            for name, default in _DEFAULTS.items()
-        }
-        for name, known in (("accuracy", ACCURACIES), ("format", FORMATS), ("subjects", SUBJECTS)):
-            if self._values[name] not in known:
-                self._values[name] = _DEFAULTS[name]
+        known = {"accuracy": ACCURACIES, "format": FORMATS, "subjects": SUBJECTS}
+        self._values = StoredChoices(settings, "batch", _DEFAULTS, known)
         self._workers = min(
             max(settings.stored("batch/workers", worker_count()), 1), most_workers()
         )
@@ -143,9 +137,7 @@ class BatchSetupModel(QObject):
         KeyError
             When there is no such choice.
         """
-        if value != self._values[name]:
-            self._values[name] = value
-            self._settings.set_value(f"batch/{name}", value)
+        if self._values.set(name, value):
             self.changed.emit()
 
     def set_workers(self, workers: int) -> None:

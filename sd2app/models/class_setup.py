@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ from PySide6.QtCore import QObject, Signal
 from sd2app.jobs.latest import LatestRunner
 from sd2app.models.class_data import DataSource, division_of, looked_into, why_not_together
 from sd2app.models.step_times import StepKey
+from sd2app.models.stored_choices import StoredChoices
 from sd2app.settings import Settings
 from sd2core.classify.defaults import DELAY_S, LONGEST_DELAY_S, MODELS, WIDTH
 from sd2core.relative_paths import plain_path
@@ -42,15 +42,9 @@ class ClassSetup(QObject):
     def __init__(self, settings: Settings, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._settings = settings
-        self._values = {
-            name: settings.stored(f"classify/train/{name}", default)
-            for name, default in _DEFAULTS.items()
-        }
-        for name, known in _CHOICES.items():
-            if self._values[name] not in known:
-                self._values[name] = _DEFAULTS[name]
+        self._values = StoredChoices(settings, "classify/train", _DEFAULTS, _CHOICES)
         if not 0 <= self._values["delay_s"] <= LONGEST_DELAY_S:
-            self._values["delay_s"] = DELAY_S
+            self._values.set("delay_s", DELAY_S)
         people = _people(settings.stored(_PEOPLE, "{}"))
         self._data = tuple(
             DataSource(path, people.get(str(path), "")) for path in settings.paths(_DATA)
@@ -84,10 +78,7 @@ class ClassSetup(QObject):
         KeyError
             When there is no such setting.
         """
-        kind: Callable[[Any], Any] = type(_DEFAULTS[name])
-        if kind(value) != self._values[name]:
-            self._values[name] = kind(value)
-            self._settings.set_value(f"classify/train/{name}", kind(value))
+        if self._values.set(name, value):
             self.changed.emit()
 
     def set_map(self, name: str, wanted: bool) -> None:
@@ -195,11 +186,12 @@ class ClassSetup(QObject):
 
     def _others(self, *names: str) -> list[str]:
         """Options for what is not as it is by default."""
+        others = self._values.others
         return [
             word
             for name in names
-            if self._values[name] != _DEFAULTS[name]
-            for word in (f"--{name.replace('_', '-')}", f"{self._values[name]}")
+            if name in others
+            for word in (f"--{name.replace('_', '-')}", f"{others[name]}")
         ]
 
     @property

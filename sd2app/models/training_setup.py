@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ from PySide6.QtCore import QObject, Signal
 
 from sd2app.jobs.latest import LatestRunner
 from sd2app.models.step_times import StepKey, StepTime, StepTimes
+from sd2app.models.stored_choices import StoredChoices
 from sd2app.settings import Settings
 from sd2core.errors import Sd2Error
 from sd2core.pair_facts import PairFacts, pair_facts
@@ -36,7 +36,6 @@ _DEFAULTS: dict[str, str | int | float] = {
     "seed": TrainingConfig().seed,
 }
 """The paper's, where it has them; nought epochs of patience is no early stopping."""
-_KINDS: dict[str, Callable[[Any], Any]] = {name: type(one) for name, one in _DEFAULTS.items()}
 
 
 @dataclass(frozen=True)
@@ -88,12 +87,7 @@ class TrainingSetupModel(QObject):
         super().__init__(parent)
         self._settings = settings
         self._times = step_times
-        self._values: dict[str, Any] = {
-            name: settings.stored(f"training/{name}", default)
-            for name, default in _DEFAULTS.items()
-        }
-        if self._values["model"] not in MODELS:
-            self._values["model"] = _DEFAULTS["model"]
+        self._values = StoredChoices(settings, "training", _DEFAULTS, {"model": MODELS})
         self._stores: tuple[Store, ...] = tuple(
             Store(path) for path in settings.paths("training/pairs")
         )
@@ -125,16 +119,9 @@ class TrainingSetupModel(QObject):
         return self._values[name]
 
     @property
-    def values(self) -> Mapping[str, Any]:
-        """All settings by their names."""
-        return dict(self._values)
-
-    @property
     def differs(self) -> bool:
         """Whether a setting, the kind of model apart, is not as the paper has it."""
-        return any(
-            self._values[name] != default for name, default in _DEFAULTS.items() if name != "model"
-        )
+        return bool(self._values.others.keys() - {"model"})
 
     def set_value(self, name: str, value: Any) -> None:
         """Choose a setting.
@@ -144,10 +131,7 @@ class TrainingSetupModel(QObject):
         KeyError
             When there is no such setting.
         """
-        value = _KINDS[name](value)
-        if value != self._values[name]:
-            self._values[name] = value
-            self._settings.set_value(f"training/{name}", value)
+        if self._values.set(name, value):
             self.changed.emit()
 
     def reset(self) -> None:

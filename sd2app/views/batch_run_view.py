@@ -44,6 +44,9 @@ class Asks(Protocol):
         """Open a recording in the window, with the sensor where a result says."""
 
 
+_FAILURES, _FAILURES_PAGE = "Failures", 2
+
+
 class BatchRunView(QWidget):
     """A view of :class:`BatchFollower` and of its results."""
 
@@ -118,15 +121,16 @@ class BatchRunView(QWidget):
         layout.addWidget(self._no_results)
         layout.addWidget(self._table, 1)
         layout.addLayout(side_by_side(self._open_result))
-        return InnerPages(
+        self._inner = InnerPages(
             (
-                InnerPage("Failures", "Tasks that could not be done, and why", self._failures),
                 InnerPage("Results", "The maps that were made", results),
                 InnerPage("Data set", "What was exported to learn from", self._card),
+                InnerPage(_FAILURES, "Tasks that could not be done, and why", self._failures),
                 InnerPage("Log", "What happened, as it happened", self._log),
             ),
             parent=self,
         )
+        return self._inner
 
     # --- showing --------------------------------------------------------------------------
 
@@ -147,6 +151,8 @@ class BatchRunView(QWidget):
         self._folder.setEnabled(run.folder.path.is_dir())
         self._new.setVisible(not run.under_way)
         _show(self._failures, "\n\n".join(map(failure_text, run.failures)) or "None.")
+        count = len(run.failures)
+        self._inner.name_page(_FAILURES_PAGE, f"{_FAILURES} ({count})" if count else _FAILURES)
         _show(self._log, run.log or "Nothing was noted.")
         if results.card != self._shown_card:
             self._shown_card = results.card

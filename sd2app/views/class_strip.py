@@ -110,7 +110,7 @@ class ClassStrip(QWidget):
             self._status.setText("Loading the classifier…")
         else:
             card = model.track.card
-            late = f"answers {delay_text(card)}" if card.delay_frames else ""
+            late = delay_text(card) if card.delay_frames else ""
             other = "It has learned from other maps than this"
             self._status.setText(late if model.knows_source else other)
 

@@ -83,6 +83,12 @@ class InnerPages(QWidget):
         self._buttons.button(place).setChecked(True)
         self._pages.setCurrentIndex(place)
 
+    def name_page(self, place: int, name: str) -> None:
+        """What is on the button of a page from now on."""
+        button = self._buttons.button(place)
+        button.setText(name)
+        button.setAccessibleName(name)
+
     def _give_room(self, shown: int) -> None:
         """The page that is shown says how much room is needed, and no other."""
         policy = QSizePolicy.Policy

@@ -268,9 +268,11 @@ def test_a_batch_runs_to_its_end_and_its_results_are_listed(qtbot, made, meshes)
 
 def test_a_batch_outlives_the_model_and_is_found_again(qtbot, made, meshes):
     settings = Settings.forgetful()
-    first = made("--step-s", 0.5, settings=settings)
+    first = made("--step-s", 1.0, settings=settings)
     begin(qtbot, first, meshes)
     until(qtbot, first, "running")
+    # Its process is there before it has said what it does.
+    qtbot.waitUntil(lambda: first.batch.folder.exists, timeout=20_000)
     first.close()
     second = made(settings=settings)
     said: list[str] = []

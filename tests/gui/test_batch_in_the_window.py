@@ -167,6 +167,7 @@ def test_failures_and_their_reasons_are_shown_and_a_batch_is_stopped(opened, qtb
     assert "1:00 so far" in words(dialog)
     failures = dialog._run._failures.toPlainText()
     assert "synthesise from place 2: It is damaged" in failures
+    click(dialog, "Failures (1)")
     click(dialog, "Log")
     qtbot.waitUntil(lambda: "looked at" in dialog._run._log.toPlainText(), timeout=20_000)
     click(dialog, "Stop")
