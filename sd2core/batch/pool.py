@@ -219,7 +219,8 @@ def _check_worker(address: str, about: Any, folder: Path) -> None:
 def local_pool(folder: BatchFolder, processes: int) -> Iterator[DaskPool]:
     """Processes on this machine, one thread each, that end with this one.
 
-    Reachable on the loopback interface only, without a dashboard.
+    Reachable on the loopback interface only, with keys that nobody else has, without a
+    dashboard.
     """
     with _dask_log(folder), local_client(folder.path / BEGUN, processes) as client:
         yield DaskPool(client, folder, most_deaths=2)
@@ -248,6 +249,7 @@ def local_client(scratch: Path, processes: int) -> Iterator[Any]:
             scheduler_kwargs={"dashboard": False},
             preload=["sd2core.batch.interrupts"],
             silence_logs=logging.CRITICAL,
+            security=_security(),
             local_directory=str(scratch),
             env=ONE_THREAD,
         )
@@ -259,6 +261,20 @@ def local_client(scratch: Path, processes: int) -> Iterator[Any]:
                 client.close(timeout=_CLOSE_S)
         finally:
             cluster.close(timeout=_CLOSE_S)
+
+
+def _security() -> Any:
+    """Keys of one cluster, made now and kept in memory; None where they cannot be made."""
+    from distributed import Security
+
+    try:
+        return Security.temporary()
+    except ImportError:
+        logging.getLogger("distributed").warning(
+            "The package cryptography is missing: other users of this machine could connect to"
+            " the processes of this batch"
+        )
+        return None
 
 
 @contextmanager

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import platform
 import signal
+import socket
+import ssl
 import subprocess
 import sys
 import threading
@@ -18,8 +21,10 @@ from dask_processes import cluster
 from moving_spheres import maps_in, save_spheres
 from pools import in_this_process
 
+from sd2core.batch import pool
 from sd2core.batch.plan import BatchPlan
 from sd2core.batch.plan_file import plan_from_text
+from sd2core.batch.pool import local_client
 from sd2core.batch.run import run_batch
 from sd2core.batch.tasks import BEGUN
 
@@ -63,6 +68,38 @@ def test_a_killed_worker_loses_its_current_task_only(tmp_path: Path) -> None:
     for path, changed_ns in killer.there.items():
         assert path.stat().st_mtime_ns == changed_ns
     assert end.facts["done"]["synthesise"] == 18
+
+
+def test_other_users_of_the_machine_cannot_connect_to_a_local_batch(tmp_path: Path) -> None:
+    pytest.importorskip("cryptography")
+    with local_client(tmp_path, 1) as client:
+        assert client.submit(abs, -3).result(timeout=60) == 3
+        (worker,) = client.scheduler_info()["workers"]
+        for address in (client.scheduler.address, worker):
+            assert address.startswith("tls://127.0.0.1:")
+            # Somebody who asks for no certificate and shows none.
+            stranger = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+            stranger.check_hostname, stranger.verify_mode = False, ssl.CERT_NONE
+            with (
+                socket.create_connection(("127.0.0.1", int(address.rsplit(":", 1)[1]))) as plain,
+                pytest.raises(ssl.SSLError, match="CERTIFICATE_REQUIRED"),
+                stranger.wrap_socket(plain) as line,
+            ):
+                line.recv(1)
+
+
+def test_without_keys_a_local_batch_says_so(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    from distributed import Security
+
+    def missing() -> None:
+        raise ImportError("cryptography")
+
+    monkeypatch.setattr(Security, "temporary", missing)
+    monkeypatch.setattr(logging.getLogger("distributed"), "propagate", True)
+    assert pool._security() is None
+    assert "other users of this machine could connect" in caplog.text
 
 
 class _Killer(threading.Thread):
