@@ -6,10 +6,10 @@ import argparse
 import json
 import shlex
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from sd2core.cli.classify_data import (
     DATA_HELP,
@@ -20,7 +20,13 @@ from sd2core.cli.classify_data import (
     split_of,
 )
 from sd2core.cli.classify_network import add_network, network_of
-from sd2core.cli.options import add_command, add_json, positive_float, positive_int
+from sd2core.cli.options import (
+    add_command,
+    add_json,
+    add_people_kept_out,
+    positive_float,
+    positive_int,
+)
 from sd2core.cli.output import finite, print_facts, print_json
 
 if TYPE_CHECKING:
@@ -60,13 +66,12 @@ def add_train(kinds: argparse._SubParsersAction) -> None:
         help="range synthesis: learn from all places of the sensor, or the first only"
         " (default: all)",
     )
-    for name in ("validation", "test"):
-        parser.add_argument(
-            f"--{name}-subjects",
-            metavar="NAMES",
-            help=f"kept out for the {name}, separated by commas (default: as the data set says,"
-            " or a sixth of all)",
-        )
+    otherwise = "(default: as the data set says, or a sixth of all)"
+    add_people_kept_out(
+        parser,
+        f"kept out to choose the best step by, separated by commas, or none {otherwise}",
+        f"kept out for a test, or none {otherwise}",
+    )
     parser.add_argument("--steps", type=positive_int, metavar="N", help="batches to learn from")
     parser.add_argument(
         "--patience",
@@ -97,8 +102,8 @@ def _train(options: argparse.Namespace) -> int:
     known = clips_of(options.data, maps, denoiser_for(maps, options.denoiser))
     parts = split_clips(
         known,
-        _names(options.validation_subjects) or split_of(options.data, "validation"),
-        _names(options.test_subjects) or split_of(options.data, "test"),
+        _kept_out(options, "validation"),
+        _kept_out(options, "test"),
         first_only=options.placements == "first",
     )
     about = {
@@ -136,8 +141,12 @@ def _options(options: argparse.Namespace) -> TrainOptions:
     return network_of(options).of(TrainOptions(**given), options.seed)
 
 
-def _names(text: str | None) -> tuple[str, ...] | None:
-    return None if text is None else tuple(name for name in text.split(",") if name)
+def _kept_out(
+    options: argparse.Namespace, part: Literal["validation", "test"]
+) -> Sequence[str] | None:
+    """Those who are named, which may be nobody; otherwise as the data sets have it."""
+    named: tuple[str, ...] | None = getattr(options, f"{part}_subjects")
+    return split_of(options.data, part) if named is None else named
 
 
 @contextmanager

@@ -14,7 +14,9 @@ from sd2core.cli.options import (
     add_axis,
     add_command,
     add_json,
+    add_people_kept_out,
     bin_list,
+    name_list,
     positive_float,
     positive_int,
     share,
@@ -111,20 +113,16 @@ def _add_content(parser: argparse.ArgumentParser) -> None:
     people = parser.add_argument_group("people")
     people.add_argument(
         "--subjects",
-        type=_names,
+        type=name_list,
         metavar="NAMES",
         help="who each recording and map is of, separated by commas, in their order (default:"
         " everyone another person)",
     )
-    people.add_argument(
-        "--validation", type=_names, metavar="NAMES", help="subjects to validate with"
-    )
-    people.add_argument(
-        "--test",
-        type=_names,
-        metavar="NAMES",
-        help="subjects to test with (default: about a sixth of all, and as many to validate, by"
-        " their names: more people do not move the others)",
+    add_people_kept_out(
+        people,
+        "kept out to validate with, separated by commas, or none (default: about a sixth of all,"
+        " by their names: more people do not move the others)",
+        "kept out to test with, or none (default: likewise)",
     )
     people.add_argument(
         "--labels",
@@ -168,10 +166,6 @@ def _add_making(parser: argparse.ArgumentParser) -> None:
         metavar="LIST",
         help="bins to empty in all kinds (default: those of the synthetic maps)",
     )
-
-
-def _names(text: str) -> tuple[str, ...]:
-    return tuple(name.strip() for name in text.split(",") if name.strip())
 
 
 def _export(options: argparse.Namespace) -> int:
@@ -226,8 +220,8 @@ def _dataset_options(options: argparse.Namespace) -> DatasetOptions:
         null_bins=options.null_bins,
         label_rule=options.label_rule,
         min_share=options.min_share,
-        validation=options.validation,
-        test=options.test,
+        validation=options.validation_subjects,
+        test=options.test_subjects,
         title=options.title,
         provenance={"command": shlex.join(["sd2", *sys.argv[1:]])},
     )

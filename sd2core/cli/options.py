@@ -132,6 +132,19 @@ def span_m(text: str) -> tuple[float, float]:
     return values[0], values[1]
 
 
+def name_list(text: str) -> tuple[str, ...]:
+    """Parse ``anna,ben`` or ``none``."""
+    if text == "none":
+        return ()
+    return tuple(name.strip() for name in text.split(",") if name.strip())
+
+
+def add_people_kept_out(group: argparse._ActionsContainer, validation: str, test: str) -> None:
+    """Add ``--validation-subjects`` and ``--test-subjects``; the texts say who else it is."""
+    for part, help_text in (("validation", validation), ("test", test)):
+        group.add_argument(f"--{part}-subjects", type=name_list, metavar="NAMES", help=help_text)
+
+
 def bin_list(text: str) -> tuple[int, ...]:
     """Parse ``14,15,16`` or ``none``."""
     if text == "none":

@@ -10,7 +10,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sd2core.cli.options import add_command, add_json, positive_float, positive_int
+from sd2core.cli.options import (
+    add_command,
+    add_json,
+    add_people_kept_out,
+    positive_float,
+    positive_int,
+)
 from sd2core.cli.output import print_facts, print_json
 from sd2core.errors import Sd2Error
 
@@ -147,19 +153,12 @@ def _add_learning(parser: argparse.ArgumentParser) -> None:
 
 def _add_data(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("what it learns from")
-    group.add_argument(
-        "--validation-subjects",
-        type=_names,
-        metavar="NAMES",
-        help="kept out to choose the best epoch by, separated by commas (default: a sixth of"
-        " all, at least one, from the end of the list), or none: then the last fifth of"
-        " everybody's takes",
-    )
-    group.add_argument(
-        "--test-subjects",
-        type=_names,
-        metavar="NAMES",
-        help="kept out for `sd2 eval`, or none (default: as many)",
+    add_people_kept_out(
+        group,
+        "kept out to choose the best epoch by, separated by commas (default: a sixth of all, at"
+        " least one, from the end of the list), or none: then the last fifth of everybody's"
+        " takes",
+        "kept out for `sd2 eval`, or none (default: as many)",
     )
     group.add_argument(
         "--segment-frames", type=positive_int, metavar="N", help="length (default: 72)"
@@ -225,10 +224,6 @@ def _option(text: str) -> tuple[str, Any]:
         except ValueError:
             continue
     return name, value
-
-
-def _names(text: str) -> tuple[str, ...]:
-    return () if text == "none" else tuple(name for name in text.split(",") if name)
 
 
 def _train(options: argparse.Namespace) -> int:

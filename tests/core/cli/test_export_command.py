@@ -125,6 +125,7 @@ def test_one_damaged_recording_is_reported_and_the_rest_is_written(
         (("--kinds", "radar"), "some of synthetic, denoised, simulated, real"),
         (("--overlap", "72"), "an overlap of 0 to 71"),
         (("--subjects", "a,b"), "2 people are named for 3 recordings"),
+        (("--test-subjects", "dora"), "'dora' is to be a test subject"),
         (("--test", "dora"), "'dora' is to be a test subject"),
         (("--model", "nobody"), "There is no model called 'nobody'"),
     ],
