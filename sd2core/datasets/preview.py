@@ -261,13 +261,14 @@ def _frame(
 ) -> None:
     """Title, what is simulated, and what the colours mean."""
     width, height = size
+    # Where both are there, each row says which of them it is.
+    radar = " The radar is simulated." if header.simulated and "real" not in header.kinds else ""
     figure.text(0.3 / width, 1 - 0.2 / height, title, fontsize=12, weight="bold", color=_INK,
                 va="top", parse_math=False)  # fmt: skip
     said = (
         f"{segments:,} segments of {header.length} frames"
         f" ({header.length / header.frame_rate_hz:.1f} s). Coloured bars: frames with the label."
-        " Colours: dB relative to each segment's own strongest cell."
-        + (" The radar is simulated." if header.simulated else "")
+        f" Colours: dB relative to each segment's own strongest cell.{radar}"
     )
     figure.text(0.3 / width, 1 - 0.46 / height, said, fontsize=7.5, color=_MUTED, va="top")
     figure.text(_LEFT_IN / width, 0.1 / height,

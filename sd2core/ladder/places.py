@@ -30,8 +30,8 @@ MOST_PLACES = 3
 """On which a plan is checked: each takes some hundred milliseconds."""
 
 _CHOOSING_FRAMES, _CHECKING_FRAMES = 250, 30
-"""Frames of the reference that choosing takes as long as (180 to 320, for meshes of 240 to 20,000
-vertices, see tests/benchmarks/test_tolerance_speed.py), and that are checked on."""
+"""Frames of the reference that choosing takes about as long as (how well that fits prints
+tests/benchmarks/test_tolerance_speed.py), and that are checked on."""
 
 _FEWEST_FRAMES = 1000
 """Of maps: fewer are made in the time that any estimate takes."""

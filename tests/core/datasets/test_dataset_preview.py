@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -49,6 +50,9 @@ def test_what_is_simulated_is_called_so(dataset: Dataset) -> None:
     assert any("The radar is simulated." in text for text in said)
     assert "Radar\n(simulated)" in said
     assert not any("Radar (real)" in text for text in said)
+    both = replace(dataset.header, kinds=(*dataset.header.kinds, "real"))
+    beside = draw_preview("Swings", both, examples_of(dataset), len(dataset))
+    assert not any("The radar is simulated." in text.get_text() for text in beside.texts)
     pictures = [axes for axes in figure.axes if axes.images]
     shown = sum(len(one.levels) for one in examples_of(dataset))
     assert len(pictures) == shown
