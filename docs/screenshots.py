@@ -13,26 +13,22 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtWidgets import QApplication, QWidget
+from learning_screenshots import learning
+from PySide6.QtWidgets import QApplication
+from windows import IMAGES, LIMIT_S, REPOSITORY, opened, save, wait_for
 
 from sd2app.dialogs.comparison import ComparisonWindow
 from sd2app.models.fit_request import FitRequest
 from sd2app.screenshot import wait_until_settled
-from sd2app.settings import Settings
-from sd2app.theme import apply_theme
 from sd2app.views.window import MainWindow
 from sd2core.placements import PlacementCloud
 from sd2core.resources import resource_path
 from sd2core.sensor import VirtualSensor, aimed_at
 
-REPOSITORY = Path(__file__).resolve().parent.parent
-IMAGES = REPOSITORY / "docs" / "images"
 SHARED = Path(os.environ.get("SD2_SHARED_DATA", REPOSITORY.parent / "shared" / "data"))
-LIMIT_S = 120.0
 
 
 def sample(window: MainWindow) -> None:
@@ -139,62 +135,6 @@ def comparison(application: QApplication) -> None:
         window.close()
 
 
-def training(application: QApplication) -> None:
-    """The Train panel while a denoiser learns from a small simulated campaign."""
-    with tempfile.TemporaryDirectory() as folder:
-        pairs, runs = Path(folder) / "campaign.zarr", Path(folder) / "runs"
-        command = [sys.executable, "-m", "sd2app.command_line", "simulate", "campaign", str(pairs)]
-        size = ["--subjects", "3", "--minutes", "6", "--seed", "1"]
-        if subprocess.run([*command, *size], check=False).returncode != 0:
-            print("training.png is left as it is: no pairs to learn from", file=sys.stderr)
-            return
-        window = opened(application, [resource_path("swipes.sd2")], runs)
-        window.context.playback.seek(1.9)
-        window.resize(1280, 960)
-        window.side.bring_up("Train")
-        model = window.context.training
-        model.setup.add_store(pairs)
-        model.setup.set_value("epochs", 40)
-        wait_for(application, lambda: not model.setup.problem)
-        model.start()
-        wait_for(application, lambda: model.run is not None and model.run.history.epoch >= 12)
-        save(window, "training.png")
-        model.cancel()
-        wait_for(application, lambda: not model.under_way)
-        window.close()
-
-
-def wait_for(application: QApplication, condition: Callable[[], bool]) -> None:
-    """Run the event loop until something is so; at most five minutes."""
-    deadline = time.monotonic() + 300.0
-    while not condition() and time.monotonic() < deadline:
-        application.processEvents()
-        time.sleep(0.01)
-
-
-def opened(application: QApplication, paths: list[Path], runs: Path | None = None) -> MainWindow:
-    """The window on some files, everything computed; trainings are kept in ``runs``."""
-    apply_theme(application, False)
-    settings = Settings.forgetful()
-    settings.dark = False
-    if runs is not None:
-        settings.set_value("training/folder", str(runs))
-    window = MainWindow(settings)
-    window.resize(1280, 800)
-    window.show()
-    window.populate()
-    window.open_paths(paths)
-    if not wait_until_settled(application, window, LIMIT_S):
-        sys.exit(f"The window was still busy with {paths[0].name} after {LIMIT_S:.0f} s")
-    return window
-
-
-def save(widget: QWidget, name: str) -> None:
-    """Write a picture of a window."""
-    widget.grab().save(str(IMAGES / name))
-    print(IMAGES.joinpath(name).relative_to(REPOSITORY))
-
-
 def take(
     application: QApplication, name: str, paths: list[Path], arrange: Callable[[MainWindow], None]
 ) -> None:
@@ -225,7 +165,7 @@ def main() -> None:
     take(application, "labels.png", swipes, labels)
     take(application, "placements.png", swipes, placements)
     comparison(application)
-    training(application)
+    learning(application)
     walk = [SHARED / "video" / "walk.mkv", SHARED / "mesh" / "walk.npz"]
     if all(path.exists() for path in walk):
         take(application, "real-video.png", walk, real)

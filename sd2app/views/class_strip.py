@@ -35,8 +35,8 @@ from sd2app.views.time_wheel import turn_wheel
 from sd2core.labels.label_set import LabelSet
 
 _PLOT_PX = 30
-_BAR_PX = (34, 8)
-_GAP_PX = 14
+_BAR_PX = (28, 8)
+_GAP_PX = 10
 _FAINT = 90
 """Of what is not of the map as it is now."""
 _UNKNOWN_CLASS = "#8a8f98"

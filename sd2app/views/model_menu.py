@@ -17,7 +17,7 @@ from sd2app.models.denoise_words import kind_words, model_title, origin_words
 
 Use = Callable[[Path | None], None]
 
-_LONGEST = 18
+_LONGEST = 14
 
 
 class Entry(NamedTuple):
