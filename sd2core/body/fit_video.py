@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
 import json
 import os
 import shutil
 import zipfile
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -174,6 +176,8 @@ def fit_video(
                 on_frame=stages.on_frame,
                 workspace=partial / LANDMARKS,
             )
+            video.close()
+            _give_back_memory()
             motion = fit_motion(
                 track,
                 camera,
@@ -218,6 +222,16 @@ def provenance(made: FittedVideo, path: Path, choices: FitChoices) -> dict[str, 
         "max_gap_s": choices.max_gap_s,
         "notes": list(made.notes),
     }
+
+
+def _give_back_memory() -> None:
+    """Give back what decoder and networks have freed.
+
+    The GNU C library keeps it, in parts for each thread that had it; others need no telling.
+    """
+    # Elsewhere there is no such library, or it has no such function.
+    with suppress(AttributeError, OSError, TypeError):
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 class _Stages:
