@@ -39,6 +39,7 @@ from batches import (  # noqa: E402
     ten_times_the_tasks,
     two_against_one,
 )
+from long_fits import LongFit, long_fit, sample_landmarks  # noqa: E402
 
 RECORDINGS, FRAMES, PLACES = 1_000_000, 1800, 8
 """What is reckoned for: a minute each at 30 frames/s."""
@@ -76,10 +77,11 @@ class Sizes:
     minutes: tuple[float, ...]
     many: int
     fit_frames: tuple[int, ...]
+    long_frames: tuple[int, ...]
 
 
-FULL = Sizes(4, 55, 600, 3, 10, 8, (1.0, 12.0, 90.0), 20, (150, 750))
-QUICK = Sizes(2, 5, 60, 1, 2, 3, (0.2, 0.5), 2, (20, 40))
+FULL = Sizes(4, 55, 600, 3, 10, 8, (1.0, 12.0, 90.0), 20, (150, 750), (900, 9000))
+QUICK = Sizes(2, 5, 60, 1, 2, 3, (0.2, 0.5), 2, (20, 40), (60, 120))
 
 
 @dataclass(frozen=True)
@@ -143,6 +145,7 @@ def _page(root: Path, sizes: Sizes) -> str:
     used.append(memory(place, sizes.minutes[0], sizes.many, 1229, "facing"))
     used.append(memory(place, sizes.minutes[0], 1, 13348, ""))
     fits = _fits(folder("fits"), sizes.fit_frames)
+    long = _long_fits(folder("long fits"), sizes.long_frames) if fits else []
     costs = _costs(folder("costs"), fits)
     files = files_per_second(folder("files"))
     own_s = statistics.median(ten.own_s) / ten.tasks
@@ -150,7 +153,7 @@ def _page(root: Path, sizes: Sizes) -> str:
         [
             INTRODUCTION.format(machine=this_machine()) + (LITTLE if sizes is QUICK else ""),
             _processes(two, ten, there_s, sizes.frames),
-            _memory(used, fits),
+            _memory(used, fits, long),
             _steps(costs),
             _million(costs, two, own_s, files),
         ]
@@ -197,7 +200,7 @@ def _processes(two: Compared, ten: Compared, there_s: float, frames: int) -> str
     )
 
 
-def _memory(used: list[Memory], fits: list[Fitted]) -> str:
+def _memory(used: list[Memory], fits: list[Fitted], long: list[LongFit]) -> str:
     rows = [
         f"| {one.recordings} | {one.minutes:g} min | {one.vertices:,} | {one.how or 'exact'} |"
         + "|".join(f" {one.peak_mb[step]:.0f} MB " for step in ("synthesise", "denoise", "export"))
@@ -216,27 +219,44 @@ def _memory(used: list[Memory], fits: list[Fitted]) -> str:
             "|---|---|---|---|---|---|---|",
             *rows,
             "",
-            *_fit_memory(fits),
+            *_fit_memory(fits, long),
         ]
     )
 
 
-def _fit_memory(fits: list[Fitted]) -> list[str]:
-    if len(fits) < 2:
+def _fit_memory(fits: list[Fitted], long: list[LongFit]) -> list[str]:
+    """Real fits, and long ones whose landmarks are there already."""
+    if not long:
         return []
-    short, long = fits[0], fits[-1]
-    each_mb = (long.peak_mb - short.peak_mb) / (long.frames - short.frames)
+    stages = [name for name in long[0].peak_mb if name != "start"]
     lines = [
-        f"A fit holds its clip as a whole: {short.peak_mb:.0f} MB with {short.frames:,} frames,"
-        f" {long.peak_mb:.0f} MB with {long.frames:,}.",
+        "A fit reads its clip in parts ([decision 42](decisions/0042-fits-of-any-length.md)). Of"
+        "the sample's video, its",
+        "landmarks found as well: "
+        + ", ".join(f"{one.peak_mb:.0f} MB with {one.frames:,} frames" for one in fits)
+        + ". With landmarks that go",
+        "forwards and backwards through the sample's, the most in each stage:",
+        "",
+        f"| frames | {' | '.join(stages)} |",
+        "|---|" + "---|" * len(stages),
+        *(
+            f"| {one.frames:,} |"
+            + "|".join(f" {one.peak_mb[name]:.0f} MB " for name in stages)
+            + "|"
+            for one in long
+        ),
+        "",
     ]
-    if each_mb > 0:
-        most = short.frames + (1000 - short.peak_mb) / each_mb
-        lines.append(
-            f"If it goes on so, {1e3 * each_mb:.0f} kB per frame, 1 GB is reached with"
-            f" {most:,.0f} frames, {most / 1800:.0f} min at 30 frames/s."
-        )
-    return [*lines, ""]
+    few, many = (max(one.peak_mb.values()) for one in (long[0], long[-1]))
+    each_kb = 1e3 * (many - few) / (long[-1].frames - long[0].frames)
+    if each_kb > 0:
+        hours = (long[-1].frames + 1e3 * (1000 - many) / each_kb) / (30 * 3600)
+        lines += [
+            f"That is {each_kb:.1f} kB per frame; if it goes on so, 1 GB is reached with"
+            f" {hours:.1f} hours of video at 30 frames/s.",
+            "",
+        ]
+    return lines
 
 
 def _steps(costs: list[Cost]) -> str:
@@ -250,8 +270,7 @@ def _steps(costs: list[Cost]) -> str:
             "## Steps",
             "",
             "On one process, for the sample recording (5,000 vertices); `fit` is of its video, in",
-            "processor time. A tolerance saves time where a recording is long, as a plan is",
-            "chosen for each map.",
+            "processor time. For a tolerance one plan is chosen per mesh, where that pays.",
             "",
             "| step | per frame | and per task | written per frame | and per task |",
             "|---|---|---|---|---|",
@@ -362,6 +381,11 @@ def _fits(folder: Path, frames: tuple[int, ...]) -> list[Fitted]:
         size = sum(one.stat().st_size for one in mesh.rglob("*") if one.is_file())
         fits.append(Fitted(count, seconds, peak_mb, size))
     return fits
+
+
+def _long_fits(folder: Path, frames: tuple[int, ...]) -> list[LongFit]:
+    track = sample_landmarks(folder)
+    return [long_fit(track, count, folder) for count in frames]
 
 
 def _both(compared: Compared) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -111,6 +111,14 @@ class ClipSet:
         """Clips of these subjects."""
         wanted = set(subjects)
         return tuple(clip for clip in self.clips if clip.subject in wanted)
+
+
+def seen_first(clips: Iterable[Clip]) -> Callable[[Clip], bool]:
+    """Which clips are from the first of the places that saw their movement: its own, if any did."""
+    first: dict[tuple[str, str], int] = {}
+    for clip in clips:
+        first[clip.key] = min(clip.placement, first.get(clip.key, clip.placement))
+    return lambda clip: clip.placement == first[clip.key]
 
 
 def frame_counts(clips: Iterable[Clip], classes: int) -> NDArray[np.int64]:

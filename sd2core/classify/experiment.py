@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
-from sd2core.classify.data import Clip, ClipSet, frame_counts
+from sd2core.classify.data import Clip, ClipSet, frame_counts, seen_first
 from sd2core.classify.defaults import DELAY_S, WIDTH
 from sd2core.classify.features import Kind
 from sd2core.classify.splitting import Parts, fold, movements
@@ -157,19 +157,25 @@ def choose(known: ClipSet, condition: Condition, seed: int, denoise: Denoise) ->
     """
     parts = fold(known, seed)
     real_pool, added_pool = _pools(known, parts, seed)
-    seen = [clip for clip in parts.training if clip.kind in RADAR and clip.placement == 0]
+    first = seen_first(known.clips)
+    seen = [clip for clip in parts.training if clip.kind in RADAR and first(clip)]
     by_key: dict[tuple[str, str], list[Clip]] = {}
     for clip in seen:
         by_key.setdefault(clip.key, []).append(clip)
     real = _first([clip for key in real_pool for clip in by_key.get(key, [])], condition.share)
-    validation = [c for c in parts.validation if c.kind in RADAR and c.placement == 0]
+    validation = [clip for clip in parts.validation if clip.kind in RADAR and first(clip)]
     test = [clip for clip in parts.test if clip.kind in RADAR]
     return Chosen(
         real=real,
-        added=_added(parts.training, set(added_pool), condition, denoise),
+        added=_added(
+            [clip for clip in parts.training if condition.moved or first(clip)],
+            set(added_pool),
+            condition,
+            denoise,
+        ),
         validation=_whole(validation, condition.share),
-        test=tuple(clip for clip in test if clip.placement == 0),
-        moved=tuple(clip for clip in test if clip.placement > 0),
+        test=tuple(clip for clip in test if first(clip)),
+        moved=tuple(clip for clip in test if not first(clip)),
         by_movement=parts.by_movement,
     )
 
@@ -220,11 +226,7 @@ def _added(
     if condition.added == "nothing":
         return ()
     kinds = RADAR if condition.added == "radar" else ("synthetic",)
-    found = [
-        clip
-        for clip in clips
-        if clip.key in pool and clip.kind in kinds and (condition.moved or clip.placement == 0)
-    ]
+    found = [clip for clip in clips if clip.key in pool and clip.kind in kinds]
     if not found:
         raise Sd2Error(
             f"The data hold no {condition.added} maps to add", "pairs, or recordings with a mesh"

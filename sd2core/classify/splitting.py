@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from sd2core.classify.data import Clip, ClipSet, frame_counts
+from sd2core.classify.data import Clip, ClipSet, frame_counts, seen_first
 from sd2core.errors import Sd2Error
 from sd2core.train.data import split_subjects
 
@@ -62,8 +62,8 @@ def split_clips(
     validation, test : sequence of str, optional
         As :func:`sd2core.train.data.split_subjects` has them.
     first_only : bool
-        Learn only from what every movement's own sensor saw; validation and test always
-        do.
+        Learn only from what every movement's own sensor saw, or the first one where it was
+        not its own; validation and test always do.
 
     Raises
     ------
@@ -77,7 +77,7 @@ def split_clips(
         parts["training"], parts["validation"] = _apart(parts["training"], kept)
     for name, clips in parts.items():
         if first_only or name != "training":
-            parts[name] = tuple(clip for clip in clips if clip.placement == 0)
+            parts[name] = tuple(filter(seen_first(clips), clips))
     return Parts(**parts, by_movement=split.by_take)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.atomic import atomic_write_text
-from sd2core.classify.data import Clip, ClipSet
+from sd2core.classify.data import Clip, ClipSet, seen_first
 from sd2core.classify.experiment import (
     PAPER,
     RADAR,
@@ -193,7 +193,7 @@ def conditions_of(known: ClipSet, options: TableOptions, denoised: bool) -> list
     added: list[Added] = []
     if has_synthetic(known):
         added = ["synthetic", "denoised"] if denoised else ["synthetic"]
-        places = (False, True) if any(clip.placement for clip in known.clips) else (False,)
+        places = (False,) if all(map(seen_first(known.clips), known.clips)) else (False, True)
         found += [replace(base, added=one, moved=moved) for one in added for moved in places]
         # What added maps are at best.
         found.append(replace(base, added="radar"))

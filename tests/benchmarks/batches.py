@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import resource
 import subprocess
 import sys
 import tempfile
@@ -16,6 +15,7 @@ from itertools import cycle, islice
 from pathlib import Path
 from typing import Any
 
+from peaks import peak_mb
 from scaling import body
 
 from sd2core.atomic import atomic_write_text
@@ -208,7 +208,7 @@ def _in_this_process(bodies: Path, how: str) -> None:
 
         def submit(self, tasks: tuple[Any, ...], worker: str) -> None:
             run_tasks([task.record(out) for task in tasks])
-            peaks[tasks[0].step] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+            peaks[tasks[0].step] = peak_mb()
             self._ended.append(Ending(tasks, (None,) * len(tasks)))
 
         def ended(self, timeout_s: float) -> list[Any]:
@@ -240,8 +240,8 @@ def fit_of(video: Path, frames: int, folder: Path) -> tuple[float, float]:
         text=True,
         check=True,
     )
-    seconds, peak_mb = json.loads(told.stdout.splitlines()[-1])
-    return seconds, peak_mb
+    seconds, peak = json.loads(told.stdout.splitlines()[-1])
+    return seconds, peak
 
 
 def _fit_in_this_process(video: str, out: str) -> None:
@@ -249,8 +249,7 @@ def _fit_in_this_process(video: str, out: str) -> None:
 
     begun_s = time.process_time()
     fit_to_video(video, {}, None, out)
-    peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    print(json.dumps([time.process_time() - begun_s, peak_mb]))
+    print(json.dumps([time.process_time() - begun_s, peak_mb()]))
 
 
 def files_per_second(folder: Path, count: int = 400) -> tuple[float, float]:

@@ -26,6 +26,7 @@ from unittest.mock import patch
 
 import numpy as np
 from numpy.typing import NDArray
+from peaks import forget_peak, peak_mb
 
 from sd2core.body import fit as fitting
 from sd2core.body import fit_windows, lifting
@@ -189,29 +190,20 @@ def _fill(store: SearchStore, video: VideoReader, track: LandmarkTrack) -> None:
 
 
 def _fit_in_this_process(video: str, out: str) -> None:
-    peak_mb: dict[str, float] = {}
+    peaks: dict[str, float] = {}
     stages = ["start"]
 
     def progress_of(stage: str) -> Any:
-        peak_mb[stages[-1]] = _peak_mb()
+        peaks[stages[-1]] = peak_mb()
+        forget_peak()
         stages.append(stage)
         return lambda done, total: None
 
     begun_s = time.process_time()
     quiet = FitReport(progress_of, lambda *_: None, lambda *_: None)
     fit_video(Path(video), Path(out), FitChoices(), quiet)
-    peak_mb[stages[-1]] = _peak_mb()
-    print(json.dumps({"seconds": time.process_time() - begun_s, "peak_mb": peak_mb}))
-
-
-def _peak_mb() -> float:
-    """The most memory since the last call.
-
-    Not by ``getrusage``: its peak begins with that of the process which started this one.
-    """
-    status = Path("/proc/self/status").read_text(encoding="ascii")
-    Path("/proc/self/clear_refs").write_text("5", encoding="ascii")
-    return int(status.split("VmHWM:")[1].split()[0]) / 1024
+    peaks[stages[-1]] = peak_mb()
+    print(json.dumps({"seconds": time.process_time() - begun_s, "peak_mb": peaks}))
 
 
 if __name__ == "__main__":

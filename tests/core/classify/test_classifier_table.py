@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from labelled_clips import clip_set
 
 from sd2core.classify.experiment import AMOUNT, PAPER, Condition, Network, choose, digest
-from sd2core.classify.splitting import movements
+from sd2core.classify.splitting import movements, split_clips
 from sd2core.classify.table import TableOptions, conditions_of, gains, make_table
 from sd2core.classify.table_plots import draw_confusions, draw_curve
 from sd2core.classify.table_words import as_json, as_markdown, as_text, frame_recall
@@ -74,6 +74,22 @@ def test_how_much_is_learnt_from() -> None:
     assert frames == [3, 30, 150, 300]
     added = choose(known, Condition(added="synthetic"), 0, halved).added
     assert sum(map(len, added)) == AMOUNT * 300
+
+
+def test_the_first_place_counts_where_a_movements_own_sensor_saw_nothing() -> None:
+    """A batch may look from planned places only, which are numbered from 1."""
+    away = replace(
+        KNOWN, clips=tuple(replace(clip, placement=clip.placement + 1) for clip in KNOWN.clips)
+    )
+    here, there = (choose(one, Condition(added="radar"), 1, halved) for one in (KNOWN, away))
+    for name in ("real", "added", "validation", "test", "moved"):
+        own, moved = getattr(here, name), getattr(there, name)
+        assert own
+        assert [clip.title for clip in own] == [clip.title for clip in moved]
+    parts = split_clips(away, first_only=True)
+    for clips in (parts.training, parts.validation, parts.test):
+        assert clips
+        assert {clip.placement for clip in clips} == {1}
 
 
 def test_little_is_part_of_more() -> None:
