@@ -215,7 +215,7 @@ def _large(options: argparse.Namespace, out: Path) -> str:
     campaign, minutes = options.large, options.large_minutes
     if campaign is None:
         campaign = campaign_of(out / "large", minutes, "--seed", 1)
-    how = ("--radar-only", "--seeds", options.seeds, "--shares", "10%,30%,100%")
+    how = ("--radar-only", "--seeds", options.seeds, "--shares", "30%,100%")
     sd2("classify", "table", campaign, "--out", out / "large-table", *how)
     facts = json.loads(_output("info", campaign, "--json"))["minutes_of_subject"]
     words = LARGE.format(

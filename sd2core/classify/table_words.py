@@ -165,7 +165,7 @@ def _lines(table: Table, lines_of: Callable[[Rows], list[str]]) -> list[str]:
         "",
         *lines_of(network_rows(table)),
     ]
-    if len(main_conditions(table)) > 1:
+    if any(condition.added != "nothing" for condition in main_conditions(table)):
         lines += ["", "What is added to all of the radar's data:", "", *lines_of(added_rows(table))]
     if len({one.share for one in curve_conditions(table)}) > 1:
         lines += ["", "Learning curve, frames:", "", *lines_of(curve_rows(table))]
