@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -101,8 +102,7 @@ class Compared:
     @property
     def ratio(self) -> float:
         """Median over the rounds of how many times the first takes what the second does."""
-        ratios = sorted(a / b for a, b in zip(self.one_s, self.other_s, strict=True))
-        return ratios[len(ratios) // 2]
+        return statistics.median(a / b for a, b in zip(self.one_s, self.other_s, strict=True))
 
 
 def two_against_one(
