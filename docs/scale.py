@@ -80,7 +80,7 @@ class Sizes:
     long_frames: tuple[int, ...]
 
 
-FULL = Sizes(4, 55, 600, 2, 10, 8, (1.0, 12.0, 90.0), 20, (150, 750), (900, 3600))
+FULL = Sizes(4, 55, 600, 2, 10, 8, (1.0, 12.0, 90.0), 20, (150, 750), (3600, 9000))
 QUICK = Sizes(2, 5, 60, 1, 2, 3, (0.2, 0.5), 2, (20, 40), (60, 120))
 
 
@@ -230,7 +230,7 @@ def _fit_memory(fits: list[Fitted], long: list[LongFit]) -> list[str]:
         return []
     stages = [name for name in long[0].peak_mb if name != "start"]
     lines = [
-        "A fit reads its clip in parts ([decision 42](decisions/0042-fits-of-any-length.md)). Of"
+        "A fit reads its clip in parts ([decision 42](decisions/0042-fits-of-any-length.md)). Of "
         "the sample's video, its",
         "landmarks found as well: "
         + ", ".join(f"{one.peak_mb:.0f} MB with {one.frames:,} frames" for one in fits)
