@@ -289,7 +289,7 @@ class ClassTrack(QObject):
         self._given, self._known = replace(doppler, values=values), known.copy()
         if doppler.present is not None:
             nobody = known & ~doppler.present
-            self._shares[nobody] = _of_nobody(self._card)
+            self._shares[nobody] = self._card.nobody()
             self._done[nobody] = True
         self.changed.emit()
 
@@ -381,11 +381,3 @@ def _in_order(
 def _present(doppler: DopplerMap) -> NDArray[np.bool_]:
     frames = len(doppler.timebase)
     return np.ones(frames, bool) if doppler.present is None else doppler.present
-
-
-def _of_nobody(card: ClassifierCard) -> NDArray[np.float32]:
-    """Background for certain; where that is no class, nothing is known."""
-    count = len(card.classes)
-    if card.background is None:
-        return np.full(count, 1.0 / count, np.float32)
-    return np.eye(count, dtype=np.float32)[card.background]

@@ -8,6 +8,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from sd2core.classify.defaults import LONGEST_DELAY_S
 from sd2core.classify.features import Features
 from sd2core.errors import Sd2Error
@@ -103,6 +106,17 @@ class ClassifierCard:
     def background(self) -> int | None:
         """Which of the classes is the background, if one is."""
         return self.classes.index(BACKGROUND) if BACKGROUND in self.classes else None
+
+    def nobody(self) -> NDArray[np.float32]:
+        """Answer to a frame without a person, (classes,).
+
+        Background, or where that is none of the classes nothing is known: all the same.
+        """
+        found = np.full(len(self.classes), 1.0 / len(self.classes), np.float32)
+        if self.background is not None:
+            found[:] = 0.0
+            found[self.background] = 1.0
+        return found
 
     def to_json(self) -> dict[str, Any]:
         """As kept in the header of a model file."""

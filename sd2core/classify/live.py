@@ -76,7 +76,7 @@ class TrainedClassifier:
         """
         matching.check_bins(doppler, self.card)
         energies = np.ascontiguousarray(doppler.values.T)  # (frames, bins)
-        found = np.tile(self.nobody(), (len(energies), 1))
+        found = np.tile(self.card.nobody(), (len(energies), 1))
         done, total = 0, len(energies)
 
         def work(values: NDArray[np.float32]) -> Probabilities:
@@ -135,7 +135,7 @@ class TrainedClassifier:
             are owed when the person has gone.
         """
         if not present:
-            answers = np.concatenate([self.finish(memory), self.nobody()[None]])
+            answers = np.concatenate([self.finish(memory), self.card.nobody()[None]])
             return answers, self.initial_memory()
         return self.advance(np.asarray(frame)[None], memory)
 
@@ -163,14 +163,3 @@ class TrainedClassifier:
             answer, state = self.network.chunk(torch.from_numpy(shown)[None], memory.network)
             found: Probabilities = probabilities_of(answer[0]).numpy()
         return found[max(self.card.delay_frames - memory.owed, 0) :], state
-
-    def nobody(self) -> Probabilities:
-        """Answer to a frame without a person, (classes,).
-
-        Background, or where that is none of the classes nothing is known: all the same.
-        """
-        found = np.full(len(self.classes), 1.0 / len(self.classes), np.float32)
-        if self.card.background is not None:
-            found[:] = 0.0
-            found[self.card.background] = 1.0
-        return found

@@ -20,7 +20,7 @@ from sd2core.classify.data import UNKNOWN, Clip, ClipSet, frame_counts
 from sd2core.classify.defaults import DELAY_S, LONGEST_DELAY_S
 from sd2core.classify.features import Features, Kind
 from sd2core.classify.live import TrainedClassifier
-from sd2core.classify.metrics import mean_recall
+from sd2core.classify.metrics import confusion_of, mean_recall
 from sd2core.classify.models import Classifier, build, options, parameter_groups
 from sd2core.classify.noise import some_noisy
 from sd2core.errors import Sd2Error
@@ -328,8 +328,7 @@ def _score(network: Classifier, material: Material, classes: int) -> float:
     with torch.no_grad():
         for shown, label in zip(material.features, material.labels, strict=True):
             found = network(torch.from_numpy(shown)[None])[0].argmax(1).numpy()
-            counted = label != UNKNOWN
-            np.add.at(confusion, (label[counted], found[counted]), 1)
+            confusion += confusion_of(label, found, classes)
     return mean_recall(confusion)
 
 
