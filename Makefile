@@ -9,8 +9,8 @@ export PYTHON
 
 INSTALLED := .venv/.installed
 COMPILED := .venv/.compiled
-# Among them every module in KERNEL_MODULES of sd2core/compiled.py.
-KERNELS := $(wildcard sd2core/compiled.py sd2core/raster.py sd2core/body/*.py sd2core/scattering/*.py sd2core/doppler/*.py sd2core/fmcw/*.py sd2core/simulate/people/*.py)
+# Among them every module in KERNEL_MODULES of sd2core/numerics/compiled.py.
+KERNELS := $(wildcard sd2core/numerics/*.py sd2core/body/*.py sd2core/scattering/*.py sd2core/doppler/*.py sd2core/fmcw/*.py sd2core/simulate/people/*.py)
 
 .PHONY: help setup demo test test-slow lint format bench wheel screenshots accuracy fitting denoiser denoiser-comparison range-synthesis scale classifier whole-loop clean
 
@@ -112,4 +112,4 @@ scale: setup
 clean:
 	rm -rf .venv build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks \
 		.import_linter_cache
-	find sd2core sd2app tests docs -name __pycache__ -type d -prune -exec rm -rf {} +
+	find sd2core app tests docs -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -13,19 +13,19 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from sd2core.compiled import warm_up
+from sd2core.accuracy.choosing import choose
+from sd2core.accuracy.measuring import measure
+from sd2core.accuracy.plot import plot_trade
+from sd2core.accuracy.results import Measurement
+from sd2core.accuracy.scene import this_machine
+from sd2core.accuracy.survey import survey_scene
 from sd2core.doppler import PRESETS
-from sd2core.figure_files import save_figure
+from sd2core.files.figure_files import save_figure
+from sd2core.files.resources import resource_path
 from sd2core.io.mesh import load_mesh
-from sd2core.ladder.choosing import choose
-from sd2core.ladder.measuring import measure
-from sd2core.ladder.plot import plot_trade
-from sd2core.ladder.results import Measurement
-from sd2core.ladder.scene import this_machine
-from sd2core.ladder.survey import survey_scene
-from sd2core.mesh import MeshSequence
-from sd2core.recording import open_recording
-from sd2core.resources import resource_path
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.numerics.compiled import warm_up
+from sd2core.recording.recording import open_recording
 from sd2core.sensor import VirtualSensor
 
 DOCS = Path(__file__).resolve().parent
@@ -76,7 +76,7 @@ def main() -> None:
 
 
 def _reference() -> str:
-    from sd2core.ladder.rungs import reference_plan
+    from sd2core.accuracy.plans import reference_plan
 
     return f"*{reference_plan('histogram')}*"
 

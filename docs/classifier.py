@@ -22,7 +22,7 @@ from pathlib import Path
 
 from runs import campaign_of, sd2
 
-from sd2core.ladder.scene import this_machine
+from sd2core.accuracy.scene import this_machine
 
 ROOT = Path(__file__).resolve().parent
 IMAGES = ROOT / "images"

@@ -13,13 +13,13 @@ import numpy as np
 from matplotlib.figure import Figure
 from runs import campaign_of, tables
 
-from sd2core.atomic import atomic_write_text
+from sd2core.accuracy.scene import this_machine
 from sd2core.denoise.files import load_model
 from sd2core.denoise.metrics import mean_velocity_error, peak_error, stands_out
-from sd2core.figure_files import save_figure
-from sd2core.ladder.scene import this_machine
-from sd2core.pairs import PairSet, read_pairs
-from sd2core.resources import resource_path
+from sd2core.files.atomic import atomic_write_text
+from sd2core.files.figure_files import save_figure
+from sd2core.files.resources import resource_path
+from sd2core.pairs.store import PairSet, read_pairs
 from sd2core.simulate.campaign.takes import Campaign, TakeMaker, take_name
 
 DOCS = Path(__file__).resolve().parent

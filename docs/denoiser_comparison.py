@@ -28,11 +28,11 @@ from runs import (
     train,
 )
 
-from sd2core.atomic import atomic_write_text
+from sd2core.accuracy.scene import this_machine
 from sd2core.denoise.registry import options as options_of
-from sd2core.figure_files import save_figure
-from sd2core.ladder.scene import this_machine
-from sd2core.pairs import read_pairs
+from sd2core.files.atomic import atomic_write_text
+from sd2core.files.figure_files import save_figure
+from sd2core.pairs.store import read_pairs
 from sd2core.train.folder import RunFolder
 from sd2core.train.progress import read_events, standing
 

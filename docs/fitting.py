@@ -14,16 +14,16 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from sd2core.atomic import atomic_write_text
+from sd2core.accuracy.scene import this_machine
 from sd2core.cli import build_parser, run
 from sd2core.compare.figure import draw_comparison
 from sd2core.compare.meshes import compare_meshes
 from sd2core.compare.truth import read_truth
-from sd2core.compiled import warm_up
-from sd2core.figure_files import save_figure
+from sd2core.files.atomic import atomic_write_text
+from sd2core.files.figure_files import save_figure
 from sd2core.io.mesh import load_mesh
 from sd2core.io.video import open_video
-from sd2core.ladder.scene import this_machine
+from sd2core.numerics.compiled import warm_up
 
 DOCS = Path(__file__).resolve().parent
 IMAGES = DOCS / "images"

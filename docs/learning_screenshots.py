@@ -15,13 +15,13 @@ from pathlib import Path
 from PySide6.QtWidgets import QApplication
 from windows import LIMIT_S, opened, save, wait_for
 
-from sd2app.dialogs.batch import BatchWindow
-from sd2app.dialogs.class_result import ClassResultDialog
-from sd2app.dialogs.export import ExportDialog
-from sd2app.screenshot import wait_until_settled
-from sd2app.views.window import MainWindow
-from sd2core.placements import PlacementGrid
-from sd2core.resources import resource_path
+from sd2app.batch.dialog import BatchWindow
+from sd2app.classify.result_dialog import ClassResultDialog
+from sd2app.dataset_export.dialog import ExportDialog
+from sd2app.shell.screenshot import wait_until_settled
+from sd2app.shell.window import MainWindow
+from sd2core.files.resources import resource_path
+from sd2core.placements.placements import PlacementGrid
 
 _CAMPAIGN = ("--subjects", "4", "--minutes", "4", "--seed", "1")
 _COMPARE_STEPS = 100

@@ -11,9 +11,9 @@ from pathlib import Path
 
 from runs import Job, campaign_of, settings, tables, train
 
-from sd2core.atomic import atomic_write_text
-from sd2core.ladder.scene import this_machine
-from sd2core.pairs import read_pairs
+from sd2core.accuracy.scene import this_machine
+from sd2core.files.atomic import atomic_write_text
+from sd2core.pairs.store import read_pairs
 
 DOCS = Path(__file__).resolve().parent
 PLACES = 3

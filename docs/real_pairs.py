@@ -31,7 +31,7 @@ from sd2core.mocap.mars_pairs import (
     skeleton_clip,
     skeleton_cloud,
 )
-from sd2core.pairs import PairSet, read_pairs
+from sd2core.pairs.store import PairSet, read_pairs
 from sd2core.sensor import VirtualSensor
 
 Maps = list[NDArray[np.float32]]

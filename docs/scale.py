@@ -14,18 +14,18 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
+from sd2core.accuracy.scene import this_machine
 from sd2core.batch.driver import AHEAD
 from sd2core.batch.estimate import task_rates
-from sd2core.batch.flow import Flow
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.inputs import find_origins, glance
 from sd2core.batch.plan_file import plan_from_text
 from sd2core.batch.stretches import LONGEST_FRAMES
-from sd2core.cli.batch_words import bytes_words
-from sd2core.compiled import warm_up
-from sd2core.ladder.scene import this_machine
-from sd2core.recording import open_recording
-from sd2core.resources import resource_path
+from sd2core.batch.task_graph import Flow
+from sd2core.cli.batch_text import bytes_words
+from sd2core.files.resources import resource_path
+from sd2core.numerics.compiled import warm_up
+from sd2core.recording.recording import open_recording
 
 DOCS = Path(__file__).resolve().parent
 sys.path.insert(0, str(DOCS.parent / "tests" / "benchmarks"))

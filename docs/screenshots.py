@@ -20,12 +20,12 @@ from learning_screenshots import learning
 from PySide6.QtWidgets import QApplication
 from windows import IMAGES, LIMIT_S, REPOSITORY, opened, save, wait_for
 
-from sd2app.dialogs.comparison import ComparisonWindow
-from sd2app.models.fit_request import FitRequest
-from sd2app.screenshot import wait_until_settled
-from sd2app.views.window import MainWindow
-from sd2core.placements import PlacementCloud
-from sd2core.resources import resource_path
+from sd2app.fit.request import FitRequest
+from sd2app.mesh_comparison.window import ComparisonWindow
+from sd2app.shell.screenshot import wait_until_settled
+from sd2app.shell.window import MainWindow
+from sd2core.files.resources import resource_path
+from sd2core.placements.placements import PlacementCloud
 from sd2core.sensor import VirtualSensor, aimed_at
 
 SHARED = Path(os.environ.get("SD2_SHARED_DATA", REPOSITORY.parent / "shared" / "data"))
@@ -82,7 +82,7 @@ def strip() -> None:
     """Frames of a swipe of the sample above its mesh."""
     from sd2core.figures.strip import plot_strip
     from sd2core.figures.strip_source import StripOptions, StripSource
-    from sd2core.recording import open_recording
+    from sd2core.recording.recording import open_recording
 
     recording = open_recording(resource_path("swipes.sd2"))
     with recording.open_video() as video:

@@ -17,9 +17,9 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from sd2core.atomic import atomic_write_text
-from sd2core.ladder.scene import this_machine
-from sd2core.resources import resource_path
+from sd2core.accuracy.scene import this_machine
+from sd2core.files.atomic import atomic_write_text
+from sd2core.files.resources import resource_path
 
 DOCS = Path(__file__).resolve().parent
 IMAGES = DOCS / "images"

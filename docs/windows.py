@@ -9,10 +9,10 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QApplication, QWidget
 
-from sd2app.screenshot import wait_until_settled
 from sd2app.settings import Settings
-from sd2app.theme import apply_theme
-from sd2app.views.window import MainWindow
+from sd2app.shell.screenshot import wait_until_settled
+from sd2app.shell.window import MainWindow
+from sd2app.widgets.theme import apply_theme
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 IMAGES = REPOSITORY / "docs" / "images"

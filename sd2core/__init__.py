@@ -16,20 +16,20 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
+from sd2core.version import __version__
 
 if TYPE_CHECKING:
     from sd2core.denoise.files import load_model
     from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
+    from sd2core.doppler_map import DopplerMap
     from sd2core.errors import Sd2Error
     from sd2core.fmcw import doppler_map
     from sd2core.io.mesh import load_mesh, save_mesh
     from sd2core.io.radar import RadarCapture, load_capture
     from sd2core.io.video import VideoReader, open_video
-    from sd2core.mesh import MeshSequence
-    from sd2core.recording import Recording, Span, open_recording
+    from sd2core.mesh.sequence import MeshSequence
+    from sd2core.recording.recording import Recording, Span, open_recording
     from sd2core.sensor import PAPER_RADAR, RadarConfig, VelocityAxis, VirtualSensor
-    from sd2core.spectrum import DopplerMap
     from sd2core.timebase import Timebase
 
 __all__ = [
@@ -48,6 +48,7 @@ __all__ = [
     "VelocityAxis",
     "VideoReader",
     "VirtualSensor",
+    "__version__",
     "doppler_map",
     "load_capture",
     "load_mesh",
@@ -60,13 +61,13 @@ __all__ = [
 _HOME = {
     "PAPER_RADAR": "sensor",
     "PRESETS": "doppler",
-    "DopplerMap": "spectrum",
-    "MeshSequence": "mesh",
+    "DopplerMap": "doppler_map",
+    "MeshSequence": "mesh.sequence",
     "RadarCapture": "io.radar",
     "RadarConfig": "sensor",
-    "Recording": "recording",
+    "Recording": "recording.recording",
     "Sd2Error": "errors",
-    "Span": "recording",
+    "Span": "recording.recording",
     "SynthesisOptions": "doppler",
     "Synthesizer": "doppler",
     "Timebase": "timebase",
@@ -77,7 +78,7 @@ _HOME = {
     "load_capture": "io.radar",
     "load_mesh": "io.mesh",
     "load_model": "denoise.files",
-    "open_recording": "recording",
+    "open_recording": "recording.recording",
     "open_video": "io.video",
     "save_mesh": "io.mesh",
 }

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from sd2core.classify.comparison import Run, Table, TableOptions
 from sd2core.classify.experiment import Condition, Network
 from sd2core.classify.metrics import Score
-from sd2core.classify.table import Run, Table, TableOptions
 
 CLASSES = ("background", "horizontal", "vertical")
 

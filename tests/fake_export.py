@@ -12,7 +12,7 @@ import sys
 import time
 from pathlib import Path
 
-from sd2app.jobs.command_folder import CommandFolder
+from sd2app.background.run_folder import CommandFolder
 
 
 def say(**content: object) -> None:

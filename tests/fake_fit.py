@@ -33,7 +33,7 @@ def write_mesh(out: Path, frames: int) -> None:
     import numpy as np
 
     from sd2core.io.mesh import save_mesh
-    from sd2core.mesh import MeshSequence
+    from sd2core.mesh.sequence import MeshSequence
     from sd2core.timebase import Timebase
 
     corners = 0.3 * np.concatenate([np.eye(3), -np.eye(3)])

@@ -6,9 +6,9 @@ import threading
 import time
 from dataclasses import replace
 
-from sd2app.models.ladder import Ladder
-from sd2core.ladder.carry_out import synthesizer_for
-from sd2core.ladder.results import (
+from sd2app.accuracy.ladder import Ladder
+from sd2core.accuracy.plans import Plan, reference_plan
+from sd2core.accuracy.results import (
     Choice,
     Cost,
     Errors,
@@ -18,7 +18,7 @@ from sd2core.ladder.results import (
     Reason,
     Spread,
 )
-from sd2core.ladder.rungs import Plan, reference_plan
+from sd2core.accuracy.synthesizers import synthesizer_for
 
 EXACT = Plan()
 FACING = Plan(visibility="facing")

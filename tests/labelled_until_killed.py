@@ -24,18 +24,18 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QToolButton
 
 # Before the fork, so that a window stands in a second.
-import sd2app.context
-import sd2app.dialogs.dialogs
-import sd2app.views.scene3d  # noqa: F401
+import sd2app.scene
+import sd2app.shell.file_dialogs
+import sd2app.shell.wiring  # noqa: F401
+from sd2app.labels.recovery_bar import LabelBar
+from sd2app.labels.timeline import ROW_PX, LabelTimeline
 from sd2app.settings import Settings
-from sd2app.views.label_bar import LabelBar
-from sd2app.views.label_timeline import ROW_PX, LabelTimeline
-from sd2app.views.window import MainWindow
-from sd2core.compiled import warm_up
+from sd2app.shell.window import MainWindow
 from sd2core.labels.entries import labels_entry
 from sd2core.labels.recovery import offers_in, recovery_folder
 from sd2core.labels.spans import Labels
-from sd2core.recording import open_recording
+from sd2core.numerics.compiled import warm_up
+from sd2core.recording.recording import open_recording
 
 NONE, CONTROL = Qt.KeyboardModifier.NoModifier, Qt.KeyboardModifier.ControlModifier
 ALT, SHIFT = Qt.KeyboardModifier.AltModifier, Qt.KeyboardModifier.ShiftModifier

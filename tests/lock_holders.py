@@ -12,7 +12,7 @@ REPOSITORY = Path(__file__).resolve().parent.parent
 def held(path: Path) -> subprocess.Popen[str]:
     """A process that holds a lock until it is killed."""
     code = (
-        "import sys, time; from pathlib import Path; from sd2core.file_lock import FileLock;"
+        "import sys, time; from pathlib import Path; from sd2core.files.lock import FileLock;"
         " lock = FileLock(Path(sys.argv[1])); print(lock.take(), flush=True); time.sleep(60)"
     )
     process = subprocess.Popen(

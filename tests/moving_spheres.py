@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from sd2core.io.mesh import save_mesh
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.timebase import Timebase
 
 _ROUND, _HIGH = 24, 12

@@ -91,7 +91,7 @@ def check(environment: Path, away: Path) -> None:
     for file in call(python, "-c", where, cwd=away).splitlines():
         assert Path(file).is_relative_to(environment)
 
-    where = "from sd2core.resources import resource_path as p; print(p('swipes.sd2'))"
+    where = "from sd2core.files.resources import resource_path as p; print(p('swipes.sd2'))"
     sample = Path(call(python, "-c", where, cwd=away).strip())
     assert sample.is_relative_to(environment)
     told = call(sd2, "info", sample, cwd=away)

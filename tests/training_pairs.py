@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sd2core.pairs import PairWriter, Take
+from sd2core.pairs.store import PairWriter, Take
 from sd2core.sensor import VelocityAxis
 
 

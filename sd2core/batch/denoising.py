@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.presence import Presence
-from sd2core.spectrum import DopplerMap
+from sd2core.doppler_map import DopplerMap
+from sd2core.mesh.presence import Presence
 
 if TYPE_CHECKING:
     from sd2core.denoise.live import TrainedDenoiser
@@ -57,7 +57,7 @@ def denoise(maps: Sequence[Path], model: str, digest: str, outs: Sequence[Path])
 def _denoise_long(trained: TrainedDenoiser, maps: Sequence[Path], outs: Sequence[Path]) -> None:
     """A stretch at a time, with what the model remembers of those before."""
     from sd2core.denoise.long_maps import denoise_long
-    from sd2core.denoise.matching import check_map, clips, is_regular
+    from sd2core.denoise.resample_to_model import check_map, clips, is_regular
 
     files, rate_hz = _Files(maps), trained.card.frame_rate_hz
     check_map(files.part(0), trained.card)

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from sd2core.batch.flow import Flow
 from sd2core.batch.pool import Ending, Pool
+from sd2core.batch.task_graph import Flow
 from sd2core.batch.tasks import Task, TaskFailed, killed_in
 from sd2core.errors import Sd2Error
 

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sd2core.batch.fitting import fitted
-from sd2core.batch.flow import Flow
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.inputs import (
     Inspection,
@@ -25,10 +24,11 @@ from sd2core.batch.inputs import (
 from sd2core.batch.plan import BatchPlan
 from sd2core.batch.probing import TaskRate, export_s, task_rates
 from sd2core.batch.rates import known_fit_rate
+from sd2core.batch.task_graph import Flow
 from sd2core.batch.tasks import Task
+from sd2core.doppler_map import MapKind
 from sd2core.errors import Sd2Error
 from sd2core.progress import Progress, silent
-from sd2core.spectrum import MapKind
 
 if TYPE_CHECKING:
     pass

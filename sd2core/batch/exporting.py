@@ -12,21 +12,21 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sd2core.atomic import atomic_write_text
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.keys import key_of
 from sd2core.batch.plan import Export
 from sd2core.batch.stretches import LONGEST_FRAMES
-from sd2core.contents import file_digest
+from sd2core.doppler_map import DopplerMap, MapKind, joined
 from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_write_text
+from sd2core.files.digests import file_digest
 from sd2core.progress import Progress
 from sd2core.sensor import VirtualSensor
-from sd2core.spectrum import DopplerMap, MapKind, joined
 from sd2core.timebase import Timebase
 
 if TYPE_CHECKING:
     from sd2core.datasets.source import LazySource, Source, SourceKey
-    from sd2core.recording import Recording
+    from sd2core.recording.recording import Recording
 
 Row = dict[str, Any]
 """A line of ``results.jsonl``: one stretch of one map."""
@@ -240,7 +240,7 @@ class _Opened:
 
     def recording(self, path: Path) -> Recording | None:
         """None for a mesh or a video by itself."""
-        from sd2core.recording import is_recording, open_recording
+        from sd2core.recording.recording import is_recording, open_recording
 
         if path != self._path:
             self._path, self._radar = path, None

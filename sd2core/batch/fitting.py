@@ -7,9 +7,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from sd2core.atomic import atomic_write_text
 from sd2core.batch.inputs import MeshInput, mesh_input, mesh_input_of
 from sd2core.batch.plan import Fit
+from sd2core.files.atomic import atomic_write_text
 from sd2core.progress import silent
 
 

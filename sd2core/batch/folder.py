@@ -13,12 +13,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from sd2core import __version__
-from sd2core.atomic import atomic_write_text
 from sd2core.errors import Sd2Error
-from sd2core.file_lock import FileLock, is_locked
+from sd2core.files.atomic import atomic_write_text
+from sd2core.files.lock import FileLock, is_locked
 from sd2core.train.control import write_control
 from sd2core.train.progress import Event, last_of, read_events
+from sd2core.version import __version__
 
 State = Literal["running", "finished", "stopped", "failed", "died"]
 """``died`` is never written: the file says that it runs, and its process is gone."""

@@ -10,18 +10,18 @@ from dataclasses import asdict, dataclass
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
-from sd2core.atomic import atomic_write_text
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.keys import code_digest, key_of
 from sd2core.batch.plan import Recordings
-from sd2core.contents import Digests, signature
 from sd2core.errors import Sd2Error
-from sd2core.relative_paths import files_at, is_there
+from sd2core.files.atomic import atomic_write_text
+from sd2core.files.digests import Digests, signature
+from sd2core.files.paths import files_at, is_there
 from sd2core.sensor import Vector, VirtualSensor
 
 if TYPE_CHECKING:
-    from sd2core.mesh import MeshSequence
-    from sd2core.recording import Recording
+    from sd2core.mesh.sequence import MeshSequence
+    from sd2core.recording.recording import Recording
 
 LARGEST_IN_MEMORY_BYTES = 256 << 20
 """Of a mesh: what is larger is streamed."""
@@ -56,7 +56,7 @@ class MeshInput:
     frames, vertices : int
     frames_per_s : float
     target_m : tuple of 3 floats
-        Where the body is, see :class:`~sd2core.whereabouts.Whereabouts`.
+        Where the body is, see :class:`~sd2core.placements.body_extent.Whereabouts`.
     faces : str, optional
     reading : mapping
         Arguments for ``load_mesh``.
@@ -241,10 +241,10 @@ class _Look:
         self._folder, self._digests = folder, digests
 
     def at(self, path: Path) -> Inspection:
+        from sd2core.files.recording_json import FILE_NAME
         from sd2core.io.kinds import kind_of
         from sd2core.labels.files import FILE_NAME as LABELS_NAME
-        from sd2core.recording import Recording, open_recording
-        from sd2core.recording_document import FILE_NAME
+        from sd2core.recording.recording import Recording, open_recording
 
         kind = kind_of(path)
         if kind == "recording":
@@ -374,7 +374,7 @@ def mesh_input_of(
     Sd2Error
         As :func:`open_mesh`, and when there is nobody in it.
     """
-    from sd2core.whereabouts import Whereabouts
+    from sd2core.placements.body_extent import Whereabouts
 
     mesh = open_mesh(path, faces, reading or {})
     x, y, z = (round(value, 6) for value in Whereabouts.of(mesh).target_m)

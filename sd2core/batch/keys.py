@@ -9,42 +9,38 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import sd2core
 from sd2core.batch.plan import Step
-from sd2core.resources import resource_path
+from sd2core.files.resources import resource_path
 
 _CODE: dict[Step, tuple[str, ...]] = {
     "inspect": (
         "batch/inputs.py",
-        "contents.py",
+        "files/digests.py",
         "io",
-        "recording.py",
-        "recording_document.py",
-        "mesh.py",
+        "recording",
+        "mesh",
     ),
-    "fit": ("batch/fitting.py", "body", "io", "mesh.py", "presence.py", "timebase.py"),
+    "fit": ("batch/fitting.py", "body", "io", "mesh", "timebase.py"),
     "synthesise": (
         "batch/synthesis.py",
         "batch/stretches.py",
-        "decimation.py",
         "doppler",
         "io",
-        "ladder",
-        "mesh.py",
-        "precision.py",
-        "presence.py",
+        "accuracy",
+        "mesh",
+        "numerics",
         "scattering",
         "sensor.py",
-        "spectrum.py",
+        "doppler_map.py",
         "timebase.py",
     ),
     "denoise": (
         "batch/denoising.py",
         "batch/stretches.py",
         "denoise",
-        "presence.py",
-        "segments.py",
-        "spectrum.py",
+        "mesh/presence.py",
+        "pairs/segments.py",
+        "doppler_map.py",
     ),
     "simulate": (
         "batch/simulation.py",
@@ -52,15 +48,14 @@ _CODE: dict[Step, tuple[str, ...]] = {
         "datasets/simulating.py",
         "fmcw",
         "io",
-        "mesh.py",
+        "mesh",
         "mocap/recording_pairs.py",
-        "presence.py",
         "scattering",
         "sensor.py",
-        "spectrum.py",
+        "doppler_map.py",
         "timebase.py",
     ),
-    "export": ("batch/exporting.py", "datasets", "labels", "segments.py", "spectrum.py"),
+    "export": ("batch/exporting.py", "datasets", "labels", "pairs/segments.py", "doppler_map.py"),
 }
 """Modules that a step's results depend on, within sd2core."""
 
@@ -86,7 +81,7 @@ def key_of(step: Step, content: dict[str, Any]) -> str:
 @cache
 def code_digest(step: Step) -> str:
     """Changes with the code that makes a step's results, and the data that comes with it."""
-    package = Path(sd2core.__file__).parent
+    package = Path(__file__).parent.parent
     digest = hashlib.sha256()
     for name in _CODE[step]:
         for file in _sources(package / name):

@@ -28,11 +28,11 @@ from sd2core.doppler.options import (
     Weight,
     chosen_options,
 )
+from sd2core.doppler_map import MapKind
 from sd2core.errors import Sd2Error
-from sd2core.placements import Placements, placements_from_dict
-from sd2core.segments import LENGTH, OVERLAP
+from sd2core.pairs.segments import LENGTH, OVERLAP
+from sd2core.placements.placements import Placements, placements_from_dict
 from sd2core.sensor import Vector, VirtualSensor
-from sd2core.spectrum import MapKind
 
 FORMAT: Literal["sd2-batch-plan"] = "sd2-batch-plan"
 VERSION: Literal[1] = 1
@@ -238,8 +238,9 @@ class BatchPlan(_Section):
     placements : mapping
         Where the sensor is put: ``kind = "recording"`` (each recording's own sensor, the
         camera where it has none), ``kind = "positions"`` with ``positions_m``, or what
-        :func:`sd2core.placements.placements_from_dict` reads (``"grid"``, ``"cloud"``), around
-        the body of each recording. With ``own = true`` the recording's own sensor besides.
+        :func:`~sd2core.placements.placements.placements_from_dict` reads (``"grid"``,
+        ``"cloud"``), around the body of each recording. With ``own = true`` the recording's
+        own sensor besides.
     fit, synthesise, denoise, simulate, export : optional
     """
 

@@ -11,12 +11,12 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from sd2core.atomic import atomic_write_text
 from sd2core.batch.plan import STEPS, BatchPlan
 from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_write_text
+from sd2core.files.paths import is_absolute, located_path, stored_path
+from sd2core.files.toml import toml_lines
 from sd2core.io.radar.named import PAPER
-from sd2core.relative_paths import is_absolute, located_path, stored_path
-from sd2core.toml_text import toml_lines
 
 _HEADER = re.compile(r"\s*\[+\s*([^\[\]]+?)\s*\]+")
 _KEY = re.compile(r"""\s*([A-Za-z0-9_."'* /\\-]+?)\s*=""")

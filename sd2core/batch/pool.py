@@ -17,7 +17,7 @@ from sd2core.batch.folder import BatchFolder
 from sd2core.batch.keys import all_code_digest
 from sd2core.batch.tasks import BEGUN, SomeFailed, Task, TaskFailed, probe, run_tasks
 from sd2core.errors import Sd2Error
-from sd2core.worker_processes import ONE_THREAD
+from sd2core.processes import ONE_THREAD
 
 _CONNECT_S = 20.0
 _LOOK_EVERY_S = 1.0

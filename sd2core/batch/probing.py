@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sd2core.batch.flow import Flow, simulation_of
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.inputs import Inspection
 from sd2core.batch.plan import BatchPlan
+from sd2core.batch.task_graph import Flow, simulation_of
+from sd2core.doppler_map import DopplerMap, MapKind
 from sd2core.progress import silent
 from sd2core.sensor import VirtualSensor
-from sd2core.spectrum import DopplerMap, MapKind
 from sd2core.timebase import Timebase
 
 if TYPE_CHECKING:
@@ -104,8 +104,8 @@ class _TimedMaps:
 
     def choose(self, path: Path) -> None:
         """Choose how they are made, where the plan is told a tolerance; it holds from now on."""
+        from sd2core.accuracy.places import spread
         from sd2core.batch.synthesis import Choosing, chosen_plan
-        from sd2core.ladder.places import spread
 
         if self.told.tolerance is not None:
             frames = self._mesh.frames * len(self._sensors)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from sd2core.atomic import atomic_write_text
 from sd2core.body.model import Resolution
+from sd2core.files.atomic import atomic_write_text
 
 _FEWEST_FRAMES = 100
 """From which a rate is worth keeping."""

@@ -11,11 +11,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from sd2core import __version__
-from sd2core.atomic import atomic_write
 from sd2core.batch.driver import Driver, Failure, Stopped, event_of
 from sd2core.batch.exporting import dataset_path
-from sd2core.batch.flow import Flow
 from sd2core.batch.folder import PROGRESS_FORMAT, PROGRESS_VERSION, BatchFolder
 from sd2core.batch.inputs import find_origins
 from sd2core.batch.leftovers import remove_old_leftovers
@@ -23,10 +20,13 @@ from sd2core.batch.plan import BatchPlan
 from sd2core.batch.plan_file import plan_text
 from sd2core.batch.pool import Pool, local_pool, scheduler_pool
 from sd2core.batch.rates import remember_fit_rate
+from sd2core.batch.task_graph import Flow
 from sd2core.batch.tasks import BEGUN
 from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_write
 from sd2core.train.control import Control, signals_kept, write_control
 from sd2core.train.progress import Event, ProgressWriter
+from sd2core.version import __version__
 
 Outcome = Literal["finished", "stopped"]
 Watch = Callable[[Event], None]

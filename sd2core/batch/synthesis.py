@@ -18,8 +18,8 @@ from sd2core.sensor import VirtualSensor
 
 if TYPE_CHECKING:
     from sd2core.doppler import Synthesizer
-    from sd2core.mesh import MeshSequence
-    from sd2core.whereabouts import Whereabouts
+    from sd2core.mesh.sequence import MeshSequence
+    from sd2core.placements.body_extent import Whereabouts
 
 PREPARED_BYTES = 128 << 20
 """For what is prepared of a mesh; with less a block would be made twice."""
@@ -34,7 +34,7 @@ class Choosing:
     path : Path
         Where the plan is kept.
     places : sequence of VirtualSensor
-        Some of all, see :func:`sd2core.ladder.places.spread`.
+        Some of all, see :func:`sd2core.accuracy.places.spread`.
     frames : int
         Of all maps together.
     """
@@ -108,7 +108,7 @@ def refuse_inside(mesh: MeshInput, sensor: VirtualSensor) -> None:
     ------
     Sd2Error
     """
-    from sd2core.whereabouts import Whereabouts
+    from sd2core.placements.body_extent import Whereabouts
 
     opened = kept_mesh(mesh)
     if _kept.body is None:
@@ -141,9 +141,9 @@ def kept_mesh(wanted: MeshInput) -> MeshSequence:
 
 
 def _synthesizer(mesh: MeshInput, told: Synthesise, plan: dict[str, Any] | None) -> Synthesizer:
-    from sd2core.decimation import decimate
+    from sd2core.accuracy.plans import Plan
     from sd2core.doppler import Synthesizer
-    from sd2core.ladder.rungs import Plan
+    from sd2core.mesh.decimation import decimate
 
     opened = kept_mesh(mesh)
     wanted = (told, None if plan is None else json.dumps(plan["plan"], sort_keys=True))
@@ -171,7 +171,7 @@ def chosen_plan(mesh: MeshInput, told: Synthesise, choosing: Choosing) -> dict[s
     path = choosing.path
     if (known := read_plan_of(path)) is not None:
         return known
-    from sd2core.ladder.places import choose_for_places
+    from sd2core.accuracy.places import choose_for_places
 
     assert told.tolerance is not None
     found = choose_for_places(

@@ -10,12 +10,12 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from sd2core.atomic import DISK_FULL
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.inputs import Origin, inspect, mesh_input
 from sd2core.batch.keys import all_code_digest
 from sd2core.batch.plan import Export, Step, Synthesise
 from sd2core.errors import Sd2Error
+from sd2core.files.atomic import DISK_FULL
 from sd2core.progress import silent
 from sd2core.sensor import RadarConfig, VelocityAxis, VirtualSensor
 
@@ -175,7 +175,7 @@ def _process_name() -> str:
 
 @lru_cache(maxsize=1)
 def _compile_once() -> None:
-    from sd2core.compiled import kernels_ready, warm_up
+    from sd2core.numerics.compiled import kernels_ready, warm_up
 
     if not kernels_ready():
         warm_up()

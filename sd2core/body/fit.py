@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.body.arm_depth import with_leaning_arms
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.evidence import EvidenceInParts
 from sd2core.body.fit_windows import Windows
 from sd2core.body.fitted import PER_FRAME, BodyFit, FittedMotion, of_limbs
 from sd2core.body.initial import initial_pose
 from sd2core.body.keypoints import KeypointSpace
-from sd2core.body.leaning import with_leaning_arms
 from sd2core.body.lifted import Lifted
 from sd2core.body.lifter import Lifter
 from sd2core.body.lifting import LiftedInParts

@@ -11,10 +11,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
-from sd2core import __version__
-from sd2core.atomic import atomic_write_text
 from sd2core.body.landmarks import SIGHTINGS
 from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_write_text
+from sd2core.version import __version__
 
 PARTIAL = ".partial"
 """What the folder's name has after that of the mesh."""

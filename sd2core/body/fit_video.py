@@ -17,10 +17,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core import __version__
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.camera_metadata import Source, camera_of
-from sd2core.body.choosing import Rectangle
 from sd2core.body.fit import DEFAULT_STATURE_M, fit_motion
 from sd2core.body.fit_folder import (
     LANDMARKS,
@@ -34,11 +32,13 @@ from sd2core.body.landmark_files import save_track
 from sd2core.body.landmark_models import landmark_models
 from sd2core.body.landmarks import DEFAULT_MAX_GAP_S, OnFrame, find_landmarks
 from sd2core.body.model import Resolution
+from sd2core.body.person_selection import Rectangle
 from sd2core.body.track import Landmarks, parts
+from sd2core.files.resources import resource_path
 from sd2core.io.mesh import save_mesh
 from sd2core.io.video import VideoReader, open_video
 from sd2core.progress import Progress
-from sd2core.resources import resource_path
+from sd2core.version import __version__
 
 Stage = Literal["models", "find", "refine", "fit", "write"]
 

@@ -15,7 +15,7 @@ from sd2core.body.landmark_files import read_arrays, write_arrays
 from sd2core.body.rig import JOINTS
 from sd2core.body.rotations import from_vector, to_vector, transposed
 from sd2core.errors import Sd2Error
-from sd2core.presence import runs
+from sd2core.mesh.presence import runs
 
 _WINDOW_FRAMES = 600
 _OVERLAP_FRAMES = 60

@@ -18,9 +18,9 @@ from sd2core.body.rotations import Floats
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.skinning import pose_vertices
 from sd2core.body.track import LANDMARKS
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
 from sd2core.timebase import Timebase
-from sd2core.uncertainty import VelocityUncertainty
 
 Poses = Callable[[NDArray[np.intp]], Pose]
 """Gives the pose in each of some frames (n,)."""

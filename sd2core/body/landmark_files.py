@@ -11,9 +11,9 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.atomic import atomic_write
 from sd2core.body.track import PER_FRAME, Landmarks, LandmarkTrack, parts
 from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_write
 from sd2core.timebase import Timebase
 
 FORMAT = "sd2-landmarks"

@@ -18,8 +18,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from sd2core.atomic import atomic_write
 from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_write
 from sd2core.progress import Progress, silent
 
 ENVIRONMENT = "SD2_MODELS"

@@ -9,18 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.blazepose import Pose, PoseDetector, PoseLandmarker
-from sd2core.body.choosing import Rectangle, Start, choose, chosen_by
 from sd2core.body.landmark_files import load_track, save_track
 from sd2core.body.landmark_models import LandmarkModels
+from sd2core.body.person_selection import Rectangle, Start, choose, chosen_by
 from sd2core.body.refining import Refiner
 from sd2core.body.roi import Roi
 from sd2core.body.roi_path import Sightings, roi_numbers, roi_of, roi_path
 from sd2core.body.search_store import SearchStore
 from sd2core.body.track_in_parts import RefinedStretches, TrackInParts
 from sd2core.body.tracking import Follower, Search
-from sd2core.compiled import worker_count
 from sd2core.errors import Sd2Error
 from sd2core.io.video import VideoReader
+from sd2core.numerics.compiled import worker_count
 from sd2core.progress import Progress, silent
 
 __all__ = ["Rectangle", "find_landmarks", "load_track", "save_track"]

@@ -25,7 +25,7 @@ from sd2core.body.lifter_features import (
     typical_size,
 )
 from sd2core.body.track import LANDMARKS, MIRRORED
-from sd2core.resources import resource_path
+from sd2core.files.resources import resource_path
 
 Singles = NDArray[np.float32]
 Floats = NDArray[np.float64]

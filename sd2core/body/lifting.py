@@ -14,7 +14,7 @@ from sd2core.body.lifter import OUTPUTS, POINTS, Lifter, Singles, spread
 from sd2core.body.lifter_features import RATE_HZ, Seen, typical_size
 from sd2core.body.track import PART_FRAMES, Landmarks, LandmarkTrack, parts
 from sd2core.errors import Sd2Error
-from sd2core.presence import runs
+from sd2core.mesh.presence import runs
 from sd2core.timebase import Timebase
 
 Floats = NDArray[np.float64]

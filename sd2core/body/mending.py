@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.body.repair import (
+from sd2core.body.landmark_repair import (
     SIDED_PARTS,
     Floats,
     Found,

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from sd2core.body.bundled_file import open_arrays
 from sd2core.body.rotations import Floats, applied, product
-from sd2core.resources import resource_path
+from sd2core.files.resources import resource_path
 
 FORMAT = "sd2-body"
 VERSION = 2

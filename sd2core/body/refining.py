@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.blazepose import CLOSE_UP, Pose, PoseLandmarker
-from sd2core.body.choosing import FOUND
+from sd2core.body.person_selection import FOUND
 from sd2core.body.roi import CROP_PX, Pixels, Roi
 from sd2core.io.video import VideoReader
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.roi import Floats, Roi
-from sd2core.presence import runs
+from sd2core.mesh.presence import runs
 
 _CENTRE_S = 0.2
 _SIZE_S = 0.5

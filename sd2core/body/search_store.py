@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from sd2core.body.choosing import Rectangle
 from sd2core.body.landmark_files import read_arrays, write_arrays
+from sd2core.body.person_selection import Rectangle
 from sd2core.errors import Sd2Error
 from sd2core.io.video import VideoReader
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.camera import PinholeCamera
-from sd2core.raster import rasterise
+from sd2core.numerics.raster import rasterise
 
 NEAREST_M = 0.05
 """What is nearer to the camera, or behind it, is not in the picture."""

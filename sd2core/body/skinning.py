@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sd2core.body.model import Body
 from sd2core.body.rotations import Floats
-from sd2core.compiled import compiled, kernels_ready, workers
+from sd2core.numerics.compiled import compiled, kernels_ready, workers
 
 _JOB_FRAMES = 8
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.body.landmark_repair import Found
 from sd2core.body.mending import mended
 from sd2core.body.refining import Stretch
-from sd2core.body.repair import Found
 from sd2core.body.search_store import SearchStore
 from sd2core.body.track import PER_FRAME, LandmarkTrack, parts
 from sd2core.errors import Sd2Error

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sd2core.body.appearance import Signature, signature, similarity
 from sd2core.body.blazepose import Detection, Pose, PoseDetector, PoseLandmarker
-from sd2core.body.choosing import FOUND, Start
+from sd2core.body.person_selection import FOUND, Start
 from sd2core.body.roi import Floats, Pixels, Roi
 from sd2core.body.roi_path import Sightings, roi_numbers
 from sd2core.io.video import VideoReader

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from sd2core.classify.card import ClassifierCard
 from sd2core.classify.features import SILENCE, Heard
 from sd2core.classify.models import Classifier, State, probabilities_of
-from sd2core.denoise import matching
+from sd2core.denoise import resample_to_model as matching
+from sd2core.doppler_map import DopplerMap
 from sd2core.progress import Progress, silent
-from sd2core.spectrum import DopplerMap
 
 CHUNK = 512
 """Frames of a long map that are worked out at once, with the state from before."""

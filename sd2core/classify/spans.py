@@ -13,7 +13,7 @@ from sd2core.classify.card import BACKGROUND
 from sd2core.errors import Sd2Error
 from sd2core.labels.spans import Span
 from sd2core.labels.suggest import TRACK, frame_ends_s, stretches
-from sd2core.presence import checked
+from sd2core.mesh.presence import checked
 from sd2core.timebase import Timebase
 
 _ROUNDING_S = 1e-6

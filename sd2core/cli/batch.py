@@ -100,7 +100,7 @@ def _batch(options: argparse.Namespace) -> int:
 
 def _run(plan: BatchPlan, options: argparse.Namespace) -> int:
     from sd2core.batch.run import run_batch
-    from sd2core.compiled import worker_count
+    from sd2core.numerics.compiled import worker_count
 
     with _watching(options) as watch:
         end = run_batch(
@@ -209,9 +209,9 @@ def _times(status: BatchStatus) -> dict[str, str]:
 
 def _dry_run(plan: BatchPlan, options: argparse.Namespace) -> int:
     from sd2core.batch.estimate import estimate
-    from sd2core.cli.batch_words import print_estimate
+    from sd2core.cli.batch_text import print_estimate
     from sd2core.cli.output import progress_bar
-    from sd2core.compiled import worker_count
+    from sd2core.numerics.compiled import worker_count
 
     workers = options.workers or worker_count()
     with progress_bar("Looking", "recording") as progress:

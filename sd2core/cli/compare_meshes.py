@@ -13,7 +13,7 @@ from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
     from sd2core.compare.meshes import Comparison
-    from sd2core.mesh import MeshSequence
+    from sd2core.mesh.sequence import MeshSequence
 
 _PICKLES = {".pkl", ".pickle", ".joblib"}
 _OWN_NAMES = {"mesh.zarr", "mesh.npz"}
@@ -72,7 +72,7 @@ def _compare(options: argparse.Namespace) -> None:
     from sd2core.cli.reading import check_output
     from sd2core.compare.figure import draw_comparison
     from sd2core.compare.meshes import compare_meshes
-    from sd2core.figure_files import SUFFIXES, save_figure
+    from sd2core.files.figure_files import SUFFIXES, save_figure
     from sd2core.sensor import VirtualSensor
 
     if options.figure is not None:
@@ -162,7 +162,7 @@ def _load(path: Path, options: argparse.Namespace) -> MeshSequence:
     from sd2core.cli.reading import mesh_reading
     from sd2core.compare.joints import own_resolution
     from sd2core.io.mesh import load_mesh
-    from sd2core.recording import is_recording, open_recording
+    from sd2core.recording.recording import is_recording, open_recording
 
     if is_recording(path):
         return open_recording(path).load_mesh()

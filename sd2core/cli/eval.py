@@ -69,9 +69,9 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _eval(options: argparse.Namespace) -> None:
-    from sd2core.atomic import atomic_write_text
     from sd2core.cli.reading import check_output
-    from sd2core.figure_files import SUFFIXES, save_figure
+    from sd2core.files.atomic import atomic_write_text
+    from sd2core.files.figure_files import SUFFIXES, save_figure
 
     if options.plot is not None:
         check_output(options.plot, *SUFFIXES)
@@ -81,7 +81,7 @@ def _eval(options: argparse.Namespace) -> None:
         check_output(options.markdown, ".md")
     from sd2core.train.data import read_mixed
     from sd2core.train.evaluate import evaluate
-    from sd2core.train.evaluate_words import as_markdown, as_text, draw
+    from sd2core.train.evaluation_text import as_markdown, as_text, draw
 
     pairs = read_mixed(options.data)
     with progress_bar("Denoising", unit="take") as progress:

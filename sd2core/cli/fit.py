@@ -186,9 +186,9 @@ def _make(options: argparse.Namespace, lines: FitLines | None) -> None:
 
 
 def _choices(options: argparse.Namespace) -> FitChoices:
-    from sd2core.body.choosing import Rectangle
     from sd2core.body.fit_video import FitChoices
     from sd2core.body.landmarks import DEFAULT_MAX_GAP_S
+    from sd2core.body.person_selection import Rectangle
 
     person = None
     if options.person is not None:

@@ -72,7 +72,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 def _import(options: argparse.Namespace) -> None:
     from sd2core.cli.info import describe_parts, describe_recording, show
     from sd2core.cli.reading import mesh_reading, refuse_in_vain
-    from sd2core.recording import Recording
+    from sd2core.recording.recording import Recording
 
     # The window lays any mesh over the video by its focal length.
     refuse_in_vain(options, options.out, options.mesh, but=("focal_px",))
@@ -97,7 +97,7 @@ def _import(options: argparse.Namespace) -> None:
 
 
 def _relink(options: argparse.Namespace) -> int:
-    from sd2core.recording import open_recording
+    from sd2core.recording.recording import open_recording
 
     recording = open_recording(options.recording)
     with progress_bar("Searching", unit="folder") as progress:

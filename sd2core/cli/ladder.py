@@ -20,9 +20,9 @@ from sd2core.cli.output import print_json, progress_bar
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
+    from sd2core.accuracy import Choice, Measurement
     from sd2core.doppler import SynthesisOptions
-    from sd2core.ladder import Choice, Measurement
-    from sd2core.mesh import MeshSequence
+    from sd2core.mesh.sequence import MeshSequence
     from sd2core.sensor import VirtualSensor
 
 _TOLERANCE = 0.02
@@ -84,10 +84,10 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _ladder(options: argparse.Namespace) -> int:
+    from sd2core.accuracy.choosing import checked_options
     from sd2core.cli.reading import check_output, mesh_and_sensor
     from sd2core.doppler import PRESETS
-    from sd2core.figure_files import SUFFIXES, save_figure
-    from sd2core.ladder.choosing import checked_options
+    from sd2core.files.figure_files import SUFFIXES, save_figure
 
     if options.plot is not None:
         if options.quick:
@@ -105,7 +105,7 @@ def _ladder(options: argparse.Namespace) -> int:
         choice = chosen(mesh, sensor, synthesis, tolerance, options.budget_ms)
     measurement = None if options.quick else _measured(mesh, sensor, synthesis, options)
     if options.plot is not None and measurement is not None:
-        from sd2core.ladder.plot import plot_trade
+        from sd2core.accuracy.plot import plot_trade
 
         save_figure(plot_trade(measurement, choice), options.plot)
     if options.json:
@@ -150,9 +150,9 @@ def chosen(
     *,
     dragging: bool = True,
 ) -> Choice:
-    """What a scene requires, with bars; arguments as for :func:`sd2core.ladder.choose`."""
-    from sd2core.compiled import warm_up
-    from sd2core.ladder.choosing import choose
+    """What a scene requires, with bars; arguments as for :func:`sd2core.accuracy.choose`."""
+    from sd2core.accuracy.choosing import choose
+    from sd2core.numerics.compiled import warm_up
 
     with progress_bar("Compiling", "file") as progress:
         warm_up(progress)
@@ -174,8 +174,8 @@ def _measured(
     synthesis: SynthesisOptions,
     options: argparse.Namespace,
 ) -> Measurement:
-    from sd2core.ladder.cache import remember, remembered
-    from sd2core.ladder.measuring import REPEATS, measure
+    from sd2core.accuracy.cache import remember, remembered
+    from sd2core.accuracy.measuring import REPEATS, measure
 
     known = remembered(mesh, sensor, synthesis, options.family)
     if known is not None and not (known.stale or options.fresh or options.repeats):
@@ -194,7 +194,7 @@ def _measured(
 
 
 def _print_choice(choice: Choice) -> None:
-    from sd2core.ladder.results import percent
+    from sd2core.accuracy.results import percent
 
     print(choice.summary)
     errors = choice.errors
@@ -210,7 +210,7 @@ def _print_choice(choice: Choice) -> None:
 
 
 def _print_measurement(measurement: Measurement) -> None:
-    from sd2core.ladder.results import percent
+    from sd2core.accuracy.results import percent
 
     print()
     print(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 
-from sd2core import __version__
 from sd2core.cli import (
     batch,
     classify,
@@ -29,6 +28,7 @@ from sd2core.cli import (
     train,
     warm_up,
 )
+from sd2core.version import __version__
 
 _DESCRIPTION = """\
 SD² Studio turns a video of a person into mmWave-radar Doppler: what a radar

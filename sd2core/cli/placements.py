@@ -12,13 +12,13 @@ from sd2core.cli.output import counted, duration, print_facts, print_json, print
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
-    from sd2core.ladder import Choice
-    from sd2core.mesh import MeshSequence
-    from sd2core.placement_cost import PlacementCost
-    from sd2core.placements import Placements
-    from sd2core.recording import Recording
+    from sd2core.accuracy import Choice
+    from sd2core.mesh.sequence import MeshSequence
+    from sd2core.placements.body_extent import Sight
+    from sd2core.placements.cost import PlacementCost
+    from sd2core.placements.placements import Placements
+    from sd2core.recording.recording import Recording
     from sd2core.sensor import RadarConfig, VirtualSensor
-    from sd2core.whereabouts import Sight
 
 _TOLERANCE = 0.02
 _LIMITS = (
@@ -74,9 +74,9 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 def _placements(options: argparse.Namespace) -> int:
     from sd2core.cli.reading import check_output, load_mesh_as_told, recording_as_told
-    from sd2core.placements import write_placements
-    from sd2core.recording import is_recording
-    from sd2core.whereabouts import Whereabouts
+    from sd2core.placements.body_extent import Whereabouts
+    from sd2core.placements.placements import write_placements
+    from sd2core.recording.recording import is_recording
 
     if options.out is not None:
         check_output(options.out, ".json")
@@ -125,8 +125,8 @@ def _placements(options: argparse.Namespace) -> int:
 
 def _spec(options: argparse.Namespace, recording: Recording | None) -> Placements:
     """What is given, or what the recording plans."""
-    from sd2core.placements import PlacementCloud, PlacementGrid, read_placements
-    from sd2core.typed_numbers import interval_of, numbers_of
+    from sd2core.files.number_lists import interval_of, numbers_of
+    from sd2core.placements.placements import PlacementCloud, PlacementGrid, read_placements
 
     typed = {
         f"--{name}": getattr(options, name)
@@ -178,10 +178,10 @@ def _cost(
     options: argparse.Namespace,
 ) -> tuple[Choice, PlacementCost]:
     """What the ladder says where the sensor has the median of all ranges."""
+    from sd2core.accuracy.choosing import checked_options
     from sd2core.cli.ladder import chosen
     from sd2core.doppler import PRESETS
-    from sd2core.ladder.choosing import checked_options
-    from sd2core.placement_cost import PlacementCost
+    from sd2core.placements.cost import PlacementCost
 
     places = placements.places()
     middle = sorted(range(len(places)), key=lambda number: places[number].range_m)[len(places) // 2]

@@ -63,7 +63,7 @@ def _radar(options: argparse.Namespace) -> None:
     from sd2core.cli.reading import check_map_output
     from sd2core.fmcw import doppler_map, limits
     from sd2core.io.radar import holds_map, load_capture, load_recorded_map
-    from sd2core.recording import is_recording, open_recording
+    from sd2core.recording.recording import is_recording, open_recording
     from sd2core.sensor import VelocityAxis
 
     check_map_output(options.out)

@@ -7,13 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sd2core.atomic import check_writable
 from sd2core.cli.output import progress_bar
 from sd2core.errors import Sd2Error
+from sd2core.files.atomic import check_writable
 
 if TYPE_CHECKING:
-    from sd2core.mesh import MeshSequence
-    from sd2core.recording import MeshReading, Recording
+    from sd2core.mesh.sequence import MeshSequence
+    from sd2core.recording.recording import MeshReading, Recording
     from sd2core.sensor import VirtualSensor
 
 
@@ -24,7 +24,7 @@ _BODY_MODEL_SUFFIXES = {".pkl", ".pickle", ".joblib"}
 
 def mesh_reading(options: argparse.Namespace) -> MeshReading:
     """How to read a mesh, as far as the command line says it."""
-    from sd2core.recording import MeshReading
+    from sd2core.recording.recording import MeshReading
 
     return MeshReading(
         frames_per_s=options.fps,
@@ -49,7 +49,7 @@ def load_mesh_as_told(path: Path, options: argparse.Namespace) -> MeshSequence:
 
 def mesh_and_sensor(options: argparse.Namespace) -> tuple[MeshSequence, VirtualSensor]:
     """The mesh, and the sensor of the recording or the camera with ``--sensor`` in its place."""
-    from sd2core.recording import is_recording
+    from sd2core.recording.recording import is_recording
     from sd2core.sensor import VirtualSensor
 
     sensor = VirtualSensor()
@@ -67,7 +67,7 @@ def mesh_and_sensor(options: argparse.Namespace) -> tuple[MeshSequence, VirtualS
 
 def recording_as_told(path: Path, options: argparse.Namespace) -> Recording:
     """Open a recording; of its mesh, what the command line says holds before what is stored."""
-    from sd2core.recording import open_recording
+    from sd2core.recording.recording import open_recording
 
     recording = open_recording(path)
     refuse_in_vain(options, path, recording.mesh)

@@ -8,10 +8,10 @@ from sd2core.cli.output import progress_bar
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
-    from sd2core.mesh import MeshSequence
-    from sd2core.recording import Recording
+    from sd2core.doppler_map import DopplerMap
+    from sd2core.mesh.sequence import MeshSequence
+    from sd2core.recording.recording import Recording
     from sd2core.sensor import VelocityAxis
-    from sd2core.spectrum import DopplerMap
 
 MapName = Literal["synthetic", "denoised", "radar"]
 MAP_NAMES: tuple[MapName, ...] = get_args(MapName)
@@ -83,7 +83,7 @@ def _synthetic(recording: Recording, mesh: MeshSequence | None) -> DopplerMap:
 
 def _denoised(recording: Recording, synthetic: DopplerMap) -> DopplerMap:
     from sd2core.denoise.files import DEFAULT_NAME, describe_model, find_model, load_model
-    from sd2core.denoise.matching import check_map
+    from sd2core.denoise.resample_to_model import check_map
 
     if recording.denoiser is None and recording.bundled_denoiser == "":
         raise Sd2Error(

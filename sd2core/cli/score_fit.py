@@ -90,11 +90,11 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _score(options: argparse.Namespace) -> None:
-    from sd2core.atomic import atomic_write_text
     from sd2core.cli.reading import check_output
     from sd2core.compare.fit_report import as_dict
-    from sd2core.compare.fit_words import as_markdown, as_text
+    from sd2core.compare.fit_text import as_markdown, as_text
     from sd2core.compare.truth import read_truth, truth_folders
+    from sd2core.files.atomic import atomic_write_text
 
     if options.markdown is not None:
         check_output(options.markdown, ".md")

@@ -18,7 +18,7 @@ from sd2core.cli.output import progress_bar
 
 if TYPE_CHECKING:
     from sd2core.figures.strip_source import StripSource
-    from sd2core.recording import Recording
+    from sd2core.recording.recording import Recording
 
 _DEFAULT_COUNT = 8
 
@@ -103,10 +103,10 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _strip(options: argparse.Namespace) -> None:
-    from sd2core.figure_files import check_figure
     from sd2core.figures.frames import parse_frames, spread_frames
     from sd2core.figures.strip import plot_strip, save_strip
     from sd2core.figures.strip_source import StripOptions
+    from sd2core.files.figure_files import check_figure
 
     check_figure(options.out)
     with ExitStack() as stack:
@@ -163,7 +163,7 @@ def _recording(options: argparse.Namespace) -> Recording:
     from sd2core.cli.reading import mesh_reading, recording_as_told, refuse_in_vain
     from sd2core.errors import Sd2Error
     from sd2core.io.kinds import kind_of
-    from sd2core.recording import Recording
+    from sd2core.recording.recording import Recording
 
     kinds = {kind_of(path): path for path in options.paths}
     if "recording" in kinds and len(options.paths) == 1:

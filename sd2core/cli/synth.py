@@ -20,14 +20,14 @@ from sd2core.cli.options import (
     positive_int,
 )
 from sd2core.cli.output import progress_bar
-from sd2core.cli.simulate_radar import add_radar_choice, simulated
+from sd2core.cli.simulate.radar import add_radar_choice, simulated
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
     from sd2core.doppler import SynthesisOptions, Synthesizer
-    from sd2core.mesh import MeshSequence
+    from sd2core.doppler_map import DopplerMap
+    from sd2core.mesh.sequence import MeshSequence
     from sd2core.sensor import VirtualSensor
-    from sd2core.spectrum import DopplerMap
 
 _RUNGS = (
     "visibility",
@@ -198,8 +198,8 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 def _synth(options: argparse.Namespace) -> None:
     from sd2core.cli.info import describe_map, show
     from sd2core.cli.reading import check_map_output, mesh_and_sensor
-    from sd2core.decimation import decimate
     from sd2core.doppler import Synthesizer
+    from sd2core.mesh.decimation import decimate
 
     check_map_output(options.out)
     if options.model == "fmcw":
@@ -247,7 +247,7 @@ def _as_chosen(
     options: argparse.Namespace, mesh: MeshSequence, sensor: VirtualSensor
 ) -> DopplerMap:
     """The map of the plan that the scene requires; plan and reasons go into its provenance."""
-    from sd2core.ladder.carry_out import synthesizer_for
+    from sd2core.accuracy.synthesizers import synthesizer_for
 
     base = synthesis_options(options)
     choice = chosen(mesh, sensor, base, options.tolerance, options.budget_ms, dragging=False)

@@ -24,7 +24,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _warm_up(options: argparse.Namespace) -> None:
-    from sd2core.compiled import warm_up
+    from sd2core.numerics.compiled import warm_up
 
     with progress_bar("Compiling", unit="module") as progress:
         warm_up(progress)

@@ -30,8 +30,8 @@ from sd2core.compare.real_score import reprojection
 from sd2core.compare.times import at_times, common_times
 from sd2core.compare.truth import Stroke, Truth
 from sd2core.errors import Sd2Error
-from sd2core.mesh import MeshSequence
-from sd2core.presence import Presence
+from sd2core.mesh.presence import Presence
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Progress, silent
 from sd2core.sensor import VirtualSensor
 

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from sd2core.body.limbs import LIMBS, vertex_limbs
 from sd2core.body.model import Body, Resolution
 from sd2core.errors import Sd2Error
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 
 Floats = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sd2core.presence import Presence
+from sd2core.mesh.presence import Presence
 from sd2core.scattering.velocity import moments, radial_velocity
 
 Floats = NDArray[np.float64]

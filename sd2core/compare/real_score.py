@@ -13,7 +13,7 @@ from sd2core.body.silhouette import overlap, silhouette
 from sd2core.body.track import LANDMARKS, LandmarkTrack
 from sd2core.compare.joints import JOINTS, own_patches, own_resolution
 from sd2core.errors import Sd2Error
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 
 _SEEN = 0.5
 """Visibility from which a landmark is compared, and sureness from which a pixel is a person."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.scattering.trajectory import cubic_weights
 from sd2core.timebase import Timebase
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from sd2core.body.camera import PinholeCamera
 from sd2core.errors import Sd2Error
 from sd2core.io.mesh import load_mesh
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 
 FORMAT = "sd2-fit-truth"
 VERSION = 1

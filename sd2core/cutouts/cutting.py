@@ -13,10 +13,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from sd2core.atomic import atomic_write_text
 from sd2core.cutouts.source import FORMAT, CutSource, folder_name
 from sd2core.errors import Sd2Error
-from sd2core.file_lock import FileLock
+from sd2core.files.atomic import atomic_write_text
+from sd2core.files.lock import FileLock
 from sd2core.io.mesh import save_mesh
 from sd2core.io.video import VideoReader, open_video
 from sd2core.io.video_writing import write_video

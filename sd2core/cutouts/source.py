@@ -8,12 +8,12 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-import sd2core
+from sd2core.doppler_map import DopplerMap
 from sd2core.errors import Sd2Error
 from sd2core.labels.spans import Span
-from sd2core.mesh import MeshSequence
-from sd2core.spectrum import DopplerMap
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.timebase import Timebase
+from sd2core.version import __version__
 
 Part = Literal["video", "mesh", "maps"]
 PARTS: tuple[Part, ...] = ("video", "mesh", "maps")
@@ -84,7 +84,7 @@ class CutSource:
         return {
             "format": FORMAT,
             "version": VERSION,
-            "program": f"SD² Studio {sd2core.__version__}",
+            "program": f"SD² Studio {__version__}",
             "span": asdict(span),
             "frames": [first, stop],
             "zero_s": self.zero_s(span),

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from sd2core.atomic import atomic_write_text
 from sd2core.datasets.layout import SPLITS
 from sd2core.datasets.reading import Dataset, open_dataset
 from sd2core.datasets.source import KINDS
+from sd2core.files.atomic import atomic_write_text
 
 CARD_FORMAT = "sd2-dataset-card"
 _ROWS = 8192
@@ -34,7 +34,7 @@ def write_card(path: Path) -> dict[str, Any]:
     Sd2Error
         When the path holds no finished data set.
     """
-    from sd2core.datasets.card_words import card_text
+    from sd2core.datasets.card_text import card_text
 
     with open_dataset(path) as dataset:
         card = describe_dataset(dataset)

@@ -9,8 +9,8 @@ from pathlib import Path
 from sd2core.datasets.recording_sources import Making, places_of
 from sd2core.datasets.simulating import simulated_map
 from sd2core.errors import Sd2Error
-from sd2core.mesh import MeshSequence
-from sd2core.recording import open_recording
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.recording.recording import open_recording
 from sd2core.sensor import VirtualSensor
 
 _TIMED_FRAMES = 60

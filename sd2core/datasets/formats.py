@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from sd2core.atomic import atomic_write
 from sd2core.datasets.layout import (
     FORMAT,
     VERSION,
@@ -22,6 +21,7 @@ from sd2core.datasets.layout import (
     row_shapes,
 )
 from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_write
 from sd2core.progress import Progress, silent
 
 NPZ_LIMIT_BYTES = 1 << 30

@@ -12,7 +12,7 @@ from sd2core.datasets.source import LazySource
 from sd2core.errors import Sd2Error
 from sd2core.io.kinds import kind_of
 from sd2core.io.radar import holds_map
-from sd2core.recording import SUFFIX, is_recording
+from sd2core.recording.recording import SUFFIX, is_recording
 
 _EXPECTED = "recordings (.sd2), pairs (.zarr), Doppler maps (.npz), or folders of recordings"
 

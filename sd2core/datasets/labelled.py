@@ -13,8 +13,8 @@ from sd2core.datasets.reading import open_dataset
 from sd2core.errors import Sd2Error
 from sd2core.io.kinds import RADAR_MAP_SUFFIXES, kind_of
 from sd2core.io.radar import holds_map, load_recorded_map
-from sd2core.pair_facts import pair_facts
-from sd2core.recording import SUFFIX, is_recording, open_recording
+from sd2core.pairs.summary import pair_facts
+from sd2core.recording.recording import SUFFIX, is_recording, open_recording
 
 LabelledKind = Literal["pairs", "data set", "recording", "radar file"]
 

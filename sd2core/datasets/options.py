@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, get_args
 
 from sd2core.datasets.source import KINDS
+from sd2core.doppler_map import MapKind
 from sd2core.errors import Sd2Error
-from sd2core.segments import LENGTH, OVERLAP, segment_starts
-from sd2core.spectrum import MapKind
+from sd2core.pairs.segments import LENGTH, OVERLAP, segment_starts
 
 LabelRule = Literal["foreground", "majority"]
 """How a segment gets its label from those of its frames; see :class:`DatasetOptions`."""

@@ -11,15 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from sd2core.contents import remembered_digest
 from sd2core.datasets.denoising import Denoising
 from sd2core.datasets.source import KINDS, LazySource, Outline, Source, SourceKey
 from sd2core.denoise.files import DEFAULT_NAME, find_model
+from sd2core.doppler_map import DopplerMap, MapKind
+from sd2core.files.digests import remembered_digest
 from sd2core.labels.label_set import GESTURES
-from sd2core.pairs import open_takes
+from sd2core.pairs.store import open_takes
 from sd2core.progress import Progress
 from sd2core.sensor import VelocityAxis, VirtualSensor
-from sd2core.spectrum import DopplerMap, MapKind
 from sd2core.timebase import Timebase
 
 

@@ -13,7 +13,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.contents import remembered_digest
+from sd2core.accuracy.places import choose_for_places, spread
+from sd2core.accuracy.synthesizers import synthesizer_for
 from sd2core.datasets.denoising import Denoising
 from sd2core.datasets.simulating import CLUTTER, Simulation, simulated_map
 from sd2core.datasets.source import (
@@ -27,21 +28,20 @@ from sd2core.datasets.source import (
     plain_name,
 )
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
+from sd2core.doppler_map import DopplerMap, MapKind
 from sd2core.errors import Sd2Error
+from sd2core.files.digests import remembered_digest
+from sd2core.files.paths import files_at
 from sd2core.fmcw.processing import doppler_map
 from sd2core.labels.spans import Labels
-from sd2core.ladder.carry_out import synthesizer_for
-from sd2core.ladder.places import choose_for_places, spread
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.mocap.recording_pairs import on_clock
-from sd2core.placements import Place, Placements
+from sd2core.placements.body_extent import Whereabouts
+from sd2core.placements.placements import Place, Placements
 from sd2core.progress import Progress
-from sd2core.recording import Recording, open_recording
-from sd2core.relative_paths import files_at
+from sd2core.recording.recording import Recording, open_recording
 from sd2core.sensor import Vector, VelocityAxis, VirtualSensor
-from sd2core.spectrum import DopplerMap, MapKind
 from sd2core.timebase import Timebase
-from sd2core.whereabouts import Whereabouts
 
 _STEPS = 1000
 _COUNTED_SHARE = 0.05
@@ -60,7 +60,7 @@ class Making:
         Its axis is that of the radar's map, too.
     tolerance : float, optional
         Error of a synthetic map that is allowed, as a share; the cheapest plan within it is
-        chosen once per recording, see :mod:`sd2core.ladder.places`. None: as ``synthesis``
+        chosen once per recording, see :mod:`sd2core.accuracy.places`. None: as ``synthesis``
         says.
     placements : Placements or "planned", optional
         Where else sensors stand around the body, besides the recording's own; each gives

@@ -11,11 +11,11 @@ from typing import Any, NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.doppler_map import DopplerMap, MapKind
 from sd2core.errors import Sd2Error
-from sd2core.presence import Presence
+from sd2core.mesh.presence import Presence
 from sd2core.progress import Progress
 from sd2core.sensor import Vector, VirtualSensor, spherical_from_position
-from sd2core.spectrum import DopplerMap, MapKind
 
 BACKGROUND = "background"
 """What frames are called in which nothing is labelled; always label 0."""

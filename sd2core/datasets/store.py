@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 
-from sd2core.atomic import atomic_write
 from sd2core.datasets.cutting import Arrays
 from sd2core.datasets.layout import (
     CHUNK_SEGMENTS,
@@ -28,6 +27,7 @@ from sd2core.datasets.layout import (
 )
 from sd2core.datasets.source import KINDS
 from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_write
 from sd2core.io.kinds import is_dataset
 
 SOURCES_NAME = "sources.jsonl"

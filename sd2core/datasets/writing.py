@@ -28,7 +28,7 @@ from sd2core.datasets.source import KINDS, LazySource, Source, SourceKey
 from sd2core.datasets.splitting import split_people
 from sd2core.datasets.store import LOCK_NAME, SegmentStore, open_arrays
 from sd2core.errors import Sd2Error
-from sd2core.file_lock import FileLock
+from sd2core.files.lock import FileLock
 from sd2core.io.kinds import is_dataset
 from sd2core.progress import Progress, silent
 from sd2core.train.data import Split

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from sd2core.denoise.card import ModelCard
 from sd2core.denoise.weights import SUFFIX, Shapes, read_header, read_weights, write_weights
 from sd2core.errors import Sd2Error
-from sd2core.resources import bundled_files
+from sd2core.files.resources import bundled_files
 
 if TYPE_CHECKING:
     from sd2core.denoise.live import TrainedDenoiser

@@ -11,15 +11,15 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from sd2core import __version__
-from sd2core.denoise import matching
+from sd2core.denoise import resample_to_model as matching
 from sd2core.denoise.card import ModelCard
 from sd2core.denoise.model import Denoiser
+from sd2core.doppler_map import DopplerMap
 from sd2core.errors import Sd2Error
-from sd2core.presence import Presence, runs
+from sd2core.mesh.presence import Presence, runs
+from sd2core.pairs.segments import OVERLAP, cut, join, segment_starts
 from sd2core.progress import Progress, silent
-from sd2core.segments import OVERLAP, cut, join, segment_starts
-from sd2core.spectrum import DopplerMap
+from sd2core.version import __version__
 
 CHUNK = 512
 """Frames of a long map that a causal model is given at once, with the state from before."""

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.denoise import matching
+from sd2core.denoise import resample_to_model as matching
 from sd2core.denoise.live import CHUNK, TrainedDenoiser
-from sd2core.segments import OVERLAP
+from sd2core.pairs.segments import OVERLAP
 
 Read = Callable[[int, int], NDArray[np.float32]]
 """Energies of frames from one to another (exclusive), (n, bins)."""

@@ -11,7 +11,7 @@ from torch.nn import functional
 from sd2core.denoise.channels import SMALLEST_VARIANCE, mix_gated, normalise
 from sd2core.denoise.convolution import causal_convolution
 from sd2core.denoise.recurrence import BLOCK
-from sd2core.denoise.systems import DT_MAX, DT_MIN, Kernel, State, StateSpace
+from sd2core.denoise.state_space_layer import DT_MAX, DT_MIN, Kernel, State, StateSpace
 from sd2core.errors import Sd2Error
 
 __all__ = ["Kernel", "S4Layer", "State"]
@@ -36,7 +36,8 @@ class S4Layer(nn.Module):
     dropout : float
         Share of channels that a training step leaves out, the same ones for all frames.
     dt_min, dt_max : float
-        Where the state spaces' steps start, see :class:`~sd2core.denoise.systems.StateSpace`.
+        Range of the state spaces' first steps, see
+        :class:`~sd2core.denoise.state_space_layer.StateSpace`.
     """
 
     def __init__(

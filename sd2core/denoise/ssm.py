@@ -13,9 +13,9 @@ import torch
 from torch import Tensor
 
 from sd2core.denoise.feedback import circle, close_loop
-from sd2core.denoise.legs import legs_normal_form
+from sd2core.denoise.hippo import legs_normal_form
 from sd2core.denoise.power_sums import power_sums
-from sd2core.denoise.terms import low_rank_terms
+from sd2core.denoise.s4_autograd import low_rank_terms
 from sd2core.errors import Sd2Error
 
 

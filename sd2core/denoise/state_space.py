@@ -9,7 +9,7 @@ from torch import Tensor, nn
 
 from sd2core.denoise.model import Denoiser, State
 from sd2core.denoise.s4 import S4Layer
-from sd2core.denoise.systems import DT_MAX, DT_MIN
+from sd2core.denoise.state_space_layer import DT_MAX, DT_MIN
 
 
 class S4Denoiser(Denoiser):

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sd2core.atomic import atomic_write
 from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_write
 
 if TYPE_CHECKING:
     from torch import nn

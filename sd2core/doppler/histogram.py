@@ -119,7 +119,7 @@ def relative_range(positions: NDArray[Any], sensor: NDArray[np.float64]) -> NDAr
     and from knot to knot is kept at the body's own scale, so the difference of two
     is the exact change of range of :func:`radial_velocity` however far the sensor
     is, with one range per vertex and knot. Its rounding error is a few roundings of
-    the largest coordinate (:func:`sd2core.precision.velocity_error_mps`).
+    the largest coordinate (:func:`sd2core.numerics.precision.velocity_error_mps`).
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sd2core.compiled import compiled
+from sd2core.numerics.compiled import compiled
 from sd2core.scattering.amplitude import NEAREST_RANGE_M
 from sd2core.scattering.visibility import facing_kernel
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.compiled import compiled, kernels_ready
 from sd2core.doppler.histogram import Counting, Frames, relative_range
 from sd2core.doppler.kernels import CLIP, WRAP
+from sd2core.numerics.compiled import compiled, kernels_ready
 
 PARTS = 8
 """A bin is cut into so many."""

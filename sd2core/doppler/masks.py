@@ -11,10 +11,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.compiled import kernels_ready
 from sd2core.doppler import histogram, vid2doppler
 from sd2core.doppler.histogram import Counting
 from sd2core.doppler.prepared import Block, PreparedMesh, near_points
+from sd2core.numerics.compiled import kernels_ready
 from sd2core.scattering import depth_plain, exact_plain
 from sd2core.scattering.depth import depth_visibility_kernel
 from sd2core.scattering.exact import exact_visibility_kernel

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from sd2core.doppler.prepared import PreparedMesh
-from sd2core.precision import SHARE_OF_A_BIN, stored_velocity_error_mps
-from sd2core.presence import gaps_in_words, runs
+from sd2core.mesh.presence import gaps_in_words, runs
+from sd2core.numerics.precision import SHARE_OF_A_BIN, stored_velocity_error_mps
 from sd2core.scattering.amplitude import NEAREST_RANGE_M
 from sd2core.sensor import VirtualSensor
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from itertools import islice
 
-from sd2core.compiled import workers
+from sd2core.numerics.compiled import workers
 from sd2core.progress import Cancelled, Progress
 
 _POLL_S = 0.03

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.compiled import kernels_ready
 from sd2core.doppler import vid2doppler
 from sd2core.doppler.histogram import Frames
 from sd2core.doppler.options import STEEPEST_RANGE_LAW, SynthesisOptions
-from sd2core.mesh import MeshSequence, refuse_missing
-from sd2core.precision import single_is_enough
+from sd2core.mesh.sequence import MeshSequence, refuse_missing
+from sd2core.numerics.compiled import kernels_ready
+from sd2core.numerics.precision import single_is_enough
 from sd2core.scattering import amplitude, visibility
 from sd2core.scattering.trajectory import Trajectory
 from sd2core.scattering.velocity import moments

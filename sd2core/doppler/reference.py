@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.compiled import kernels_ready
 from sd2core.doppler import vid2doppler
 from sd2core.doppler.options import SynthesisOptions
-from sd2core.mesh import MeshSequence
-from sd2core.precision import keeps_shape
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.numerics.compiled import kernels_ready
+from sd2core.numerics.precision import keeps_shape
 from sd2core.scattering.amplitude import NEAREST_RANGE_M
 from sd2core.scattering.exact import exact_visibility_kernel
 from sd2core.scattering.exact_plain import exact_visibility

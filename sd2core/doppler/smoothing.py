@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.doppler.options import SynthesisOptions
-from sd2core.presence import Presence
+from sd2core.mesh.presence import Presence
 
 _REACH = 4.0
 """Where the Gaussian on time is cut, in sigmas."""

@@ -9,8 +9,6 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core import __version__
-from sd2core.compiled import compile_in_background, kernels_ready
 from sd2core.doppler import histogram, vid2doppler
 from sd2core.doppler.histogram import Counting, Counts
 from sd2core.doppler.kernels import CLIP, DROP, WRAP
@@ -22,14 +20,16 @@ from sd2core.doppler.prepared import Block, ByteBudget, PreparedMesh
 from sd2core.doppler.results import FrameScattering, Stretch
 from sd2core.doppler.scatterers import Scatterers
 from sd2core.doppler.smoothing import frames_within_reach, smooth
+from sd2core.doppler_map import CellUncertainty, DopplerMap
 from sd2core.errors import Sd2Error
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.numerics.compiled import compile_in_background, kernels_ready
 from sd2core.progress import Progress, silent
 from sd2core.scattering.amplitude import range_weight
 from sd2core.scattering.velocity import radial_velocity
 from sd2core.sensor import VirtualSensor
-from sd2core.spectrum import CellUncertainty, DopplerMap
 from sd2core.timebase import Timebase
+from sd2core.version import __version__
 
 _MEMORY_BUDGET_BYTES = 512 << 20
 _FAST_FRAMES = 64
@@ -283,7 +283,7 @@ class Synthesizer:
     ) -> CellUncertainty:
         """How well the cells of :meth:`map` are known, as far as the mesh's velocities are.
 
-        Model and limits are those of :mod:`sd2core.doppler.uncertainty`.
+        Model and limits are those of :mod:`sd2core.doppler.cell_uncertainty`.
 
         Parameters
         ----------
@@ -295,7 +295,7 @@ class Synthesizer:
         Sd2Error
             When the mesh does not say how well its velocities are known.
         """
-        from sd2core.doppler.uncertainty import cell_uncertainty
+        from sd2core.doppler.cell_uncertainty import cell_uncertainty
 
         start, stop = frames or (0, self.mesh.frame_count)
         if not 0 <= start < stop <= self.mesh.frame_count:

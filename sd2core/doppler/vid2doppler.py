@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from sd2core.doppler.histogram import Counting, Counts, Frames
 from sd2core.doppler.kernels import CLIP, DROP, WRAP
 from sd2core.doppler.scatterers import Scatterers
-from sd2core.presence import Presence
+from sd2core.mesh.presence import Presence
 
 TAPS = 5
 """Frames in its mean over time."""

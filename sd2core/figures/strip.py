@@ -8,11 +8,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sd2core.figure_files import save_figure
 from sd2core.figures.colours import DIVERGING
 from sd2core.figures.strip_drawing import MUTED, Body, draw_picture, strip_box
 from sd2core.figures.strip_source import Row, StripOptions, StripSource, check_strip
 from sd2core.figures.surface import Frame
+from sd2core.files.figure_files import save_figure
 from sd2core.progress import Progress, silent
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from sd2core.body.camera import PinholeCamera
 from sd2core.figures.colours import rgb, velocity_colours
 from sd2core.figures.strip_source import Row, StripOptions, StripSource
 from sd2core.figures.surface import Frame, lightness, projected, seen
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.scattering.velocity import moments, radial_velocity
 from sd2core.sensor import VirtualSensor
 

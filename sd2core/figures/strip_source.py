@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 from sd2core.body.camera import PinholeCamera
 from sd2core.errors import Sd2Error
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 
 if TYPE_CHECKING:
     from sd2core.io.video import VideoReader
-    from sd2core.recording import Recording
+    from sd2core.recording.recording import Recording
 
 Row = Literal["video", "mesh", "overlay"]
 ROWS: tuple[Row, ...] = get_args(Row)

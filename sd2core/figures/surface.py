@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.camera import PinholeCamera
-from sd2core.raster import interpolate, rasterise
+from sd2core.numerics.raster import interpolate, rasterise
 from sd2core.scattering.visibility import sum_cross_products
 
 NEAREST_M = 0.01

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-import sd2core
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.options import SignalOptions
 from sd2core.io.radar.capture import RadarCapture
 from sd2core.sensor import RadarConfig, VirtualSensor
 from sd2core.timebase import Timebase
+from sd2core.version import __version__
 
 _NOISE_WITHOUT_ECHO_COUNTS = 4.0
 
@@ -127,7 +127,7 @@ def simulated_capture(
                 "frame_time": "middle of the burst of chirps",
                 **levels,
                 **({"without_person": [list(gap) for gap in nobody]} if nobody else {}),
-                "version": sd2core.__version__,
+                "version": __version__,
             }
         },
     )

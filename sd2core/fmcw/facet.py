@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from sd2core.compiled import compiled
+from sd2core.numerics.compiled import compiled
 
 # Must be plain numbers here: kernels read module constants when they are compiled.
 _SERIES_BELOW_RAD = 0.1

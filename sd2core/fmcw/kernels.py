@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.compiled import compiled
 from sd2core.fmcw.facet import bent_facet_mean, unit_phasor
+from sd2core.numerics.compiled import compiled
 
 Floats = NDArray[np.float64]
 

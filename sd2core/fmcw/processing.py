@@ -21,14 +21,14 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-import sd2core
+from sd2core.doppler_map import DopplerMap
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.chain import Chain, Clutter, ProcessingOptions, Window
 from sd2core.io.radar.capture import RadarCapture
-from sd2core.presence import gaps_in_words, runs
+from sd2core.mesh.presence import gaps_in_words, runs
 from sd2core.progress import Progress, silent
 from sd2core.sensor import RadarConfig, VelocityAxis
-from sd2core.spectrum import DopplerMap
+from sd2core.version import __version__
 
 UNIT = "power (1 = full-scale sine)"
 
@@ -134,7 +134,7 @@ def doppler_map(
                 *_without_person(capture),
                 *_notes(config, axis, unseen, beyond, chain.clipped_share),
             ],
-            "version": sd2core.__version__,
+            "version": __version__,
         },
         present=capture.present,
     )

@@ -22,8 +22,8 @@ from sd2core.fmcw.converter import check_converter, digitise, simulated_capture
 from sd2core.fmcw.options import SignalOptions
 from sd2core.fmcw.scene import MeshScene, Scatterers, point_scatterers
 from sd2core.io.radar.capture import RadarCapture
-from sd2core.mesh import MeshSequence
-from sd2core.presence import runs
+from sd2core.mesh.presence import runs
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Progress, silent
 from sd2core.sensor import (
     SPEED_OF_LIGHT_MPS,

@@ -14,14 +14,14 @@ from dataclasses import asdict
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.compiled import worker_count, workers
 from sd2core.fmcw.converter import check_converter, digitise, simulated_capture, store
 from sd2core.fmcw.options import SignalOptions, WaveOptions
 from sd2core.fmcw.scene import FacetsSeen
 from sd2core.fmcw.wave import WaveScene
 from sd2core.io.radar.capture import RadarCapture
-from sd2core.mesh import MeshSequence
-from sd2core.presence import runs
+from sd2core.mesh.presence import runs
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.numerics.compiled import worker_count, workers
 from sd2core.progress import Cancelled, Progress, silent
 from sd2core.sensor import RadarConfig, VirtualSensor
 

@@ -8,13 +8,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sd2core.compiled import workers
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.chain import FrameChain, ProcessingOptions, own_clutter_removed, taper
 from sd2core.fmcw.options import WaveOptions
 from sd2core.fmcw.processing import rebinning
 from sd2core.fmcw.wave import WaveScene
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.numerics.compiled import workers
 from sd2core.sensor import RadarConfig, VelocityAxis, VirtualSensor
 
 

@@ -12,7 +12,7 @@ from sd2core.fmcw.kernels import facet_echoes
 from sd2core.fmcw.options import Antenna, Reflector, WaveOptions, paths
 from sd2core.fmcw.scene import NEAREST_M, FacetsSeen, MeshScene
 from sd2core.fmcw.sums import Echoes, direct, nufft
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import RadarConfig, VirtualSensor
 
 GoOn = Callable[[], None]

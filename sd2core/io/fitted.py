@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from sd2core.recording_document import CameraEntry
+from sd2core.files.recording_json import CameraEntry
 
 
 def fitted_camera(mesh: Path) -> CameraEntry | None:

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Literal
 
 from sd2core.errors import Sd2Error
-from sd2core.pairs import is_pair_store
-from sd2core.relative_paths import is_pattern
+from sd2core.files.paths import is_pattern
+from sd2core.pairs.store import is_pair_store
 
 Kind = Literal["recording", "video", "mesh", "radar", "map", "pairs", "model", "dataset"]
 

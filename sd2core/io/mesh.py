@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
+from sd2core.files.paths import is_pattern
 from sd2core.io.mesh_arrays import (
     RawMesh,
     StoredVertices,
@@ -21,9 +22,8 @@ from sd2core.io.mesh_arrays import (
 from sd2core.io.mesh_checks import check_mesh, mark_empty_frames, uncertainty_of
 from sd2core.io.mesh_files import SURFACE_SUFFIXES, read_faces, read_mesh_files
 from sd2core.io.mesh_models import read_model_output
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Progress, silent
-from sd2core.relative_paths import is_pattern
 from sd2core.timebase import Timebase
 
 _PICKLES = {".pkl", ".pickle", ".joblib"}

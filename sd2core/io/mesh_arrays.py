@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.atomic import atomic_write
 from sd2core.errors import Sd2Error
-from sd2core.mesh import MeshSequence, VertexArray, refuse_missing
+from sd2core.files.atomic import atomic_write
+from sd2core.mesh.sequence import MeshSequence, VertexArray, refuse_missing
 from sd2core.progress import Progress, silent
 
 VERTEX_NAMES = ("vertices", "verts")

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.io.mesh_arrays import RawMesh, StoredVertices
-from sd2core.mesh import place_in_words
-from sd2core.precision import ROUNDING, SHARE_OF_A_BIN, stored_velocity_error_mps
-from sd2core.presence import checked
+from sd2core.mesh.presence import checked
+from sd2core.mesh.sequence import place_in_words
+from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
+from sd2core.numerics.precision import ROUNDING, SHARE_OF_A_BIN, stored_velocity_error_mps
 from sd2core.sensor import VelocityAxis
-from sd2core.uncertainty import VelocityUncertainty
 
 _SAMPLE_FRAMES = 5
 _LARGEST_BODY_M = 10.0

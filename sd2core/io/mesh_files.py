@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
+from sd2core.files.paths import files_of_pattern
 from sd2core.io.mesh_arrays import FACE_NAMES, RawMesh
 from sd2core.progress import Progress, silent
-from sd2core.relative_paths import files_of_pattern
 
 SURFACE_SUFFIXES = (".obj", ".ply", ".glb")
 

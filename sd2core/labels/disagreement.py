@@ -9,7 +9,7 @@ import numpy as np
 
 from sd2core.labels.agreement import Answer, held_labels
 from sd2core.labels.spans import Span
-from sd2core.presence import runs
+from sd2core.mesh.presence import runs
 from sd2core.timebase import Timebase
 
 _WORDS = (

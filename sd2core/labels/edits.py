@@ -14,7 +14,7 @@ place, so the ones before are the step back. Decision 30 has the reasons for the
 - An edit that changes nothing returns the very labels that it was given.
 
 There is no history here: a step is the labels before and after, and whoever shows labels
-has a stack for such steps (``sd2app/commands.py``: ``_push(edit.name, assign, before,
+has a stack for such steps (``app/sd2app/session/undo.py``: ``_push(edit.name, assign, before,
 edit.labels)``, which also knows what is saved and drops what changed nothing).
 
 While a hand drags, call the edit with the labels from before it took hold and the place
@@ -29,7 +29,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from sd2core.errors import Sd2Error
-from sd2core.labels.rooms import Frames, clipped, free_parts, room_around, steps_free
+from sd2core.labels.free_time import Frames, clipped, free_parts, room_around, steps_free
 from sd2core.labels.spans import Labels, Span
 from sd2core.timebase import Timebase
 

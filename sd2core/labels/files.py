@@ -14,8 +14,10 @@ from typing import Any, Literal, Protocol, TypeVar
 
 from pydantic import ValidationError
 
-from sd2core.atomic import atomic_write_text
 from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_write_text
+from sd2core.files.paths import located_path, plain_path, stored_path
+from sd2core.files.recording_json import Span as InlineSpan
 from sd2core.labels.entries import (
     Entry,
     LabelsEntry,
@@ -27,8 +29,6 @@ from sd2core.labels.entries import (
 )
 from sd2core.labels.label_set import LONGEST_NAME, LabelSet
 from sd2core.labels.spans import Labels, Span, Track
-from sd2core.recording_document import Span as InlineSpan
-from sd2core.relative_paths import located_path, plain_path, stored_path
 from sd2core.timebase import Timebase
 
 FILE_NAME = "labels.json"

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 from sd2core.errors import Sd2Error
 from sd2core.labels.edits import Edit, duplicate
-from sd2core.labels.rooms import Frames, Stretch, steps_free
+from sd2core.labels.free_time import Frames, Stretch, steps_free
 from sd2core.labels.spans import Labels, Span
 from sd2core.timebase import Timebase
 

@@ -17,7 +17,7 @@ import os
 import time
 from pathlib import Path
 
-from sd2core.atomic import atomic_write
+from sd2core.files.atomic import atomic_write
 from sd2core.labels.journal_records import change, head, packed
 from sd2core.labels.spans import Labels
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sd2core.labels.rooms import Frames
+from sd2core.labels.free_time import Frames
 from sd2core.labels.spans import Labels
 from sd2core.timebase import Timebase
 

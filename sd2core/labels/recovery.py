@@ -25,9 +25,9 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from sd2core.atomic import atomic_write_text, remove_leftovers
 from sd2core.errors import Sd2Error
-from sd2core.file_lock import FileLock, is_locked
+from sd2core.files.atomic import atomic_write_text, remove_leftovers
+from sd2core.files.lock import FileLock, is_locked
 from sd2core.labels.journal import SUFFIX, Journal
 from sd2core.labels.recovery_offers import (
     DAMAGED,

@@ -6,7 +6,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Literal
 
-from sd2core.labels.rooms import Frames
+from sd2core.labels.free_time import Frames
 from sd2core.labels.spans import Labels
 from sd2core.timebase import Timebase
 

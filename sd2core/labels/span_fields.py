@@ -8,7 +8,7 @@ from typing import Any
 
 from sd2core.errors import Sd2Error
 from sd2core.labels.edits import Edit
-from sd2core.labels.rooms import Frames, clipped
+from sd2core.labels.free_time import Frames, clipped
 from sd2core.labels.spans import Labels, Span
 from sd2core.timebase import Timebase
 

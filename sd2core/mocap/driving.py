@@ -23,7 +23,7 @@ from sd2core.body.shaping import shape_of_lengths
 from sd2core.body.solve import solve, solve_stills
 from sd2core.body.track import LANDMARKS
 from sd2core.errors import Sd2Error
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.mocap.skeleton import Marker, SkeletonClip, evidence_of_points
 from sd2core.timebase import Timebase
 

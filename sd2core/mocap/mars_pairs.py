@@ -15,7 +15,6 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core import __version__
 from sd2core.body.model import Resolution
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
 from sd2core.errors import Sd2Error
@@ -27,13 +26,14 @@ from sd2core.io.radar.mars import (
     mars_parts,
     read_mars,
 )
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.mocap.driving import DrivenClip, puppet_of
 from sd2core.mocap.skeleton import KINECT_MARKERS, SkeletonClip
-from sd2core.pairs import PairWriter, Take, TakeKey
+from sd2core.pairs.store import PairWriter, Take, TakeKey
 from sd2core.progress import Progress, silent
 from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase
+from sd2core.version import __version__
 
 Target = Literal["share", "intensity"]
 

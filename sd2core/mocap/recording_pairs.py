@@ -11,16 +11,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core import __version__
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
+from sd2core.doppler_map import DopplerMap
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.processing import doppler_map
-from sd2core.pairs import PairWriter, Take, TakeKey
-from sd2core.presence import Presence, runs
+from sd2core.mesh.presence import Presence, runs
+from sd2core.pairs.store import PairWriter, Take, TakeKey
 from sd2core.progress import Progress, silent
-from sd2core.recording import Recording, open_recording
-from sd2core.spectrum import DopplerMap
+from sd2core.recording.recording import Recording, open_recording
 from sd2core.timebase import Timebase
+from sd2core.version import __version__
 
 TAKE_S = 15.0
 """Longer stretches are cut: takes can be kept apart even where there is one person."""

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.compiled import compiled
+from sd2core.numerics.compiled import compiled
 from sd2core.scattering.visibility import sum_cross_products
 
 NEAREST_RANGE_M = 0.1

@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.compiled import compiled
+from sd2core.numerics.compiled import compiled
 from sd2core.scattering.exact import (
     CONTACT,
     EDGE,

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.compiled import compiled
+from sd2core.numerics.compiled import compiled
 
 CONTACT = 1e-6
 """Nearer to either end of the segment than this share of the body's size, a

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sd2core.compiled import workers
 from sd2core.errors import Sd2Error
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.numerics.compiled import workers
 from sd2core.progress import Progress, silent
 from sd2core.scattering.exact import exact_visibility_kernel
 from sd2core.sensor import VirtualSensor

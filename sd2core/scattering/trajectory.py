@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.presence import Presence
+from sd2core.mesh.presence import Presence
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array

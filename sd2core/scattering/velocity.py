@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sd2core.presence import Presence
+from sd2core.mesh.presence import Presence
 
 
 def radial_velocity(

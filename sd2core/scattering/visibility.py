@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.compiled import compiled
+from sd2core.numerics.compiled import compiled
 
 NORMAL_SCALE = 127
 """A unit normal's component as a signed byte: directions are right to 0.4 degrees."""

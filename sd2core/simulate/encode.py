@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from sd2core.io.mesh_arrays import write_small
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 
 _CHUNK_FRAMES = 150
 

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.atomic import atomic_write
 from sd2core.body.model import FORMAT, INFLUENCES, VERSION, Resolution
 from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_write
 from sd2core.progress import Progress, silent
 from sd2core.simulate.decimate import decimate
 from sd2core.simulate.export_shapes import (

@@ -18,18 +18,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core import __version__
-from sd2core.atomic import atomic_write, atomic_write_text
 from sd2core.body.keypoints import KeypointSpace
 from sd2core.body.model import Body, Resolution, Skeleton
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.skinning import pose_vertices
 from sd2core.body.track import LANDMARKS
 from sd2core.compare.truth import FORMAT, VERSION, read_truth
-from sd2core.compiled import worker_count, workers
 from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_write, atomic_write_text
 from sd2core.io.video_writing import write_video
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.numerics.compiled import worker_count, workers
 from sd2core.progress import Progress, silent
 from sd2core.simulate.cast import PEOPLE, ROOMS
 from sd2core.simulate.clothing import Clothes
@@ -38,6 +37,7 @@ from sd2core.simulate.gestures import GestureSpan, arm_length_m
 from sd2core.simulate.motions import Action, duration_s, perform
 from sd2core.simulate.render import Camera, Renderer
 from sd2core.timebase import Timebase
+from sd2core.version import __version__
 
 FRAMES_PER_S = 30
 RESOLUTION: Resolution = "medium"

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.model import Body, vertex_normals
-from sd2core.raster import interpolate, lit_share, rasterise
+from sd2core.numerics.raster import interpolate, lit_share, rasterise
 from sd2core.simulate.caption import stamp
 from sd2core.simulate.clothing import Clothes, linear, srgb
 

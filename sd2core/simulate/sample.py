@@ -16,15 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.model import Body, Resolution
-from sd2core.compiled import worker_count, workers
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.options import Reflector, SignalOptions
 from sd2core.fmcw.signal import simulate_capture
 from sd2core.io.radar.infineon import write_capture
 from sd2core.io.video_writing import write_video
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.numerics.compiled import worker_count, workers
 from sd2core.progress import Progress, silent
-from sd2core.recording import SUFFIX, Recording, Span
+from sd2core.recording.recording import SUFFIX, Recording, Span
 from sd2core.scattering.facets import facet_visibility
 from sd2core.sensor import PAPER_RADAR, VirtualSensor
 from sd2core.simulate.encode import write_compact_mesh

@@ -11,8 +11,8 @@ import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 
-from sd2core.atomic import atomic_write, atomic_write_text
 from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_write, atomic_write_text
 
 FORMAT = "sd2-checkpoint"
 VERSION = 1

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from sd2core.errors import Sd2Error
-from sd2core.relative_paths import located_path
-from sd2core.segments import LENGTH, OVERLAP
-from sd2core.toml_text import toml_lines
+from sd2core.files.paths import located_path
+from sd2core.files.toml import toml_lines
+from sd2core.pairs.segments import LENGTH, OVERLAP
 from sd2core.train.rules import Allowed, choice, flag, number, paths, refused, table, text, texts
 
 

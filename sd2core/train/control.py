@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-from sd2core.atomic import atomic_write_text
+from sd2core.files.atomic import atomic_write_text
 
 Word = Literal["run", "pause", "stop", "cancel"]
 WORDS: tuple[Word, ...] = get_args(Word)

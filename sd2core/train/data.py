@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from sd2core.denoise.metrics import stands_out
 from sd2core.errors import Sd2Error
-from sd2core.pairs import PairSet, Take, read_pairs
-from sd2core.segments import cut, segment_starts
+from sd2core.pairs.segments import cut, segment_starts
+from sd2core.pairs.store import PairSet, Take, read_pairs
 from sd2core.train.config import DataConfig
 
 RANGE_LAW = 4.0

@@ -15,8 +15,8 @@ import torch
 from lightning.pytorch import LightningModule
 
 from sd2core.denoise.model import Denoiser
+from sd2core.train.callbacks import Course
 from sd2core.train.checkpoint import Checkpoint, moments_of, set_moments
-from sd2core.train.course import Course
 from sd2core.train.data import Order, Windows
 from sd2core.train.optimiser import optimiser_of, set_rate
 

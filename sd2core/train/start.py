@@ -18,9 +18,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from sd2core.atomic import atomic_write_text
 from sd2core.errors import Sd2Error
-from sd2core.file_lock import FileLock
+from sd2core.files.atomic import atomic_write_text
+from sd2core.files.lock import FileLock
 from sd2core.train.config import TrainConfig, config_text, read_config
 from sd2core.train.control import Control, signals_kept, write_control
 from sd2core.train.folder import RunFolder
@@ -137,7 +137,7 @@ def check(config: TrainConfig) -> None:
         For stores that are none, unknown models and their options.
     """
     from sd2core.denoise.registry import MODELS, options
-    from sd2core.pairs import is_pair_store
+    from sd2core.pairs.store import is_pair_store
 
     for path in config.data.pairs:
         if not is_pair_store(path):

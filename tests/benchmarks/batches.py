@@ -19,15 +19,15 @@ from typing import Any
 from peaks import peak_mb
 from scaling import body
 
-from sd2core.atomic import atomic_write_text
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.plan_file import plan_from_text
 from sd2core.batch.pool import DaskPool, local_client
 from sd2core.batch.run import BatchEnd, run_batch
+from sd2core.files.atomic import atomic_write_text
 from sd2core.io.mesh import save_mesh
 from sd2core.io.video import open_video
 from sd2core.io.video_writing import write_video
-from sd2core.worker_processes import ONE_THREAD
+from sd2core.processes import ONE_THREAD
 
 _PLAN = """
 out = "{out}"

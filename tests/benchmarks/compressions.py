@@ -22,8 +22,8 @@ from torch import Tensor, nn
 from sd2core.denoise.metrics import map_error, mean_velocity_error, peak_error, stands_out
 from sd2core.denoise.recurrent import GruDenoiser
 from sd2core.denoise.scaling import Compression, Scaling
-from sd2core.pairs import PairSet, read_pairs
-from sd2core.segments import cut, segment_starts
+from sd2core.pairs.segments import cut, segment_starts
+from sd2core.pairs.store import PairSet, read_pairs
 
 HALF, THIRD, QUARTER = 1 / 2, 1 / 3, 1 / 4
 WAYS = (

@@ -41,10 +41,10 @@ from sd2core.body.refining import Stretch
 from sd2core.body.search_store import SearchStore
 from sd2core.body.track import LandmarkTrack
 from sd2core.body.track_in_parts import RefinedStretches
+from sd2core.files.resources import resource_path
 from sd2core.io.video import VideoReader, open_video
 from sd2core.io.video_writing import write_video
-from sd2core.resources import resource_path
-from sd2core.worker_processes import ONE_THREAD
+from sd2core.processes import ONE_THREAD
 
 _RATE_HZ = 30
 _STRETCH_FRAMES = 256

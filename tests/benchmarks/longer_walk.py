@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.timebase import Timebase
 
 FRAMES = 450

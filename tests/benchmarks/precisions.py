@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from sd2core.doppler import PRESETS, Synthesizer, prepared
 from sd2core.doppler.histogram import relative_range
-from sd2core.mesh import MeshSequence
-from sd2core.precision import SHARE_OF_A_BIN, velocity_error_mps
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.numerics.precision import SHARE_OF_A_BIN, velocity_error_mps
 from sd2core.scattering.velocity import radial_velocity
 from sd2core.sensor import VelocityAxis, VirtualSensor
 

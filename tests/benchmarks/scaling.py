@@ -13,9 +13,9 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from sd2core.compiled import warm_up
 from sd2core.doppler import PRESETS, Synthesizer
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.numerics.compiled import warm_up
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 

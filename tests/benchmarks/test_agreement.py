@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sd2core.compiled import warm_up
 from sd2core.doppler import SynthesisOptions, Synthesizer
+from sd2core.files.resources import resource_path
 from sd2core.fmcw import ProcessingOptions, WaveOptions, frame_spectra, velocity_response
-from sd2core.mesh import MeshSequence
-from sd2core.recording import open_recording
-from sd2core.resources import resource_path
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.numerics.compiled import warm_up
+from sd2core.recording.recording import open_recording
 from sd2core.scattering.facets import facet_visibility
 from sd2core.sensor import PAPER_RADAR, VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase

@@ -14,8 +14,8 @@ import pytest
 from numpy.typing import NDArray
 
 from sd2core.body.model import Resolution
-from sd2core.compiled import warm_up
-from sd2core.pairs import Take
+from sd2core.numerics.compiled import warm_up
+from sd2core.pairs.store import Take
 from sd2core.simulate.campaign.fit_errors import FitErrors
 from sd2core.simulate.campaign.motion import perform
 from sd2core.simulate.campaign.people import random_subject

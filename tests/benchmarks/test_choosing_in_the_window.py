@@ -24,7 +24,7 @@ def ended():
 
 @pytest.fixture
 def window(qtbot, ended):
-    from sd2app.models.ladder import CORE
+    from sd2app.accuracy.ladder import CORE
 
     def survey(*place):
         try:

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sd2core.compiled import warm_up
+from sd2core.accuracy.choosing import choose
+from sd2core.accuracy.results import Choice
+from sd2core.files.resources import resource_path
 from sd2core.io.mesh import load_mesh
-from sd2core.ladder.choosing import choose
-from sd2core.ladder.results import Choice
-from sd2core.mesh import MeshSequence
-from sd2core.recording import open_recording
-from sd2core.resources import resource_path
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.numerics.compiled import warm_up
+from sd2core.recording.recording import open_recording
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 

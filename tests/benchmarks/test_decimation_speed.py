@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from timing import best_s
 
-from sd2core.compiled import warm_up
-from sd2core.decimation import decimate
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.io.mesh import load_mesh
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.decimation import decimate
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.numerics.compiled import warm_up
 from sd2core.sensor import VirtualSensor
 
 RAW = replace(PRESETS["paper"], velocity_sigma_bins=0.0, time_sigma_s=0.0)

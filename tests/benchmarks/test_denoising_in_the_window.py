@@ -16,11 +16,11 @@ import pytest
 from PySide6.QtCore import Qt, QTimer
 from window_on_sample import settle, window_on_sample
 
-from sd2app.jobs.denoise_process import DenoiseProcess
+from sd2app.background.model_worker.client import DenoiseProcess
 from sd2core.denoise.card import ModelCard
 from sd2core.denoise.scaling import Compression, Scaling
+from sd2core.doppler_map import DopplerMap
 from sd2core.sensor import VelocityAxis
-from sd2core.spectrum import DopplerMap
 from sd2core.timebase import Timebase
 
 FRAMES = 450
@@ -29,7 +29,7 @@ TICK = """
 import json, sys, threading, time
 import numpy as np
 from PySide6.QtCore import QCoreApplication, Qt, QTimer
-from sd2app.jobs.denoise_process import DenoiseProcess
+from sd2app.background.model_worker.client import DenoiseProcess
 
 how, model = sys.argv[1:]
 application = QCoreApplication([])

@@ -15,13 +15,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sd2core.compiled import warm_up
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.doppler.masks import VisibilityMasks
 from sd2core.doppler.prepared import Block
-from sd2core.mesh import MeshSequence
-from sd2core.recording import open_recording
-from sd2core.resources import resource_path
+from sd2core.files.resources import resource_path
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.numerics.compiled import warm_up
+from sd2core.recording.recording import open_recording
 from sd2core.scattering.depth import depth_visibility_kernel
 from sd2core.scattering.exact import exact_visibility_kernel
 from sd2core.sensor import VirtualSensor

@@ -13,13 +13,13 @@ from sd2core.body.limbs import LIMBS, vertex_limbs
 from sd2core.body.model import Body
 from sd2core.body.rotations import about
 from sd2core.body.skinning import pose_vertices
-from sd2core.compiled import warm_up
 from sd2core.doppler import Synthesizer
+from sd2core.files.resources import resource_path
 from sd2core.io.mesh import load_mesh
-from sd2core.mesh import MeshSequence
-from sd2core.resources import resource_path
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
+from sd2core.numerics.compiled import warm_up
 from sd2core.sensor import VirtualSensor
-from sd2core.uncertainty import VelocityUncertainty
 
 FRAMES = 64
 

@@ -18,16 +18,16 @@ from longer_walk import FRAMES, LAST, POSES, longer_walk
 from numpy.typing import NDArray
 from timing import best_s
 
-from sd2core.compiled import worker_count
+from sd2core.files.resources import resource_path
 from sd2core.fmcw import WaveOptions, simulate_radar
 from sd2core.fmcw.kernels import compile_kernels
 from sd2core.fmcw.reference import converged_frame, doppler_marginal
 from sd2core.fmcw.sums import direct, nufft, recurrent
 from sd2core.fmcw.wave import WaveScene
 from sd2core.io.mesh import load_mesh
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.numerics.compiled import worker_count
 from sd2core.progress import Cancelled
-from sd2core.resources import resource_path
 from sd2core.scattering.facets import facet_visibility
 from sd2core.sensor import PAPER_RADAR, VirtualSensor
 from sd2core.timebase import Timebase

@@ -22,8 +22,8 @@ from sd2core.body.landmarks import find_landmarks
 from sd2core.body.model import Body
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.track import LANDMARKS
+from sd2core.files.resources import resource_path
 from sd2core.io.video import VideoReader, open_video
-from sd2core.resources import resource_path
 from sd2core.simulate.gestures import swipes
 from sd2core.simulate.render import Camera
 from sd2core.simulate.sample import _PLACE_ACROSS_M, DISTANCE_M

@@ -15,7 +15,7 @@ import pytest
 
 from sd2core.body.model import Body
 from sd2core.io.mesh import save_mesh
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.timebase import Timebase
 
 FRAMES = 162_000
@@ -25,8 +25,8 @@ import json, sys, time
 from pathlib import Path
 from PySide6.QtWidgets import QApplication
 from sd2app.settings import Settings
-from sd2app.theme import apply_theme
-from sd2app.views.window import MainWindow
+from sd2app.widgets.theme import apply_theme
+from sd2app.shell.window import MainWindow
 
 application = QApplication(sys.argv[:1])
 apply_theme(application, False)
@@ -104,7 +104,7 @@ class SwayingBody:
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
 def test_ninety_minutes(benchmark, tmp_path):
-    from sd2core.compiled import warm_up
+    from sd2core.numerics.compiled import warm_up
 
     warm_up()
     body = SwayingBody()

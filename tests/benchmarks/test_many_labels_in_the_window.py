@@ -28,8 +28,8 @@ from sd2core.io.mesh import save_mesh
 from sd2core.labels.files import write_labels
 from sd2core.labels.label_set import GESTURES
 from sd2core.labels.spans import Labels, Span, Track
-from sd2core.mesh import MeshSequence
-from sd2core.recording import Recording
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.recording.recording import Recording
 from sd2core.timebase import Timebase
 
 FRAMES, RATE = 162_000, 30.0
@@ -77,8 +77,8 @@ def long_recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def long_window(qtbot: Any, long_recording: Path) -> Iterator[Any]:
     """The window on it as soon as a map is drawn; nothing is computed beside it from then on."""
     from sd2app.settings import Settings
-    from sd2app.views.window import MainWindow
-    from sd2core.compiled import warm_up
+    from sd2app.shell.window import MainWindow
+    from sd2core.numerics.compiled import warm_up
 
     warm_up()
     window = MainWindow(Settings.forgetful())

@@ -15,9 +15,9 @@ import pytest
 from longer_walk import longer_walk
 from precisions import CAMERA, costs, errors, in_both_precisions
 
-from sd2core.compiled import warm_up
-from sd2core.mesh import MeshSequence
-from sd2core.precision import SHARE_OF_A_BIN
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.numerics.compiled import warm_up
+from sd2core.numerics.precision import SHARE_OF_A_BIN
 
 
 @pytest.fixture(scope="module")

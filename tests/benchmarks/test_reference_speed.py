@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sd2core.compiled import warm_up
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.doppler.reference import reference_stretch
 from sd2core.io.mesh import load_mesh
+from sd2core.numerics.compiled import warm_up
 from sd2core.sensor import VirtualSensor
 
 FRAMES = (30, 54)

@@ -20,8 +20,8 @@ class Player:
     """The scene over the off-screen backend, frame by frame."""
 
     def __init__(self, mesh: Any) -> None:
-        from sd2app.views.scene3d.image_backend import ImageBackend
-        from sd2app.views.scene3d.scene import Scene
+        from sd2app.scene.offscreen_backend import ImageBackend
+        from sd2app.scene.scene import Scene
 
         self.mesh = mesh
         self.backend = ImageBackend()

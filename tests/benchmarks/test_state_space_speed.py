@@ -20,7 +20,7 @@ from torch import Tensor, nn
 
 from sd2core.denoise.convolution import by_product, by_transform
 from sd2core.denoise.s4 import S4Layer
-from sd2core.denoise.systems import StateSpace
+from sd2core.denoise.state_space_layer import StateSpace
 
 CHANNELS, STATE_SIZE = 128, 64
 PUBLISHED = {"legs": PublishedLegs, "diagonal": PublishedDiagonal}

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from timing import best_s
 
-from sd2core.compiled import warm_up, worker_count
 from sd2core.doppler import PRESETS, Synthesizer
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.numerics.compiled import warm_up, worker_count
 from sd2core.scattering.exact import exact_visibility_kernel
 from sd2core.sensor import VirtualSensor
 

@@ -11,17 +11,17 @@ from typing import Any
 import pytest
 from scaling import body
 
-from sd2core.compiled import warm_up
+from sd2core.accuracy import places
+from sd2core.accuracy.choosing import choose
+from sd2core.accuracy.places import PlacedPlan, choose_for_places, spread
+from sd2core.accuracy.plans import reference_plan
+from sd2core.accuracy.synthesizers import synthesizer_for
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
-from sd2core.ladder import places
-from sd2core.ladder.carry_out import synthesizer_for
-from sd2core.ladder.choosing import choose
-from sd2core.ladder.places import PlacedPlan, choose_for_places, spread
-from sd2core.ladder.rungs import reference_plan
-from sd2core.mesh import MeshSequence
+from sd2core.files.resources import resource_path
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.numerics.compiled import warm_up
 from sd2core.progress import silent
-from sd2core.recording import open_recording
-from sd2core.resources import resource_path
+from sd2core.recording.recording import open_recording
 from sd2core.sensor import VirtualSensor
 
 PAPER = PRESETS["paper"]

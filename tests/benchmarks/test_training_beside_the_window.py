@@ -76,8 +76,8 @@ def test_an_update_of_the_panel(benchmark, sample_window, qtbot, tmp_path):
     """
     from PySide6.QtWidgets import QApplication
 
-    from sd2app.models.training_history import EpochPoint, StepPoint
-    from sd2app.views.training_curves import TrainingCurves
+    from sd2app.training.curves import TrainingCurves
+    from sd2app.training.history import EpochPoint, StepPoint
 
     window, training = sample_window, sample_window.context.training
     training.setup.add_store(write_pairs(tmp_path / "campaign.zarr"))

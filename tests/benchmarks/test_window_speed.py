@@ -18,7 +18,7 @@ import pytest
 from PySide6.QtCore import QEvent, QObject, QTimer
 from window_on_sample import window_on_sample
 
-from sd2core.resources import resource_path
+from sd2core.files.resources import resource_path
 
 SECONDS = 5.0
 
@@ -28,8 +28,8 @@ from pathlib import Path
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication
 from sd2app.settings import Settings
-from sd2app.theme import apply_theme
-from sd2app.views.window import MainWindow
+from sd2app.widgets.theme import apply_theme
+from sd2app.shell.window import MainWindow
 
 begun, path = float(sys.argv[1]), Path(sys.argv[2])
 marks = {}
@@ -98,9 +98,9 @@ def sample_window(qtbot):
 
 
 def play(window, qtbot, every_tick=lambda: None):
-    from sd2app.views.heatmap import HeatmapView
-    from sd2app.views.scene3d.image_backend import ImageBackend
-    from sd2app.views.video import VideoView
+    from sd2app.maps.heatmap import HeatmapView
+    from sd2app.scene.offscreen_backend import ImageBackend
+    from sd2app.video.view import VideoView
 
     heatmaps = [view for view in window.findChildren(HeatmapView) if view.isVisible()]
     views = [window.findChild(VideoView), *heatmaps]
@@ -150,7 +150,7 @@ def test_dragging_the_sensor_while_playing(benchmark, sample_window, qtbot):
 
 def test_starting_on_the_sample(benchmark):
     """Targets: skeleton 0.5 s, usable 3 s, first drag answered in 0.2 s; best of three starts."""
-    from sd2core.compiled import warm_up
+    from sd2core.numerics.compiled import warm_up
 
     warm_up()
     starts = []

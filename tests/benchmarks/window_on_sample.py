@@ -6,15 +6,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from sd2core.resources import resource_path
+from sd2core.files.resources import resource_path
 
 
 @contextmanager
 def window_on_sample(qtbot: Any, *more: Any) -> Iterator[Any]:
     """A window that has come to rest; closed at the end. ``more`` goes to ``MainWindow``."""
     from sd2app.settings import Settings
-    from sd2app.views.window import MainWindow
-    from sd2core.compiled import warm_up
+    from sd2app.shell.window import MainWindow
+    from sd2core.numerics.compiled import warm_up
 
     warm_up()
     window = MainWindow(Settings.forgetful(), *more)

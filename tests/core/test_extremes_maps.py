@@ -13,13 +13,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from sd2core.compiled import warm_up
-from sd2core.decimation import decimate
 from sd2core.doppler import PRESETS, Synthesizer, masks, prepared, synthesizer
 from sd2core.doppler.reference import reference_stretch
 from sd2core.errors import Sd2Error
-from sd2core.mesh import MeshSequence
-from sd2core.precision import ROUNDING, velocity_error_mps
+from sd2core.mesh.decimation import decimate
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.numerics.compiled import warm_up
+from sd2core.numerics.precision import ROUNDING, velocity_error_mps
 from sd2core.scattering.amplitude import NEAREST_RANGE_M
 from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase

@@ -22,7 +22,7 @@ from sd2core.fmcw.reference import subdivided
 from sd2core.fmcw.simulation import simulate_radar
 from sd2core.fmcw.sums import NUFFT_TOLERANCE, Echoes, direct, nufft, recurrent
 from sd2core.fmcw.triangle import mean_phasor
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.scattering.facets import facet_visibility
 from sd2core.sensor import SPEED_OF_LIGHT_MPS, RadarConfig, VirtualSensor
 from sd2core.timebase import Timebase

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from sd2core.compiled import KERNEL_MODULES
+from sd2core.numerics.compiled import KERNEL_MODULES
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 

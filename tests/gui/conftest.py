@@ -15,8 +15,8 @@ from PySide6.QtCore import QCoreApplication, QEvent
 
 from sd2core.io.mesh import save_mesh
 from sd2core.io.radar.infineon import write_capture
-from sd2core.mesh import MeshSequence
-from sd2core.recording import Recording, Span
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.recording.recording import Recording, Span
 from sd2core.sensor import PAPER_RADAR
 from sd2core.timebase import Timebase
 
@@ -95,7 +95,7 @@ def own_data(tmp_path_factory, monkeypatch) -> Path:
 @pytest.fixture(scope="session")
 def compiled_kernels() -> None:
     """Machine code on disk, as after set-up."""
-    from sd2core.compiled import warm_up
+    from sd2core.numerics.compiled import warm_up
 
     warm_up()
 
@@ -122,7 +122,7 @@ def fake_classes() -> FakeClassifiers:
 def empty_window(qtbot, compiled_kernels, fake, fake_models, fake_classes):
     """The window without a recording, all views in place."""
     from sd2app.settings import Settings
-    from sd2app.views.window import MainWindow
+    from sd2app.shell.window import MainWindow
 
     window = MainWindow(
         Settings.forgetful(),

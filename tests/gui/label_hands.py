@@ -7,8 +7,8 @@ from typing import Any
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
-from sd2app.views.heatmap import HeatmapView
-from sd2app.views.label_timeline import LabelTimeline
+from sd2app.labels.timeline import LabelTimeline
+from sd2app.maps.heatmap import HeatmapView
 
 NONE = Qt.KeyboardModifier.NoModifier
 SHIFT, CONTROL = Qt.KeyboardModifier.ShiftModifier, Qt.KeyboardModifier.ControlModifier

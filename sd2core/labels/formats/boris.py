@@ -15,13 +15,13 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from sd2core.atomic import atomic_write_text
+from sd2core.files.atomic import atomic_write_text
+from sd2core.files.paths import plain_path, stored_path
 from sd2core.labels.formats.boris_reading import DETAILS, LABEL_SET
 from sd2core.labels.formats.lanes import Lane, lanes_of
 from sd2core.labels.formats.losses import ASPECTS, LabelFormat, Loss, losses_by_format
 from sd2core.labels.label_set import Label
 from sd2core.labels.spans import Labels, Span
-from sd2core.relative_paths import plain_path, stored_path
 from sd2core.timebase import Timebase
 
 FORMAT = LabelFormat(

@@ -20,8 +20,8 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from sd2core.atomic import atomic_write_text
 from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_write_text
 from sd2core.labels.formats.losses import (
     ASPECTS,
     DEFAULT_TRACK,

@@ -17,8 +17,9 @@ from pathlib import Path
 from urllib.parse import quote
 from xml.etree import ElementTree
 
-from sd2core.atomic import atomic_write
 from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_write
+from sd2core.files.paths import plain_path, stored_path
 from sd2core.labels.formats.elan_reading import (
     DETAILS,
     LABELS,
@@ -36,7 +37,6 @@ from sd2core.labels.formats.losses import (
 )
 from sd2core.labels.label_set import LabelSet
 from sd2core.labels.spans import Labels, Span
-from sd2core.relative_paths import plain_path, stored_path
 from sd2core.timebase import Timebase
 
 FORMAT = LabelFormat(

@@ -13,8 +13,8 @@ from collections.abc import Callable
 from pathlib import Path
 from urllib.parse import quote, unquote
 
-from sd2core.atomic import atomic_write_text
 from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_write_text
 from sd2core.labels.formats.losses import (
     ASPECTS,
     DEFAULT_TRACK,

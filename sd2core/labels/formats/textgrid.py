@@ -12,8 +12,8 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from sd2core.atomic import atomic_write_text
 from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_write_text
 from sd2core.labels.formats.lanes import Lane, lanes_of, track_of
 from sd2core.labels.formats.losses import LabelFormat, Loss, losses_by_format
 from sd2core.labels.formats.rows import Row, assemble

@@ -14,7 +14,7 @@ from sd2core.compare.fit_report import reach_table
 from sd2core.compare.fit_score import ClipScore, score_clip
 from sd2core.compare.truth import Truth
 from sd2core.io.mesh import load_mesh
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Progress, silent
 from sd2core.simulate.campaign.fit_errors import FitErrors
 from sd2core.simulate.fit_truth import RESOLUTION, clip_named, scene

@@ -24,12 +24,12 @@ from typing import Any
 
 import numpy as np
 
-from sd2core.atomic import atomic_write_text
 from sd2core.body.model import Skeleton
 from sd2core.body.rotations import Floats
 from sd2core.body.shape import BodyShape
 from sd2core.errors import Sd2Error
-from sd2core.resources import resource_path
+from sd2core.files.atomic import atomic_write_text
+from sd2core.files.resources import resource_path
 from sd2core.simulate.campaign.posture import Group, all_groups, held_otherwise, posture
 
 FORMAT = "sd2-fit-errors"

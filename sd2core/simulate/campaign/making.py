@@ -15,15 +15,15 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, contextmanager
 from pathlib import Path
 
-from sd2core import __version__
 from sd2core.errors import Sd2Error
-from sd2core.pairs import PairWriter, Take, TakeKey
+from sd2core.pairs.store import PairWriter, Take, TakeKey
+from sd2core.processes import ONE_THREAD, end_with_parent
 from sd2core.progress import Progress, silent
 from sd2core.simulate.campaign.fit_errors import FitErrors
 from sd2core.simulate.campaign.motion import LABELS
 from sd2core.simulate.campaign.people import subject_name
 from sd2core.simulate.campaign.takes import OPTIONS, Campaign, TakeMaker, take_name
-from sd2core.worker_processes import ONE_THREAD, end_with_parent
+from sd2core.version import __version__
 
 _AHEAD = 3
 """Takes per process that are handed out before the first of them is written."""

@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sd2core import __version__
 from sd2core.body.fit import fit_body
 from sd2core.body.keypoints import KeypointSpace
 from sd2core.body.landmark_files import load_track
@@ -22,6 +21,7 @@ from sd2core.progress import Progress, silent
 from sd2core.simulate.campaign.fit_errors import FitErrors, GroupErrors
 from sd2core.simulate.campaign.posture import Group, all_groups, errors, posture
 from sd2core.simulate.fit_truth import clip_named, scene
+from sd2core.version import __version__
 
 _LAGS = (1, 2, 3, 4, 6, 9, 13, 19, 28, 42)
 """Frames apart."""

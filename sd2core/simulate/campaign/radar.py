@@ -27,7 +27,7 @@ from sd2core.fmcw.processing import rebinning
 from sd2core.fmcw.scene import MeshScene
 from sd2core.fmcw.sums import Echoes, turns_of
 from sd2core.fmcw.wave import WaveScene
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.scattering.facets import visible_facets
 from sd2core.sensor import RadarConfig, VelocityAxis, VirtualSensor
 

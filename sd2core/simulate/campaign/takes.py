@@ -14,8 +14,8 @@ from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.skinning import pose_vertices
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.errors import Sd2Error
-from sd2core.mesh import MeshSequence
-from sd2core.pairs import Take
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.pairs.store import Take
 from sd2core.sensor import PAPER_RADAR, RadarConfig
 from sd2core.simulate.campaign.fit_errors import FitErrors
 from sd2core.simulate.campaign.motion import perform

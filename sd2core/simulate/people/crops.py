@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.roi import CROP_PX, Roi
-from sd2core.compiled import compiled
-from sd2core.raster import rasterise
+from sd2core.numerics.compiled import compiled
+from sd2core.numerics.raster import rasterise
 from sd2core.simulate.people.wardrobe import Wardrobe
 
 Singles = NDArray[np.float32]

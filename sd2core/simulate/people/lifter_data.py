@@ -7,10 +7,10 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from functools import partial
 from pathlib import Path
 
+from sd2core.processes import end_with_parent
 from sd2core.progress import Progress, silent
 from sd2core.simulate.people.motion import Manner
 from sd2core.simulate.people.takes import Take, TakeMaker
-from sd2core.worker_processes import end_with_parent
 
 _maker: TakeMaker | None = None
 

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.atomic import atomic_write
 from sd2core.body.blazepose import CLOSE_UP, PoseLandmarker, Roi
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.keypoints import KeypointSpace
@@ -17,6 +16,7 @@ from sd2core.body.rotations import Floats
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.skinning import pose_vertices
 from sd2core.body.track import LANDMARKS
+from sd2core.files.atomic import atomic_write
 from sd2core.simulate.people.crops import CropPainter, random_background, random_look
 from sd2core.simulate.people.motion import Manner, random_deed, random_motion
 from sd2core.simulate.people.view import random_view

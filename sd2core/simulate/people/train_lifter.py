@@ -13,7 +13,6 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from sd2core.atomic import atomic_write
 from sd2core.body.lifter import (
     FORMAT,
     LOG_SIGMA,
@@ -26,6 +25,7 @@ from sd2core.body.lifter import (
 )
 from sd2core.body.lifter_features import RATE_HZ
 from sd2core.body.track import LANDMARKS
+from sd2core.files.atomic import atomic_write
 from sd2core.progress import Progress, silent
 from sd2core.simulate.people.emulate import Emulator, Walk, random_walks
 from sd2core.simulate.people.examples import Batch, Example, batch, emulated, example, varied

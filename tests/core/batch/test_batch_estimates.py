@@ -15,7 +15,7 @@ from sd2core.batch.plan import BatchPlan
 from sd2core.batch.plan_file import plan_from_text
 from sd2core.batch.probing import TaskRate, export_s
 from sd2core.batch.rates import known_fit_rate, remember_fit_rate
-from sd2core.cli.batch_words import print_estimate
+from sd2core.cli.batch_text import print_estimate
 
 PLAN = """
 out = "made"

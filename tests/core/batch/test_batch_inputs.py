@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from moving_spheres import save_spheres, swinging_sphere
 
-from sd2core import contents
 from sd2core.batch import inputs
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.inputs import find_origins, inspect, known_inspection
@@ -18,9 +17,10 @@ from sd2core.batch.leftovers import remove_old_leftovers
 from sd2core.batch.plan import Recordings
 from sd2core.batch.pool import _check_worker
 from sd2core.errors import Sd2Error
+from sd2core.files import digests as contents
 from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.io.unpacking import npz_vertices, unpack_npz
-from sd2core.recording import Recording
+from sd2core.recording.recording import Recording
 
 
 def _origins(folder: Path, **told: object) -> dict[str, str]:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from sd2core.batch.keys import all_code_digest, code_digest, key_of
 from sd2core.batch.plan import STEPS
-from sd2core.contents import file_digest
+from sd2core.files.digests import file_digest
 
 values = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False)

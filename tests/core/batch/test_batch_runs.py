@@ -15,6 +15,7 @@ from moving_spheres import maps_in, save_spheres, swinging_sphere
 from numbered_videos import write_video
 from pools import SerialPool
 
+from sd2core.accuracy.plans import reference_plan
 from sd2core.batch.driver import AHEAD
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.plan_file import plan_from_text
@@ -22,12 +23,11 @@ from sd2core.batch.run import BatchEnd, run_batch
 from sd2core.batch.tasks import Task
 from sd2core.denoise.files import find_model
 from sd2core.doppler import PRESETS, Synthesizer
+from sd2core.doppler_map import DopplerMap
 from sd2core.errors import Sd2Error
 from sd2core.io.mesh import load_mesh, save_mesh
-from sd2core.ladder.rungs import reference_plan
-from sd2core.recording import Recording
+from sd2core.recording.recording import Recording
 from sd2core.sensor import VirtualSensor
-from sd2core.spectrum import DopplerMap
 
 PLAN = """
 out = "made"
@@ -96,8 +96,8 @@ def test_maps_are_those_of_synth_and_denoise(run: Runs) -> None:
 def test_a_tolerance_is_one_plan_per_mesh_for_all_its_places(
     run: Runs, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("sd2core.ladder.places._FEWEST_FRAMES", 1)
-    monkeypatch.setattr("sd2core.ladder.places._Search.reference_s", lambda _: 0.0)
+    monkeypatch.setattr("sd2core.accuracy.places._FEWEST_FRAMES", 1)
+    monkeypatch.setattr("sd2core.accuracy.places._Search.reference_s", lambda _: 0.0)
     paths = save_spheres(run.folder / "meshes", 2)
     end = run(MAPS + "tolerance = 0.1\n")
     assert (end.outcome, end.failed) == ("finished", 0)
@@ -312,7 +312,7 @@ def test_a_pattern_that_matches_nothing_is_refused(run: Runs) -> None:
 
 def test_recordings_become_a_data_set(run: Runs) -> None:
     from sd2core.datasets.reading import open_dataset
-    from sd2core.recording_document import Span
+    from sd2core.files.recording_json import Span
 
     folder = run.folder / "meshes"
     folder.mkdir()

@@ -13,7 +13,7 @@ from moving_spheres import save_spheres
 from pools import SerialPool
 from swinging_recordings import recording
 
-from sd2core.batch import flow
+from sd2core.batch import task_graph as flow
 from sd2core.batch.estimate import estimate
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.plan_file import plan_from_text, plan_text
@@ -21,10 +21,10 @@ from sd2core.batch.run import BatchEnd, run_batch
 from sd2core.batch.stretches import stretches_of
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.simulating import Simulation, simulated_map
+from sd2core.doppler_map import DopplerMap, joined
 from sd2core.errors import Sd2Error
 from sd2core.io.mesh import load_mesh
 from sd2core.sensor import PAPER_RADAR, VelocityAxis, VirtualSensor
-from sd2core.spectrum import DopplerMap, joined
 
 PLAN = """
 out = "made"

@@ -9,7 +9,7 @@ import trimesh
 from sd2core.body.model import Body, Resolution, vertex_normals
 from sd2core.body.rotations import about
 from sd2core.errors import Sd2Error
-from sd2core.resources import resource_path
+from sd2core.files.resources import resource_path
 
 SURFACES: tuple[tuple[Resolution, int], ...] = (("low", 1229), ("medium", 5000), ("high", 13348))
 

@@ -18,10 +18,10 @@ from sd2core.body.camera import PinholeCamera
 from sd2core.body.fit import fit_body, fit_motion
 from sd2core.body.keypoints import KeypointSpace
 from sd2core.body.landmark_files import load_track, save_track
+from sd2core.body.landmark_repair import Found, resided
 from sd2core.body.lifter import Lifter
 from sd2core.body.lifting import LiftedInParts
 from sd2core.body.refining import Stretch
-from sd2core.body.repair import Found, resided
 from sd2core.body.search_store import SearchStore
 from sd2core.body.shape import ShapeSpace
 from sd2core.body.track import LANDMARKS, PER_FRAME, LandmarkTrack

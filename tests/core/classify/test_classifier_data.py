@@ -24,7 +24,7 @@ from sd2core.classify.splitting import fold, movements, split_clips
 from sd2core.errors import Sd2Error
 from sd2core.labels.label_set import Label, LabelSet
 from sd2core.labels.spans import Labels, Span, Track
-from sd2core.pairs import PairSet, Take
+from sd2core.pairs.store import PairSet, Take
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 

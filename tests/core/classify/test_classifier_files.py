@@ -23,7 +23,7 @@ from sd2core.classify.live import TrainedClassifier
 from sd2core.classify.models import build
 from sd2core.denoise.files import describe_model
 from sd2core.errors import Sd2Error
-from sd2core.resources import resource_path
+from sd2core.files.resources import resource_path
 
 ABOUT = {"data": "six simulated people", "metrics": {"mean_recall": 0.7}}
 

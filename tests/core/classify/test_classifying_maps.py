@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from sd2core.classify.defaults import MODELS
 from sd2core.classify.live import CHUNK
+from sd2core.doppler_map import DopplerMap
 from sd2core.errors import Sd2Error
 from sd2core.sensor import VelocityAxis
-from sd2core.spectrum import DopplerMap
 from sd2core.timebase import Timebase
 
 SAME = 2e-5

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from labelled_clips import clip_set
 
-from sd2core.classify.judging import judge
+from sd2core.classify.model_selection import judge
 from sd2core.classify.noise import BELOW_LOUDEST_DB, some_noisy, with_noise_floor
 from sd2core.classify.training import TrainOptions, train
 

@@ -10,11 +10,11 @@ import pytest
 from cli_outcome import Sd2
 
 from sd2core.classify import training
+from sd2core.doppler_map import DopplerMap
+from sd2core.files.resources import resource_path
 from sd2core.labels.files import read_labels
-from sd2core.pairs import PairWriter, Take
-from sd2core.resources import resource_path
+from sd2core.pairs.store import PairWriter, Take
 from sd2core.sensor import VelocityAxis
-from sd2core.spectrum import DopplerMap
 from sd2core.timebase import Timebase
 
 AXIS = VelocityAxis(32, 2.0)

@@ -12,7 +12,7 @@ from matplotlib.image import imread
 from swinging_recordings import recording
 
 from sd2core.datasets.reading import open_dataset
-from sd2core.placements import PlacementGrid, write_placements
+from sd2core.placements.placements import PlacementGrid, write_placements
 
 SMALL = ("--kinds", "synthetic,simulated", "--length", 30, "--overlap", 5)
 

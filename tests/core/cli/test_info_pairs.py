@@ -10,7 +10,7 @@ import pytest
 from cli_outcome import Sd2
 
 from sd2core.io.kinds import kind_of
-from sd2core.pairs import PairWriter, Take
+from sd2core.pairs.store import PairWriter, Take
 from sd2core.sensor import VelocityAxis
 
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from cli_outcome import Sd2
 
+from sd2core.doppler_map import DopplerMap
 from sd2core.labels import files
 from sd2core.labels.formats import FORMATS, read_labels
 from sd2core.labels.label_set import Label, LabelSet
 from sd2core.labels.spans import Labels, Span, Track
-from sd2core.recording import Recording
+from sd2core.recording.recording import Recording
 from sd2core.sensor import VelocityAxis
-from sd2core.spectrum import DopplerMap
 from sd2core.timebase import Timebase
 
 
@@ -291,7 +291,7 @@ def test_every_format_is_named_in_the_help(sd2: Sd2) -> None:
 def moving_recording(tmp_path: Path, moving: Path) -> Path:
     """A recording whose mesh, a tetrahedron, swings for two seconds; two labels."""
     from sd2core.io.mesh import save_mesh
-    from sd2core.mesh import MeshSequence
+    from sd2core.mesh.sequence import MeshSequence
 
     corners = np.array([[0, 0, 2], [1, 0, 2], [0, 1, 2], [0, 0, 3]], np.float32)
     times_s = np.arange(40) / 20.0

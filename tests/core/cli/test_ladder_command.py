@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from cli_outcome import Sd2
 
-from sd2core.ladder import Plan
-from sd2core.spectrum import DopplerMap
+from sd2core.accuracy import Plan
+from sd2core.doppler_map import DopplerMap
 
 
 @pytest.fixture(autouse=True)

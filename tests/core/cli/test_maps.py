@@ -15,8 +15,8 @@ from sd2core.cli import build_parser
 from sd2core.cli.synth import synthesis_options
 from sd2core.doppler import PRESETS
 from sd2core.doppler.options import same_velocities
+from sd2core.doppler_map import DopplerMap
 from sd2core.sensor import VelocityAxis
-from sd2core.spectrum import DopplerMap
 
 
 def options_of(*arguments: str) -> object:
@@ -123,7 +123,7 @@ def test_from_behind_it_recedes(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
 
 
 def test_a_recording_brings_its_sensor(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
-    from sd2core.recording import Recording
+    from sd2core.recording.recording import Recording
     from sd2core.sensor import VirtualSensor
 
     Recording.create(tmp_path / "a.sd2", mesh=plate, sensor=VirtualSensor((0.0, 0.0, 9.0)))
@@ -185,7 +185,7 @@ def test_an_axis_beyond_the_radar_is_said(sd2: Sd2, shared_data: Path, tmp_path:
 def test_the_capture_of_a_recording_is_on_its_clock(
     sd2: Sd2, shared_data: Path, tmp_path: Path
 ) -> None:
-    from sd2core.recording import Recording
+    from sd2core.recording.recording import Recording
 
     capture = shared_data / "radar" / "infineon_people"
     Recording.create(tmp_path / "a.sd2", radar=capture, radar_offset_s=-0.25)

@@ -12,8 +12,8 @@ from cli_outcome import Sd2
 
 from sd2core.cli import build_parser
 from sd2core.cli.synth import synthesis_options
-from sd2core.recording import MeshReading, Recording, open_recording
-from sd2core.spectrum import DopplerMap
+from sd2core.doppler_map import DopplerMap
+from sd2core.recording.recording import MeshReading, Recording, open_recording
 
 
 def must_not_work(*_: object, **__: object) -> None:
@@ -66,7 +66,7 @@ class TestOutput:
         outcome = sd2(command, plate, "--out", tmp_path / "folder.npz")
         assert outcome.code == 1
         assert "folder.npz is a folder" in outcome.err
-        monkeypatch.setattr("sd2core.atomic.tempfile.mkstemp", refuse)
+        monkeypatch.setattr("sd2core.files.atomic.tempfile.mkstemp", refuse)
         outcome = sd2(command, plate, "--out", tmp_path / "map.npz")
         assert outcome.code == 1
         assert "map.npz cannot be written (Permission denied)" in outcome.err

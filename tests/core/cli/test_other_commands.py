@@ -49,6 +49,6 @@ def test_an_existing_sample_is_not_replaced(sd2: Sd2, tmp_path: Path) -> None:
 
 def test_warm_up(sd2: Sd2, monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[Progress] = []
-    monkeypatch.setattr("sd2core.compiled.warm_up", calls.append)
+    monkeypatch.setattr("sd2core.numerics.compiled.warm_up", calls.append)
     assert sd2("warm-up").code == 0
     assert len(calls) == 1

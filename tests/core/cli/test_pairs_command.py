@@ -7,7 +7,7 @@ from pathlib import Path
 
 from cli_outcome import Sd2
 
-from sd2core.pairs import read_pairs
+from sd2core.pairs.store import read_pairs
 
 
 def test_a_real_recording_in_part(sd2: Sd2, shared_data: Path, tmp_path: Path) -> None:

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from cli_outcome import Sd2
 
-from sd2core.placements import PlacementCloud, PlacementGrid, read_placements
-from sd2core.recording import Recording, open_recording
+from sd2core.placements.placements import PlacementCloud, PlacementGrid, read_placements
+from sd2core.recording.recording import Recording, open_recording
 
 
 def test_a_grid_is_listed_with_what_it_costs(sd2: Sd2, plate: Path) -> None:

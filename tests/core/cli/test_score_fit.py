@@ -14,7 +14,7 @@ from cli_outcome import Sd2
 from sd2core.body.model import Body
 from sd2core.compare.truth import FORMAT, VERSION
 from sd2core.io.mesh import save_mesh
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.timebase import Timebase
 
 

@@ -9,7 +9,7 @@ import pytest
 from cli_outcome import Sd2
 
 from sd2core.compare.truth import FORMAT, VERSION
-from sd2core.pairs import read_pairs
+from sd2core.pairs.store import read_pairs
 
 
 def test_a_campaign_is_made_and_told(sd2: Sd2, tmp_path: Path) -> None:

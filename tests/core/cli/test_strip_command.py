@@ -8,7 +8,7 @@ from pathlib import Path
 from cli_outcome import Sd2
 from PIL import Image
 
-from sd2core.recording import Recording
+from sd2core.recording.recording import Recording
 
 
 def frames_of(path: Path) -> list[int]:

@@ -22,9 +22,9 @@ def window(monkeypatch: pytest.MonkeyPatch) -> list[tuple[list[Path], Path | Non
         shown.append((paths, screenshot))
         return 0
 
-    module = ModuleType("sd2app.main")
+    module = ModuleType("sd2app.shell.app")
     module.run = run  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "sd2app.main", module)
+    monkeypatch.setitem(sys.modules, "sd2app.shell.app", module)
     return shown
 
 
@@ -111,7 +111,7 @@ def test_ctrl_c_ends_the_window(
 
     before = signal.getsignal(signal.SIGINT)
     monkeypatch.setenv("DISPLAY", ":0")
-    monkeypatch.setattr(sys.modules["sd2app.main"], "run", run)
+    monkeypatch.setattr(sys.modules["sd2app.shell.app"], "run", run)
     assert sd2("open", plate).code == 0
     assert handlers == [signal.SIG_DFL]
     assert signal.getsignal(signal.SIGINT) is before

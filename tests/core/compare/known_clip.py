@@ -12,7 +12,7 @@ from sd2core.body.model import Body
 from sd2core.body.rotations import about
 from sd2core.compare.truth import FORMAT, VERSION
 from sd2core.io.mesh import save_mesh
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.timebase import Timebase
 
 TIMES = np.arange(36) / 30.0

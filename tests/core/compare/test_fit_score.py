@@ -12,13 +12,13 @@ from sd2core.body.model import Body
 from sd2core.compare.fit_report import Row, as_dict, clip_table, gesture_table, reach_table
 from sd2core.compare.fit_score import LIMBS as MEASURED
 from sd2core.compare.fit_score import ClipScore, score_clip
-from sd2core.compare.fit_words import as_markdown, as_text
+from sd2core.compare.fit_text import as_markdown, as_text
 from sd2core.compare.joints import JOINTS, own_patches
 from sd2core.compare.measures import coverage, line_of_sight_velocity, rms
 from sd2core.compare.truth import Truth, read_truth
 from sd2core.errors import Sd2Error
-from sd2core.mesh import MeshSequence
-from sd2core.uncertainty import VelocityUncertainty
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ from sd2core.compare.joints import (
     rows_of,
 )
 from sd2core.errors import Sd2Error
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.timebase import Timebase
 
 BONES = {

@@ -14,8 +14,8 @@ from sd2core.compare.maps import map_l1
 from sd2core.compare.meshes import compare_meshes
 from sd2core.compare.times import at_times, common_times
 from sd2core.errors import Sd2Error
-from sd2core.figure_files import save_figure
-from sd2core.mesh import MeshSequence
+from sd2core.files.figure_files import save_figure
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 

@@ -15,7 +15,7 @@ from sd2core.compare.joints import JOINTS, own_patches
 from sd2core.compare.real_score import score_real
 from sd2core.compare.truth import read_truth
 from sd2core.errors import Sd2Error
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.timebase import Timebase
 
 CAMERA = PinholeCamera()

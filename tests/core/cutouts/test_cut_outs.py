@@ -12,15 +12,15 @@ import pytest
 
 from sd2core.cutouts.cutting import cut_out, plan_cuts
 from sd2core.cutouts.source import CutSource, folder_name
+from sd2core.doppler_map import DopplerMap
 from sd2core.errors import Sd2Error
 from sd2core.io.mesh import load_mesh
 from sd2core.io.video import open_video
 from sd2core.io.video_writing import write_video
 from sd2core.labels.spans import Span
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Cancelled
 from sd2core.sensor import VelocityAxis
-from sd2core.spectrum import DopplerMap
 from sd2core.timebase import Timebase
 
 # Frames of a phone: now 30, now 40 ms apart.
@@ -141,7 +141,7 @@ def test_what_a_killed_process_left_behind_is_cleared_away(source, tmp_path) -> 
 
 
 def test_two_do_not_write_to_one_folder(source, tmp_path) -> None:
-    from sd2core.file_lock import FileLock
+    from sd2core.files.lock import FileLock
 
     lock = FileLock(tmp_path / ".sd2-lock")
     assert lock.take()

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_sources import AXIS, source
 
-from sd2core.cli.classify_data import clips_of, split_of
+from sd2core.cli.classify.data import clips_of, split_of
 from sd2core.datasets.clips import clips_of_dataset
 from sd2core.datasets.labelled import LabelledSource
 from sd2core.datasets.options import DatasetOptions

@@ -13,10 +13,10 @@ from made_sources import AXIS, LABELS, source
 from sd2core.datasets.cutting import clips_of, count_segments, cut_source, label_of_segments
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.source import KINDS, Source
+from sd2core.doppler_map import DopplerMap
 from sd2core.errors import Sd2Error
-from sd2core.presence import runs
-from sd2core.segments import join
-from sd2core.spectrum import DopplerMap
+from sd2core.mesh.presence import runs
+from sd2core.pairs.segments import join
 from sd2core.timebase import Timebase
 
 NUMBERS = np.arange(3, dtype=np.int16)

@@ -11,6 +11,9 @@ import pytest
 from small_pairs import write_pairs
 from swinging_recordings import FRAMES, RATE_HZ, recording
 
+from sd2core.accuracy.places import PlacedPlan
+from sd2core.accuracy.plans import Plan
+from sd2core.accuracy.synthesizers import synthesizer_for
 from sd2core.datasets.inputs import gather
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.planning import Counting
@@ -25,13 +28,10 @@ from sd2core.fmcw.processing import doppler_map
 from sd2core.labels.files import write_labels
 from sd2core.labels.label_set import Label, LabelSet
 from sd2core.labels.spans import Labels, Span, Track
-from sd2core.ladder.carry_out import synthesizer_for
-from sd2core.ladder.places import PlacedPlan
-from sd2core.ladder.rungs import Plan
-from sd2core.pairs import read_pairs
-from sd2core.placements import PlacementGrid
+from sd2core.pairs.store import read_pairs
+from sd2core.placements.body_extent import Whereabouts
+from sd2core.placements.placements import PlacementGrid
 from sd2core.progress import silent
-from sd2core.whereabouts import Whereabouts
 
 GRID = PlacementGrid((1.0, 2.5), (0.0, 30.0))
 SWINGS = LabelSet("Swings", (Label("swing", "#0072b2", "1", "vertical"),))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from made_sources import source
 
-from sd2core.cli.classify_data import clips_of
+from sd2core.cli.classify.data import clips_of
 from sd2core.datasets.labelled import (
     ONE_PERSON,
     LabelledSource,
@@ -20,9 +20,9 @@ from sd2core.datasets.labelled import (
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.writing import write_dataset
 from sd2core.errors import Sd2Error
-from sd2core.pairs import PairWriter, Take
-from sd2core.recording import open_recording
-from sd2core.resources import resource_path
+from sd2core.files.resources import resource_path
+from sd2core.pairs.store import PairWriter, Take
+from sd2core.recording.recording import open_recording
 from sd2core.sensor import VelocityAxis
 
 SAMPLE = resource_path("swipes.sd2")

@@ -17,13 +17,13 @@ from sd2core.datasets.source import Source
 from sd2core.errors import Sd2Error
 from sd2core.fmcw import LinkBudget, SignalOptions, WaveOptions, simulate_radar
 from sd2core.io.radar import write_capture
-from sd2core.mesh import MeshSequence
-from sd2core.placements import PlacementGrid
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.placements.body_extent import Whereabouts
+from sd2core.placements.placements import PlacementGrid
 from sd2core.progress import silent
-from sd2core.recording import Recording
+from sd2core.recording.recording import Recording
 from sd2core.sensor import PAPER_RADAR, VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase
-from sd2core.whereabouts import Whereabouts
 
 GRID = PlacementGrid((1.0, 2.5), (30.0,))
 KINDS = ("synthetic", "simulated", "real")

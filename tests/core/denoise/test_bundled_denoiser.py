@@ -7,10 +7,10 @@ import numpy as np
 from sd2core.denoise.files import describe_model, load_model
 from sd2core.denoise.metrics import mean_velocity_error, stands_out
 from sd2core.doppler import Synthesizer
+from sd2core.files.resources import resource_path
 from sd2core.fmcw.processing import doppler_map
 from sd2core.io.mesh import load_mesh
 from sd2core.io.radar import load_capture
-from sd2core.resources import resource_path
 from sd2core.sensor import VelocityAxis, VirtualSensor
 
 PATH = resource_path("denoiser.safetensors")

@@ -8,10 +8,10 @@ from denoisers import trained
 from numpy.typing import NDArray
 
 from sd2core.denoise import long_maps
-from sd2core.denoise.matching import clips
-from sd2core.presence import Presence
+from sd2core.denoise.resample_to_model import clips
+from sd2core.doppler_map import DopplerMap
+from sd2core.mesh.presence import Presence
 from sd2core.sensor import VelocityAxis
-from sd2core.spectrum import DopplerMap
 from sd2core.timebase import Timebase
 
 FRAMES = 3000

@@ -12,7 +12,7 @@ from torch import Tensor
 from sd2core.denoise.convolution import causal_convolution
 from sd2core.denoise.s4 import S4Layer
 from sd2core.denoise.ssm import legs_kernel
-from sd2core.denoise.systems import SLOWEST_DECAY, Kernel, StateSpace
+from sd2core.denoise.state_space_layer import SLOWEST_DECAY, Kernel, StateSpace
 from sd2core.errors import Sd2Error
 
 KERNELS = ("legs", "diagonal")

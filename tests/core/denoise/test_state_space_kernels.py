@@ -9,7 +9,7 @@ from dense_kernels import dense_diagonal_kernel, dense_legs_kernel, hippo_legs
 from numpy.typing import NDArray
 from torch import Tensor
 
-from sd2core.denoise.legs import legs_matrices, legs_normal_form
+from sd2core.denoise.hippo import legs_matrices, legs_normal_form
 from sd2core.denoise.ssm import (
     StateMatrix,
     diagonal_kernel,

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sd2core.doppler import PRESETS, SynthesisOptions
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer, limb_histograms
 from sd2core.doppler.reference import reference_velocities
 from sd2core.doppler.smoothing import smooth
+from sd2core.doppler_map import CellUncertainty, DopplerMap
 from sd2core.errors import Sd2Error
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
 from sd2core.sensor import VelocityAxis, VirtualSensor
-from sd2core.spectrum import CellUncertainty, DopplerMap
 from sd2core.timebase import Timebase
-from sd2core.uncertainty import VelocityUncertainty
 
 FRAMES = 12
 ALL = replace(PRESETS["paper"], visibility="none", range_exponent=0.0)

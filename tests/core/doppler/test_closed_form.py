@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sd2core.doppler import Synthesizer
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.timebase import Timebase
 
 TIMES_S = np.arange(30) / 30.0

@@ -20,7 +20,7 @@ from sd2core.doppler import (
 )
 from sd2core.doppler.masks import VisibilityMasks
 from sd2core.errors import Sd2Error
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.scattering.amplitude import (
     projected_areas,
     range_weight,

@@ -11,9 +11,9 @@ import pytest
 import zarr
 from doppler_scenes import CAMERA, moving, options, plate, sensor_at, wobbling
 
-from sd2core.decimation import decimate
 from sd2core.doppler import PRESETS, Synthesizer, masks, prepared, synthesizer
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.decimation import decimate
+from sd2core.mesh.sequence import MeshSequence
 
 SENSOR = sensor_at(0.3, -0.2, 0.1)
 

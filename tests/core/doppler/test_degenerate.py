@@ -10,7 +10,7 @@ from doppler_scenes import CAMERA, RAW, moving, options, plate, sensor_at, spher
 
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.errors import Sd2Error
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from doppler_scenes import CAMERA, sensor_at, wobbling
 
-from sd2core.decimation import decimate
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
 from sd2core.doppler.reference import reference_stretch
-from sd2core.mesh import MeshSequence
-from sd2core.spectrum import DopplerMap
+from sd2core.doppler_map import DopplerMap
+from sd2core.mesh.decimation import decimate
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.timebase import Timebase
 
 FRAMES = 40

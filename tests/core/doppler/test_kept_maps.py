@@ -15,8 +15,8 @@ import pytest
 from numpy.typing import NDArray
 
 import sd2core as sd2
-from sd2core.compiled import warm_up
 from sd2core.doppler import PRESETS, SynthesisOptions
+from sd2core.numerics.compiled import warm_up
 
 KEPT = Path(__file__).with_name("kept_maps.npz")
 AT_THE_CAMERA = (0.0, 0.0, 0.0)

@@ -11,7 +11,7 @@ from doppler_scenes import CAMERA, moving, options, wobbling
 from numpy.typing import NDArray
 
 from sd2core.doppler import Synthesizer
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import VelocityAxis
 
 EVERY = (1, 2, 3, 4, 8)

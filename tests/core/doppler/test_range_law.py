@@ -9,7 +9,7 @@ import pytest
 from doppler_scenes import CAMERA, moving, options, sensor_at, wobbling
 
 from sd2core.doppler import Synthesizer
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.scattering.amplitude import NEAREST_RANGE_M
 
 VELOCITIES = ("central", "vid2doppler")

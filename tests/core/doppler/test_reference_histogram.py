@@ -11,11 +11,11 @@ import pytest
 from doppler_scenes import CAMERA, RAW, moving, options, plate, sensor_at, wobbling
 from numpy.typing import NDArray
 
-from sd2core.decimation import decimate
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
 from sd2core.doppler.reference import reference_stretch, reference_velocities
 from sd2core.io.mesh import load_mesh
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.decimation import decimate
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.scattering.amplitude import NEAREST_RANGE_M, vertex_areas
 from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase

@@ -9,8 +9,8 @@ import pytest
 
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.doppler.options import SynthesisOptions
-from sd2core.recording import open_recording
-from sd2core.resources import resource_path
+from sd2core.files.resources import resource_path
+from sd2core.recording.recording import open_recording
 from sd2core.sensor import VirtualSensor
 
 BASE = PRESETS["paper"]

@@ -19,7 +19,7 @@ from sd2core.doppler.masks import VisibilityMasks
 from sd2core.doppler.parallel import run_jobs
 from sd2core.doppler.prepared import ByteBudget
 from sd2core.errors import Sd2Error
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Cancelled, silent
 
 NEAR = sensor_at(0.3, -0.2, 0.1)

@@ -14,12 +14,12 @@ import trimesh
 from PIL import Image
 
 from sd2core.body.camera import PinholeCamera
-from sd2core.compiled import warm_up
 from sd2core.errors import Sd2Error
 from sd2core.figures.strip import plot_strip, save_strip
 from sd2core.figures.strip_drawing import Body, _reduced, strip_box
 from sd2core.figures.strip_source import StripOptions, StripSource
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.numerics.compiled import warm_up
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
+from sd2core.doppler_map import DopplerMap
+from sd2core.files.resources import resource_path
 from sd2core.fmcw import (
     ProcessingOptions,
     SignalOptions,
@@ -18,11 +20,9 @@ from sd2core.fmcw import (
     velocity_response,
 )
 from sd2core.io.mesh import load_mesh
-from sd2core.mesh import MeshSequence
-from sd2core.resources import resource_path
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.scattering.facets import facet_visibility
 from sd2core.sensor import PAPER_RADAR, VelocityAxis, VirtualSensor
-from sd2core.spectrum import DopplerMap
 from sd2core.timebase import Timebase
 
 AXIS = VelocityAxis()

@@ -19,7 +19,7 @@ from sd2core.fmcw.scene import MeshScene, Scatterers, facet_scatterers, point_sc
 from sd2core.fmcw.signal import capture_scene, echo, simulate_capture
 from sd2core.fmcw.triangle import mean_phasor
 from sd2core.io.radar import load_capture, write_capture
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Cancelled
 from sd2core.sensor import PAPER_RADAR, SPEED_OF_LIGHT_MPS, VirtualSensor
 from sd2core.timebase import Timebase

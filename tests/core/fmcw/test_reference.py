@@ -14,7 +14,7 @@ from sd2core.fmcw.reference import converged_frame, doppler_marginal, subdivided
 from sd2core.fmcw.spectra import frame_spectra, velocity_response
 from sd2core.fmcw.sums import direct
 from sd2core.fmcw.wave import WaveScene
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Cancelled
 from sd2core.sensor import PAPER_RADAR, VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase

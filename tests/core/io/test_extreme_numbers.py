@@ -14,7 +14,7 @@ from sd2core.doppler import Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.simulation import simulate_radar
 from sd2core.io.mesh import load_mesh, save_mesh
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import PAPER_RADAR, VirtualSensor
 from sd2core.timebase import Timebase
 

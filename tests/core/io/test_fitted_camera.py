@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 import zarr
 
+from sd2core.files.recording_json import CameraEntry
 from sd2core.io.fitted import fitted_camera
-from sd2core.recording import MeshReading, Recording
-from sd2core.recording_document import CameraEntry
+from sd2core.recording.recording import MeshReading, Recording
 
 SAID = {"camera": {"focal_px": 612.5, "width": 640, "height": 480, "source": "metadata"}}
 CAMERA = CameraEntry(focal_px=612.5, width=640, height=480, source="metadata")

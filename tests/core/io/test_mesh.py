@@ -13,11 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from sd2core.decimation import decimate
 from sd2core.errors import Sd2Error
 from sd2core.io import mesh_arrays
 from sd2core.io.mesh import load_mesh, save_mesh
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.decimation import decimate
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Cancelled
 from sd2core.simulate.encode import write_compact_mesh
 from sd2core.timebase import Timebase

@@ -12,7 +12,7 @@ import pytest
 from sd2core.errors import Sd2Error
 from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.io.mesh_files import read_surface
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.timebase import Timebase
 
 OBJ = """mtllib person.mtl

@@ -12,6 +12,9 @@ from hypothesis import strategies as st
 from labelled import even, imported, uneven
 
 from sd2core.errors import Sd2Error
+from sd2core.files.recording_json import Span as InlineSpan
+from sd2core.files.recording_json import read_document
+from sd2core.files.resources import resource_path
 from sd2core.labels.files import (
     FILE_NAME,
     NO_LABEL,
@@ -23,9 +26,6 @@ from sd2core.labels.files import (
 )
 from sd2core.labels.label_set import GESTURES, Label, LabelSet
 from sd2core.labels.spans import ORIGINS, Labels, Span, Track
-from sd2core.recording_document import Span as InlineSpan
-from sd2core.recording_document import read_document
-from sd2core.resources import resource_path
 from sd2core.timebase import Timebase
 
 names = st.text(st.characters(codec="utf-8", exclude_categories=["C", "Z"]), min_size=1, max_size=9)
@@ -114,7 +114,7 @@ def test_an_interrupted_write_leaves_the_old_file(
     def full(descriptor: int) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("sd2core.atomic.os.fsync", full)
+    monkeypatch.setattr("sd2core.files.atomic.os.fsync", full)
     with pytest.raises(OSError, match="No space"):
         write_labels(path, Labels())
     assert read_labels(path).labels == labels

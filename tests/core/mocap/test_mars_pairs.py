@@ -12,7 +12,7 @@ from mars_files import approaching, write_part
 from sd2core.errors import Sd2Error
 from sd2core.io.radar.mars import MarsStretch, read_mars
 from sd2core.mocap.mars_pairs import MarsChoices, drive, make_mars_pairs, radar_doppler
-from sd2core.pairs import PairSet, read_pairs
+from sd2core.pairs.store import PairSet, read_pairs
 from sd2core.progress import Cancelled
 from sd2core.sensor import VelocityAxis
 

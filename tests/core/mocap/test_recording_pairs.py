@@ -14,7 +14,7 @@ from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.processing import doppler_map
 from sd2core.mocap.recording_pairs import make_recording_pairs
-from sd2core.pairs import read_pairs
+from sd2core.pairs.store import read_pairs
 
 
 def test_input_and_target_are_the_maps_on_one_clock(tmp_path: Path) -> None:

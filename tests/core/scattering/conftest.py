@@ -1,6 +1,6 @@
 import pytest
 
-from sd2core.compiled import warm_up
+from sd2core.numerics.compiled import warm_up
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -20,7 +20,7 @@ from scattering_scenes import (
     together,
 )
 
-from sd2core.resources import resource_path
+from sd2core.files.resources import resource_path
 from sd2core.scattering import exact_plain
 from sd2core.scattering.exact import exact_visibility_kernel
 

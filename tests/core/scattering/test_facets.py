@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from sd2core.errors import Sd2Error
-from sd2core.mesh import MeshSequence
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.scattering.facets import facet_visibility, visible_facets
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase

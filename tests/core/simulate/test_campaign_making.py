@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from sd2core.errors import Sd2Error
-from sd2core.pairs import PairSet, PairWriter, Take, read_pairs
+from sd2core.pairs.store import PairSet, PairWriter, Take, read_pairs
 from sd2core.progress import Cancelled
 from sd2core.simulate.campaign.making import make_campaign, take_numbers
 from sd2core.simulate.campaign.radar import TargetOptions

@@ -10,7 +10,7 @@ import pytest
 
 from sd2core.body.model import Body, Resolution
 from sd2core.errors import Sd2Error
-from sd2core.resources import resource_path
+from sd2core.files.resources import resource_path
 from sd2core.simulate import export_body as exporting
 
 needs_anny = pytest.mark.skipif(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sd2core.body.model import Body
-from sd2core.raster import interpolate, lit_share, rasterise
+from sd2core.numerics.raster import interpolate, lit_share, rasterise
 from sd2core.simulate.caption import stamp
 from sd2core.simulate.clothing import SHIRT, TROUSERS
 from sd2core.simulate.render import Renderer

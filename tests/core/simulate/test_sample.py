@@ -8,13 +8,13 @@ import pytest
 
 from sd2core.doppler import Synthesizer
 from sd2core.errors import Sd2Error
+from sd2core.files.resources import resource_path
 from sd2core.fmcw.processing import doppler_map
 from sd2core.io.mesh import load_mesh
 from sd2core.io.radar import load_capture
 from sd2core.io.video import open_video
 from sd2core.progress import Cancelled
-from sd2core.recording import Recording, open_recording
-from sd2core.resources import resource_path
+from sd2core.recording.recording import Recording, open_recording
 from sd2core.scattering.facets import facet_visibility
 from sd2core.sensor import PAPER_RADAR, VirtualSensor
 from sd2core.simulate.gestures import DURATION_S, SPANS

@@ -152,7 +152,7 @@ class TestLearning:
     ) -> None:
         errors = iter([0.5, 0.4, 0.6, 0.4, 0.5, 0.1])
         monkeypatch.setattr(
-            "sd2core.train.course.validate", lambda *_: Validation(next(errors), 1.0)
+            "sd2core.train.callbacks.validate", lambda *_: Validation(next(errors), 1.0)
         )
         ending = begin(settings(pairs, early_stopping_epochs=3, epochs=6), tmp_path / "run")
         assert (ending.outcome, ending.best_epoch) == ("finished", 2)

@@ -1,0 +1,1 @@
+"""The trade of speed for accuracy: plans, measurements, panel."""

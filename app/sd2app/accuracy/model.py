@@ -1,0 +1,331 @@
+"""The trade between error and cost: a tolerance, and the plan that holds it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from PySide6.QtCore import QObject, Signal
+
+from sd2app.accuracy.ladder import Ladder
+from sd2app.accuracy.measurements import MeasuredModel, serves_at_rest
+from sd2app.accuracy.text import InUse
+from sd2app.background.latest import LatestRunner
+from sd2app.session.tasks import Job, JobsModel
+from sd2app.settings import Settings
+from sd2core.doppler.options import SynthesisOptions
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.progress import Progress
+from sd2core.sensor import VirtualSensor
+
+if TYPE_CHECKING:
+    from sd2core.accuracy.results import Choice, PlanResult
+
+PRESETS = (0.005, 0.01, 0.02, 0.05, 0.1)
+"""Tolerances that are offered."""
+
+
+class _Wish(NamedTuple):
+    """What a choice is for; without a tolerance a clicked point rules at rest."""
+
+    tolerance: float | None
+    budget_ms: float
+    sensor: VirtualSensor
+
+
+class _Surveyed(NamedTuple):
+    """What the library found out about a place, for further choices there."""
+
+    mesh: MeshSequence
+    sensor: VirtualSensor
+    survey: Any
+
+
+class TradeModel(QObject):
+    """Chooses a plan for the scene that is open, in the background; the newest wish wins.
+
+    At rest the tolerance rules, unless the user clicked a point: then that plan
+    stays until the tolerance is set again. While the sensor is dragged a budget
+    rules.
+
+    Signals
+    -------
+    plan_changed
+        The plan at rest or the one for dragging is another one, or newly known.
+    decided
+        A choice came back, whether it is another plan or not, or failed to.
+    wished
+        Another tolerance: somebody who knows whether the sensor rests is to choose.
+    changed
+        Anything that is shown.
+    noted, failed : str
+        Sentences for the user.
+    """
+
+    plan_changed = Signal()
+    decided = Signal()
+    wished = Signal()
+    changed = Signal()
+    noted = Signal(str)
+    failed = Signal(str)
+
+    def __init__(
+        self,
+        jobs: JobsModel,
+        settings: Settings,
+        ladder: Ladder,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._jobs = jobs
+        self._settings = settings
+        self.ladder = ladder
+        self.measured = MeasuredModel(jobs, ladder, self)
+        self.measured.changed.connect(self._follow_measured)
+        self.measured.failed.connect(self.failed)
+        self._tolerance = settings.tolerance
+        self._scene: tuple[MeshSequence, SynthesisOptions] | None = None
+        self._runner = LatestRunner("choose", self)
+        self._runner.partial.connect(self._report)
+        self._runner.finished.connect(self._receive)
+        self._runner.failed.connect(self._fail)
+        self._job: Job | None = None
+        self._forget()
+
+    def _forget(self) -> None:
+        self._choice: Choice | None = None
+        self._dragging: Choice | None = None
+        self._decided_for: _Wish | None = None
+        self._asking: _Wish | None = None
+        self._surveyed: _Surveyed | None = None
+        self._clicked: PlanResult | None = None
+        self._clicked_elsewhere = False
+
+    # --- what is known --------------------------------------------------------------------
+
+    @property
+    def tolerance(self) -> float:
+        """Relative L1 after smoothing that the user accepts."""
+        return self._tolerance
+
+    @property
+    def frames(self) -> int:
+        """Frames of the clip; none without a mesh to choose for."""
+        return self._scene[0].frame_count if self._scene else 0
+
+    @property
+    def choice(self) -> Choice | None:
+        """The newest choice by tolerance; its place may be the one before."""
+        return self._choice
+
+    @property
+    def in_use(self) -> InUse | None:
+        """The plan at rest; None until the first choice."""
+        if self._clicked is not None:
+            result, cost = self._clicked, self._clicked.cost
+            return InUse(
+                result.plan,
+                result.errors.l1,
+                cost.all_cores_ms.median,
+                "clicked",
+                self._clicked_elsewhere,
+            )
+        return _in_use(self._choice)
+
+    @property
+    def while_dragging(self) -> InUse | None:
+        """The plan while the sensor moves; None until it is known."""
+        return _in_use(self._dragging)
+
+    @property
+    def choosing(self) -> bool:
+        """Whether a choice is under way."""
+        return self._job is not None
+
+    @property
+    def current_point(self) -> PlanResult | None:
+        """What was measured of the plan at rest."""
+        measurement, in_use = self.measured.measurement, self.in_use
+        return measurement.of(in_use.plan) if measurement and in_use else None
+
+    def cost_at(self, tolerance: float) -> float | None:
+        """Milliseconds per frame of the cheapest counting plan known to hold a tolerance.
+
+        Of those that were measured, and the one that was chosen; None until the
+        scene has been measured, and where none holds.
+        """
+        if self.measured.counting is None:
+            return None
+        known = [
+            (result.errors.l1, result.cost.all_cores_ms.median)
+            for result in self.measured.counting.results
+            if serves_at_rest(result)
+        ]
+        if self._choice is not None:
+            known.append((self._choice.errors.l1, self._choice.cost_ms))
+        return min((cost_ms for error, cost_ms in known if error <= tolerance), default=None)
+
+    def is_decided(self, sensor: VirtualSensor, budget_ms: float) -> bool:
+        """Whether the plans are for this place, this budget, and the tolerance as it is."""
+        return self._decided_for == self._wish(sensor, budget_ms)
+
+    def _wish(self, sensor: VirtualSensor, budget_ms: float) -> _Wish:
+        return _Wish(None if self._clicked else self._tolerance, budget_ms, sensor)
+
+    # --- requests -------------------------------------------------------------------------
+
+    def take_over(self, mesh: MeshSequence | None, options: SynthesisOptions) -> None:
+        """Start on another scene, or none."""
+        self.hold()
+        self._scene = None if mesh is None else (mesh, options)
+        self._forget()
+        self.measured.take_over(mesh, options)
+        self.plan_changed.emit()
+        self.changed.emit()
+
+    def rest_at(self, sensor: VirtualSensor) -> None:
+        """The sensor rests here."""
+        self.measured.rest_at(sensor)
+
+    def choose(self, sensor: VirtualSensor, budget_ms: float) -> None:
+        """Choose for the sensor where it rests, and for a hand that moves it from there.
+
+        Parameters
+        ----------
+        sensor : VirtualSensor
+        budget_ms : float
+            Per frame, for what keeps up with a hand.
+        """
+        wish = self._wish(sensor, budget_ms)
+        if self._scene is None or wish == self._decided_for:
+            return
+        if self._job is not None and wish == self._asking:
+            return
+        self._end_job()
+        self._asking = wish
+        self._job = self._jobs.start("Choosing what the scene requires", self._give_up)
+        mesh, options = self._scene
+        self._runner.submit(
+            lambda emit: self._work_out(
+                mesh, options, wish, lambda done, total: emit((done, total))
+            )
+        )
+        self.changed.emit()
+
+    def hold(self) -> None:
+        """Stop choosing: the sensor moves, and the machine is needed for that."""
+        self._runner.cancel()
+        self._end_job()
+
+    def set_tolerance(self, tolerance: float) -> None:
+        """Accept another error; a clicked point no longer rules."""
+        if tolerance != self._tolerance or self._clicked is not None:
+            self._tolerance = self._settings.tolerance = tolerance
+            self.choose_by_tolerance()
+
+    def choose_by_tolerance(self) -> None:
+        """Let the tolerance rule again."""
+        if self._clicked is not None:
+            self._clicked = None
+            self.plan_changed.emit()
+        self.wished.emit()
+        self.changed.emit()
+
+    def use(self, result: PlanResult) -> None:
+        """Carry out a plan that was measured, whatever the tolerance is."""
+        if result.plan.family != "histogram":
+            self.noted.emit(
+                "The window counts vertices; FMCW plans are shown for comparison. "
+                "Run one with: sd2 synth MESH --out map.npz --model fmcw"
+            )
+            return
+        if not serves_at_rest(result):
+            self.noted.emit(
+                "That plan keeps a mask while the sensor moves; it is used for dragging where it "
+                "is the best. At rest the mask is made anew: click a filled point."
+            )
+            return
+        self.hold()
+        self._clicked = result
+        counting = self.measured.counting
+        self._clicked_elsewhere = counting is None or counting.stale
+        self.plan_changed.emit()
+        self.changed.emit()
+
+    def close(self) -> None:
+        """Stop every thread."""
+        self._runner.close()
+        self.measured.close()
+        self._end_job()
+
+    # --- choosing -------------------------------------------------------------------------
+
+    def _work_out(
+        self, mesh: MeshSequence, options: SynthesisOptions, wish: _Wish, progress: Progress
+    ) -> list[Choice]:
+        """In the background: the choices for a wish; a place is surveyed once."""
+        known = self._surveyed
+        if known is None or known.mesh is not mesh or known.sensor != wish.sensor:
+            like = known.survey if known is not None and known.mesh is mesh else None
+            survey = self.ladder.survey(mesh, wish.sensor, options, progress, like)
+            self._surveyed = known = _Surveyed(mesh, wish.sensor, survey)
+        limits = [{"budget_ms": wish.budget_ms}]
+        if wish.tolerance is not None:
+            limits.insert(0, {"tolerance": wish.tolerance})
+        return [
+            self.ladder.choose(
+                mesh, wish.sensor, options=options, survey=known.survey, progress=progress, **limit
+            )
+            for limit in limits
+        ]
+
+    def _report(self, progress: Any) -> None:
+        if self._job is not None:
+            self._jobs.report(self._job, *progress)
+
+    def _receive(self, choices: list[Choice]) -> None:
+        before = self.in_use, self.while_dragging
+        for choice in choices:
+            if choice.tolerance is not None:
+                self._choice = choice
+            else:
+                self._dragging = choice
+        self._decide()
+        if before != (self.in_use, self.while_dragging):
+            self.plan_changed.emit()
+        self.decided.emit()
+
+    def _give_up(self) -> None:
+        """The user does not want to wait for it; what was in use stays."""
+        self._runner.cancel()
+        self._decide()
+        self.decided.emit()
+
+    def _fail(self, error: Exception) -> None:
+        # Not asked again for the same place.
+        self._decide()
+        self.failed.emit(str(error))
+        self.decided.emit()
+
+    def _decide(self) -> None:
+        self._decided_for = self._asking
+        self._end_job()
+
+    def _end_job(self) -> None:
+        if self._job is not None:
+            self._jobs.finish(self._job)
+            self._job = None
+            self.changed.emit()
+
+    def _follow_measured(self) -> None:
+        """A clicked point keeps its plan, with figures from here once there are some."""
+        before, counting = self.in_use, self.measured.counting
+        if self._clicked is not None:
+            here = None if counting is None or counting.stale else counting.of(self._clicked.plan)
+            self._clicked, self._clicked_elsewhere = here or self._clicked, here is None
+        if self.in_use != before:
+            self.plan_changed.emit()
+        self.changed.emit()
+
+
+def _in_use(choice: Choice | None) -> InUse | None:
+    return None if choice is None else InUse(choice.plan, choice.errors.l1, choice.cost_ms)

@@ -1,0 +1,289 @@
+"""Error against cost of every plan that was measured, both on logarithmic axes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QEvent, QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPen, QPolygonF
+from PySide6.QtWidgets import QWidget
+
+from sd2app.accuracy.measurements import front_at_rest, serves_at_rest
+from sd2app.accuracy.model import TradeModel
+from sd2app.accuracy.text import percent, point_text
+from sd2app.session.display import DisplayModel
+from sd2app.widgets.log_axis import LogAxis, tick_text
+from sd2app.widgets.point_plot import PointPlot
+
+if TYPE_CHECKING:
+    from sd2core.accuracy.results import PlanResult
+
+_FLOOR_PERCENT = 0.01
+_REACH_PX = 8.0
+_STEPS = {
+    Qt.Key.Key_Left: -1,
+    Qt.Key.Key_Right: 1,
+    Qt.Key.Key_Up: 1,
+    Qt.Key.Key_Down: -1,
+}
+
+
+class TradePlot(PointPlot):
+    """Every plan as a point: the cheaper the further left, the nearer the lower.
+
+    Hovering says what a point is, a click uses it. With the keyboard Left and
+    Right go along the front, Up and Down over all points by their error, Return
+    uses the point, Escape gives the keyboard back.
+    """
+
+    MARGINS_PX = (44, 20, 10, 36)
+    HEIGHTS_PX = (164, 164, 260)
+    KEYS = frozenset({Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Escape, *_STEPS})
+
+    def __init__(
+        self, trade: TradeModel, display: DisplayModel, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(display, "Error against cost of every plan", parent)
+        self._trade = trade
+        trade.changed.connect(self._refresh)
+        trade.plan_changed.connect(self._refresh)
+
+    def points(self) -> tuple[PlanResult, ...]:
+        """All plans that were measured."""
+        measurement = self._trade.measured.measurement
+        return measurement.results if measurement is not None else ()
+
+    def first_point(self) -> PlanResult | None:
+        """The plan in use."""
+        return self._trade.current_point
+
+    def tip_place(self, point: PlanResult) -> QPointF:
+        """Where the plan stands."""
+        return self.point_of(point)
+
+    def words_of(self, point: PlanResult) -> str:
+        """What a plan costs and misses."""
+        return point_text(point)
+
+    def tip_of(self, point: PlanResult) -> str:
+        """The same, and whether it can be used."""
+        if point is self._trade.current_point:
+            return f"In use\n{point_text(point)}"
+        if point.plan.family != "histogram":
+            return f"For comparison\n{point_text(point)}"
+        if not serves_at_rest(point):
+            return f"For a sensor that moves\n{point_text(point)}"
+        return f"{point_text(point)}\nClick to use it"
+
+    # --- places ---------------------------------------------------------------------------
+
+    def point_of(self, result: PlanResult) -> QPointF:
+        """Pixel of a plan."""
+        costs, errors = self._axes()
+        return QPointF(costs.px(result.cost.all_cores_ms.median), errors.px(100 * result.errors.l1))
+
+    def _axes(self) -> tuple[LogAxis, LogAxis]:
+        plot, results = self.plot_rect(), self.points()
+        costs = [result.cost.all_cores_ms.median for result in results]
+        errors = [100 * self._trade.tolerance, *(100 * result.errors.l1 for result in results)]
+        return (
+            LogAxis.around(costs, plot.left(), plot.right()),
+            LogAxis.around(errors, plot.bottom(), plot.top(), floor=_FLOOR_PERCENT),
+        )
+
+    def _refresh(self) -> None:
+        if self._pointed not in self.points():
+            self._pointed = None
+        self.update()
+
+    # --- painting -------------------------------------------------------------------------
+
+    def paint_plot(self, painter: QPainter) -> None:
+        """Axes, tolerance, points, front, what is in use."""
+        measurement = self._trade.measured.measurement
+        if measurement is None or not measurement.results:
+            return
+        colours, plot = self._display.palette, self.plot_rect()
+        costs, errors = self._axes()
+        self._paint_axes(painter, plot, costs, errors)
+        self._paint_tolerance(painter, plot, errors)
+        accent = QColor(colours.synthetic if measurement.family == "histogram" else colours.real)
+        if measurement.stale:
+            accent = QColor(colours.muted)
+        front = front_at_rest(measurement)
+        for result in measurement.results:
+            if result not in front:
+                self._paint_point(painter, result, QColor(colours.muted), 2.0)
+        self._paint_front(painter, plot, front, accent)
+        for result in front:
+            self._paint_point(painter, result, accent, 3.5)
+        self._paint_tolerance_text(painter, plot, errors)
+        self._paint_in_use(painter, costs, errors)
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        if self._pointed is not None:
+            painter.setPen(QPen(QColor(colours.accent), 1.5))
+            painter.drawEllipse(self.point_of(self._pointed), 5.5, 5.5)
+
+    def _paint_axes(self, painter: QPainter, plot: QRectF, costs: LogAxis, errors: LogAxis) -> None:
+        self.paint_axes(
+            painter,
+            [
+                (costs.px(value), tick_text(value))
+                for value in costs.ticks(max(int(plot.width() / 44), 2))
+            ],
+            [
+                (errors.px(value), _error_text(value))
+                for value in errors.ticks(self.most_upwards(painter))
+            ],
+            "cost (ms per frame)",
+        )
+        box = QRectF(4, 0, plot.width(), painter.fontMetrics().height() + 2)
+        painter.drawText(box, Qt.AlignmentFlag.AlignVCenter, "error (%)")
+
+    def _paint_tolerance(self, painter: QPainter, plot: QRectF, errors: LogAxis) -> None:
+        if self._trade.measured.family != "histogram":
+            return
+        colours, y = self._display.palette, errors.px(100 * self._trade.tolerance)
+        below = QColor(colours.accent)
+        below.setAlpha(18)
+        painter.fillRect(QRectF(plot.left(), y, plot.width(), plot.bottom() - y), below)
+        painter.setPen(QPen(QColor(colours.accent), 1.5, Qt.PenStyle.DashLine))
+        painter.drawLine(QPointF(plot.left(), y), QPointF(plot.right(), y))
+
+    def _paint_tolerance_text(self, painter: QPainter, plot: QRectF, errors: LogAxis) -> None:
+        if self._trade.measured.family != "histogram":
+            return
+        colours, metrics = self._display.palette, painter.fontMetrics()
+        text, line_px = f"tolerance {percent(self._trade.tolerance)}", metrics.height()
+        y, width = errors.px(100 * self._trade.tolerance), metrics.horizontalAdvance(text) + 6
+        above = y - line_px - 1 if y - line_px > plot.top() else y + 1
+        box = QRectF(plot.right() - width, above, width, line_px)
+        ground = QColor(colours.panel)
+        ground.setAlpha(220)
+        painter.fillRect(box, ground)
+        painter.setPen(QColor(colours.accent))
+        painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)
+
+    def _paint_in_use(self, painter: QPainter, costs: LogAxis, errors: LogAxis) -> None:
+        """Where the plan in use was measured; else where the choice of it found it to be."""
+        in_use, current = self._trade.in_use, self._trade.current_point
+        if in_use is None or self._trade.measured.family != in_use.plan.family:
+            return
+        place = QPointF(costs.px(in_use.cost_ms), errors.px(100 * in_use.error))
+        if current is not None:
+            place = self.point_of(current)
+        colour = QColor(self._display.palette.text)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(colour)
+        painter.drawEllipse(place, 3.5, 3.5)
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        painter.setPen(QPen(colour, 2))
+        painter.drawEllipse(place, 7.0, 7.0)
+
+    def _paint_front(
+        self, painter: QPainter, plot: QRectF, front: tuple[PlanResult, ...], colour: QColor
+    ) -> None:
+        """Stepped: between two points one gets the error of the cheaper."""
+        line = QPolygonF()
+        for result in front:
+            place = self.point_of(result)
+            if line:
+                line.append(QPointF(place.x(), line[-1].y()))
+            line.append(place)
+        line.append(QPointF(plot.right(), line[-1].y()))
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        painter.setPen(QPen(colour, 1.5))
+        painter.drawPolyline(line)
+
+    def _paint_point(
+        self, painter: QPainter, result: PlanResult, colour: QColor, radius_px: float
+    ) -> None:
+        place, (_, errors) = self.point_of(result), self._axes()
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(colour)
+        if not serves_at_rest(result):
+            painter.setPen(QPen(colour, 1))
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            radius_px = 3.0
+        if errors.is_below(100 * result.errors.l1):
+            # On the edge: an arrow down, its value is off the axis.
+            painter.drawPolygon(
+                QPolygonF(
+                    [
+                        place + QPointF(-radius_px - 1, -radius_px),
+                        place + QPointF(radius_px + 1, -radius_px),
+                        place + QPointF(0, radius_px + 1),
+                    ]
+                )
+            )
+        else:
+            painter.drawEllipse(place, radius_px, radius_px)
+
+    # --- mouse ----------------------------------------------------------------------------
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """Point at the nearest point."""
+        self.point_at(self._near(event.position()))
+        self.setCursor(
+            Qt.CursorShape.PointingHandCursor if self._pointed else Qt.CursorShape.ArrowCursor
+        )
+        self.explain()
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Use the point."""
+        result = self._near(event.position())
+        if event.button() == Qt.MouseButton.LeftButton and result is not None:
+            self._trade.use(result)
+
+    def leaveEvent(self, event: QEvent) -> None:
+        """Point at nothing."""
+        self.point_at(None)
+
+    def _near(self, place: QPointF) -> PlanResult | None:
+        """The nearest plan within reach; one on the front before others as near."""
+        measurement = self._trade.measured.measurement
+        if measurement is None:
+            return None
+        front = set(map(id, front_at_rest(measurement)))
+
+        def distance_px(result: PlanResult) -> float:
+            offset = self.point_of(result) - place
+            return float((offset.x() ** 2 + offset.y() ** 2) ** 0.5) - (
+                2.0 if id(result) in front else 0.0
+            )
+
+        best = min(measurement.results, key=distance_px, default=None)
+        return best if best is not None and distance_px(best) <= _REACH_PX else None
+
+    # --- keyboard -------------------------------------------------------------------------
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Go from point to point; Return uses one."""
+        measurement, key = self._trade.measured.measurement, event.key()
+        if measurement is None or key not in self.KEYS:
+            super().keyPressEvent(event)
+        elif key == Qt.Key.Key_Escape:
+            self.clearFocus()
+        elif key in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            if self._pointed is not None:
+                self._trade.use(self._pointed)
+        else:
+            along = list(front_at_rest(measurement))
+            if key in (Qt.Key.Key_Up, Qt.Key.Key_Down):
+                along = sorted(measurement.results, key=lambda result: result.errors.l1)
+            self.point_at(self._next(along, _STEPS[Qt.Key(key)]))
+            self.explain()
+
+    def _next(self, along: list[PlanResult], step: int) -> PlanResult:
+        """The neighbour of the point the keyboard is at; from elsewhere, the nearest."""
+        here = self._pointed or self._trade.current_point
+        if here is None:
+            return along[0]
+        if here in along:
+            return along[min(max(along.index(here) + step, 0), len(along) - 1)]
+        place = self.point_of(here)
+        return min(along, key=lambda result: (self.point_of(result) - place).manhattanLength())
+
+
+def _error_text(value: float) -> str:
+    return f"{'≤' if value <= _FLOOR_PERCENT * 1.001 else ''}{tick_text(value)}"

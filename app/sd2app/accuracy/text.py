@@ -1,0 +1,104 @@
+"""Plans, errors and costs in words, the same wherever they are shown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from sd2core.accuracy.plans import Plan
+    from sd2core.accuracy.results import PlanResult
+
+Origin = Literal["chosen", "clicked"]
+
+
+@dataclass(frozen=True)
+class InUse:
+    """A plan that is carried out, and what is known of it.
+
+    Parameters
+    ----------
+    plan : Plan
+    error : float
+        Relative L1 after smoothing, as measured on this scene.
+    cost_ms : float
+        Per frame, on all cores.
+    origin : {"chosen", "clicked"}
+        By tolerance or budget, or a point of the plot.
+    elsewhere : bool
+        Whether error and cost were measured with the sensor at another place.
+    """
+
+    plan: Plan
+    error: float
+    cost_ms: float
+    origin: Origin = "chosen"
+    elsewhere: bool = False
+
+    @property
+    def figures(self) -> str:
+        """Error and cost."""
+        figures = f"{deviation(self.error)} · {milliseconds(self.cost_ms)}/frame"
+        return f"{figures} (measured elsewhere)" if self.elsewhere else figures
+
+    def __str__(self) -> str:
+        return f"{self.plan} · {self.figures}"
+
+
+def number(value: float) -> str:
+    """Two significant digits, but every digit before the point."""
+    return f"{value:.0f}" if abs(value) >= 10 else f"{value:.2g}" if abs(value) >= 1e-3 else "0"
+
+
+def percent(share: float) -> str:
+    """A share with its unit; what is hardly there is said to be so."""
+    if 0 < share < 1e-4:
+        return "<0.01 %"
+    return f"{number(100 * share)} %"
+
+
+def deviation(error: float) -> str:
+    """By how much a map is off."""
+    return percent(error) if 0 < error < 1e-4 else f"±{percent(error)}"
+
+
+def milliseconds(value_ms: float) -> str:
+    """A cost with its unit."""
+    return f"{number(value_ms)} ms" if value_ms >= 1e-3 or value_ms == 0 else "<0.001 ms"
+
+
+def seconds(value_s: float) -> str:
+    """How long a clip takes, in the unit one would say it in."""
+    return milliseconds(1e3 * value_s) if value_s < 1 else f"{number(value_s)} s"
+
+
+def short(plan: Plan) -> str:
+    """What of a plan tells maps of one scene apart: visibility, masks, geometry, time."""
+    sight = plan.visibility
+    words = [f"visibility {sight}"]
+    if sight in ("depth", "none"):
+        words = [f"depth {plan.depth_resolution}" if sight == "depth" else "all vertices"]
+    if plan.mask_stride > 1:
+        words.append(f"mask every {plan.mask_stride} frames")
+    if plan.vertices_kept < 1:
+        words.append(f"{percent(plan.vertices_kept)} of the vertices")
+    if plan.frame_rate_factor > 1:
+        words.append(f"frame rate × {plan.frame_rate_factor}")
+    return " · ".join(words)
+
+
+def point_text(result: PlanResult) -> str:
+    """What a point of the plot is: its plan, errors and cost, one fact a line."""
+    errors, cost = result.errors, result.cost
+    return "\n".join(
+        (
+            str(result.plan),
+            f"Error {percent(errors.l1)} after smoothing, {percent(errors.l1_raw)} before",
+            f"Peak velocity off by {errors.peak_mps.median:.2g} m/s"
+            f" (95 % of frames within {errors.peak_mps.p95:.2g} m/s)",
+            f"{percent(errors.wrong_bins.median)} of the energy in wrong bins",
+            f"{milliseconds(cost.all_cores_ms.median)} per frame on all cores,"
+            f" {milliseconds(cost.one_thread_ms.median)} on one thread",
+            f"{cost.peak_bytes / 2**20:.0f} MiB at most, {seconds(cost.setup_s)} once per clip",
+        )
+    )

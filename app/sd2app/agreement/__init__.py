@@ -1,0 +1,1 @@
+"""Comparison of the labels of two annotators."""

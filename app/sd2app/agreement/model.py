@@ -1,0 +1,183 @@
+"""Another person's labels beside those of the recording: how far the two agree, and where not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+from PySide6.QtCore import QObject, Signal
+
+from sd2app.background.latest import Emit, LatestRunner
+from sd2app.labels.model import LabelsModel
+from sd2app.session.playback import PlaybackModel
+from sd2app.session.time_window import VisibleSpanModel
+from sd2core.labels.agreement import Agreement, agreement
+from sd2core.labels.disagreement import Disagreement, disagreements
+from sd2core.labels.formats import read_labels
+from sd2core.labels.import_labels import Incoming
+from sd2core.labels.spans import Labels
+
+
+class _Compared(NamedTuple):
+    found: Agreement
+    stretches: tuple[Disagreement, ...]
+
+
+class AgreementModel(QObject):
+    """Reads a file, and compares again whenever the labels of the recording change.
+
+    Suggestions that nobody has accepted are no answers and are left out.
+
+    Signals
+    -------
+    changed
+        What is compared, what came of it, or which disagreement is looked at.
+    failed : str
+        Why a file could not be read.
+    """
+
+    changed = Signal()
+    failed = Signal(str)
+
+    def __init__(
+        self,
+        labels: LabelsModel,
+        playback: PlaybackModel,
+        span: VisibleSpanModel,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._labels, self._playback, self._span = labels, playback, span
+        self.other = LabelsModel(self)
+        self._path: Path | None = None
+        self._left_out = 0
+        self._compared: _Compared | None = None
+        self._reader = LatestRunner("labels", self)
+        self._reader.finished.connect(self._receive)
+        self._reader.failed.connect(lambda error: self.failed.emit(str(error)))
+        self._comparer = LatestRunner("agreement", self)
+        self._comparer.finished.connect(self._take)
+        self._comparer.failed.connect(lambda error: self.failed.emit(str(error)))
+        labels.changed.connect(self._compare)
+
+    # --- what is there --------------------------------------------------------------------
+
+    @property
+    def active(self) -> bool:
+        """Whether somebody else's labels are there."""
+        return self._path is not None
+
+    @property
+    def busy(self) -> bool:
+        """Whether a file is being read, or the two compared."""
+        return self._reader.busy or self._comparer.busy
+
+    @property
+    def name(self) -> str:
+        """What the other is called: the name of the file."""
+        return self._path.stem if self._path is not None else ""
+
+    @property
+    def path(self) -> Path | None:
+        """The other's file."""
+        return self._path
+
+    @property
+    def left_out(self) -> int:
+        """How many of the other's spans lie outside the recording."""
+        return self._left_out
+
+    @property
+    def found(self) -> Agreement | None:
+        """How far the two agree; None until that is known."""
+        return self._compared.found if self._compared is not None else None
+
+    @property
+    def disagreements(self) -> tuple[Disagreement, ...]:
+        """Where they do not, in order."""
+        return self._compared.stretches if self._compared is not None else ()
+
+    @property
+    def current(self) -> int | None:
+        """Number of the disagreement at the cursor, if there is one."""
+        now_s = self._playback.timebase.time_of(self._playback.frame)
+        for number, one in enumerate(self.disagreements):
+            if one.start_s <= now_s < one.end_s:
+                return number
+        return None
+
+    # --- asking ---------------------------------------------------------------------------
+
+    def open(self, path: Path) -> None:
+        """Compare with the labels of a file, in the background."""
+        base = self._playback.timebase
+
+        def read(emit: Emit) -> tuple[Path, Incoming]:
+            return path, Incoming.of(read_labels(path, base), base)
+
+        self._reader.submit(read)
+
+    def clear(self) -> None:
+        """No more comparison."""
+        self._reader.cancel()
+        self._comparer.cancel()
+        if self._path is not None:
+            self._path, self._compared = None, None
+            self.other.open(Labels())
+            self.changed.emit()
+
+    def step(self, towards: Literal[-1, 1]) -> None:
+        """Go to the start of the next disagreement, or of the one before."""
+        now_s = self._playback.timebase.time_of(self._playback.frame)
+        if towards > 0:
+            ahead = [one for one in self.disagreements if one.start_s > now_s]
+        else:
+            ahead = [one for one in reversed(self.disagreements) if one.start_s < now_s]
+        if ahead:
+            self._playback.seek(ahead[0].start_s)
+            self._span.reveal(ahead[0].start_s)
+            self.changed.emit()
+
+    def close(self) -> None:
+        """Stop all work."""
+        self._reader.close()
+        self._comparer.close()
+
+    # --- inside ---------------------------------------------------------------------------
+
+    def _receive(self, result: tuple[Path, Incoming]) -> None:
+        self._path, incoming = result
+        self._left_out = len(incoming.outside)
+        self._compared = None
+        # Colours are those of this recording wherever it has the label.
+        own = self._labels.labels.label_set
+        names = {one.name for one in own.labels}
+        more = [one for one in incoming.labels.label_set.labels if one.name not in names]
+        colours = replace(own, labels=(*own.labels, *(replace(one, key="") for one in more)))
+        self.other.open(replace(incoming.labels, label_set=colours))
+        self._compare()
+
+    def _compare(self) -> None:
+        if self._path is None:
+            return
+        mine, theirs = _answers(self._labels.labels), _answers(self.other.labels)
+        base = self._playback.timebase
+
+        def compare(emit: Emit) -> _Compared:
+            return _Compared(
+                agreement(mine, theirs, base), disagreements(mine.spans, theirs.spans, base)
+            )
+
+        self._comparer.submit(compare)
+        self.changed.emit()
+
+    def _take(self, compared: _Compared) -> None:
+        self._compared = compared
+        self.changed.emit()
+
+
+def _answers(labels: Labels) -> Labels:
+    return replace(
+        labels, spans=tuple(span for span in labels.spans if span.origin != "suggestion")
+    )

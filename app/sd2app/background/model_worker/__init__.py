@@ -1,0 +1,1 @@
+"""Process that holds torch, so that the window's process does not."""

@@ -1,0 +1,269 @@
+"""Models that work in a process of their own, where torch is; the window never loads it."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2app.background.model_worker.protocol import (
+    Message,
+    packed_map,
+    read_message,
+    unpacked_map,
+    write_message,
+)
+from sd2core.doppler_map import DopplerMap
+from sd2core.errors import Sd2Error
+from sd2core.processes import ONE_THREAD
+
+COMMAND = (sys.executable, "-m", "sd2app.background.model_worker.server")
+
+
+class DenoiseProcess:
+    """Started with the first model, started anew where it died; one request at a time.
+
+    Its methods wait for the answer: they belong into background threads.
+
+    Attributes
+    ----------
+    generation : int
+        How often it was started: a new one knows nothing of what the others had loaded.
+    """
+
+    def __init__(self, command: Sequence[str] = COMMAND) -> None:
+        self._command = list(command)
+        self._process: subprocess.Popen[bytes] | None = None
+        self._lock = threading.Lock()
+        self._closed = False
+        self.generation = 0
+
+    @property
+    def running(self) -> bool:
+        """Whether there is a process."""
+        return self._process is not None and self._process.poll() is None
+
+    def load(self, path: Path) -> RemoteDenoiser:
+        """Load a model; the first one takes as long as loading torch.
+
+        Raises
+        ------
+        Sd2Error
+            When it cannot be loaded.
+        """
+        return RemoteDenoiser(self, path)
+
+    def load_classifier(self, path: Path) -> RemoteClassifier:
+        """Load a classifier; it works beside the denoisers.
+
+        Raises
+        ------
+        Sd2Error
+            When it cannot be loaded.
+        """
+        return RemoteClassifier(self, path)
+
+    def ask(self, content: dict[str, Any], numbers: bytes = b"") -> Message:
+        """Ask, and wait for the answer.
+
+        Raises
+        ------
+        Sd2Error
+            What the other side says, or that it is gone.
+        """
+        with self._lock:
+            process = self._started()
+            assert process.stdin is not None
+            assert process.stdout is not None
+            try:
+                write_message(process.stdin, content, numbers)
+                answer = read_message(process.stdout)
+            except (OSError, ValueError):  # closed from another thread
+                answer = None
+            if answer is None:
+                self._process = None
+                _let_go(process)
+        if answer is None:
+            raise Sd2Error(
+                "The process in which the models work has ended",
+                remedy="Choose the model again; if it ends again, there may be too little memory",
+            )
+        if "error" in answer[0]:
+            raise Sd2Error(*answer[0]["error"])
+        return answer
+
+    def close(self) -> None:
+        """End it, whatever it is doing."""
+        self._closed = True
+        busy = self._process
+        if busy is not None:
+            busy.kill()  # a thread that waits for its answer goes on
+        with self._lock:
+            process, self._process = self._process, None
+            if process is not None:
+                _let_go(process)
+
+    def _started(self) -> subprocess.Popen[bytes]:
+        if self._closed:
+            raise Sd2Error("The window is being closed")
+        if self._process is not None and self._process.poll() is not None:
+            _let_go(self._process)
+            self._process = None
+        if self._process is None:
+            # One thread: the cores belong to synthesis, video and drawing as well.
+            self._process = subprocess.Popen(
+                self._command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                env=os.environ | ONE_THREAD,
+                creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
+            )
+            self.generation += 1
+        return self._process
+
+
+def _let_go(process: subprocess.Popen[bytes]) -> None:
+    process.kill()
+    process.wait()
+    for stream in (process.stdin, process.stdout):
+        if stream is not None:
+            # What was not written has nobody to read it.
+            with contextlib.suppress(OSError):
+                stream.close()
+
+
+class _Remote:
+    """A model in that process."""
+
+    _LOAD: ClassVar[str]
+
+    def __init__(self, process: DenoiseProcess, path: Path) -> None:
+        self._process = process
+        self._path = path
+        self._load()
+
+    def _load(self) -> None:
+        content, _ = self._process.ask({"do": self._LOAD, "path": str(self._path)})
+        self._number: int = content["model"]
+        self._generation = self._process.generation
+        self._take(content)
+
+    def _take(self, content: dict[str, Any]) -> None:
+        """What else was said of it."""
+
+    def _ready(self) -> int:
+        """Its number, loaded again where the process that had it is gone."""
+        if not self._process.running or self._process.generation != self._generation:
+            self._load()
+        return self._number
+
+    def _begin(self) -> int:
+        """A clip whose frames come one after another; its number."""
+        content, _ = self._process.ask({"do": "live", "model": self._ready()})
+        return int(content["live"])
+
+
+class RemoteDenoiser(_Remote):
+    """What it offers is what ``TrainedDenoiser`` does."""
+
+    _LOAD = "load"
+
+    def denoise(self, doppler: DopplerMap) -> DopplerMap:
+        """What a radar would show in place of a synthetic map."""
+        content, numbers = packed_map(doppler)
+        answer, numbers = self._process.ask(
+            {"do": "denoise", "model": self._ready(), "map": content}, numbers
+        )
+        return replace(unpacked_map(answer, numbers), timebase=doppler.timebase)
+
+    def live(self) -> RemoteLive:
+        """For frames as they come; the one before is forgotten."""
+        return RemoteLive(self._process, self._begin(), self.equals_batch)
+
+    def _take(self, content: dict[str, Any]) -> None:
+        self.equals_batch: bool = content["equals_batch"]
+        self.frame_rate_hz: float = content["frame_rate_hz"]
+
+
+class RemoteClassifier(_Remote):
+    """What it offers is what ``TrainedClassifier`` does."""
+
+    _LOAD = "load_classifier"
+
+    def probabilities(self, doppler: DopplerMap) -> NDArray[np.float32]:
+        """What every frame of a map shows, (frames, classes)."""
+        content, numbers = packed_map(doppler)
+        _, answer = self._process.ask(
+            {"do": "classify", "model": self._ready(), "map": content}, numbers
+        )
+        return np.frombuffer(answer, np.float32).reshape(len(doppler.timebase), -1).copy()
+
+    def live(self) -> RemoteClasses:
+        """For frames of one stretch, all with a person, as they come."""
+        return RemoteClasses(self._process, self._begin())
+
+
+class _RemoteSession:
+    """A clip whose frames come one after another."""
+
+    def __init__(self, process: DenoiseProcess, number: int) -> None:
+        self._process = process
+        self._number = number
+        self._generation = process.generation
+
+    def _ask(self, do: str, numbers: bytes = b"", **content: int) -> NDArray[np.float32]:
+        if self._process.generation != self._generation:
+            raise Sd2Error(
+                "The process in which the models work was started again",
+                remedy="Choose the model again",
+            )
+        told, answer = self._process.ask({"do": do, "live": self._number, **content}, numbers)
+        return np.frombuffer(answer, np.float32).reshape(told["shape"]).copy()
+
+    def _advance(
+        self, energies: NDArray[np.float32], present: NDArray[np.bool_]
+    ) -> NDArray[np.float32]:
+        frames, bins = energies.shape
+        values = np.ascontiguousarray(energies, np.float32)
+        numbers = np.asarray(present, np.bool_).tobytes() + values.tobytes()
+        return self._ask("advance", numbers, frames=frames, bins=bins)
+
+
+class RemoteClasses(_RemoteSession):
+    """Frames with a person in; probabilities of the classes out, as late as the card says."""
+
+    def advance(self, energies: NDArray[np.float32]) -> NDArray[np.float32]:
+        """What became known by the next frames: (frames, bins) → (answers, classes)."""
+        return self._advance(energies, np.ones(len(energies), np.bool_))
+
+    def finish(self) -> NDArray[np.float32]:
+        """Answers that are owed, if nothing moves from now on; it goes on all the same."""
+        return self._ask("finish")
+
+
+class RemoteLive(_RemoteSession):
+    """Frames in; for each of them what the model makes of it."""
+
+    def __init__(self, process: DenoiseProcess, number: int, equals_batch: bool) -> None:
+        super().__init__(process, number)
+        self.equals_batch = equals_batch
+
+    def step(self, energies: NDArray[np.float32], present: bool = True) -> NDArray[np.float32]:
+        """Answer to the next frame (bins,)."""
+        return self.advance(energies[None], np.array([present]))[0]
+
+    def advance(
+        self, energies: NDArray[np.float32], present: NDArray[np.bool_]
+    ) -> NDArray[np.float32]:
+        """Answers to the next frames (frames, bins), one row for each."""
+        return self._advance(energies, present)

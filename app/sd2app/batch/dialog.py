@@ -1,0 +1,346 @@
+"""The window of a batch, and what it asks: files, folders, placements."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QTimer, QUrl
+from PySide6.QtGui import QDesktopServices, QHideEvent, QShowEvent
+from PySide6.QtWidgets import (
+    QDialog,
+    QFileDialog,
+    QHBoxLayout,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from sd2app.batch.model import BatchModel
+from sd2app.batch.results import Result
+from sd2app.batch.run_view import BatchRunView
+from sd2app.batch.setup_view import BatchSetupView
+from sd2app.sensor.placement_text import counted
+from sd2app.widgets.panel import outlined, sentence, title
+from sd2core.batch.plan_file import write_plan
+from sd2core.errors import Sd2Error
+from sd2core.files.paths import plain_path
+from sd2core.io.kinds import VIDEO_SUFFIXES
+from sd2core.placements.placements import Placements, read_placements
+from sd2core.recording.recording import is_recording, open_recording
+
+if TYPE_CHECKING:
+    from sd2app.shell.wiring import Context
+
+_FILES = (
+    "Recordings, videos, meshes (*.mp4 *.mkv *.mov *.avi *.webm *.npz *.zip *.obj *.ply *.glb"
+    " *.pkl recording.json zarr.json);;All files (*)"
+)
+_PLACEMENTS = "Placements (*.json *.toml);;All files (*)"
+_ESTIMATE_MS = 600
+_OWN, _PLANNED, _FILE = range(3)
+
+
+class BatchDialogs:
+    """Asks, then calls the models; a failure is handed to ``report`` as a sentence.
+
+    Parameters
+    ----------
+    parent : QWidget
+    context : Context
+    report : callable
+    open_paths : callable
+        Opens files in the window; False where the user wants to keep what is open.
+    """
+
+    def __init__(
+        self,
+        parent: QWidget,
+        context: Context,
+        report: Callable[[str], None],
+        open_paths: Callable[[list[Path]], bool],
+    ) -> None:
+        self._parent, self._context = parent, context
+        self._batch = context.batch
+        self._report, self._open_paths = report, open_paths
+        self._window: BatchWindow | None = None
+        self._opening: tuple[Result, set[Path]] | None = None
+        context.placements.changed.connect(self._follow_plan)
+        context.document.opened.connect(self._place_sensor)
+        context.document.failed.connect(lambda _: self._forget_result())
+
+    # --- the window -----------------------------------------------------------------------
+
+    def show(self) -> None:
+        """Bring up the batch in view, or set up another."""
+        if self._window is None:
+            self._window = BatchWindow(self._batch, self, self._parent)
+        if self._batch.batch is None and not self._batch.setup.entries:
+            self._add_what_is_open()
+        self._window.show()
+        self._window.raise_()
+        self._window.activateWindow()
+
+    def show_with_placements(self) -> None:
+        """The same, with the places that are planned in the recording that is open."""
+        placements = self._context.placements.plan
+        if placements is not None and self._batch.batch is None:
+            self._batch.setup.set_placements(placements, _PLAN_HERE)
+        self.show()
+
+    def close(self) -> None:
+        """Close the window; what is at work goes on."""
+        if self._window is not None:
+            self._window.close()
+
+    def _add_what_is_open(self) -> None:
+        content = self._context.document.content
+        if content is not None and content.saved:
+            self._batch.setup.add([content.recording.folder])
+
+    # --- setting up -----------------------------------------------------------------------
+
+    def add_files(self) -> None:
+        """Let the user choose recordings, videos or meshes."""
+        names, _ = QFileDialog.getOpenFileNames(self._over, "Recordings to work on", "", _FILES)
+        self._batch.setup.add([_meant(Path(name)) for name in names])
+
+    def add_folder(self) -> None:
+        """Let the user choose a folder of some."""
+        name = QFileDialog.getExistingDirectory(self._over, "A recording, or a folder of some")
+        if name:
+            self._batch.setup.add([Path(name)])
+
+    def placement_choices(self) -> Sequence[str]:
+        """Where sensors may be put, in words."""
+        placements, setup = self._context.placements.plan, self._batch.setup
+        here = "As planned in the open recording"
+        if placements is not None:
+            here += f" ({_count_text(placements)})"
+        chosen = setup.placements
+        file = "Of a file…"
+        if chosen is not None and setup.placed != _PLAN_HERE:
+            file = f"Of {setup.placed} ({_count_text(chosen)})"
+        return ("Where each recording has its own", here, file)
+
+    def placement_index(self) -> int:
+        """Which of them holds."""
+        if self._batch.setup.placements is None:
+            return _OWN
+        return _PLANNED if self._batch.setup.placed == _PLAN_HERE else _FILE
+
+    def choose_placements(self, index: int) -> None:
+        """Put sensors where one of the choices says."""
+        setup = self._batch.setup
+        if index == _OWN:
+            setup.set_placements(None)
+        elif index == _PLANNED:
+            placements = self._context.placements.plan
+            if placements is None:
+                self._say("The open recording plans no placements: Edit → Placements… does.")
+            setup.set_placements(placements, _PLAN_HERE)
+        else:
+            self._ask_placements()
+        self._batch.changed.emit()  # the choice goes back where nothing was chosen
+
+    def _ask_placements(self) -> None:
+        name, _ = QFileDialog.getOpenFileName(self._over, "Placements", "", _PLACEMENTS)
+        if name:
+            found: list[Placements] = []
+            self._attempt(lambda: found.append(read_placements(Path(name))))
+            if found:
+                self._batch.setup.set_placements(found[0], Path(name).name)
+
+    def _follow_plan(self) -> None:
+        """What is planned in the open recording is what was chosen, as long as it is open."""
+        setup, placements = self._batch.setup, self._context.placements.plan
+        if setup.placements is None or setup.placed != _PLAN_HERE:
+            return
+        if placements is None:
+            setup.set_placements(setup.placements, _PLAN_BEFORE)
+        elif placements != setup.placements:
+            setup.set_placements(placements, _PLAN_HERE)
+
+    def model_names(self) -> Sequence[str]:
+        """Models that are installed."""
+        return self._context.denoise.installed()
+
+    def choose_out(self) -> None:
+        """Let the user choose the folder of the results."""
+        start = str(self._batch.setup.out or "")
+        name, _ = QFileDialog.getSaveFileName(self._over, "Folder of the results", start)
+        if name:
+            self._batch.setup.set_out(Path(name))
+
+    def save_plan(self) -> None:
+        """Let the user choose a file for the plan."""
+        name, _ = QFileDialog.getSaveFileName(
+            self._over, "Save plan", "plan.toml", "Plan of a batch (*.toml)"
+        )
+        if name:
+            path = Path(name)
+            path = path if path.suffix == ".toml" else path.with_name(path.name + ".toml")
+            self._attempt(lambda: write_plan(path, self._batch.setup.plan()))
+
+    def start(self) -> None:
+        """Begin as it is set up."""
+        self._attempt(self._batch.start)
+
+    # --- a batch that is there ------------------------------------------------------------
+
+    def open_batch(self) -> None:
+        """Let the user choose a batch that lies elsewhere, as of a command in a terminal."""
+        name = QFileDialog.getExistingDirectory(self._over, "Folder of a batch")
+        if name:
+            self._attempt(lambda: self._batch.open_batch(Path(name)))
+
+    def resume(self) -> None:
+        """Go on with the batch in view."""
+        self._attempt(self._batch.resume)
+
+    def open_folder(self) -> None:
+        """Show the folder of the results."""
+        if self._batch.batch is not None:
+            _show_in_files(self._batch.batch.folder.path)
+
+    def open_result(self, row: int) -> None:
+        """Open a recording in the window, with the sensor where a result says."""
+        result = self._batch.results.rows[row]
+        found: list[list[Path]] = []
+        self._attempt(lambda: found.append(paths_of(result)))
+        if found and self._open_paths(found[0]):
+            self._opening = (result, set(map(plain_path, found[0])))
+
+    def _place_sensor(self) -> None:
+        recording, opening = self._context.document.recording, self._opening
+        self._opening = None
+        if recording is None or opening is None:
+            return
+        result, paths = opening
+        # Something else may have been opened meanwhile.
+        if paths & {recording.folder, recording.video, recording.mesh}:
+            self._context.edits.place_sensor(result.sensor, "Sensor to placement")
+
+    def _forget_result(self) -> None:
+        self._opening = None
+
+    @property
+    def _over(self) -> QWidget:
+        """What choosers are put over."""
+        return self._window or self._parent
+
+    def _attempt(self, work: Callable[[], object]) -> None:
+        self._say("")
+        try:
+            work()
+        except (Sd2Error, OSError) as error:
+            self._say(str(error))
+
+    def _say(self, text: str) -> None:
+        """Where the user looks."""
+        if self._window is not None and self._window.isVisible():
+            self._window.warn(text)
+        elif text:
+            self._report(text)
+
+
+_PLAN_HERE = "the open recording"
+_PLAN_BEFORE = "what was planned before"
+
+
+class BatchWindow(QDialog):
+    """A new batch, or the one in view; the rest of the program can be used meanwhile."""
+
+    def __init__(self, batch: BatchModel, asks: BatchDialogs, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Batch")
+        self._batch, self._asks = batch, asks
+        self._title = title("New batch")
+        another = outlined("Open batch…", "One that lies elsewhere", asks.open_batch, self)
+        head = QHBoxLayout()
+        head.addWidget(self._title, 1)
+        head.addWidget(another)
+        self._setup = BatchSetupView(batch, asks, self)
+        self._run = BatchRunView(batch, asks, self)
+        self._pages = QStackedWidget(self)
+        self._pages.addWidget(self._setup)
+        self._pages.addWidget(self._run)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(16, 12, 16, 16)
+        layout.setSpacing(10)
+        self._warning = sentence("", "warning")
+        self._warning.hide()
+        layout.addLayout(head)
+        layout.addWidget(self._warning)
+        layout.addWidget(self._pages, 1)
+        # Not while somebody still turns a number.
+        self._patience = QTimer(self)
+        self._patience.setSingleShot(True)
+        self._patience.setInterval(_ESTIMATE_MS)
+        self._patience.timeout.connect(self._estimate)
+        batch.changed.connect(self._refresh)
+        batch.setup.changed.connect(self._patience.start)
+        self.resize(620, 640)
+        self._refresh()
+
+    def warn(self, text: str) -> None:
+        """Say what went wrong, or nothing any more."""
+        self._warning.setText(text)
+        self._warning.setVisible(bool(text))
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Somebody looks: say what it would take."""
+        super().showEvent(event)
+        self._batch.set_watched(True)
+        self._setup.refresh()
+        self._patience.start()
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        """Nobody looks."""
+        super().hideEvent(event)
+        self._batch.set_watched(False)
+
+    def _refresh(self) -> None:
+        run = self._batch.batch
+        self._title.setText("New batch" if run is None else run.folder.path.name)
+        page = self._setup if run is None else self._run
+        if self._pages.currentWidget() is not page:
+            self._pages.setCurrentWidget(page)
+            self._patience.start()
+
+    def _estimate(self) -> None:
+        if self.isVisible() and self._batch.batch is None:
+            self._batch.ask_estimate()
+
+
+def paths_of(result: Result) -> list[Path]:
+    """What is opened in the window for a result: the recording, or a video with its mesh.
+
+    Raises
+    ------
+    Sd2Error
+        When the recording is damaged.
+    """
+    source = Path(result.source)
+    video = source if source.suffix.lower() in VIDEO_SUFFIXES else None
+    if is_recording(source):
+        recording = open_recording(source)
+        video = recording.video if recording.mesh is None else None
+    return [source] if video is None else [video, Path(result.mesh)]
+
+
+@lru_cache(maxsize=8)
+def _count_text(placements: Placements) -> str:
+    # There may be ten thousand, and this is asked for whenever something changes.
+    return counted(len(placements.places()), "placement")
+
+
+def _meant(path: Path) -> Path:
+    """The folder that a file inside of a recording or of a Zarr group stands for."""
+    return path.parent if path.name in ("recording.json", "zarr.json") else path
+
+
+def _show_in_files(folder: Path) -> None:
+    QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder)))

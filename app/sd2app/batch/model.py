@@ -1,0 +1,217 @@
+"""Batches: set up, started in a process that outlives the window, followed, opened."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from PySide6.QtCore import QObject, Signal
+
+from sd2app.background.detached import launch
+from sd2app.batch.estimate import COMMAND, BatchEstimateModel
+from sd2app.batch.results import BatchResults
+from sd2app.batch.run import BatchFollower, output_of, plan_of
+from sd2app.batch.setup import BatchSetupModel
+from sd2app.sensor.placement_text import counted
+from sd2app.settings import Settings
+from sd2core.batch.folder import BatchFolder
+from sd2core.batch.plan_file import write_plan
+from sd2core.errors import Sd2Error
+
+
+class BatchModel(QObject):
+    """One batch in view, or a new one that is being set up.
+
+    Parameters
+    ----------
+    settings : Settings
+    command : sequence of str
+        What runs ``sd2`` commands.
+
+    Signals
+    -------
+    changed
+        Anything that is shown.
+    phase_changed
+        How the batch in view stands, or another one is in view.
+    noted, failed : str
+        Sentences for the user.
+    """
+
+    changed = Signal()
+    phase_changed = Signal()
+    noted = Signal(str)
+    failed = Signal(str)
+
+    def __init__(
+        self,
+        settings: Settings,
+        parent: QObject | None = None,
+        command: Sequence[str] = COMMAND,
+    ) -> None:
+        super().__init__(parent)
+        self._settings = settings
+        self._command = tuple(command)
+        self.setup = BatchSetupModel(settings, self)
+        self.estimate = BatchEstimateModel(self, command)
+        self.results = BatchResults(self)
+        self._follower: BatchFollower | None = None
+        self._was_under_way = self._taking_up = self._watched = False
+        for signal in (self.setup.changed, self.estimate.changed, self.results.changed):
+            signal.connect(self.changed)
+
+    # --- what is known --------------------------------------------------------------------
+
+    @property
+    def batch(self) -> BatchFollower | None:
+        """The batch in view; None while a new one is being set up."""
+        return self._follower
+
+    @property
+    def why_not_start(self) -> str:
+        """Why what is set up cannot be started; empty when it can."""
+        setup, estimate = self.setup, self.estimate
+        if setup.problem:
+            return setup.problem
+        if not estimate.of(setup.plan(), setup.workers):
+            return "What it would do has not been worked out yet."
+        if estimate.busy:
+            return "Working out what it would do…"
+        return estimate.problem
+
+    def set_watched(self, watched: bool) -> None:
+        """Somebody looks at it, or no longer."""
+        self._watched = watched
+
+    # --- one batch after another ----------------------------------------------------------
+
+    def look_for_batch(self) -> None:
+        """At the start of the program: find the last one, which may be under way."""
+        last = self._settings.stored("batch/last", "")
+        if last and BatchFolder(Path(last)).exists:  # it may lie elsewhere
+            self._taking_up = True
+            self.select(Path(last))
+
+    def select(self, path: Path | None) -> None:
+        """Show a batch; None is a new one, to be set up."""
+        if path is None:
+            self._follow(None)
+            self._settings.set_value("batch/last", "")
+        elif self._follower is None or self._follower.folder.path != path:
+            self._follow(BatchFollower(path, self))
+
+    def open_batch(self, path: Path) -> None:
+        """Show a batch that lies elsewhere, as of a command in a terminal.
+
+        Raises
+        ------
+        Sd2Error
+            When there is none.
+        """
+        BatchFolder(path).read_about()
+        self.select(path)
+
+    def ask_estimate(self) -> None:
+        """Work out what the set-up would do, unless that is known."""
+        if not self.setup.problem:
+            self.estimate.ask(self.setup.plan(), self.setup.workers)
+
+    def start(self) -> None:
+        """Begin as it is set up.
+
+        Raises
+        ------
+        Sd2Error
+            When it cannot be started.
+        OSError
+            When its plan cannot be written.
+        """
+        if self.why_not_start:
+            raise Sd2Error(self.why_not_start)
+        plan = self.setup.plan()
+        out = Path(plan.out)
+        if BatchFolder(out).live:
+            raise Sd2Error(f"A process is at work in {out} already", "one batch at a time there")
+        file = plan_of(out)  # beside its folder, which may not be there yet
+        write_plan(file, plan)
+        self._launch(out, file)
+
+    def resume(self) -> None:
+        """Go on with the batch in view.
+
+        Raises
+        ------
+        Sd2Error
+            When it cannot be started.
+        """
+        run = self._follower
+        if run is not None and run.resumable:
+            self._launch(run.folder.path, run.folder.plan)
+
+    def stop(self) -> None:
+        """End the batch in view; what is done stays, and it can go on later."""
+        if self._follower is not None:
+            try:
+                self._follower.stop()
+            except OSError as error:
+                self.failed.emit(str(error))
+
+    def close(self) -> None:
+        """Look no more; what is at work goes on."""
+        self.estimate.close()
+        self.setup.close()
+        self.results.close()
+        if self._follower is not None:
+            self._follower.close()
+
+    def _launch(self, out: Path, plan: Path) -> None:
+        output = output_of(out)
+        # What an earlier start said is not about this one.
+        output.unlink(missing_ok=True)
+        words = ["batch", str(plan), "--workers", str(self.setup.workers)]
+        pid = launch([*self._command, *words], output)
+        self.estimate.forget()  # of what is about to be done
+        self._follow(BatchFollower(out, self, pid=pid))
+
+    # --- following ------------------------------------------------------------------------
+
+    def _follow(self, follower: BatchFollower | None) -> None:
+        if self._follower is not None:
+            self._follower.close()
+            self._follower.deleteLater()
+        self._follower = follower
+        self._was_under_way = False
+        self.results.forget()
+        if follower is not None:
+            self._settings.set_value("batch/last", str(follower.folder.path))
+            follower.changed.connect(self.changed)
+            follower.phase_changed.connect(self._notice)
+        self.phase_changed.emit()
+        self.changed.emit()
+
+    def _notice(self) -> None:
+        run = self._follower
+        if run is None:
+            return
+        if run.phase == "gone":
+            self.select(None)
+            return
+        ended = run.known and self._was_under_way and not run.under_way
+        taken_up, self._taking_up = self._taking_up and run.known, False
+        self._was_under_way = run.known and run.under_way
+        if run.known and not run.under_way:
+            self.results.read(run.folder)
+        self.phase_changed.emit()
+        name = run.folder.path.name
+        if taken_up and run.under_way:
+            self.noted.emit(f"{name} is at work. File → Batch… shows it.")
+        elif ended and not self._watched:
+            self._say_ended(name, run)
+
+    def _say_ended(self, name: str, run: BatchFollower) -> None:
+        if run.phase in ("failed", "died"):
+            self.failed.emit(f"{name} did not come to its end. File → Batch… says more.")
+        elif run.phase == "finished":
+            failed = run.status.failed if run.status is not None else 0
+            but = f", but {counted(failed, 'task')} could not be done" if failed else ""
+            self.noted.emit(f"{name} has come to its end{but}. File → Batch… opens results.")

@@ -1,0 +1,182 @@
+"""The maps that a batch made, as rows."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtCore import (
+    QAbstractTableModel,
+    QModelIndex,
+    QObject,
+    QPersistentModelIndex,
+    Qt,
+    Signal,
+)
+
+from sd2app.background.latest import LatestRunner
+from sd2core.batch.folder import BatchFolder
+from sd2core.errors import Sd2Error
+from sd2core.placements.placements import Place
+from sd2core.sensor import Vector, VirtualSensor, spherical_from_position
+
+Index = QModelIndex | QPersistentModelIndex
+_NOWHERE = QModelIndex()
+_MOST_ROWS = 50_000
+"""A person looks at no more; the file has all."""
+_COLUMNS = ("Recording", "Subject", "Place", "Seen from the body", "Maps")
+
+
+@dataclass(frozen=True)
+class Result:
+    """One map of a recording from one place.
+
+    Parameters
+    ----------
+    recording, subject : str
+    source, mesh : str
+        The file that was worked on, and the mesh that the map is of.
+    placement : int
+        0 is the recording's own sensor.
+    sensor : VirtualSensor
+    target_m : tuple of 3 floats
+        Where the body is.
+    maps : dict of str to str
+        File of each kind of map, relative to the folder of the batch.
+    """
+
+    recording: str
+    subject: str
+    source: str
+    mesh: str
+    placement: int
+    sensor: VirtualSensor
+    target_m: Vector
+    maps: dict[str, str]
+
+
+class BatchResults(QAbstractTableModel):
+    """Reads ``results.jsonl`` in the background; one row per map, however many stretches."""
+
+    changed = Signal()
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._rows: list[Result] = []
+        self._card = ""
+        self._runner = LatestRunner("results", self)
+        self._runner.finished.connect(self._take)
+        # There may be none, or the disk is away.
+        self._runner.failed.connect(lambda error: self.forget())
+
+    @property
+    def rows(self) -> list[Result]:
+        """What was made or found made by the last run that came to its end."""
+        return self._rows
+
+    @property
+    def card(self) -> str:
+        """What the exported data set says of itself, as Markdown; empty where there is none."""
+        return self._card
+
+    def read(self, folder: BatchFolder) -> None:
+        """Read those of a batch."""
+        self._runner.submit(lambda emit: (_rows(folder.results), _card(folder)))
+
+    def forget(self) -> None:
+        """Show none."""
+        self._runner.cancel()
+        self._take(([], ""))
+
+    def close(self) -> None:
+        """Stop reading."""
+        self._runner.close()
+
+    def _take(self, found: tuple[list[Result], str]) -> None:
+        self.beginResetModel()
+        self._rows, self._card = found
+        self.endResetModel()
+        self.changed.emit()
+
+    # --- Qt's questions ---------------------------------------------------------------------
+
+    def rowCount(self, parent: Index = _NOWHERE) -> int:
+        """One per map."""
+        return 0 if parent.isValid() else len(self._rows)
+
+    def columnCount(self, parent: Index = _NOWHERE) -> int:
+        """What is said of each."""
+        return 0 if parent.isValid() else len(_COLUMNS)
+
+    def headerData(
+        self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole
+    ) -> Any:
+        """Names of the columns."""
+        if role == Qt.ItemDataRole.DisplayRole and orientation == Qt.Orientation.Horizontal:
+            return _COLUMNS[section]
+        return None
+
+    def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
+        """Words."""
+        if role != Qt.ItemDataRole.DisplayRole or not index.isValid():
+            return None
+        row = self._rows[index.row()]
+        around = spherical_from_position(row.target_m, row.sensor.position_m)
+        return (
+            row.recording,
+            row.subject,
+            f"{row.placement:,}" if row.placement else "own sensor",
+            Place(*around).words.replace("-", "−"),
+            ", ".join(row.maps),
+        )[index.column()]
+
+
+def _rows(file: Path) -> list[Result]:
+    rows: dict[tuple[str, int], Result] = {}
+    with file.open(encoding="utf-8") as stream:
+        for line in stream:
+            row = _row(line)
+            if row is not None:
+                rows.setdefault((row.recording, row.placement), row)
+            if len(rows) >= _MOST_ROWS:
+                break
+    return list(rows.values())
+
+
+def _row(line: str) -> Result | None:
+    try:
+        content = json.loads(line)
+        maps = {
+            kind: content[kind]
+            for kind in ("synthetic", "denoised", "simulated")
+            if content.get(kind)
+        }
+        return Result(
+            str(content["recording"]),
+            str(content["subject"]),
+            str(content["source"]),
+            str(content["mesh"]),
+            int(content["placement"] or 0),
+            VirtualSensor(**content["sensor"]),
+            _vector(content["target_m"]),
+            maps,
+        )
+    except (ValueError, KeyError, TypeError, Sd2Error):
+        return None
+
+
+def _vector(values: Any) -> Vector:
+    x, y, z = map(float, values)
+    return (x, y, z)
+
+
+def _card(folder: BatchFolder) -> str:
+    """What a data set says of itself; empty where none was exported."""
+    from sd2core.datasets.card import card_paths
+
+    try:
+        return card_paths(folder.path / "dataset")[0].read_text(encoding="utf-8")
+    except OSError:
+        return ""

@@ -1,0 +1,221 @@
+"""A batch that is at work or has ended: how far, what failed, and what it made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QGridLayout,
+    QHBoxLayout,
+    QHeaderView,
+    QLabel,
+    QPlainTextEdit,
+    QProgressBar,
+    QTableView,
+    QTextBrowser,
+    QVBoxLayout,
+    QWidget,
+)
+
+from sd2app.batch.model import BatchModel
+from sd2app.batch.text import failure_text, headline, step_facts, time_text
+from sd2app.widgets.cell_table import ROW_PX
+from sd2app.widgets.elided import ElidedLabel
+from sd2app.widgets.pages import InnerPage, InnerPages
+from sd2app.widgets.panel import outlined, sentence, side_by_side
+
+_MOST_STEPS = 6
+_NO_DATASET = "No data set has been exported here yet."
+
+
+class Asks(Protocol):
+    """What the view leaves to dialogs."""
+
+    def resume(self) -> None:
+        """Go on with the batch in view."""
+
+    def open_folder(self) -> None:
+        """Show the folder of the results."""
+
+    def open_result(self, row: int) -> None:
+        """Open a recording in the window, with the sensor where a result says."""
+
+
+_FAILURES, _FAILURES_PAGE = "Failures", 2
+
+
+class BatchRunView(QWidget):
+    """A view of :class:`BatchFollower` and of its results."""
+
+    def __init__(self, batch: BatchModel, asks: Asks, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._batch, self._asks = batch, asks
+        self._shown_card: str | None = None
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(8)
+        self._name = ElidedLabel(self)
+        self._headline = QLabel(self)
+        self._headline.setObjectName("title")
+        self._headline.setWordWrap(True)
+        self._headline.setAccessibleName("How the batch stands")
+        self._time = sentence("")
+        self._reason = sentence("", "warning")
+        for widget in (self._name, self._headline, self._time, self._reason):
+            layout.addWidget(widget)
+        layout.addLayout(self._bars())
+        layout.addLayout(self._button_row())
+        layout.addWidget(self._pages(), 1)
+        batch.changed.connect(self._refresh)
+        self._refresh()
+
+    # --- building -------------------------------------------------------------------------
+
+    def _bars(self) -> QGridLayout:
+        grid = QGridLayout()
+        grid.setHorizontalSpacing(12)
+        grid.setVerticalSpacing(4)
+        grid.setColumnStretch(1, 1)
+        self._steps: list[tuple[QLabel, QProgressBar, QLabel]] = []
+        for row in range(_MOST_STEPS):
+            bar = QProgressBar(self)
+            bar.setMaximumHeight(12)
+            bar.setTextVisible(False)
+            widgets = (QLabel(self), bar, sentence(""))
+            widgets[2].setWordWrap(False)
+            for column, widget in enumerate(widgets):
+                grid.addWidget(widget, row, column)
+            self._steps.append(widgets)
+        return grid
+
+    def _button_row(self) -> QHBoxLayout:
+        asks, batch = self._asks, self._batch
+        self._stop = outlined("Stop", "End it now; what is done stays", batch.stop, self)
+        self._resume = outlined("Go on", "Do what is missing or new", asks.resume, self)
+        self._folder = outlined("Open folder", "Show the results as files", asks.open_folder, self)
+        self._new = outlined("New batch", "Set up another", lambda: batch.select(None), self)
+        buttons = (self._stop, self._resume, self._folder, self._new)
+        return side_by_side(*buttons, spacing_px=6)
+
+    def _pages(self) -> InnerPages:
+        self._failures = _text("What could not be done")
+        self._log = _text("Log")
+        self._card = QTextBrowser(self)
+        self._card.setAccessibleName("What the data set holds")
+        self._table = _result_table(self._open)
+        self._table.setModel(self._batch.results)
+        self._open_result = outlined(
+            "Open in the window",
+            "The recording, with the sensor where this map was made from",
+            self._open,
+            self,
+        )
+        self._no_results = sentence("What was made is listed once the batch has come to its end.")
+        results = QWidget(self)
+        layout = QVBoxLayout(results)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(6)
+        layout.addWidget(self._no_results)
+        layout.addWidget(self._table, 1)
+        layout.addLayout(side_by_side(self._open_result))
+        self._inner = InnerPages(
+            (
+                InnerPage("Results", "The maps that were made", results),
+                InnerPage("Data set", "What was exported to learn from", self._card),
+                InnerPage(_FAILURES, "Tasks that could not be done, and why", self._failures),
+                InnerPage("Log", "What happened, as it happened", self._log),
+            ),
+            parent=self,
+        )
+        return self._inner
+
+    # --- showing --------------------------------------------------------------------------
+
+    def _refresh(self) -> None:
+        run, results = self._batch.batch, self._batch.results
+        if run is None:
+            return
+        self._name.setText(str(run.folder.path))
+        self._headline.setText(headline(run))
+        for label, text in ((self._time, time_text(run)), (self._reason, run.text)):
+            label.setText(text)
+            label.setVisible(bool(text))
+        self._show_steps()
+        self._stop.setVisible(run.under_way)
+        self._stop.setEnabled(run.phase != "stopping")
+        self._resume.setVisible(run.resumable)
+        self._resume.setText("Run again" if run.phase == "finished" else "Go on")
+        self._folder.setEnabled(run.folder.path.is_dir())
+        self._new.setVisible(not run.under_way)
+        _show(self._failures, "\n\n".join(map(failure_text, run.failures)) or "None.")
+        count = len(run.failures)
+        self._inner.name_page(_FAILURES_PAGE, f"{_FAILURES} ({count})" if count else _FAILURES)
+        _show(self._log, run.log or "Nothing was noted.")
+        if results.card != self._shown_card:
+            self._shown_card = results.card
+            self._card.setMarkdown(results.card or _NO_DATASET)
+        self._no_results.setVisible(not results.rows)
+        self._table.setVisible(bool(results.rows))
+        self._open_result.setVisible(bool(results.rows))
+
+    def _show_steps(self) -> None:
+        run = self._batch.batch
+        facts = step_facts(run) if run is not None else []
+        for row, (name, bar, words) in enumerate(self._steps):
+            shown = row < len(facts)
+            for widget in (name, bar, words):
+                widget.setVisible(shown)
+            if shown:
+                text, done, total, said = facts[row]
+                name.setText(text)
+                bar.setRange(0, max(total, 1))
+                bar.setValue(done)
+                bar.setAccessibleName(f"{text}: {said}")
+                words.setText(said)
+
+    def _open(self) -> None:
+        index = self._table.currentIndex()
+        if index.isValid():
+            self._asks.open_result(index.row())
+        elif self._batch.results.rows:
+            self._asks.open_result(0)
+
+
+def _result_table(open_row: Callable[[], None]) -> QTableView:
+    """Return or a double click opens a row."""
+    table = QTableView()
+    table.setAccessibleName("Results")
+    table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+    table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+    table.setShowGrid(False)
+    table.setWordWrap(False)
+    table.verticalHeader().hide()
+    table.verticalHeader().setDefaultSectionSize(ROW_PX)
+    header = table.horizontalHeader()
+    header.setHighlightSections(False)
+    header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+    header.setStretchLastSection(True)
+    header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+    header.setResizeContentsPrecision(50)
+    table.activated.connect(lambda _: open_row())
+    return table
+
+
+def _text(name: str) -> QPlainTextEdit:
+    text = QPlainTextEdit()
+    text.setReadOnly(True)
+    text.setAccessibleName(name)
+    text.setTextInteractionFlags(
+        Qt.TextInteractionFlag.TextSelectableByMouse
+        | Qt.TextInteractionFlag.TextSelectableByKeyboard
+    )
+    return text
+
+
+def _show(widget: QPlainTextEdit, text: str) -> None:
+    """Show other words, without losing the place in the same."""
+    if text != widget.toPlainText():
+        widget.setPlainText(text)

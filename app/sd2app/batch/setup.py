@@ -1,0 +1,272 @@
+"""What a batch is to be: recordings, placements, steps, and where its results go."""
+
+from __future__ import annotations
+
+import glob
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+from PySide6.QtCore import QObject, Signal
+
+from sd2app.background.latest import LatestRunner
+from sd2app.settings import Settings
+from sd2app.stored_choices import StoredChoices
+from sd2core.batch.plan import BatchPlan, Denoise, Export, Fit, Recordings, Synthesise
+from sd2core.errors import Sd2Error
+from sd2core.files.paths import plain_path
+from sd2core.io.kinds import VIDEO_SUFFIXES, kind_of
+from sd2core.numerics.compiled import worker_count
+from sd2core.placements.placements import Placements
+
+OptionalStep = Literal["fit", "denoise", "export"]
+OPTIONAL_STEPS: tuple[OptionalStep, ...] = get_args(OptionalStep)
+Accuracy = Literal["exact", "tolerance"]
+ACCURACIES: tuple[Accuracy, ...] = get_args(Accuracy)
+FORMATS: tuple[Literal["zarr", "hdf5", "npz"], ...] = ("zarr", "hdf5", "npz")
+SUBJECTS: tuple[Literal["recording", "folder"], ...] = ("recording", "folder")
+
+_USABLE = ("recording", "video", "mesh")
+_DEFAULTS: dict[str, Any] = {
+    "fit": True,
+    "denoise": True,
+    "export": True,
+    "accuracy": "exact",
+    "model": "denoiser",
+    "format": "zarr",
+    "subjects": "recording",
+}
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A file, or all recordings in a folder.
+
+    Parameters
+    ----------
+    path : Path
+        The file or the folder.
+    patterns : tuple of str
+        What the plan names; none while it is looked at.
+    count : int or None
+        Files; None while it is looked at.
+    problem : str
+        Why it cannot be used.
+    """
+
+    path: Path
+    patterns: tuple[str, ...] = ()
+    count: int | None = None
+    problem: str = ""
+
+
+class BatchSetupModel(QObject):
+    """The choices, kept from one start to the next; placements are those of the day.
+
+    Parameters
+    ----------
+    settings : Settings
+    """
+
+    changed = Signal()
+
+    def __init__(self, settings: Settings, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._settings = settings
+        known = {"accuracy": ACCURACIES, "format": FORMATS, "subjects": SUBJECTS}
+        self._values = StoredChoices(settings, "batch", _DEFAULTS, known)
+        self._workers = min(
+            max(settings.stored("batch/workers", worker_count()), 1), most_workers()
+        )
+        self._entries = tuple(Entry(path) for path in settings.paths("batch/recordings"))
+        out = settings.stored("batch/out", "")
+        self._out = Path(out) if out else None
+        self._placements: Placements | None = None
+        self._placed = ""
+        self._runner = LatestRunner("batch files", self)
+        self._runner.finished.connect(self._take)
+        self._look()
+
+    # --- what is chosen -------------------------------------------------------------------
+
+    @property
+    def entries(self) -> tuple[Entry, ...]:
+        """What is worked on."""
+        return self._entries
+
+    @property
+    def placements(self) -> Placements | None:
+        """Where sensors are put; None: where each recording has its own."""
+        return self._placements
+
+    @property
+    def placed(self) -> str:
+        """Where the placements come from, in words."""
+        return self._placed
+
+    @property
+    def out(self) -> Path | None:
+        """Folder of the results; one beside the first recording until another is chosen."""
+        if self._out is not None:
+            return self._out
+        if not self._entries:
+            return None
+        first = self._entries[0].path
+        return first.parent / f"{first.stem} batch"
+
+    @property
+    def tolerance(self) -> float:
+        """Error that is allowed where a plan is chosen: that of the Trade panel."""
+        return self._settings.tolerance
+
+    @property
+    def workers(self) -> int:
+        """Processes that share the work."""
+        return self._workers
+
+    def value(self, name: str) -> Any:
+        """One of the other choices."""
+        return self._values[name]
+
+    def set_value(self, name: str, value: Any) -> None:
+        """Choose something.
+
+        Raises
+        ------
+        KeyError
+            When there is no such choice.
+        """
+        if self._values.set(name, value):
+            self.changed.emit()
+
+    def set_workers(self, workers: int) -> None:
+        """Share the work among so many processes."""
+        workers = min(max(int(workers), 1), most_workers())
+        if workers != self._workers:
+            self._workers = workers
+            self._settings.set_value("batch/workers", workers)
+            self.changed.emit()
+
+    def set_out(self, folder: Path) -> None:
+        """Put the results elsewhere."""
+        self._out = plain_path(folder)
+        self._settings.set_value("batch/out", str(self._out))
+        self.changed.emit()
+
+    def set_placements(self, placements: Placements | None, placed: str = "") -> None:
+        """Put sensors elsewhere; ``placed`` says where that is from."""
+        self._placements, self._placed = placements, placed
+        self.changed.emit()
+
+    def add(self, paths: Sequence[Path]) -> None:
+        """Work on these as well: recordings, videos, meshes, or folders of some."""
+        known = {entry.path for entry in self._entries}
+        new = [path for path in dict.fromkeys(map(plain_path, paths)) if path not in known]
+        if new:
+            self._entries += tuple(map(Entry, new))
+            self._keep()
+            self._look()
+
+    def remove(self, paths: Sequence[Path]) -> None:
+        """Do not work on these."""
+        self._entries = tuple(entry for entry in self._entries if entry.path not in paths)
+        self._keep()
+
+    def close(self) -> None:
+        """Stop looking."""
+        self._runner.close()
+
+    # --- what follows ---------------------------------------------------------------------
+
+    @property
+    def problem(self) -> str:
+        """Why there is no plan; empty when there is."""
+        if not self._entries:
+            return "Add recordings to work on."
+        bad = [entry.problem for entry in self._entries if entry.problem]
+        if bad:
+            return bad[0]
+        if any(entry.count is None for entry in self._entries):
+            return "Looking for recordings…"
+        return ""
+
+    @property
+    def files(self) -> int:
+        """How many recordings were found."""
+        return sum(entry.count or 0 for entry in self._entries)
+
+    def plan(self) -> BatchPlan:
+        """As the library takes it.
+
+        Raises
+        ------
+        Sd2Error
+            When something is missing.
+        """
+        if self.problem:
+            raise Sd2Error(self.problem)
+        assert self.out is not None
+        values = self._values
+        tolerance = self.tolerance if values["accuracy"] == "tolerance" else None
+        where = {"kind": "recording"} if self._placements is None else self._placements.as_dict()
+        return BatchPlan(
+            out=str(self.out),
+            recordings=Recordings(
+                files=tuple(pattern for entry in self._entries for pattern in entry.patterns),
+                subjects=values["subjects"],
+            ),
+            placements=where,
+            fit=Fit() if values["fit"] else None,
+            synthesise=Synthesise(tolerance=tolerance),
+            denoise=Denoise(model=values["model"]) if values["denoise"] else None,
+            export=Export(format=values["format"]) if values["export"] else None,
+        )
+
+    # --- looking --------------------------------------------------------------------------
+
+    def _keep(self) -> None:
+        self._settings.set_paths("batch/recordings", [entry.path for entry in self._entries])
+        self.changed.emit()
+
+    def _look(self) -> None:
+        paths = [entry.path for entry in self._entries if entry.count is None]
+        if paths:
+            self._runner.submit(lambda emit: {path: _looked_at(path) for path in paths})
+
+    def _take(self, found: dict[Path, Entry]) -> None:
+        self._entries = tuple(found.get(entry.path, entry) for entry in self._entries)
+        self.changed.emit()
+
+
+def most_workers() -> int:
+    """More processes than this only get into one another's way."""
+    return 2 * worker_count()
+
+
+def _looked_at(path: Path) -> Entry:
+    """In the background: what is there of a file or folder."""
+    try:
+        if path.is_dir() and (found := _in_folder(path)):
+            patterns, count = found
+            return Entry(path, patterns, count)
+        kind = kind_of(path)
+    except (Sd2Error, OSError) as error:
+        return Entry(path, problem=str(error))
+    if kind not in _USABLE:
+        return Entry(path, problem=f"{path} is a {kind}; add recordings, videos or meshes.")
+    return Entry(path, (str(path),), 1)
+
+
+def _in_folder(folder: Path) -> tuple[tuple[str, ...], int] | None:
+    """Patterns of the recordings in a folder, else of its videos; None where it is one itself."""
+    if (folder / "recording.json").is_file() or (folder / "zarr.json").is_file():
+        return None
+    for suffixes in ((".sd2",), sorted(VIDEO_SUFFIXES)):
+        counts = {one: sum(1 for _ in folder.rglob(f"*{one}")) for one in suffixes}
+        if any(counts.values()):
+            # Brackets in the folder's own name are no pattern.
+            below = f"{glob.escape(str(folder))}/**/*"
+            patterns = tuple(f"{below}{one}" for one, count in counts.items() if count)
+            return patterns, sum(counts.values())
+    return None

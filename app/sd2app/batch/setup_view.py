@@ -1,0 +1,302 @@
+"""A batch that is to be: what, from where, which steps, and what that would take."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Protocol
+
+from PySide6.QtCore import QSignalBlocker, QSize, Qt
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QCheckBox,
+    QFormLayout,
+    QHBoxLayout,
+    QListWidget,
+    QListWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from sd2app.accuracy.text import percent
+from sd2app.batch.model import BatchModel
+from sd2app.batch.setup import (
+    ACCURACIES,
+    FORMATS,
+    SUBJECTS,
+    Accuracy,
+    OptionalStep,
+    most_workers,
+)
+from sd2app.batch.text import entry_text, estimate_facts, estimate_headline, unusable_text
+from sd2app.widgets.elided import ElidedLabel
+from sd2app.widgets.fact_rows import FactRows
+from sd2app.widgets.inputs import Choice, NumberBox
+from sd2app.widgets.panel import outlined, rule, sentence, side_by_side, title
+
+_SUBJECT_TEXT = {
+    "recording": "each recording is somebody of its own",
+    "folder": "all in a folder are one person",
+}
+_ACCURACY_TEXT: dict[Accuracy, str] = {
+    "exact": "as exactly as possible",
+    "tolerance": "within the tolerance of the Trade panel, {percent}, which takes time to plan",
+}
+_STEP_TEXT: dict[OptionalStep, tuple[str, str]] = {
+    "fit": ("Fit bodies", "To the person in videos that have no mesh"),
+    "denoise": ("Denoise with", "What a radar would show in place of every synthetic map"),
+    "export": ("Export as", "Segments of all maps with their labels, to learn from"),
+}
+_FORMAT_TEXT = {"zarr": "Zarr", "hdf5": "HDF5", "npz": "NPZ"}
+_MOST_FACTS = 8
+
+
+class Asks(Protocol):
+    """What the view leaves to dialogs."""
+
+    def add_files(self) -> None:
+        """Let the user choose recordings, videos or meshes."""
+
+    def add_folder(self) -> None:
+        """Let the user choose a folder of some."""
+
+    def choose_placements(self, index: int) -> None:
+        """Put sensors where one of :meth:`placement_choices` says; it may ask for a file."""
+
+    def placement_choices(self) -> Sequence[str]:
+        """Where sensors may be put, in words."""
+
+    def placement_index(self) -> int:
+        """Which of them holds."""
+
+    def model_names(self) -> Sequence[str]:
+        """Models that are installed."""
+
+    def choose_out(self) -> None:
+        """Let the user choose the folder of the results."""
+
+    def save_plan(self) -> None:
+        """Let the user choose a file for the plan."""
+
+    def start(self) -> None:
+        """Begin as it is set up."""
+
+
+class BatchSetupView(QWidget):
+    """A view of :class:`BatchSetupModel` and of its estimate."""
+
+    def __init__(self, batch: BatchModel, asks: Asks, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._batch, self._setup, self._asks = batch, batch.setup, asks
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(8)
+        self._add_recordings(layout)
+        layout.addLayout(self._form())
+        layout.addWidget(rule())
+        self._add_estimate(layout)
+        layout.addStretch(1)
+        layout.addLayout(self._buttons())
+        batch.changed.connect(self.refresh)
+        self.refresh()
+
+    # --- building -------------------------------------------------------------------------
+
+    def _add_recordings(self, layout: QVBoxLayout) -> None:
+        asks = self._asks
+        add = outlined("Add files…", "Recordings, videos or meshes", asks.add_files, self)
+        folder = outlined("Add folder…", "All recordings below a folder", asks.add_folder, self)
+        self._remove = outlined("Remove", "Do not work on what is selected", self._drop, self)
+        head = QHBoxLayout()
+        head.setSpacing(6)
+        head.addWidget(title("Recordings"), 1)
+        for button in (add, folder, self._remove):
+            head.addWidget(button)
+        layout.addLayout(head)
+        self._list = _Paths(self._drop, self)
+        self._list.itemSelectionChanged.connect(self._follow_selection)
+        layout.addWidget(self._list, 1)
+
+    def _form(self) -> QFormLayout:
+        form = QFormLayout()
+        form.setHorizontalSpacing(16)
+        form.setVerticalSpacing(6)
+        form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+        self._subjects = self._choice("subjects", "Who is who", SUBJECTS, _SUBJECT_TEXT)
+        form.addRow("People", self._subjects)
+        self._placements = Choice("Where sensors are put", self)
+        self._placements.activated.connect(self._asks.choose_placements)
+        form.addRow("Sensors", self._placements)
+        self._steps: dict[OptionalStep, QCheckBox] = {}
+        for step, (text, tip) in _STEP_TEXT.items():
+            box = QCheckBox(text, self)
+            box.setToolTip(tip)
+            box.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+            box.toggled.connect(lambda on, step=step: self._setup.set_value(step, on))
+            self._steps[step] = box
+        self._accuracy = self._choice("accuracy", "How exactly", ACCURACIES, _ACCURACY_TEXT)
+        self._model = Choice("Model to denoise with", self)
+        self._model.currentTextChanged.connect(
+            lambda name: name and self._setup.set_value("model", name)
+        )
+        self._format = self._choice("format", "Format of the data set", FORMATS, _FORMAT_TEXT)
+        form.addRow("Videos", self._steps["fit"])
+        form.addRow("Synthesise", self._accuracy)
+        form.addRow("Then", side_by_side(self._steps["denoise"], self._model))
+        form.addRow("", side_by_side(self._steps["export"], self._format))
+        self._out = ElidedLabel(self)
+        choose = outlined("Choose…", "Put the results elsewhere", self._asks.choose_out, self)
+        row = QHBoxLayout()
+        row.setSpacing(8)
+        row.addWidget(self._out, 1)
+        row.addWidget(choose)
+        form.addRow("Results in", row)
+        self._workers = NumberBox(
+            1, most_workers(), "", "Processes that share the work", decimals=0, step=1.0
+        )
+        self._workers.valueChanged.connect(lambda value: self._setup.set_workers(int(value)))
+        form.addRow("Workers", side_by_side(self._workers))
+        return form
+
+    def _choice(
+        self,
+        name: str,
+        tip: str,
+        values: Sequence[str],
+        texts: dict[str, str] | dict[Accuracy, str],
+    ) -> Choice:
+        choice = Choice(tip, self)
+        for value in values:
+            choice.addItem(texts[value], value)  # type: ignore[index]
+        choice.currentIndexChanged.connect(lambda index: self._setup.set_value(name, values[index]))
+        return choice
+
+    def _add_estimate(self, layout: QVBoxLayout) -> None:
+        self._total = title("")
+        self._total.setWordWrap(True)
+        self._total.setAccessibleName("What the batch would take")
+        self._facts = FactRows(_MOST_FACTS, at_the_edge=False, parent=self)
+        self._problem = sentence("")
+        for widget in (self._total, self._facts, self._problem):
+            layout.addWidget(widget)
+
+    def _buttons(self) -> QHBoxLayout:
+        asks = self._asks
+        self._save = outlined("Save plan…", "As a file for sd2 batch", asks.save_plan, self)
+        self._start = outlined("Start", "In processes beside the window", asks.start, self)
+        self._start.setObjectName("primary")
+        row = QHBoxLayout()
+        row.setSpacing(6)
+        row.addStretch(1)
+        row.addWidget(self._save)
+        row.addWidget(self._start)
+        return row
+
+    # --- showing --------------------------------------------------------------------------
+
+    def refresh(self) -> None:
+        """Follow the models, and what of the open recording may be chosen."""
+        if self._batch.batch is not None:
+            return
+        setup = self._setup
+        self._list.show_entries([(e.path, entry_text(e), bool(e.problem)) for e in setup.entries])
+        self._follow_selection()
+        for name, choice, values in (
+            ("subjects", self._subjects, SUBJECTS),
+            ("accuracy", self._accuracy, ACCURACIES),
+            ("format", self._format, FORMATS),
+        ):
+            with QSignalBlocker(choice):
+                if values is ACCURACIES:
+                    allowed = percent(setup.tolerance)
+                    choice.setItemText(1, _ACCURACY_TEXT["tolerance"].format(percent=allowed))
+                choice.setCurrentIndex(list(values).index(setup.value(name)))
+        _fill(self._placements, self._asks.placement_choices(), self._asks.placement_index())
+        names = list(dict.fromkeys([*self._asks.model_names(), setup.value("model")]))
+        _fill(self._model, names, names.index(setup.value("model")))
+        for step, box in self._steps.items():
+            with QSignalBlocker(box):
+                box.setChecked(setup.value(step))
+        self._model.setEnabled(setup.value("denoise"))
+        self._format.setEnabled(setup.value("export"))
+        self._out.setText(str(setup.out or "–"))
+        self._workers.show_value(setup.workers)
+        self._show_estimate()
+
+    def _show_estimate(self) -> None:
+        batch, estimate = self._batch, self._batch.estimate
+        why_not = batch.why_not_start
+        facts = None if why_not else estimate.facts
+        self._total.setVisible(facts is not None)
+        self._total.setText(estimate_headline(facts) if facts is not None else "")
+        self._facts.show_facts(() if facts is None else estimate_facts(facts)[:_MOST_FACTS])
+        text = why_not if facts is None else unusable_text(facts)
+        bad = facts is not None or why_not == estimate.problem
+        bad |= any(entry.problem for entry in self._setup.entries)
+        role = "warning" if bad else "muted"
+        if self._problem.objectName() != role:
+            self._problem.setObjectName(role)
+            self._problem.style().unpolish(self._problem)
+            self._problem.style().polish(self._problem)
+        self._problem.setText(text)
+        self._problem.setVisible(bool(text))
+        self._start.setEnabled(not why_not)
+        self._save.setEnabled(not self._setup.problem)
+
+    def _follow_selection(self) -> None:
+        self._remove.setEnabled(bool(self._list.selectedItems()))
+
+    def _drop(self) -> None:
+        self._setup.remove(self._list.chosen)
+
+
+class _Paths(QListWidget):
+    """Files and folders; Delete removes what is selected."""
+
+    def __init__(self, drop: Callable[[], None], parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._drop = drop
+        self._shown: list[tuple[Path, str, bool]] = []
+        self.setAccessibleName("Recordings to work on")
+        self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
+        self.setTextElideMode(Qt.TextElideMode.ElideMiddle)
+
+    @property
+    def chosen(self) -> list[Path]:
+        """What is selected."""
+        return [self._shown[self.row(item)][0] for item in self.selectedItems()]
+
+    def show_entries(self, entries: list[tuple[Path, str, bool]]) -> None:
+        """Paths, what is said of each, and whether that is a problem."""
+        if entries == self._shown:
+            return
+        self._shown = entries
+        self.clear()
+        for path, words, _ in entries:
+            item = QListWidgetItem(f"{path.name} · {words}" if words else path.name)
+            item.setToolTip(f"{path}\n{words}".rstrip())
+            self.addItem(item)
+
+    def sizeHint(self) -> QSize:
+        """A few lines."""
+        return QSize(400, 96)
+
+    def minimumSizeHint(self) -> QSize:
+        """Two lines."""
+        return QSize(200, 52)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Delete."""
+        if event.key() in (Qt.Key.Key_Delete, Qt.Key.Key_Backspace):
+            self._drop()
+        else:
+            super().keyPressEvent(event)
+
+
+def _fill(choice: Choice, texts: Sequence[str], index: int) -> None:
+    with QSignalBlocker(choice):
+        if list(texts) != [choice.itemText(number) for number in range(choice.count())]:
+            choice.clear()
+            choice.addItems(list(texts))
+        choice.setCurrentIndex(index)

@@ -1,0 +1,1 @@
+"""Gesture classifiers in the window: use, training, comparison."""

@@ -1,0 +1,147 @@
+"""Labelled data that was chosen for a classifier: what it holds, and who does what in training."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from sd2app.training.text import duration_text
+from sd2core.datasets.labelled import (
+    LabelledFacts,
+    LabelledSource,
+    labelled_facts,
+    people_of,
+    unfolded,
+)
+from sd2core.errors import Sd2Error
+from sd2core.train.data import Split, split_subjects
+
+
+@dataclass(frozen=True)
+class DataSource:
+    """Something labelled that was chosen.
+
+    Parameters
+    ----------
+    path : Path
+    person : str
+        Who it is of; empty where nobody was named.
+    facts : tuple of LabelledFacts
+        Of it, or of all that a folder holds; none until it has been looked into.
+    problem : str
+        Why it cannot be used.
+    """
+
+    path: Path
+    person: str = ""
+    facts: tuple[LabelledFacts, ...] = ()
+    problem: str = ""
+
+    @property
+    def nameable(self) -> bool:
+        """Whether the user can say who it is of: pairs and data sets say it themselves."""
+        return any(one.kind in ("recording", "radar file") for one in self.facts)
+
+    @property
+    def people(self) -> tuple[str, ...]:
+        """Who is in it."""
+        return people_of(self.facts)
+
+    @property
+    def text(self) -> str:
+        """What it holds; an ellipsis while that is not known."""
+        if not self.facts:
+            return "…"
+        parts = [_what(self.facts)]
+        people = len(self.people)
+        if not self.nameable or people > 1:
+            parts.append(f"{people} {'person' if people == 1 else 'people'}")
+        spans = sum(one.spans for one in self.facts)
+        if spans:
+            parts.append(f"{spans:,} label{'s' * (spans != 1)}")
+        known_s = [one.duration_s for one in self.facts if one.duration_s is not None]
+        if len(known_s) == len(self.facts):
+            parts.append(duration_text(sum(known_s)))
+        placements = max(one.placements for one in self.facts)
+        if placements > 1:
+            parts.append(f"{placements} placements")
+        maps = [name for name in ("synthetic", "denoised", "radar") if self.has(name)]
+        if len(maps) < 3:
+            parts.append(f"{' and '.join(maps) or 'no'} maps")
+        return " · ".join(parts)
+
+    def has(self, name: str) -> bool:
+        """Whether all of it has maps of a kind, or can be given them."""
+        return all(name in one.maps for one in self.facts)
+
+
+def looked_into(path: Path, person: str) -> DataSource:
+    """What something holds; may wait for the disk."""
+    try:
+        sources = unfolded([LabelledSource(path, person)])
+        facts = tuple(labelled_facts(one) for one in sources)
+        of_itself = [one.path for one in facts if one.kind in ("pairs", "data set")]
+        # A name that was given before is no reason to refuse them.
+        return DataSource(path, "" if len(of_itself) == len(facts) else person, facts)
+    except (Sd2Error, OSError) as error:
+        return DataSource(path, person, problem=str(error))
+
+
+def division_of(data: Sequence[DataSource]) -> Split | None:
+    """Who is learnt from, who chooses the best moment, who is kept out; None where nobody is.
+
+    As ``sd2 classify train`` has it: data sets say it themselves, where there is nothing else.
+
+    Raises
+    ------
+    Sd2Error
+        When data sets contradict each other.
+    """
+    facts = [one for source in data for one in source.facts]
+    people = people_of(facts)
+    if not people:
+        return None
+    validation: list[str] = []
+    test: list[str] = []
+    if all(one.kind == "data set" for one in facts):
+        for one in facts:
+            validation += one.splits.get("validation", ())
+            test += one.splits.get("test", ())
+    return split_subjects(people, validation or None, test or None)
+
+
+def why_not_together(data: Sequence[DataSource], maps: Sequence[str] = ()) -> str:
+    """Why these cannot be learnt from together, with these maps of each; empty when they can."""
+    for source in data:
+        for name in maps:
+            if not source.has(name):
+                return f"{source.path.name} has no {name} maps: choose others, or leave it out."
+    grids = {one.grid for source in data for one in source.facts if one.grid is not None}
+    if len(grids) > 1:
+        return (
+            "These differ in their velocity axis or frame rate: "
+            + "; ".join(
+                f"{grid.bins} bins up to ±{grid.v_max_mps:g} m/s at {grid.frame_rate_hz:.4g}"
+                " frames/s"
+                for grid in sorted(grids)
+            )
+            + ". Choose data of one kind."
+        )
+    try:
+        division_of(data)
+    except Sd2Error as error:
+        return str(error)
+    return ""
+
+
+def _what(facts: Sequence[LabelledFacts]) -> str:
+    """Such as ``simulated pairs``, or ``3 recordings``."""
+    kinds = {one.kind for one in facts}
+    if len(facts) > 1:
+        words = {"recording": "recordings", "radar file": "radar files", "data set": "data sets"}
+        kind = next(iter(kinds)) if len(kinds) == 1 else ""
+        what = f"{len(facts)} {words.get(kind, 'recordings and radar files')}"
+    else:
+        what = facts[0].kind
+    return f"{what} (simulated)" if any(one.simulated for one in facts) else what

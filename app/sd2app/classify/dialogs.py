@@ -1,0 +1,147 @@
+"""What classifiers ask: files, data to learn from, whether to delete; and what they show."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from PySide6.QtWidgets import QApplication, QFileDialog, QWidget
+
+from sd2app.classify.result import read_result
+from sd2app.classify.result_dialog import ClassResultDialog
+from sd2app.classify.text import classifier_page
+from sd2app.denoise.card_dialog import ModelCardDialog
+from sd2app.session.content import UNTITLED
+from sd2app.widgets.confirm import may_delete
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    from sd2app.classify.training import ClassTraining
+    from sd2app.shell.wiring import Context
+
+_FILES = "Classifiers (*.safetensors)"
+_DATA = "Data sets and labelled radar files (*.h5 *.hdf5 *.npz)"
+_RESULTS = "Results (*.json)"
+
+
+class ClassifyDialogs:
+    """Asks, then calls the models; a failure is handed to ``report`` as a sentence."""
+
+    def __init__(self, parent: QWidget, context: Context, report: Callable[[str], None]) -> None:
+        self._parent = parent
+        self._context = context
+        self._report = report
+
+    def open_classifier(self) -> None:
+        """Choose a file, and use it."""
+        start = str(self._context.classify.path or "")
+        name, _ = QFileDialog.getOpenFileName(self._parent, "Open classifier file", start, _FILES)
+        if name:
+            self.use(Path(name))
+
+    def use(self, path: Path | None) -> None:
+        """Classify with a file, or not at all."""
+        self._attempt(lambda: self._context.classify.use(path))
+
+    def show_card(self) -> None:
+        """What the classifier in use says about itself."""
+        card = self._context.classify.card
+        if card is not None:
+            ModelCardDialog(classifier_page(card), self._parent).exec()
+
+    def take_dropped(self, path: Path) -> bool:
+        """Use a file that was dropped; False where it is no classifier."""
+        try:
+            self._context.classify.describe(path)
+        except Sd2Error:
+            return False
+        self.use(path)
+        return True
+
+    # --- the panel ------------------------------------------------------------------------
+
+    def add_folder(self) -> None:
+        """Let the user choose a folder with labelled data."""
+        name = QFileDialog.getExistingDirectory(
+            self._parent, "A campaign, a data set, a recording, or a folder of recordings"
+        )
+        if name:
+            self._training.setup.add(Path(name))
+
+    def add_file(self) -> None:
+        """Let the user choose a data set or a labelled radar file."""
+        name, _ = QFileDialog.getOpenFileName(
+            self._parent, "Data set or labelled radar file", "", _DATA
+        )
+        if name:
+            self._training.setup.add(Path(name))
+
+    def add_this(self) -> None:
+        """Learn from the recording that is open."""
+        recording = self._context.document.recording
+        if recording is not None and self.has_this():
+            self._training.setup.add(recording.folder)
+
+    def has_this(self) -> bool:
+        """Whether it can be learnt from: it is on disk."""
+        content = self._context.document.content
+        return content is not None and content.recording.folder != UNTITLED
+
+    def train(self) -> None:
+        """Begin to train."""
+        self._attempt(self._training.train)
+
+    def compare(self) -> None:
+        """Begin to compare."""
+        self._attempt(self._training.compare)
+
+    def again(self) -> None:
+        """Go on with the comparison in view."""
+        self._attempt(self._training.again)
+
+    def copy_command(self) -> None:
+        """Put the command on the clipboard."""
+        QApplication.clipboard().setText(self._training.command)
+
+    def use_model(self) -> None:
+        """Use the model of the run in view."""
+        self._attempt(self._training.use_model)
+
+    def show_result(self) -> None:
+        """Show what came of the comparison in view."""
+        run = self._training.run
+        if run is not None and run.result is not None:
+            self._show(run.result)
+
+    def open_result(self) -> None:
+        """Let the user choose a result, and show it."""
+        name, _ = QFileDialog.getOpenFileName(self._parent, "Open a result", "", _RESULTS)
+        if name:
+            self._show(Path(name))
+
+    def delete(self) -> None:
+        """Ask, then delete the run in view."""
+        run = self._training.run
+        if run is None:
+            return
+        what = (
+            f"{run.folder.path.name} is deleted with what it made. A classifier that was put to"
+            " use stays among your classifiers."
+        )
+        if may_delete(self._parent, "Delete this run?", what):
+            self._training.delete()
+
+    def _show(self, path: Path) -> None:
+        display = self._context.display
+        self._attempt(lambda: ClassResultDialog(read_result(path), display, self._parent).show())
+
+    @property
+    def _training(self) -> ClassTraining:
+        return self._context.class_training
+
+    def _attempt(self, work: Callable[[], object]) -> None:
+        try:
+            work()
+        except (Sd2Error, OSError) as error:
+            self._report(str(error))

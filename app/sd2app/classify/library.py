@@ -1,0 +1,80 @@
+"""Classifiers as the window asks for them; a test puts its own here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.doppler_map import DopplerMap
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    from sd2app.background.model_worker.client import DenoiseProcess
+    from sd2core.classify.card import ClassifierCard
+
+
+class LiveClasses(Protocol):
+    """Frames in, probabilities out, as late as the classifier's card says."""
+
+    def advance(self, energies: NDArray[np.float32]) -> NDArray[np.float32]:
+        """What became known by the next frames: (frames, bins) → (answers, classes)."""
+
+    def finish(self) -> NDArray[np.float32]:
+        """Answers that are owed, if nothing moves from now on; it goes on all the same."""
+
+
+class Classifier(Protocol):
+    """A classifier that is loaded; its methods take a while."""
+
+    def probabilities(self, doppler: DopplerMap) -> NDArray[np.float32]:
+        """What every frame of a map shows, (frames, classes)."""
+
+    def live(self) -> LiveClasses:
+        """For frames of one stretch, all with a person, as they come."""
+
+
+@dataclass(frozen=True)
+class ClassifierLibrary:
+    """What the models ask of :mod:`sd2core.classify`.
+
+    Parameters
+    ----------
+    available : callable
+        Cards of the user's classifiers.
+    describe : callable
+        Card of a file.
+    load : callable
+        Loads a file; takes seconds the first time.
+    """
+
+    available: Callable[[], Sequence[ClassifierCard]]
+    describe: Callable[[Path], ClassifierCard]
+    load: Callable[[Path], Classifier]
+
+
+def user_classifiers_folder() -> Path:
+    """Where the user's classifiers are kept; it need not be there yet."""
+    from sd2core.denoise.files import user_models_folder
+
+    return user_models_folder().parent / "classifiers"
+
+
+def core_classifiers(process: DenoiseProcess) -> ClassifierLibrary:
+    """The library's own: cards are read here, classifiers work where the denoisers do."""
+    from sd2core.classify.files import describe_classifier
+
+    def available() -> Sequence[ClassifierCard]:
+        cards = []
+        for path in sorted(user_classifiers_folder().glob("*.safetensors")):
+            try:
+                cards.append(describe_classifier(path))
+            except (Sd2Error, OSError):
+                continue  # damaged: the others are still of use
+        return cards
+
+    return ClassifierLibrary(available, describe_classifier, process.load_classifier)

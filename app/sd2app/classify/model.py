@@ -1,0 +1,255 @@
+"""The classifier in use, the map that it looks at, and what it makes of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from sd2app.background.latest import LatestRunner
+from sd2app.classify.library import Classifier, ClassifierLibrary
+from sd2app.classify.track import ClassReading, ClassTrack
+from sd2app.denoise.validity import Standing
+from sd2app.labels.model import LabelsModel
+from sd2app.session.playback import PlaybackModel
+from sd2app.session.tracks import TrackModel
+from sd2app.settings import Settings
+
+if TYPE_CHECKING:
+    from sd2core.classify.card import ClassifierCard
+
+_PATIENCE_MS = 1500
+"""The classifier of the last time is loaded so long after there is a map: others go first."""
+
+_MODEL, _SHOWN = "classify/model", "classify/shown"
+
+
+class _Loaded(NamedTuple):
+    card: ClassifierCard
+    classifier: Classifier
+
+
+class ClassifyModel(QObject):
+    """A classifier is the user's choice, for all recordings, and remembered.
+
+    Parameters
+    ----------
+    maps : sequence of TrackModel
+        Synthetic, denoised, and the radar's.
+
+    Signals
+    -------
+    changed
+        The classifier, the map that is looked at, whether it is shown.
+    moved
+        What it makes of the frames, or the frame on screen.
+    counts_changed
+        Whether what it makes of them counts: the sensor has moved, or the map has followed.
+    failed : str
+        A sentence for the user.
+    """
+
+    changed = Signal()
+    moved = Signal()
+    counts_changed = Signal()
+    failed = Signal(str)
+
+    def __init__(
+        self,
+        maps: Sequence[TrackModel],
+        playback: PlaybackModel,
+        standing: Standing,
+        labels: LabelsModel,
+        settings: Settings,
+        library: ClassifierLibrary,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._synthetic, self._denoised, self._real = self._maps = tuple(maps)
+        self._playback, self._labels = playback, labels
+        self._settings, self._library = settings, library
+        self.track = ClassTrack(standing.of, self)
+        self._path: Path | None = next(iter(settings.paths(_MODEL)), None)
+        self._card: ClassifierCard | None = None
+        self._problem = ""
+        self._shown = settings.flag(_SHOWN, True)
+        self._chosen: TrackModel | None = None
+        self._runner = LatestRunner("classifier", self)
+        self._runner.finished.connect(self._set_loaded)
+        self._runner.failed.connect(self._fail)
+        self._patience = QTimer(self)
+        self._patience.setSingleShot(True)
+        self._patience.setInterval(_PATIENCE_MS)
+        self._patience.timeout.connect(self._load)
+        self.track.changed.connect(self.moved)
+        for track in self._maps:
+            track.changed.connect(self._follow)
+        playback.frame_changed.connect(lambda _: self.moved.emit())
+        standing.changed.connect(self.counts_changed)
+        self.counts_changed.connect(self.moved)
+
+    # --- what is known --------------------------------------------------------------------
+
+    @property
+    def path(self) -> Path | None:
+        """File of the classifier that is in use or being loaded."""
+        return self._path
+
+    @property
+    def card(self) -> ClassifierCard | None:
+        """Of the classifier in use."""
+        return self._card
+
+    @property
+    def loading(self) -> bool:
+        """Whether it is being loaded."""
+        return self._runner.busy
+
+    @property
+    def busy(self) -> bool:
+        """Whether it is being loaded, about to be, or at work."""
+        return self._runner.busy or self._patience.isActive() or self.track.busy
+
+    @property
+    def problem(self) -> str:
+        """Why nothing is classified; empty where something is, or nothing was asked for."""
+        return self._problem or self.track.problem
+
+    @property
+    def sources(self) -> tuple[TrackModel, ...]:
+        """Maps that can be looked at."""
+        return tuple(track for track in self._maps if track.map is not None)
+
+    @property
+    def source(self) -> TrackModel | None:
+        """The map that is looked at: the one chosen, else one of a kind that was learnt from."""
+        there = self.sources
+        if self._chosen in there:
+            return self._chosen
+        # The denoised one first: it follows the sensor and looks like a radar's.
+        ordered = [one for one in (self._denoised, self._real, self._synthetic) if one in there]
+        known = [one for one in ordered if self._knows(one)]
+        return next(iter(known or ordered), None)
+
+    @property
+    def knows_source(self) -> bool:
+        """Whether the map that is looked at is of a kind that was learnt from."""
+        return self.source is not None and self._knows(self.source)
+
+    @property
+    def shown(self) -> bool:
+        """Whether the probabilities are to be shown under the maps."""
+        return self._shown
+
+    @property
+    def visible(self) -> bool:
+        """Whether there is something to show, and it is to be shown."""
+        return self._shown and self._path is not None and self.source is not None
+
+    @property
+    def reading(self) -> ClassReading | None:
+        """What the frame on screen shows; None where that is not known."""
+        return self.track.at(self._playback.time_s)
+
+    def available(self) -> Sequence[ClassifierCard]:
+        """The user's classifiers, and the one in use."""
+        cards = list(self._library.available())
+        if self._card is not None and self._card.path not in {card.path for card in cards}:
+            cards.append(self._card)
+        return cards
+
+    def label_of(self, name: str) -> str:
+        """What a span of a class is called: the label of that class where there is just one."""
+        offered = self._labels.labels.label_set
+        labels = offered.of_class(name)
+        if offered.find(name) is None and len(labels) == 1:
+            return labels[0].name
+        return name
+
+    def describe(self, path: Path) -> ClassifierCard:
+        """Card of a file; raises where it is no classifier."""
+        return self._library.describe(path)
+
+    # --- requests -------------------------------------------------------------------------
+
+    def use(self, path: Path | None) -> None:
+        """Classify with a file, or not at all.
+
+        Raises
+        ------
+        Sd2Error
+            When the file is no classifier.
+        """
+        card = self.describe(path) if path is not None else None
+        self._path = None if path is None else Path(path).absolute()
+        self._settings.set_paths(_MODEL, [self._path] if self._path is not None else [])
+        self._set_card(card)
+        self.track.use(None, None)
+        if path is not None:
+            self.set_shown(True)
+        self._load()
+        self._follow()
+        self.changed.emit()
+
+    def set_source(self, source: TrackModel | None) -> None:
+        """Look at another map; None leaves it to the classifier."""
+        self._chosen = source
+        self._follow()
+        self.changed.emit()
+
+    def set_shown(self, shown: bool) -> None:
+        """Show the probabilities under the maps, or not."""
+        if shown != self._shown:
+            self._shown = shown
+            self._settings.set_value(_SHOWN, shown)
+            self.changed.emit()
+
+    def close(self) -> None:
+        """Stop."""
+        self._patience.stop()
+        self._runner.close()
+        self.track.close()
+
+    # --- following ------------------------------------------------------------------------
+
+    def _knows(self, track: TrackModel) -> bool:
+        kinds = {track.map.kind} if track.map is not None else set()
+        if track is self._real:
+            kinds |= {"simulated", "real"}
+        return self._card is not None and bool(kinds & set(self._card.trained_on))
+
+    def _follow(self) -> None:
+        source = self.source
+        if source is not self.track.source:
+            self.track.look_at(source)
+            self.changed.emit()
+        waiting = self._path is not None and self.track.card is None and not self._problem
+        about_to = self._runner.busy or self._patience.isActive()
+        if waiting and source is not None and not about_to:
+            self._patience.start()
+
+    def _load(self) -> None:
+        self._patience.stop()
+        self._runner.cancel()
+        self._problem = ""
+        path, library = self._path, self._library
+        if path is not None and self.source is not None:
+            self._runner.submit(lambda emit: _Loaded(library.describe(path), library.load(path)))
+        self.changed.emit()
+
+    def _set_card(self, card: ClassifierCard | None) -> None:
+        self._card = card
+        self.track.look_at(self.source)
+
+    def _set_loaded(self, loaded: _Loaded) -> None:
+        self._set_card(loaded.card)
+        self.track.use(loaded.classifier, loaded.card)
+        self.changed.emit()
+
+    def _fail(self, error: Exception) -> None:
+        self._problem = str(error)
+        self._card = None
+        self.failed.emit(str(error))
+        self.changed.emit()

@@ -1,0 +1,207 @@
+"""What a classifier is to learn: from which data and maps, with which network, for how long."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtCore import QObject, Signal
+
+from sd2app.background.latest import LatestRunner
+from sd2app.background.step_times import StepKey
+from sd2app.classify.data import DataSource, division_of, looked_into, why_not_together
+from sd2app.settings import Settings
+from sd2app.stored_choices import StoredChoices
+from sd2core.classify.defaults import DELAY_S, LONGEST_DELAY_S, MODELS, WIDTH
+from sd2core.files.paths import plain_path
+from sd2core.train.data import Split
+
+MAPS = ("radar", "synthetic", "denoised")
+FEATURES = ("columns", "peak")
+_DEFAULTS: dict[str, Any] = {
+    "model": "lstm",
+    "features": "columns",
+    "width": WIDTH,
+    "delay_s": DELAY_S,
+    "maps": "radar",
+    "steps": 300,
+    "seed": 0,
+    "quick": "yes",
+}
+"""Those of ``sd2 classify train``; ``quick`` is of a comparison."""
+_DATA, _PEOPLE = "classify/train/data", "classify/train/people"
+_CHOICES = {"model": MODELS, "features": FEATURES, "quick": ("yes", "no")}
+
+
+class ClassSetup(QObject):
+    """The choices, kept from one start to the next."""
+
+    changed = Signal()
+
+    def __init__(self, settings: Settings, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._settings = settings
+        self._values = StoredChoices(settings, "classify/train", _DEFAULTS, _CHOICES)
+        if not 0 <= self._values["delay_s"] <= LONGEST_DELAY_S:
+            self._values.set("delay_s", DELAY_S)
+        people = _people(settings.stored(_PEOPLE, "{}"))
+        self._data = tuple(
+            DataSource(path, people.get(str(path), "")) for path in settings.paths(_DATA)
+        )
+        self._runner = LatestRunner("labelled data", self)
+        self._runner.finished.connect(self._take)
+        self.refresh()
+
+    # --- what is chosen -------------------------------------------------------------------
+
+    @property
+    def data(self) -> tuple[DataSource, ...]:
+        """What is learnt from."""
+        return self._data
+
+    @property
+    def maps(self) -> tuple[str, ...]:
+        """Which maps of it."""
+        chosen = str(self._values["maps"]).split(",")
+        return tuple(name for name in MAPS if name in chosen)
+
+    def value(self, name: str) -> Any:
+        """One of the settings."""
+        return self._values[name]
+
+    def set_value(self, name: str, value: Any) -> None:
+        """Choose a setting.
+
+        Raises
+        ------
+        KeyError
+            When there is no such setting.
+        """
+        if self._values.set(name, value):
+            self.changed.emit()
+
+    def set_map(self, name: str, wanted: bool) -> None:
+        """Learn from one kind of maps, or do not."""
+        chosen = {*self.maps, name} if wanted else set(self.maps) - {name}
+        self.set_value("maps", ",".join(one for one in MAPS if one in chosen))
+
+    def add(self, path: Path) -> None:
+        """Learn from this as well."""
+        path = plain_path(path)
+        if path.name in ("zarr.json", "recording.json"):
+            path = path.parent
+        if path not in [one.path for one in self._data]:
+            self._keep((*self._data, DataSource(path)))
+            self.refresh()
+
+    def remove(self, path: Path) -> None:
+        """Do not learn from this."""
+        self._keep(tuple(one for one in self._data if one.path != path))
+        self.refresh()
+
+    def name_person(self, path: Path, name: str) -> None:
+        """Say who the recordings or radar files of a source are of; empty: as they say it."""
+        # The command takes a person as PERSON=PATH.
+        name = name.translate(str.maketrans("=/", "--")).strip()
+        known = {one.path: one.person for one in self._data}
+        if known.get(path, name) != name:
+            named = DataSource(path, name)
+            self._keep(tuple(named if one.path == path else one for one in self._data))
+            self.refresh()
+
+    def refresh(self) -> None:
+        """Look into the data again."""
+        chosen = [(one.path, one.person) for one in self._data]
+        if chosen:
+            self._runner.submit(lambda emit: tuple(looked_into(*one) for one in chosen))
+
+    def close(self) -> None:
+        """Stop reading."""
+        self._runner.close()
+
+    def _keep(self, data: tuple[DataSource, ...]) -> None:
+        self._runner.cancel()
+        self._data = data
+        self._settings.set_paths(_DATA, [one.path for one in data])
+        people = {str(one.path): one.person for one in data if one.person}
+        self._settings.set_value(_PEOPLE, json.dumps(people))
+        self.changed.emit()
+
+    def _take(self, data: tuple[DataSource, ...]) -> None:
+        self._data = data
+        self.changed.emit()
+
+    # --- what follows ---------------------------------------------------------------------
+
+    @property
+    def problem(self) -> str:
+        """Why nothing can be started; empty when it can."""
+        if not self._data:
+            return "Add labelled data to learn from."
+        problems = [one.problem for one in self._data if one.problem]
+        if problems:
+            return problems[0]
+        if any(not one.facts for one in self._data):
+            return "Reading the data…"
+        return why_not_together(self._data)
+
+    @property
+    def train_problem(self) -> str:
+        """Why no classifier can be trained; empty when one can."""
+        if self.problem:
+            return self.problem
+        if not self.maps:
+            return "Choose maps to learn from."
+        return why_not_together(self._data, self.maps)
+
+    @property
+    def division(self) -> Split | None:
+        """Who does what in a training; None until the data is known and fits together."""
+        return None if self.problem else division_of(self._data)
+
+    @property
+    def step_key(self) -> StepKey:
+        """What the time of a step depends on."""
+        values = self._values
+        return StepKey.of_classifier(values["model"], values["features"], values["width"])
+
+    def train_arguments(self, out: Path) -> list[str]:
+        """``sd2 classify train`` with what is not as it is by default."""
+        values = self._values
+        # Network and steps are named even where they are the default: one looks for them.
+        words = ["classify", "train", *self._sources]
+        words += ["--model", values["model"], "--steps", f"{values['steps']}"]
+        words += self._others("features", "width", "delay_s", "maps", "seed")
+        return [*words, "--out", str(out)]
+
+    def table_arguments(self, out: Path) -> list[str]:
+        """``sd2 classify table`` with the network that is chosen."""
+        values = self._values
+        words = ["classify", "table", *self._sources, "--steps", f"{values['steps']}"]
+        words += self._others("model", "features", "width", "delay_s")
+        if values["quick"] == "yes":
+            words.append("--quick")
+        return [*words, "--out", str(out)]
+
+    def _others(self, *names: str) -> list[str]:
+        """Options for what is not as it is by default."""
+        others = self._values.others
+        return [
+            word
+            for name in names
+            if name in others
+            for word in (f"--{name.replace('_', '-')}", f"{others[name]}")
+        ]
+
+    @property
+    def _sources(self) -> list[str]:
+        return [f"{one.person}={one.path}" if one.person else str(one.path) for one in self._data]
+
+
+def _people(text: str) -> dict[str, str]:
+    """Who sources are of, by their paths, as it was stored."""
+    try:
+        return {str(path): str(name) for path, name in json.loads(text).items()}
+    except (ValueError, AttributeError):
+        return {}

@@ -1,0 +1,349 @@
+"""Under the maps: how probable each gesture is over time, and which one is on screen."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QRectF, QSignalBlocker, QSize, Qt
+from PySide6.QtGui import (
+    QBrush,
+    QColor,
+    QFont,
+    QFontMetrics,
+    QImage,
+    QMouseEvent,
+    QPainter,
+    QPaintEvent,
+    QWheelEvent,
+)
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
+
+from sd2app.classify.model import ClassifyModel
+from sd2app.classify.text import ago_text, delay_text, reading_text
+from sd2app.classify.track import ClassReading
+from sd2app.labels.model import LabelsModel
+from sd2app.maps.map_widget import paint_cursor
+from sd2app.playback.wheel import turn_wheel
+from sd2app.session.display import DisplayModel
+from sd2app.session.playback import PlaybackModel
+from sd2app.session.time_window import VisibleSpanModel
+from sd2app.widgets.cached_paint import Still
+from sd2app.widgets.elided import ElidedLabel
+from sd2app.widgets.inputs import Choice
+from sd2app.widgets.model_menu import ModelButton
+from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, TimeScale
+from sd2core.labels.label_set import LabelSet
+
+_PLOT_PX = 30
+_BAR_PX = (28, 8)
+_GAP_PX = 10
+_FAINT = 90
+"""Of what is not of the map as it is now."""
+_UNKNOWN_CLASS = "#8a8f98"
+
+
+def class_colour(name: str, offered: LabelSet) -> str:
+    """Of a class: that of the first label which it stands for, as its spans have it."""
+    labels = offered.of_class(name)
+    known = offered.find(name) or (labels[0] if labels else None)
+    return _UNKNOWN_CLASS if known is None else known.colour
+
+
+class ClassStrip(QWidget):
+    """A line with model, map and read-out over the probabilities, stacked."""
+
+    def __init__(
+        self,
+        classify: ClassifyModel,
+        labels: LabelsModel,
+        span: VisibleSpanModel,
+        playback: PlaybackModel,
+        display: DisplayModel,
+        button: ModelButton,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._classify = classify
+        title = QLabel("Classifier", self)
+        title.setObjectName("title")
+        self._source = Choice("The map that the classifier looks at", self)
+        self._source.activated.connect(lambda at: classify.set_source(classify.sources[at]))
+        self._status = ElidedLabel(self)
+        self._status.setObjectName("muted")
+        self.readout = ClassReadout(classify, labels, display, self)
+        row = QHBoxLayout()
+        row.setContentsMargins(8, 2, MARGIN_PX, 2)
+        row.setSpacing(8)
+        for widget in (title, button, self._source):
+            row.addWidget(widget)
+        row.addWidget(self._status, 1)
+        row.addWidget(self.readout)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addLayout(row)
+        column.addWidget(ClassPlot(classify, labels, span, playback, display, self))
+        classify.changed.connect(self._refresh)
+        classify.moved.connect(self._say)
+        self._refresh()
+
+    def _refresh(self) -> None:
+        model = self._classify
+        self.setVisible(model.visible)
+        titles = [f"on {track.title.lower()}" for track in model.sources]
+        with QSignalBlocker(self._source):
+            if titles != [self._source.itemText(at) for at in range(self._source.count())]:
+                self._source.clear()
+                self._source.addItems(titles)
+            if model.source in model.sources:
+                self._source.setCurrentIndex(model.sources.index(model.source))
+        self._source.setVisible(bool(titles))
+        self._say()
+
+    def _say(self) -> None:
+        model = self._classify
+        if not self.isVisibleTo(self.parentWidget()):
+            return
+        if model.problem:
+            self._status.setText(model.problem)
+        elif model.loading or model.track.card is None:
+            self._status.setText("Loading the classifier…")
+        else:
+            card = model.track.card
+            late = delay_text(card) if card.delay_frames else ""
+            other = "It has learned from other maps than this"
+            self._status.setText(late if model.knows_source else other)
+
+
+class ClassReadout(QWidget):
+    """A bar for every class, and the most probable one in words; grey while it is not current.
+
+    Where there is no room for the bars there are the words alone.
+    """
+
+    def __init__(
+        self,
+        classify: ClassifyModel,
+        labels: LabelsModel,
+        display: DisplayModel,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._classify, self._labels, self._display = classify, labels, display
+        self._shown: ClassReading | None = None
+        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
+        self._resize()
+        for signal in (classify.moved, display.theme_changed):
+            signal.connect(self._follow)
+        classify.changed.connect(self._resize)
+
+    @property
+    def text(self) -> str:
+        """The class of the frame on screen, and how sure it is; nothing where none is current."""
+        reading = self._shown
+        return reading_text(reading) if reading is not None and reading.current else ""
+
+    def _resize(self) -> None:
+        metrics, card = self.fontMetrics(), self._classify.card
+        names = card.classes if card is not None else ()
+        bold = QFont(self.font())
+        bold.setBold(True)
+        ago = f", {ago_text(card.delay_s)}" if card is not None and card.delay_frames else ""
+        longest = ["no person", *(f"{name} 100 %{ago}" for name in names)]
+        words = max(map(QFontMetrics(bold).horizontalAdvance, longest))
+        bars = sum(metrics.horizontalAdvance(name) for name in names)
+        self._bars_px = bars + len(names) * (_BAR_PX[0] + 4 + _GAP_PX)
+        self._words_px = words + 8
+        self.setFixedHeight(metrics.height() + 4)
+        self.updateGeometry()
+        self._follow()
+
+    def sizeHint(self) -> QSize:
+        """Room for all."""
+        return QSize(self._bars_px + self._words_px, self.fontMetrics().height() + 4)
+
+    def minimumSizeHint(self) -> QSize:
+        """Room for the words."""
+        return QSize(self._words_px, self.fontMetrics().height() + 4)
+
+    def _follow(self) -> None:
+        self._shown = self._classify.reading
+        self.setAccessibleName(f"Gesture: {self.text or 'not known'}")
+        self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Bars with their names, then the words."""
+        reading, palette = self._shown, self._display.palette
+        if reading is None:
+            return
+        with QPainter(self) as painter:
+            if self.width() >= self._bars_px + self._words_px:
+                self._paint_bars(painter, reading)
+            font = painter.font()
+            font.setBold(reading.current)
+            painter.setFont(font)
+            painter.setPen(QColor(palette.text if reading.current else palette.muted))
+            painter.drawText(
+                self.rect(),
+                Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight,
+                reading_text(reading) if reading.current else "…",
+            )
+
+    def _paint_bars(self, painter: QPainter, reading: ClassReading) -> None:
+        palette, offered = self._display.palette, self._labels.labels.label_set
+        metrics, centre = painter.fontMetrics(), self.height() / 2
+        x = float(self.width() - self._bars_px - self._words_px)
+        for name, share in zip(reading.classes, reading.shares, strict=True):
+            width = metrics.horizontalAdvance(name)
+            painter.setPen(QColor(palette.muted))
+            room = QRectF(x, 0, width + 1, self.height())
+            painter.drawText(room, Qt.AlignmentFlag.AlignVCenter, name)
+            x += width + 4
+            box = QRectF(x, centre - _BAR_PX[1] / 2, *_BAR_PX)
+            painter.fillRect(box, QColor(palette.well))
+            colour = QColor(class_colour(name, offered))
+            colour.setAlpha(255 if reading.current else _FAINT)
+            box.setWidth(share * box.width())
+            painter.fillRect(box, colour)
+            x += _BAR_PX[0] + _GAP_PX
+
+
+class ClassPlot(QWidget):
+    """Probabilities over time, stacked: the background at the bottom. Click or drag seeks."""
+
+    def __init__(
+        self,
+        classify: ClassifyModel,
+        labels: LabelsModel,
+        span: VisibleSpanModel,
+        playback: PlaybackModel,
+        display: DisplayModel,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._classify, self._labels = classify, labels
+        self._span, self._playback, self._display = span, playback, display
+        self._still = Still(self)
+        self.setFixedHeight(_PLOT_PX)
+        self.setAccessibleName("Probability of each gesture over time")
+        for signal in (
+            classify.track.changed,
+            classify.counts_changed,
+            classify.changed,
+            labels.changed,
+            span.changed,
+            display.theme_changed,
+        ):
+            signal.connect(self._redraw)
+        playback.frame_changed.connect(self.update)
+
+    @property
+    def scale(self) -> TimeScale:
+        """Time axis of this widget."""
+        return TimeScale(self._span.start_s, self._span.end_s, self.width())
+
+    def _redraw(self) -> None:
+        self._still.forget()
+        self.update()
+
+    def _plot_rect(self) -> QRectF:
+        return QRectF(GUTTER_PX, 1, max(self.width() - GUTTER_PX - MARGIN_PX, 1), self.height() - 4)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """The strip, and the cursor."""
+        with QPainter(self) as painter:
+            self._still.paint(painter, self._paint)
+            paint_cursor(painter, self._plot_rect(), self.scale.x_of(self._playback.time_s))
+
+    def _paint(self, painter: QPainter) -> None:
+        palette, plot = self._display.palette, self._plot_rect()
+        painter.fillRect(self.rect(), QColor(palette.panel))
+        painter.fillRect(plot, QColor(palette.well))
+        painter.setPen(QColor(palette.muted))
+        right = Qt.AlignmentFlag.AlignRight
+        gutter = QRectF(0, plot.top() - 2, GUTTER_PX - 8, plot.height() + 4)
+        painter.drawText(gutter, right | Qt.AlignmentFlag.AlignTop, "1")
+        painter.drawText(gutter, right | Qt.AlignmentFlag.AlignBottom, "0")
+        track, source = self._classify.track, self._classify.track.source
+        if track.card is None or source is None or not track.done.size:
+            return
+        ratio = painter.device().devicePixelRatioF()
+        columns = max(round(plot.width() * ratio), 1)
+        frames = self._frames(columns)
+        offered = self._labels.labels.label_set
+        colours = [QColor(class_colour(name, offered)).rgb() for name in track.card.classes]
+        done = track.done if track.current else np.zeros_like(track.done)
+        image = stacked_image(track.shares, done, frames, colours, round(plot.height() * ratio))
+        painter.drawImage(plot, image)
+        painter.save()
+        painter.setClipRect(plot)
+        for start_s, end_s in source.gaps_s:
+            left, end = self.scale.x_of(start_s), self.scale.x_of(end_s)
+            box = QRectF(left, plot.top(), max(end - left, 1.0), plot.height())
+            painter.fillRect(box, QColor(palette.well))
+            painter.fillRect(box, QBrush(QColor(palette.hatch), Qt.BrushStyle.FDiagPattern))
+        painter.restore()
+
+    def _frames(self, columns: int) -> NDArray[np.int64]:
+        """Frame of the map in every column; −1 where there is none."""
+        source = self._classify.track.source
+        assert source is not None
+        assert source.map is not None
+        edges_s = np.linspace(self._span.start_s, self._span.end_s, columns + 1)
+        middles_s = 0.5 * (edges_s[:-1] + edges_s[1:]) - source.offset_s
+        timebase = source.map.timebase
+        frames = np.searchsorted(timebase.times_s, middles_s, side="right") - 1
+        outside = (middles_s < timebase.start_s) | (middles_s >= timebase.end_s)
+        return np.where(outside, -1, np.clip(frames, 0, len(timebase) - 1))
+
+    # --- the hand -------------------------------------------------------------------------
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Go to a time."""
+        if event.button() == Qt.MouseButton.LeftButton:
+            self._playback.seek(self.scale.time_of(event.position().x()))
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """Scrub."""
+        if event.buttons() & Qt.MouseButton.LeftButton:
+            self._playback.seek(self.scale.time_of(event.position().x()))
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Zoom about the pointer, or pan with Shift or a sideways wheel."""
+        turn_wheel(event, self._span, self.scale)
+
+
+def stacked_image(
+    shares: NDArray[np.float32],
+    done: NDArray[np.bool_],
+    frames: NDArray[np.int64],
+    colours: list[int],
+    height: int,
+) -> QImage:
+    """Columns of stacked shares, the first class at the bottom.
+
+    Parameters
+    ----------
+    shares : float32 array, shape (frames, classes)
+        NaN where nothing is known: left clear.
+    done : bool array, shape (frames,)
+        Others are faint.
+    frames : int64 array, shape (columns,)
+        The frame of every column; −1 is left clear.
+    colours : list of int
+        ``0xAARRGGBB`` of every class.
+    height : int
+    """
+    known = frames >= 0
+    chosen = shares[np.where(known, frames, 0)]  # (columns, classes)
+    known &= ~np.isnan(chosen).any(axis=1)
+    tops = np.cumsum(np.nan_to_num(chosen), axis=1)  # (columns, classes)
+    levels = (np.arange(height)[::-1] + 0.5) / height
+    # The class in whose part of the stack a pixel lies.
+    index = (levels[:, None, None] > tops[None]).sum(axis=2)
+    rgb = np.array(colours, np.uint32) & np.uint32(0xFFFFFF)
+    alpha = np.where(done[np.where(known, frames, 0)], 255, _FAINT).astype(np.uint32)
+    pixels = rgb[np.minimum(index, len(colours) - 1)] | (alpha << np.uint32(24))[None]
+    pixels = np.ascontiguousarray(np.where(known[None], pixels, 0).astype(np.uint32))
+    image = QImage(pixels.data, len(frames), height, 4 * len(frames), QImage.Format.Format_ARGB32)
+    return image.copy()

@@ -1,0 +1,76 @@
+"""Classifiers in words, the same wherever they are shown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from sd2app.denoise.text import ModelPage, about_sections, map_and_file_rows
+
+if TYPE_CHECKING:
+    from sd2app.classify.track import ClassReading
+    from sd2core.classify.card import ClassifierCard
+
+MODEL_WORDS = {"lstm": "LSTM (the paper's)", "s4": "S4"}
+FEATURE_WORDS = {"columns": "whole columns", "peak": "strongest bin (the paper's)"}
+_KINDS = {
+    "simulated": "simulated radar",
+    "real": "real radar",
+    "synthetic": "synthetic",
+    "denoised": "denoised synthetic",
+}
+
+
+def classifier_title(card: ClassifierCard) -> str:
+    """What to call it in a list."""
+    return card.title or card.name
+
+
+def kinds_text(kinds: Iterable[str]) -> str:
+    """Kinds of maps; what is simulated is called so."""
+    return " and ".join(_KINDS.get(kind, kind) for kind in kinds)
+
+
+def learned_text(card: ClassifierCard) -> str:
+    """What it learned from."""
+    return f"learned from {kinds_text(card.trained_on)} maps"
+
+
+def network_text(card: ClassifierCard) -> str:
+    """What sort of network looks at what."""
+    model = MODEL_WORDS.get(card.model, card.model)
+    return f"{model}, {FEATURE_WORDS.get(card.features.kind, card.features.kind)}"
+
+
+def classifier_page(card: ClassifierCard) -> ModelPage:
+    """What it says about itself."""
+    rows = [
+        ("Kind", f"{network_text(card)}, {card.parameters:,} parameters"),
+        ("Learned from", f"{kinds_text(card.trained_on)} maps"),
+        ("Classes", ", ".join(card.classes)),
+        ("Answers", delay_text(card) + (", having seen what follows" * bool(card.delay_frames))),
+        *map_and_file_rows(card.axis, card.frame_rate_hz, card.path),
+    ]
+    simulated = "real" not in card.trained_on
+    return ModelPage(classifier_title(card), simulated, rows, list(about_sections(card.about)))
+
+
+def reading_text(reading: ClassReading | None) -> str:
+    """The class of a frame and how sure it is."""
+    if reading is None:
+        return ""
+    if reading.nobody:
+        return "no person"
+    best = reading.best
+    text = f"{reading.classes[best]} {100 * reading.shares[best]:.0f} %"
+    return f"{text}, {ago_text(reading.ago_s)}" if reading.ago_s else text
+
+
+def ago_text(seconds: float) -> str:
+    """How much earlier something was."""
+    return f"{seconds:.1f} s ago"
+
+
+def delay_text(card: ClassifierCard) -> str:
+    """When it answers."""
+    return f"{card.delay_s:.2g} s late" if card.delay_frames else "at once"

@@ -1,0 +1,383 @@
+"""What every frame of a map shows, kept in step with the map."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from sd2app.background.latest import Emit, LatestRunner
+from sd2app.classify.library import Classifier, LiveClasses
+from sd2app.denoise.pieces import AT_ONCE, cut_out, known_frames
+from sd2app.session.tracks import TrackModel
+from sd2core.denoise.resample_to_model import check_bins, is_regular, stretches
+from sd2core.doppler_map import DopplerMap
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    from sd2core.classify.card import ClassifierCard
+
+_LATE_S = 0.2
+"""While a map grows frame by frame, what is known is that much behind the clock at most."""
+_LATER_S = 0.5
+"""The same besides the delay of a classifier that answers late: there the time is named."""
+
+_BETWEEN_MS = 120
+"""While a long map is painted piece by piece, it is looked at so often at most."""
+
+
+@dataclass(frozen=True)
+class ClassReading:
+    """What one frame shows.
+
+    Parameters
+    ----------
+    classes : tuple of str
+    shares : tuple of float
+        Probability of each of them.
+    current : bool
+        False while the map is another than the one that this was read from.
+    nobody : bool
+        Whether there is no person in the frame.
+    ago_s : float
+        So much earlier than the time that was asked for: of a map that still grows, a
+        classifier which answers late knows no later frame.
+    """
+
+    classes: tuple[str, ...]
+    shares: tuple[float, ...]
+    current: bool
+    nobody: bool
+    ago_s: float = 0.0
+
+    @property
+    def best(self) -> int:
+        """The most probable class."""
+        return max(range(len(self.shares)), key=self.shares.__getitem__)
+
+
+class _Going(NamedTuple):
+    """A stretch that was gone through up to a frame, and what is remembered of it."""
+
+    session: LiveClasses
+    start: int
+    next: int
+    answered: int
+    """The answers of frames from here on may change with the next frames."""
+
+
+class _Piece(NamedTuple):
+    start: int
+    shares: NDArray[np.float32]
+    going: _Going | None
+
+
+class ClassTrack(QObject):
+    """Classifies what changed of a map, from the first frame that differs.
+
+    Classifiers are causal: what stands before that frame stays right, and where the map
+    only grows, the classifier goes on with what it remembers, as beside a live radar.
+
+    Parameters
+    ----------
+    counts : callable
+        Whether a map is of the sensor where it stands: else nothing of it is current.
+
+    Signals
+    -------
+    changed
+        What is known of the frames.
+    """
+
+    changed = Signal()
+
+    def __init__(self, counts: Callable[[TrackModel], bool], parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._counts = counts
+        self._source: TrackModel | None = None
+        self._classifier: Classifier | None = None
+        self._card: ClassifierCard | None = None
+        self._problem = ""
+        self._runner = LatestRunner("classify", self)
+        self._runner.partial.connect(self._receive)
+        self._runner.finished.connect(self._finish)
+        self._runner.failed.connect(self._fail)
+        self._calm = QTimer(self)
+        self._calm.setSingleShot(True)
+        self._calm.setInterval(_BETWEEN_MS)
+        self._calm.timeout.connect(self._go_on)
+        self._forget()
+
+    def _forget(self) -> None:
+        self._given: DopplerMap | None = None
+        self._known = np.zeros(0, bool)
+        self._shares = np.zeros((0, 0), np.float32)
+        self._done = np.zeros(0, bool)
+        self._revision = -1
+        self._going: _Going | None = None
+        self._until = 0
+        self._again = False
+
+    # --- what is known --------------------------------------------------------------------
+
+    @property
+    def card(self) -> ClassifierCard | None:
+        """Of the classifier at work."""
+        return self._card
+
+    @property
+    def busy(self) -> bool:
+        """Whether frames are being classified or about to be."""
+        return self._runner.busy or self._calm.isActive()
+
+    @property
+    def problem(self) -> str:
+        """Why this map cannot be classified; empty where it can."""
+        return self._problem
+
+    @property
+    def complete(self) -> bool:
+        """Whether every frame of the map is classified, as it is now and is to be."""
+        source = self._source
+        whole = source is not None and source.map is not None and source.covered is None
+        return whole and self.current and self._done.size > 0 and bool(self._done.all())
+
+    @property
+    def shares(self) -> NDArray[np.float32]:
+        """Probabilities, (frames, classes); of frames that are not :attr:`done` older ones."""
+        return self._shares
+
+    @property
+    def done(self) -> NDArray[np.bool_]:
+        """Frames whose answer is of the map as it is now, (frames,)."""
+        return self._done
+
+    @property
+    def source(self) -> TrackModel | None:
+        """The map that is looked at."""
+        return self._source
+
+    @property
+    def current(self) -> bool:
+        """Whether what is known counts: the map is of the sensor where it stands."""
+        return self._source is not None and self._counts(self._source)
+
+    def at(self, time_s: float) -> ClassReading | None:
+        """What the frame at a time of the recording shows; None where that is not known.
+
+        Of a map that is still growing up to there, what its newest frames show.
+        """
+        frame = self._source.frame_at(time_s) if self._source is not None else None
+        if frame is None or self._card is None or frame >= len(self._shares):
+            return None
+        asked, frame = frame, self._newest(frame)
+        shares = self._shares[frame]
+        if np.isnan(shares).any():
+            return None
+        assert self._given is not None
+        present, times_s = self._given.present, self._given.times_s
+        return ClassReading(
+            self._card.classes,
+            tuple(map(float, shares)),
+            bool(self._done[frame]) and self.current,
+            present is not None and not present[frame],
+            float(times_s[asked] - times_s[frame]) if self._card.delay_frames else 0.0,
+        )
+
+    def _newest(self, frame: int) -> int:
+        """The newest frame up to this one that is done, if it is hardly earlier."""
+        assert self._given is not None
+        assert self._card is not None
+        late_s = self._card.delay_s + _LATER_S if self._card.delay_frames else _LATE_S
+        late = round(late_s * self._given.timebase.frames_per_s)
+        done = np.flatnonzero(self._done[max(frame - late, 0) : frame + 1])
+        return max(frame - late, 0) + int(done[-1]) if done.size else frame
+
+    # --- requests -------------------------------------------------------------------------
+
+    def use(self, classifier: Classifier | None, card: ClassifierCard | None) -> None:
+        """Classify with another one, or not at all."""
+        self._classifier, self._card = classifier, card if classifier is not None else None
+        self._begin_anew()
+
+    def look_at(self, source: TrackModel | None) -> None:
+        """Look at another map, or at none."""
+        if source is self._source:
+            return
+        if self._source is not None:
+            self._source.changed.disconnect(self._follow)
+        self._source = source
+        if source is not None:
+            source.changed.connect(self._follow)
+        self._begin_anew()
+
+    def close(self) -> None:
+        """Stop."""
+        self._calm.stop()
+        self._runner.close()
+
+    # --- following the map ----------------------------------------------------------------
+
+    def _begin_anew(self) -> None:
+        self._runner.cancel()
+        self._calm.stop()
+        self._forget()
+        self._problem = ""
+        self._follow()
+        self.changed.emit()
+
+    def _follow(self) -> None:
+        source, card = self._source, self._card
+        if source is None or source.map is None or card is None:
+            if self._given is not None:
+                self._runner.cancel()
+                self._calm.stop()
+                self._forget()
+                self.changed.emit()
+            return
+        if source.revision == self._revision:
+            return  # its levels, its place in time
+        self._revision = source.revision
+        try:
+            check_bins(source.map, card)
+        except Sd2Error as error:
+            self._fail(error)
+            return
+        self._take(source.map, known_frames(source.map, source.covered))
+        if self._again:
+            return
+        if np.count_nonzero(self._known & ~self._done) <= AT_ONCE:
+            self._calm.stop()
+            self._go_on()
+        elif not self._calm.isActive():
+            self._calm.start()
+
+    def _take(self, doppler: DopplerMap, known: NDArray[np.bool_]) -> None:
+        """Copied: the values go on changing while they are looked at."""
+        assert self._card is not None
+        before = self._given
+        if before is None or not np.array_equal(before.times_s, doppler.times_s):
+            self._shares = np.full((len(known), len(self._card.classes)), np.nan, np.float32)
+            self._done = np.zeros(len(known), bool)
+            first, values = 0, doppler.values.copy()
+        else:
+            # Of a long map little is known while it grows frame by frame: no more is looked at.
+            numbers = np.flatnonzero(known | self._known)
+            start, stop = (int(numbers[0]), int(numbers[-1]) + 1) if numbers.size else (0, 0)
+            differs = self._differs(before, doppler, known, slice(start, stop))
+            first = start + int(differs.argmax()) if differs.any() else len(known)
+            values = before.values
+        self._problem = ""
+        # What was known of this frame and is another now has been seen by earlier answers.
+        seen = first < len(known) and before is not None and bool(self._known[first])
+        self._done[first - (min(self._card.delay_frames, first) if seen else 0) :] = False
+        # What is under way is still right where the map only grew behind it.
+        self._again = self._runner.busy and first >= self._until
+        if self._runner.busy and not self._again:
+            # The other side may have gone on without anybody to take its answer.
+            self._runner.cancel()
+            self._going = None
+        if self._going is not None and self._going.next > first:
+            self._going = None
+        if before is not None and values is before.values:
+            # What is read meanwhile is before it, or of no interest any more.
+            values[:, first:stop] = doppler.values[:, first:stop]
+        self._given, self._known = replace(doppler, values=values), known.copy()
+        if doppler.present is not None:
+            nobody = known & ~doppler.present
+            self._shares[nobody] = self._card.nobody()
+            self._done[nobody] = True
+        self.changed.emit()
+
+    def _differs(
+        self, before: DopplerMap, doppler: DopplerMap, known: NDArray[np.bool_], part: slice
+    ) -> NDArray[np.bool_]:
+        """Which frames of a part are others than before."""
+        differs = (before.values[:, part] != doppler.values[:, part]).any(axis=0)
+        differs |= self._known[part] != known[part]
+        if before.present is not None or doppler.present is not None:
+            differs |= _present(before)[part] != _present(doppler)[part]
+        return np.asarray(differs)
+
+    # --- classifying ----------------------------------------------------------------------
+
+    def _go_on(self) -> None:
+        doppler, classifier, card = self._given, self._classifier, self._card
+        if doppler is None or classifier is None or card is None:
+            return
+        waiting = self._known & ~self._done
+        numbers = np.flatnonzero(waiting)
+        if not numbers.size:
+            return
+        self._until = int(numbers[-1]) + 1
+        known, going, rate_hz = self._known, self._going, card.frame_rate_hz
+
+        def work(emit: Emit) -> None:
+            there = replace(doppler, present=_present(doppler) & known)
+            for start, stop in stretches(there, rate_hz):
+                if not waiting[start:stop].any():
+                    continue
+                # What follows is still to come: the last frames have no answer until then.
+                grows = stop < len(known) and not known[stop]
+                if is_regular(doppler.times_s[start:stop], rate_hz):
+                    _in_order(classifier, doppler, (start, stop), grows, going, emit)
+                else:
+                    cut = cut_out(doppler, start, doppler.values[:, start:stop])
+                    cut = replace(cut, present=None)
+                    owed = round(card.delay_s * cut.timebase.frames_per_s) if grows else 0
+                    shares = classifier.probabilities(cut)
+                    emit(_Piece(start, shares[: max(len(shares) - owed, 0)], None))
+
+        self._runner.submit(work)
+
+    def _receive(self, piece: _Piece) -> None:
+        stop = piece.start + len(piece.shares)
+        self._shares[piece.start : stop] = piece.shares
+        self._done[piece.start : stop] = True
+        self._going = piece.going
+        self.changed.emit()
+
+    def _finish(self, _: object) -> None:
+        again, self._again = self._again, False
+        if again:
+            self._go_on()
+        self.changed.emit()
+
+    def _fail(self, error: Exception) -> None:
+        revision = self._revision
+        self._runner.cancel()
+        self._forget()
+        self._revision = revision
+        self._problem = str(error)
+        self.changed.emit()
+
+
+def _in_order(
+    classifier: Classifier,
+    doppler: DopplerMap,
+    stretch: tuple[int, int],
+    grows: bool,
+    going: _Going | None,
+    emit: Emit,
+) -> None:
+    """One stretch piece by piece, from where it was left; ``grows`` where it has no end yet."""
+    start, stop = stretch
+    if going is None or going.start != start or going.next > stop:
+        going = _Going(classifier.live(), start, start, start)
+    while going.next < stop:
+        end = min(going.next + AT_ONCE, stop)
+        shares = going.session.advance(np.ascontiguousarray(doppler.values[:, going.next : end].T))
+        answered = going.answered
+        going = _Going(going.session, start, end, answered + len(shares))
+        emit(_Piece(answered, shares, going))
+    if going.answered < stop and not grows:
+        emit(_Piece(going.answered, going.session.finish(), going))
+
+
+def _present(doppler: DopplerMap) -> NDArray[np.bool_]:
+    frames = len(doppler.timebase)
+    return np.ones(frames, bool) if doppler.present is None else doppler.present

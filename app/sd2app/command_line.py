@@ -1,0 +1,119 @@
+"""The ``sd2`` script: the library's commands, and those that open the window."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from sd2core.cli import build_parser, run
+from sd2core.cli.options import add_command
+from sd2core.errors import Sd2Error
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one ``sd2`` command and return its exit code."""
+    return run(full_parser(), sys.argv[1:] if arguments is None else arguments)
+
+
+def full_parser() -> argparse.ArgumentParser:
+    """The library's commands and those that open the window."""
+    parser, commands = build_parser()
+    _add_window_commands(commands)
+    return parser
+
+
+def _add_window_commands(commands: argparse._SubParsersAction) -> None:
+    opening = add_command(
+        commands,
+        "open",
+        "open a recording, or a video, a mesh or a radar capture, in the window",
+        handler=_open,
+        examples=(
+            "  sd2 open walk.sd2\n"
+            "  sd2 open walk.mkv walk.npz capture/    (what belongs together)\n"
+            "  sd2 open walk.sd2 --screenshot window.png    (needs no display)"
+        ),
+    )
+    opening.add_argument(
+        "paths",
+        nargs="*",
+        type=Path,
+        metavar="PATH",
+        help="a recording; or a video, a mesh and a radar capture, each or together"
+        " (default: an empty window)",
+    )
+    demo = add_command(
+        commands,
+        "demo",
+        "open the bundled sample recording in the window",
+        handler=_demo,
+        description="A simulated body makes eight swipes in front of a simulated radar.",
+        examples="  sd2 demo\n  sd2 demo --screenshot window.png    (needs no display)",
+    )
+    for parser in (opening, demo):
+        parser.add_argument(
+            "--screenshot",
+            type=Path,
+            metavar="FILE.png",
+            help="draw the window into a picture instead of on the screen",
+        )
+
+
+def _open(options: argparse.Namespace) -> int:
+    from sd2app.fit.request import read_request
+    from sd2core.io.kinds import kind_of
+
+    # Says what is wrong before the window is there. A folder in which a fit was stopped
+    # is no recording yet, and can be opened.
+    for path in options.paths:
+        if read_request(path) is None:
+            kind_of(path)
+    return _show(options.paths, options.screenshot)
+
+
+def _demo(options: argparse.Namespace) -> int:
+    from sd2core.files.resources import resource_path
+
+    return _show([resource_path("swipes.sd2")], options.screenshot)
+
+
+def _show(paths: Sequence[Path], screenshot: Path | None) -> int:
+    if screenshot is not None:
+        _check_screenshot(screenshot)
+        os.environ["QT_QPA_PLATFORM"] = "offscreen"
+    elif not has_display(sys.platform, os.environ):
+        raise Sd2Error(
+            "There is no display to open a window on",
+            remedy="Draw the same window into a picture with --screenshot FILE.png",
+        )
+    from sd2app.shell.app import run as run_window
+
+    # Qt's event loop gives Python no turn to raise KeyboardInterrupt.
+    previous = signal.signal(signal.SIGINT, signal.SIG_DFL)
+    try:
+        return run_window(paths, screenshot=screenshot)
+    finally:
+        signal.signal(signal.SIGINT, previous)
+
+
+def has_display(platform: str, environment: Mapping[str, str]) -> bool:
+    """Whether Qt will find a screen, or was told to do without one."""
+    if not platform.startswith("linux"):
+        return True
+    names = ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM")
+    return any(environment.get(name) for name in names)
+
+
+def _check_screenshot(path: Path) -> None:
+    if path.suffix.lower() != ".png":
+        raise Sd2Error(f"The screenshot is to be {path}", "a name that ends in .png")
+    if not path.absolute().parent.is_dir():
+        raise Sd2Error(f"The folder {path.absolute().parent} does not exist", "an existing folder")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

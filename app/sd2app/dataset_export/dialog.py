@@ -1,0 +1,286 @@
+"""Export a data set: what of, which maps, from where, cut how; what it would be, and writing it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import QSignalBlocker, Qt, QUrl
+from PySide6.QtGui import QDesktopServices, QPixmap
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QDialog,
+    QFileDialog,
+    QFormLayout,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QProgressBar,
+    QScrollArea,
+    QVBoxLayout,
+    QWidget,
+)
+
+from sd2app.dataset_export.model import ENDINGS, MAPS, ExportModel
+from sd2app.dataset_export.text import label_words, size_words, split_words
+from sd2app.widgets.elided import ElidedLabel
+from sd2app.widgets.inputs import Choice, NumberBox
+from sd2app.widgets.panel import outlined, rule, sentence, side_by_side
+from sd2core.recording.recording import is_recording
+
+_FORMATS = {
+    ".zarr": "Zarr: a folder, read in parts",
+    ".h5": "HDF5: one file, read in parts",
+    ".npz": "NPZ: one file, read whole; for small sets",
+}
+_SIZE_PX = (680, 360)
+_SHEET_PX = 940
+"""Width of the preview sheet."""
+
+
+class ExportDialog(QDialog):
+    """A view of :class:`ExportModel`; the writing goes on when it, or the window, is closed."""
+
+    def __init__(self, model: ExportModel, opened: Path | None, parent: QWidget | None) -> None:
+        super().__init__(parent)
+        self._model, self._opened = model, opened
+        self.setWindowTitle("Export data set")
+        self._build_form()
+        self._build_foot()
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(16, 16, 16, 16)
+        layout.setSpacing(12)
+        layout.addLayout(self._form)
+        layout.addWidget(rule())
+        for words in (self._size, self._labels, self._splits, self._message):
+            layout.addWidget(words)
+        layout.addWidget(self._sheet, 1)
+        layout.addStretch(0)
+        layout.addWidget(self._bar)
+        layout.addLayout(self._foot)
+        model.changed.connect(self._refresh)
+        self._refresh()
+        self.resize(*_SIZE_PX)
+
+    # --- building -------------------------------------------------------------------------
+
+    def _build_form(self) -> None:
+        model = self._model
+        self._place = ElidedLabel(self)
+        self._this = outlined(
+            "This recording", "Export the recording that is open",
+            lambda: model.begin(self._opened), self,
+        )  # fmt: skip
+        self._other = outlined(
+            "Folder…", "Export a recording (.sd2), or all recordings in a folder", self._ask_place,
+            self,
+        )  # fmt: skip
+        self._people = QLineEdit(self)
+        self._people.setAccessibleName("Who each recording is of")
+        self._people.setPlaceholderText("everyone another person; or names, as anna, anna, ben")
+        self._people.editingFinished.connect(self._name_people)
+        self._boxes = {name: QCheckBox(name, self) for name in MAPS}
+        for box in self._boxes.values():
+            box.toggled.connect(self._choose_maps)
+        self._sensors = Choice("From which sensors the maps are seen", self)
+        self._sensors.addItem("each recording's own", False)
+        self._sensors.addItem("", True)
+        self._sensors.currentIndexChanged.connect(
+            lambda at: model.choose(planned=self._sensors.itemData(at))
+        )
+        self._length = self._frames("Frames of a segment", 2)
+        self._overlap = self._frames("Frames that neighbouring segments share", 0)
+        self._length.valueChanged.connect(lambda _: self._choose_frames())
+        self._overlap.valueChanged.connect(lambda _: self._choose_frames())
+        self._format = Choice("Format of the data set", self)
+        for ending in ENDINGS:
+            self._format.addItem(_FORMATS[ending], ending)
+        self._format.currentIndexChanged.connect(
+            lambda at: model.choose(ending=self._format.itemData(at))
+        )
+        where = QHBoxLayout()
+        where.setSpacing(8)
+        where.addWidget(self._place, 1)
+        where.addWidget(self._this)
+        where.addWidget(self._other)
+        self._form = QFormLayout()
+        self._form.setHorizontalSpacing(16)
+        self._form.setVerticalSpacing(8)
+        self._form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+        self._form.addRow("From", where)
+        self._form.addRow("People", self._people)
+        self._form.addRow("Maps", side_by_side(*self._boxes.values(), spacing_px=16))
+        self._form.addRow("Sensors", side_by_side(self._sensors))
+        self._form.addRow(
+            "Segments", side_by_side(self._length, QLabel("overlap", self), self._overlap)
+        )
+        self._form.addRow("Format", side_by_side(self._format))
+
+    def _build_foot(self) -> None:
+        self._size, self._labels, self._splits = sentence("", "plain"), sentence(""), sentence("")
+        self._message = sentence("", "warning")
+        self._picture = QLabel(self)
+        self._picture.setAccessibleName("Preview sheet")
+        self._sheet = QScrollArea(self)
+        self._sheet.setWidget(self._picture)
+        self._sheet.setWidgetResizable(True)
+        self._sheet.setMinimumHeight(120)
+        self._picture.setAlignment(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft)
+        self._bar = QProgressBar(self)
+        self._bar.setAccessibleName("How far the export is")
+        self._export = outlined("Export…", "Choose a name and write", self._ask_out, self)
+        self._export.setObjectName("primary")
+        self._stop = outlined(
+            "Stop", "What is complete stays; the same export goes on there", self._model.stop, self
+        )
+        self._open = outlined("Open folder", "Show the data set's folder", self._show_folder, self)
+        self._close = outlined("Close", "An export under way goes on", self.close, self)
+        self._foot = QHBoxLayout()
+        self._foot.setSpacing(8)
+        self._foot.addWidget(self._open)
+        self._foot.addStretch(1)
+        for button in (self._stop, self._export, self._close):
+            self._foot.addWidget(button)
+
+    def _frames(self, tip: str, low: int) -> NumberBox:
+        return NumberBox(low, 10_000, " frames", tip, decimals=0, step=1.0, parent=self)
+
+    # --- following the model --------------------------------------------------------------
+
+    def _refresh(self) -> None:
+        model = self._model
+        choice = model.choice
+        place = choice.place
+        self._place.setText("nothing yet" if place is None else str(place))
+        self._this.setVisible(self._opened is not None and place != self._opened)
+        several = place is not None and not is_recording(place)
+        self._form.setRowVisible(self._people, several)
+        if not self._people.hasFocus():
+            self._people.setText(", ".join(choice.subjects))
+        for name, box in self._boxes.items():
+            with QSignalBlocker(box):
+                box.setChecked(name in choice.maps)
+        with QSignalBlocker(self._sensors):
+            self._sensors.setItemText(
+                1, f"its own, and {model.places} planned place{'s' * (model.places != 1)}"
+            )
+            self._sensors.setCurrentIndex(int(choice.planned))
+        self._sensors.setToolTip(
+            "From which sensors the maps are seen" if model.places
+            else "No places are planned: Edit → Placements…"
+        )  # fmt: skip
+        self._length.show_value(choice.length)
+        self._overlap.show_value(choice.overlap)
+        with QSignalBlocker(self._format):
+            self._format.setCurrentIndex(ENDINGS.index(choice.ending))
+        for field in (
+            self._this, self._other, self._sensors, self._length, self._overlap, self._format,
+            self._people, *self._boxes.values(),
+        ):  # fmt: skip
+            field.setEnabled(self._may(field))
+        self._show_counts()
+        self._show_writing()
+
+    def _may(self, field: QWidget) -> bool:
+        """Whether a field can be changed now."""
+        model = self._model
+        if model.exporting:
+            return False
+        if field is self._sensors:
+            return model.places > 0
+        return True
+
+    def _show_counts(self) -> None:
+        model, forecast = self._model, self._model.forecast
+        if forecast is None:
+            self._size.setText("Counting…" if model.counting else "")
+            self._labels.setText("")
+            self._splits.setText("")
+        else:
+            self._size.setText(size_words(forecast, model.choice.length))
+            self._labels.setText(label_words(forecast))
+            self._splits.setText(split_words(forecast))
+        left_out = [] if forecast is None else list(forecast.failed)
+        if model.result is not None:
+            left_out = list(model.result.left_out)
+        said = [model.problem, *(f"Left out: {one}" for one in left_out)]
+        self._message.setText("\n".join(filter(None, said)))
+        self._message.setVisible(bool(self._message.text()))
+
+    def _show_writing(self) -> None:
+        model = self._model
+        done, total = model.progress
+        self._bar.setVisible(model.exporting)
+        self._bar.setRange(0, total)
+        self._bar.setValue(done)
+        self._stop.setVisible(model.exporting)
+        self._stop.setEnabled(not model.stopping)
+        self._export.setEnabled(model.ready)
+        result = model.result
+        written = result is not None and not model.exporting
+        self._open.setVisible(written)
+        if written and result is not None:
+            self._size.setText(
+                f"{result.segments:,} segments are in {result.path.name}, with a card"
+                f" ({result.card.name}) and this sheet:"
+            )
+            self._size.setToolTip(str(result.path))
+            self._show_sheet(result.sheet)
+        elif not self._picture.pixmap().isNull():
+            self._picture.clear()
+            self.resize(*_SIZE_PX)
+        self._sheet.setVisible(written)
+
+    def _show_sheet(self, file: Path) -> None:
+        """The sheet as wide as the dialog, which grows to hold it."""
+        picture = QPixmap(str(file))
+        if picture.isNull() or not self._picture.pixmap().isNull():
+            return
+        ratio = self.devicePixelRatioF()
+        picture = picture.scaledToWidth(
+            round(_SHEET_PX * ratio), Qt.TransformationMode.SmoothTransformation
+        )
+        picture.setDevicePixelRatio(ratio)
+        self._picture.setPixmap(picture)
+        needed = self.sizeHint().height() + round(picture.height() / ratio) + 16
+        self.resize(max(self.width(), _SHEET_PX + 48), min(max(self.height(), needed), 860))
+
+    # --- what is clicked ------------------------------------------------------------------
+
+    def _choose_maps(self) -> None:
+        chosen = frozenset(name for name, box in self._boxes.items() if box.isChecked())
+        self._model.choose(maps=chosen)
+
+    def _choose_frames(self) -> None:
+        length = round(self._length.value())
+        overlap = min(round(self._overlap.value()), length - 1)
+        self._model.choose(length=length, overlap=overlap)
+
+    def _name_people(self) -> None:
+        names = tuple(part.strip() for part in self._people.text().split(",") if part.strip())
+        self._model.choose(subjects=names)
+
+    def _ask_place(self) -> None:
+        name = QFileDialog.getExistingDirectory(self, "A recording, or a folder of recordings")
+        if name:
+            self._model.begin(Path(name))
+
+    def _ask_out(self) -> None:
+        choice = self._model.choice
+        if choice.place is None:
+            return
+        # A folder is not asked for by its own name: one that is there can be gone on with.
+        start = str(choice.place.parent / f"{choice.place.stem}-set{choice.ending}")
+        name, _ = QFileDialog.getSaveFileName(
+            self, "Export data set", start, f"Data set (*{choice.ending})",
+            options=QFileDialog.Option.DontConfirmOverwrite,
+        )  # fmt: skip
+        if name:
+            path = Path(name)
+            if path.suffix.lower() != choice.ending:
+                path = path.with_name(path.name + choice.ending)
+            self._model.start(path)
+
+    def _show_folder(self) -> None:
+        result = self._model.result
+        if result is not None:
+            QDesktopServices.openUrl(QUrl.fromLocalFile(str(result.path.absolute().parent)))

@@ -1,0 +1,395 @@
+"""A data set to be exported: what of, what it would hold, and the process that writes it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from PySide6.QtCore import QObject, Signal
+
+from sd2app.background.latest import Emit, LatestRunner
+from sd2app.background.run_folder import COMMAND, CommandFolder, folders_in
+from sd2app.dataset_export.messages import Exported
+from sd2app.dataset_export.run import ExportRun, user_exports_folder
+from sd2app.session.tasks import Job, JobsModel
+from sd2core.datasets.inputs import gather, recordings_in
+from sd2core.datasets.options import DatasetOptions
+from sd2core.datasets.planning import Counting, Forecast
+from sd2core.datasets.recording_sources import Making
+from sd2core.doppler_map import MapKind
+from sd2core.errors import Sd2Error
+from sd2core.pairs.segments import LENGTH, OVERLAP
+from sd2core.progress import Cancelled
+from sd2core.recording.recording import is_recording, open_recording
+from sd2core.sensor import VelocityAxis
+
+ENDINGS = (".zarr", ".h5", ".npz")
+
+MAPS: dict[str, tuple[MapKind, ...]] = {
+    "synthetic": ("synthetic",),
+    "denoised": ("denoised",),
+    "radar": ("simulated", "real"),
+}
+"""What is chosen together: a radar's map is simulated or real as its recording is."""
+
+
+@dataclass(frozen=True)
+class ExportChoice:
+    """What a data set is to hold.
+
+    Parameters
+    ----------
+    place : Path or None
+        A recording, or a folder of recordings.
+    maps : frozenset of str
+        Some of :data:`MAPS`.
+    planned : bool
+        From all places that each recording plans, besides its own sensor.
+    subjects : tuple of str
+        Who each recording is of; empty: everyone another person.
+    length, overlap : int
+        Frames.
+    ending : str
+        One of :data:`ENDINGS`.
+    """
+
+    place: Path | None = None
+    maps: frozenset[str] = frozenset(MAPS)
+    planned: bool = False
+    subjects: tuple[str, ...] = ()
+    length: int = LENGTH
+    overlap: int = OVERLAP
+    ending: str = ".zarr"
+
+    @property
+    def kinds(self) -> tuple[MapKind, ...]:
+        """Kinds of maps that are wanted."""
+        return tuple(kind for name, kinds in MAPS.items() if name in self.maps for kind in kinds)
+
+    @property
+    def sources(self) -> tuple[object, ...]:
+        """What decides which sources there are."""
+        return self.place, self.maps, self.planned, self.subjects
+
+    def to_json(self) -> dict[str, Any]:
+        """By name."""
+        return {
+            "place": str(self.place),
+            "maps": sorted(self.maps),
+            "planned": self.planned,
+            "subjects": list(self.subjects),
+            "length": self.length,
+            "overlap": self.overlap,
+            "ending": self.ending,
+        }
+
+    @classmethod
+    def from_json(cls, content: Mapping[str, Any]) -> ExportChoice:
+        """Read what :meth:`to_json` gave; raises KeyError, TypeError or ValueError."""
+        ending = str(content["ending"])
+        return cls(
+            Path(content["place"]),
+            frozenset(MAPS) & frozenset(map(str, content["maps"])),
+            bool(content["planned"]),
+            tuple(map(str, content["subjects"])),
+            int(content["length"]),
+            int(content["overlap"]),
+            ENDINGS[ENDINGS.index(ending)],
+        )
+
+
+class _Counted(NamedTuple):
+    sources: tuple[object, ...]
+    counting: Counting
+    forecast: Forecast
+
+
+class ExportModel(QObject):
+    """Counts while choices are made, and has one data set written at a time.
+
+    The writing outlives the window, and is found again by the next one.
+
+    Parameters
+    ----------
+    jobs : JobsModel
+    command : sequence of str
+        What runs ``sd2`` commands in a folder.
+    folder : Path, optional
+        Where exports under way are noted.
+
+    Signals
+    -------
+    changed
+        A choice, a count, or how far the writing is.
+    noted : str
+        What was written.
+    failed : str
+        Why nothing was written, or what was left out.
+    """
+
+    changed = Signal()
+    noted = Signal(str)
+    failed = Signal(str)
+
+    def __init__(
+        self,
+        jobs: JobsModel,
+        parent: QObject | None = None,
+        command: Sequence[str] = COMMAND,
+        folder: Path | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._jobs, self._command = jobs, tuple(command)
+        self._folder = folder or user_exports_folder()
+        self._choice = ExportChoice()
+        self._counted: _Counted | None = None
+        self._problem = ""
+        self._places = 0
+        self._runner = LatestRunner("count segments", self)
+        self._runner.finished.connect(self._receive)
+        self._runner.failed.connect(self._refuse)
+        self._run: ExportRun | None = None
+        self._job: Job | None = None
+        self._result: Exported | None = None
+        self._over: set[Path] = set()
+
+    @property
+    def choice(self) -> ExportChoice:
+        """What was chosen."""
+        return self._choice
+
+    @property
+    def forecast(self) -> Forecast | None:
+        """What would be written; None while that is counted, or where it cannot be."""
+        return None if self._counted is None or self.counting else self._counted.forecast
+
+    @property
+    def counting(self) -> bool:
+        """Whether what would be written is being counted."""
+        return self._runner.busy
+
+    @property
+    def problem(self) -> str:
+        """Why these choices cannot be exported; empty where they can."""
+        return self._problem
+
+    @property
+    def places(self) -> int:
+        """Places that the recordings plan besides their own sensors, the most of any."""
+        return self._places
+
+    @property
+    def exporting(self) -> bool:
+        """Whether a data set is being written."""
+        return self._run is not None
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        """Steps done, and of how many; 0 where that is not known."""
+        return (0, 0) if self._job is None else (self._job.done, self._job.total)
+
+    @property
+    def result(self) -> Exported | None:
+        """What was written last, until something else is chosen."""
+        return self._result
+
+    @property
+    def ready(self) -> bool:
+        """Whether there is something to write, and nothing being written."""
+        forecast = self.forecast
+        return forecast is not None and forecast.segments > 0 and not self.exporting
+
+    @property
+    def stopping(self) -> bool:
+        """Whether the writing was told to stop."""
+        return self._run is not None and self._run.phase == "stopping"
+
+    def begin(self, place: Path | None) -> None:
+        """Start anew with a recording or a folder, keeping other choices; looks at it again."""
+        self._counted = None
+        self._places = _places(place)
+        planned = self._choice.planned and self._places > 0
+        self._result = None
+        self._choice = replace(self._choice, place=place, planned=planned, subjects=())
+        self._count()
+
+    def choose(self, **changes: object) -> None:
+        """Choose something else."""
+        choice = replace(self._choice, **changes)  # type: ignore[arg-type]
+        if choice == self._choice:
+            return
+        same = replace(choice, ending=self._choice.ending) == self._choice
+        self._choice, self._result = choice, None
+        if same:  # the format changes no count
+            self.changed.emit()
+        else:
+            self._count()
+
+    def start(self, out: Path) -> None:
+        """Have the data set written, in a process of its own; goes on with one begun there."""
+        if not self.ready or self._choice.place is None:
+            return
+        choice = self._choice
+        words = [
+            "export", str(choice.place), "--out", str(out), "--kinds", ",".join(choice.kinds),
+            "--length", str(choice.length), "--overlap", str(choice.overlap), "--progress-json",
+        ]  # fmt: skip
+        words += ["--placements", "planned"] if choice.planned else []
+        words += ["--subjects", ",".join(choice.subjects)] if choice.subjects else []
+        about = {"what": "export", "out": str(out), "choice": choice.to_json()}
+        path = self._new_folder(out)
+        try:
+            # It may use all processors: it gives way to whatever else wants them.
+            pid = CommandFolder(path).start(words, about, self._command, {})
+        except (Sd2Error, OSError) as error:
+            CommandFolder(path).delete()
+            self.failed.emit(str(error))
+            return
+        self._result = None
+        self._follow(ExportRun(path, self, pid=pid))
+
+    def stop(self) -> None:
+        """Stop writing; what is complete stays, and the same export goes on from there."""
+        if self._run is not None:
+            self._run.stop()
+
+    def look_for_export(self) -> None:
+        """At the start of the program: find what is being written, or has been meanwhile."""
+        # One that has ended is there again where its folder could not be deleted.
+        found = [one for one in folders_in(self._folder) if one.path not in self._over]
+        one = next((folder for folder in found if folder.live), next(iter(found), None))
+        if one is None or self.exporting:
+            return
+        run = ExportRun(one.path, self)
+        try:
+            self._choice = ExportChoice.from_json(run.choice)
+        except (KeyError, TypeError, ValueError):
+            pass  # of another version: it is followed all the same
+        else:
+            self._places = _places(self._choice.place)
+            self._count()
+        self._follow(run)
+        if one.live:
+            self.noted.emit(
+                f"{run.out.name} is being written. File → Export data set… shows how far it is."
+            )
+
+    def close(self) -> None:
+        """Look no more; what is being written goes on."""
+        self._runner.close()
+        if self._run is not None:
+            self._run.close()
+
+    # --- inside ---------------------------------------------------------------------------
+
+    def _count(self) -> None:
+        choice, known = self._choice, self._counted
+        self._problem = ""
+        if choice.place is None or not choice.maps:
+            self._runner.cancel()
+            self._counted = None
+            self._problem = "" if choice.place is None else "No map is chosen."
+            self.changed.emit()
+            return
+        place = choice.place
+
+        def count(emit: Emit) -> _Counted:
+            options = DatasetOptions(
+                kinds=choice.kinds, length=choice.length, overlap=choice.overlap
+            )
+            if known is not None and known.sources == choice.sources:
+                counting = known.counting
+            else:
+                sources = gather(
+                    [place],
+                    Making(kinds=choice.kinds, placements="planned" if choice.planned else None),
+                    subjects=choice.subjects or None,
+                )
+                counting = Counting.of(sources, lambda done, total: emit(None))
+            forecast = counting.forecast(options, VelocityAxis().bins)
+            return _Counted(choice.sources, counting, forecast)
+
+        self._runner.submit(count)
+        self.changed.emit()
+
+    def _receive(self, counted: _Counted) -> None:
+        self._counted = counted
+        if not counted.forecast.segments:
+            self._problem = f"No recording has {self._choice.length} frames on end with a person."
+        self.changed.emit()
+
+    def _refuse(self, error: Exception) -> None:
+        if isinstance(error, Cancelled):
+            return
+        self._counted = None
+        self._problem = str(error)
+        self.changed.emit()
+
+    def _new_folder(self, out: Path) -> Path:
+        """A name that is free."""
+        path, number = self._folder / out.name, 2
+        while path.exists() or path in self._over:
+            path, number = path.with_name(f"{out.name} {number}"), number + 1
+        return path
+
+    def _follow(self, run: ExportRun) -> None:
+        self._run = run
+        self._job = self._jobs.start(f"Exporting {run.out.name}", self.stop)
+        run.changed.connect(self._tell)
+        run.ended.connect(self._end)
+        self.changed.emit()
+
+    def _tell(self) -> None:
+        if self._run is not None and self._job is not None:
+            self._jobs.report(self._job, self._run.done, self._run.total)
+            self.changed.emit()
+
+    def _end(self) -> None:
+        run = self._run
+        if run is None:
+            return
+        self._run = None
+        if self._job is not None:
+            self._jobs.finish(self._job)
+            self._job = None
+        run.close()
+        run.folder.delete()
+        self._over.add(run.folder.path)
+        run.deleteLater()
+        self._say_ended(run)
+        self.changed.emit()
+        self.look_for_export()  # several may have ended while no window was there
+
+    def _say_ended(self, run: ExportRun) -> None:
+        self._result = result = run.written
+        if result is not None:
+            self.noted.emit(
+                f"{result.segments:,} segment{'s' * (result.segments != 1)} from {result.sources:,}"
+                f" view{'s' * (result.sources != 1)} are in {result.path}."
+            )
+            if result.left_out:
+                self.failed.emit("\n".join(f"Left out: {one}" for one in result.left_out))
+        elif run.phase == "died":
+            self.failed.emit(
+                f"{run.out.name} was not written to its end: its process is gone. Export it again;"
+                " what is complete is kept."
+            )
+        elif run.phase not in ("stopped", "gone"):
+            self.failed.emit(run.refused or run.text.splitlines()[-1])
+
+
+def _places(place: Path | None) -> int:
+    """The most places that a recording there plans; damaged ones plan none."""
+    if place is None:
+        return 0
+    most = 0
+    for folder in [place] if is_recording(place) else recordings_in(place):
+        try:
+            recording = open_recording(folder)
+        except Sd2Error:
+            continue
+        if recording.placements is not None and recording.mesh is not None:
+            most = max(most, len(recording.placements.places()))
+    return most

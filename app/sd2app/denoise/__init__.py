@@ -1,0 +1,1 @@
+"""Denoised maps and the choice of the denoiser."""

@@ -1,0 +1,94 @@
+"""Denoisers as the window asks for them; a test puts its own here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.doppler_map import DopplerMap
+
+if TYPE_CHECKING:
+    from sd2app.background.model_worker.client import DenoiseProcess
+    from sd2core.denoise.card import ModelCard
+
+
+class LiveSession(Protocol):
+    """Frame in, frame out."""
+
+    equals_batch: bool
+
+    def step(self, energies: NDArray[np.float32], present: bool = True) -> NDArray[np.float32]:
+        """Answer to the next frame (bins,)."""
+
+    def advance(
+        self, energies: NDArray[np.float32], present: NDArray[np.bool_]
+    ) -> NDArray[np.float32]:
+        """Answers to the next frames (frames, bins)."""
+
+
+class Denoiser(Protocol):
+    """A model that is loaded; its methods take a while.
+
+    Attributes
+    ----------
+    equals_batch : bool
+        Whether frame after frame gives what the whole map does.
+    frame_rate_hz : float
+        Of the maps that it learned from.
+    """
+
+    equals_batch: bool
+    frame_rate_hz: float
+
+    def denoise(self, doppler: DopplerMap) -> DopplerMap:
+        """What a radar would show in place of a synthetic map."""
+
+    def live(self) -> LiveSession:
+        """For frames as they come."""
+
+
+@dataclass(frozen=True)
+class DenoiserLibrary:
+    """What the models ask of :mod:`sd2core.denoise`.
+
+    Parameters
+    ----------
+    available : callable
+        Cards of the bundled models and the user's own.
+    describe : callable
+        Card of a file.
+    load : callable
+        Loads a file; takes seconds the first time.
+    close : callable
+        Let go of everything.
+    """
+
+    available: Callable[[], Sequence[ModelCard]]
+    describe: Callable[[Path], ModelCard]
+    load: Callable[[Path], Denoiser]
+    close: Callable[[], None] = lambda: None
+
+    def named(self, name: str) -> ModelCard | None:
+        """Card of a model that comes with the program; a user's own of that name goes first."""
+        return next((card for card in self.available() if card.name == name), None)
+
+
+def core_library(process: DenoiseProcess) -> DenoiserLibrary:
+    """The library's own: cards are read here, models work in another process."""
+
+    def available() -> Sequence[ModelCard]:
+        from sd2core.denoise.files import available_models
+
+        return available_models()
+
+    def describe(path: Path) -> ModelCard:
+        from sd2core.denoise.files import describe_model
+
+        return describe_model(path)
+
+    return DenoiserLibrary(available, describe, process.load, process.close)

@@ -1,0 +1,433 @@
+"""A track that keeps in step with the synthetic map, denoised by one model."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from sd2app.background.latest import LatestRunner
+from sd2app.denoise.library import Denoiser, LiveSession
+from sd2app.denoise.pieces import AT_ONCE, cut_out, next_piece, touched, with_context
+from sd2app.maps.partial_map import View
+from sd2app.maps.refine import Companion
+from sd2app.session.content import reference_of
+from sd2app.session.tasks import Job, JobsModel
+from sd2app.session.tracks import TrackModel
+from sd2core.denoise.resample_to_model import is_regular
+from sd2core.doppler_map import DopplerMap
+from sd2core.errors import Sd2Error
+
+_TOO_SLOW_S = 0.15
+"""A model that takes longer for what follows a hand waits until the hand rests."""
+
+_TRIED = 3
+"""Sweeps in which that is found out."""
+
+_BETWEEN_MS = 80
+"""While the synthetic map sharpens, a short clip is denoised so often at most."""
+
+_WAITS = "too slow to be dragged, follows when the sensor rests"
+
+
+class Swept(NamedTuple):
+    """What a model made of a sweep."""
+
+    denoiser: Denoiser
+    doppler: DopplerMap
+
+
+class _Answer(NamedTuple):
+    piece: View
+    revision: int
+    doppler: DopplerMap
+    offset: int
+
+
+class _InOrder(NamedTuple):
+    piece: View
+    session: LiveSession
+    values: NDArray[np.float32]
+
+
+class DenoisedMap(QObject):
+    """Denoises what changed of the synthetic map, what is in view first.
+
+    While a hand moves the sensor the model is asked in the same background task that
+    sweeps the map (:meth:`companion`), so that both are of the same place and are shown
+    together. At rest one piece after another is denoised behind the synthetic map. Pieces
+    of a long clip are a preview, where a model remembers more than is around them: when
+    the synthetic map stands, the clip is gone through in order (:meth:`finish`).
+
+    Signals
+    -------
+    failed : str
+        The model could not do it.
+    idle
+        Everything is denoised.
+    """
+
+    failed = Signal(str)
+    idle = Signal()
+
+    _stumbled = Signal(str)
+
+    def __init__(
+        self,
+        track: TrackModel,
+        view: Callable[[], View],
+        jobs: JobsModel,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self.track = track
+        self._view = view
+        self._jobs = jobs
+        self._job: Job | None = None
+        self._denoiser: Denoiser | None = None
+        self.words = ""
+        self._held = False
+        self._runner = LatestRunner("denoise", self)
+        self._runner.finished.connect(self._receive)
+        self._runner.failed.connect(lambda error: self._fail(str(error)))
+        self._stumbled.connect(self._fail)
+        self._again = QTimer(self)
+        self._again.setSingleShot(True)
+        self._again.setInterval(_BETWEEN_MS)
+        self._again.timeout.connect(self._go_on)
+        self._took_s: deque[float] = deque(maxlen=5)
+        self._forget()
+
+    def _forget(self) -> None:
+        self._source: DopplerMap | None = None
+        self._known = np.zeros(0, bool)
+        self._sensor: object = None
+        self._stands = False
+        self._made: DopplerMap | None = None
+        self._needs_reference = True
+        self._revision = 0
+        self._start_anew()
+
+    def _start_anew(self) -> None:
+        """Nothing is denoised."""
+        frames = self._known.size
+        self._shown = np.zeros(frames, bool)
+        self._changed_at = np.full(frames, self._revision)
+        self._done_at = np.full(frames, -1)
+        self._strongest = 0.0
+        self._begin_order()
+
+    def _begin_order(self) -> None:
+        self._session: LiveSession | None = None
+        self._in_order = 0
+
+    # --- what is known --------------------------------------------------------------------
+
+    @property
+    def denoiser(self) -> Denoiser | None:
+        """The model in use."""
+        return self._denoiser
+
+    @property
+    def busy(self) -> bool:
+        """Whether something is being denoised or about to be."""
+        return self._runner.busy or self._again.isActive()
+
+    @property
+    def shows_source(self) -> bool:
+        """Whether some of it is of the synthetic map as it is now, and none of another sensor's."""
+        return bool(self._shown.any())
+
+    @property
+    def keeps_up(self) -> bool:
+        """Whether the model is fast enough to follow a hand."""
+        # The best of some: a busy machine is not a slow model.
+        return len(self._took_s) < _TRIED or min(self._took_s) <= _TOO_SLOW_S
+
+    # --- requests -------------------------------------------------------------------------
+
+    def use(self, denoiser: Denoiser | None, words: str = "") -> None:
+        """Denoise with another model, called ``words`` on the track, or not at all."""
+        self._stop()
+        self._took_s.clear()
+        self._denoiser = denoiser
+        self.words = words
+        self.track.set_status(words)
+        self._needs_reference = True
+        self._made = None
+        self._start_anew()
+        if denoiser is None:
+            self.track.set_map(None)
+        else:
+            self._go_on()
+
+    def clear(self) -> None:
+        """There is no synthetic map."""
+        self._stop()
+        self._forget()
+        self.track.set_map(None)
+
+    def take(
+        self, source: DopplerMap, known: NDArray[np.bool_], sensor: object, piece: View
+    ) -> None:
+        """A stretch of the synthetic map changed while nobody waits for it.
+
+        Parameters
+        ----------
+        source : DopplerMap
+            The synthetic map; its values may change in place.
+        known : bool array, shape (T,)
+            Frames of it that hold something.
+        sensor : object
+            Placement that all of it is for.
+        piece : tuple of int
+            What changed.
+        """
+        self._took_s.clear()
+        if not self._held:
+            self.track.set_status(self.words)
+        self._follow(source, known, sensor)
+        self._stands = False
+        self._begin_order()
+        self._revision += 1
+        self._changed_at[touched(piece, known.size)] = self._revision
+        if not self._again.isActive():
+            self._go_on()
+
+    def finish(self) -> None:
+        """The synthetic map stands: what is a preview can be replaced."""
+        if not self._stands:
+            self._stands = True
+            self._go_on()
+
+    def companion(self) -> Companion | None:
+        """What denoises a sweep in the sweep's own task; None where nothing is to be."""
+        denoiser, source = self._denoiser, self._source
+        if denoiser is None or source is None or self._held or not self.keeps_up:
+            return None
+
+        def denoised(start: int, values: NDArray[np.float32]) -> Swept | None:
+            began = time.perf_counter()
+            try:
+                made = denoiser.denoise(cut_out(source, start, values))
+            except Sd2Error as error:
+                self._stumbled.emit(str(error))
+                return None
+            self._took_s.append(time.perf_counter() - began)
+            return Swept(denoiser, made)
+
+        return denoised
+
+    def take_sweep(
+        self,
+        source: DopplerMap,
+        known: NDArray[np.bool_],
+        sensor: object,
+        start: int,
+        swept: Swept | None,
+    ) -> None:
+        """A hand moved the sensor; ``swept`` is what the companion made of the sweep."""
+        self._runner.cancel()
+        self._again.stop()
+        self._follow(source, known, sensor)
+        self._stands = False
+        self._begin_order()
+        self._revision += 1
+        self._changed_at[:] = self._revision
+        self._shown[:] = False
+        if self._denoiser is None or self._held:
+            return
+        if swept is not None and swept.denoiser is self._denoiser:
+            stop = start + swept.doppler.values.shape[1]
+            self._paint(swept.doppler, 0, (start, stop))
+            self._done_at[start:stop] = self._revision
+        else:
+            self.track.set_status(f"{self.words} · {_WAITS}")
+        self._publish()
+
+    def hold(self, held: bool) -> None:
+        """Leave the track to somebody else for a while."""
+        if held == self._held:
+            return
+        self._held = held
+        self._stop()
+        self._start_anew()
+        if held:
+            self._publish()
+        else:
+            self.track.set_status(self.words)
+            self._go_on()
+
+    def put(self, start: int, values: NDArray[np.float32], anew: bool = False) -> None:
+        """Show frames (bins, n) that somebody else denoised; ``anew``: no others."""
+        if self._source is None or not self._held:
+            return
+        if anew:
+            self._shown[:] = False
+        if self._made is None:
+            self._blank(replace(self._source, kind="denoised", meta={}, uncertainty=None))
+        stop = start + values.shape[1]
+        assert self._made is not None
+        self._made.values[:, start:stop] = values
+        self._shown[start:stop] = True
+        self._publish()
+
+    def close(self) -> None:
+        """Stop computing."""
+        self._stop()
+        self._runner.close()
+
+    # --- denoising ------------------------------------------------------------------------
+
+    def _follow(self, source: DopplerMap, known: NDArray[np.bool_], sensor: object) -> None:
+        self._source, self._known = source, known
+        if self._shown.size != known.size:
+            self._start_anew()
+        if sensor != self._sensor:
+            self._sensor = sensor
+            self._shown[:] = False  # of another place; on screen until there is better
+            self._changed_at[:] = self._revision + 1
+
+    def _go_on(self) -> None:
+        if self._source is None or self._denoiser is None or self._held or self._runner.busy:
+            return
+        wanted = self._known & (self._done_at < self._changed_at)
+        piece = next_piece(wanted, self._view())
+        if piece is None:
+            if not self._go_on_in_order():
+                self._report(0)
+                self.idle.emit()
+            return
+        self._report(int(wanted.sum()))
+        first, last = piece
+        begin, end = with_context(self._known, piece)
+        source, denoiser, revision = self._source, self._denoiser, self._revision
+        # Copied: the values go on changing while the model works.
+        doppler = cut_out(source, begin, source.values[:, begin:end].copy())
+        self._runner.submit(
+            lambda emit: _Answer((first, last), revision, denoiser.denoise(doppler), begin)
+        )
+
+    def _go_on_in_order(self) -> bool:
+        """Denoise the next piece with what the model remembers of those before, if need be."""
+        source, denoiser, frames = self._source, self._denoiser, self._known.size
+        if not self._stands or frames <= AT_ONCE or self._in_order >= frames:
+            return False
+        assert source is not None
+        assert denoiser is not None
+        rate_hz = denoiser.frame_rate_hz
+        if not (denoiser.equals_batch and is_regular(source.times_s, rate_hz)):
+            return False
+        self._report(frames - self._in_order)
+        start, session = self._in_order, self._session
+        stop = min(start + AT_ONCE, frames)
+        values = source.values[:, start:stop].T.copy()
+        present = np.ones(stop - start, bool)
+        if source.present is not None:
+            present = source.present[start:stop]
+
+        def work(emit: object) -> _InOrder:
+            live = session or denoiser.live()
+            return _InOrder((start, stop), live, live.advance(values, present).T)
+
+        self._runner.submit(work)
+        return True
+
+    def _receive(self, answer: _Answer | _InOrder) -> None:
+        if isinstance(answer, _InOrder):
+            self._session, self._in_order = answer.session, answer.piece[1]
+            self._paint_values(answer.values, answer.piece)
+            whole = self._in_order == self._known.size
+            share = 100 * self._in_order // self._known.size
+            self.track.set_status(
+                self.words if whole else f"{self.words} · preview, {share} % final"
+            )
+            self._publish()
+            self._go_on()
+            return
+        first, last = answer.piece
+        self._paint(answer.doppler, first - answer.offset, answer.piece)
+        self._done_at[first:last] = answer.revision
+        self._publish()
+        # Pieces of a long clip follow each other at once; a short one begins again.
+        if self._shown.size > AT_ONCE:
+            self.track.set_status(f"{self.words} · preview")
+            self._go_on()
+        elif (self._done_at < self._changed_at)[self._known].any():
+            self._again.start()
+        else:
+            self._report(0)
+            self.idle.emit()
+
+    def _paint(self, doppler: DopplerMap, offset: int, piece: View) -> None:
+        if self._made is None:
+            self._blank(doppler)
+        first, last = piece
+        self._paint_values(doppler.values[:, offset : offset + last - first], piece)
+
+    def _paint_values(self, values: NDArray[np.float32], piece: View) -> None:
+        assert self._made is not None
+        first, last = piece
+        self._made.values[:, first:last] = values
+        self._strongest = max(self._strongest, float(values.max(initial=0.0)))
+        self._shown[first:last] = self._known[first:last]
+
+    def _blank(self, like: DopplerMap) -> None:
+        assert self._source is not None
+        self._made = replace(
+            like,
+            values=np.zeros_like(self._source.values),
+            timebase=self._source.timebase,
+            present=self._source.present,
+        )
+
+    def _publish(self) -> None:
+        if self._made is None:
+            return
+        whole = bool(self._shown.all())
+        if self._needs_reference and self._strongest > 0:
+            # Of the first map that is whole; until then of what there was.
+            self._needs_reference = not whole
+            strongest = reference_of(self._made.values) if whole else self._strongest
+            self.track.set_reference(strongest)
+        self.track.set_map(self._made, None if whole else self._shown.copy())
+
+    def _report(self, left: int) -> None:
+        """A long clip is a job that can be cancelled."""
+        total = self._known.size
+        if left > AT_ONCE and self._job is None:
+            self._job = self._jobs.start("Denoising the map", self._give_up)
+        if self._job is not None:
+            self._jobs.report(self._job, total - left, total)
+            if left == 0:
+                self._end_job()
+
+    def _give_up(self) -> None:
+        """The user does not want to wait; what is denoised stays."""
+        self._stop()
+        self._stands = False
+        self._done_at[:] = self._changed_at
+        self.idle.emit()
+
+    def _fail(self, words: str) -> None:
+        self._stop()
+        self._denoiser = None
+        self._made = None
+        self.track.set_map(None)
+        self.failed.emit(words)
+
+    def _stop(self) -> None:
+        self._runner.cancel()
+        self._again.stop()
+        self._end_job()
+
+    def _end_job(self) -> None:
+        if self._job is not None:
+            self._jobs.finish(self._job)
+            self._job = None

@@ -1,0 +1,354 @@
+"""The model that denoises the recording, and the map that it makes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from sd2app.background.latest import LatestRunner
+from sd2app.denoise.library import Denoiser, DenoiserLibrary
+from sd2app.denoise.map import DenoisedMap
+from sd2app.denoise.pieces import known_frames
+from sd2app.denoise.text import origin_words, track_words
+from sd2app.maps.model import SynthesisModel
+from sd2app.maps.partial_map import View
+from sd2app.maps.refine import Companion, Part
+from sd2app.session.denoiser_choice import NO_MODEL, UNSAID, DenoiserChoice
+from sd2app.session.document import DocumentModel
+from sd2app.session.tasks import JobsModel
+from sd2app.session.time_window import VisibleSpanModel
+from sd2app.session.tracks import TrackModel
+from sd2core.denoise.files import DEFAULT_NAME
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    from sd2core.denoise.card import ModelCard
+
+_PATIENCE_MS = 2000
+"""The first model is loaded when the synthetic map stands, or after so long."""
+
+
+@dataclass(frozen=True, eq=False)
+class Loaded:
+    """A model at work."""
+
+    card: ModelCard
+    denoiser: Denoiser
+
+
+class DenoiseModel(QObject):
+    """Follows what the recording says, loads the model in the background, and uses it.
+
+    Signals
+    -------
+    changed
+        Choice, model, or what is compared.
+    noted, failed : str
+        Sentences for the user.
+    """
+
+    changed = Signal()
+    noted = Signal(str)
+    failed = Signal(str)
+
+    def __init__(
+        self,
+        document: DocumentModel,
+        synthesis: SynthesisModel,
+        span: VisibleSpanModel,
+        synthetic: TrackModel,
+        track: TrackModel,
+        before: TrackModel,
+        jobs: JobsModel,
+        library: DenoiserLibrary,
+        choose: Callable[[DenoiserChoice], None],
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._document = document
+        self._synthesis = synthesis
+        self._span = span
+        self._synthetic = synthetic
+        self._library = library
+        self._choose = choose
+        self.map = DenoisedMap(track, self._view, jobs, self)
+        self.before_map = DenoisedMap(before, self._view, jobs, self)
+        self._choice = UNSAID
+        self._path: Path | None = None
+        self._loaded: Loaded | None = None
+        self._before: Loaded | None = None
+        self._comparing = False
+        self._problem = ""
+        self._awake = False
+        self._runner = LatestRunner("denoiser", self)
+        self._runner.finished.connect(self._set_model)
+        self._runner.failed.connect(self._fail)
+        self._patience = QTimer(self)
+        self._patience.setSingleShot(True)
+        self._patience.setInterval(_PATIENCE_MS)
+        self._patience.timeout.connect(self._wake)
+        self.map.failed.connect(self._say_problem)
+        self.map.idle.connect(self.changed)
+        self.before_map.failed.connect(lambda _: self.set_comparing(False))
+        document.opened.connect(self._open)
+        document.changed.connect(self._follow)
+        synthesis.accompany(self._companion)
+        synthesis.painted.connect(self._take)
+        synthesis.completed.connect(self._wake)
+        synthesis.completed.connect(self._finish)
+        synthetic.changed.connect(self._watch)
+
+    # --- what is known --------------------------------------------------------------------
+
+    @property
+    def choice(self) -> DenoiserChoice:
+        """What the recording says."""
+        return self._choice
+
+    @property
+    def path(self) -> Path | None:
+        """File of the model that is in use or being loaded."""
+        return self._path
+
+    @property
+    def card(self) -> ModelCard | None:
+        """Of the model in use."""
+        return self._loaded.card if self._loaded else None
+
+    @property
+    def before(self) -> ModelCard | None:
+        """Of the model that was in use before this one."""
+        return self._before.card if self._before else None
+
+    @property
+    def comparing(self) -> bool:
+        """Whether the map of the model before is shown as well."""
+        return self._comparing and self._before is not None
+
+    @property
+    def loading(self) -> bool:
+        """Whether a model is being loaded."""
+        return self._runner.busy
+
+    @property
+    def busy(self) -> bool:
+        """Whether a model or a map is on its way."""
+        waiting = self._path is not None and self._patience.isActive()
+        return waiting or self.loading or self.map.busy or self.before_map.busy
+
+    @property
+    def problem(self) -> str:
+        """Why the chosen model is not in use; empty where it is."""
+        return self._problem
+
+    @property
+    def can_export(self) -> bool:
+        """Whether there is a map to write."""
+        return self._loaded is not None and self._synthesis.complete
+
+    def available(self) -> Sequence[ModelCard]:
+        """Models that can be chosen by name, and the one that is chosen."""
+        cards = list(self._library.available())
+        known = {card.path for card in cards}
+        return [*cards, *(one for one in (self.before, self.card) if one and one.path not in known)]
+
+    def installed(self) -> list[str]:
+        """Names by which models are found everywhere."""
+        return [card.name for card in self._library.available()]
+
+    def describe(self, path: Path) -> ModelCard:
+        """Card of a model file; raises where it is none."""
+        return self._library.describe(path)
+
+    # --- requests -------------------------------------------------------------------------
+
+    def use(self, path: Path | None) -> None:
+        """Denoise this recording with a model file, or with none; can be undone.
+
+        Raises
+        ------
+        Sd2Error
+            When the file is no model.
+        """
+        if self._document.recording is None:
+            self.noted.emit("Open a recording first: a model is chosen for a recording.")
+            return
+        if path is not None:
+            self._library.describe(path)
+        choice = NO_MODEL if path is None else DenoiserChoice.of_file(path)
+        if choice == self._choice and self._loaded is None:
+            self._problem = ""
+            self._load()  # once more, after it failed
+        self._choose(choice)
+
+    def set_comparing(self, comparing: bool) -> None:
+        """Show the map of the model before beside that of this one, or not."""
+        if comparing != self._comparing:
+            self._comparing = comparing
+            self._show_before()
+            self.changed.emit()
+
+    def export(self, path: Path) -> None:
+        """Write the denoised map that is shown, made anew with its provenance.
+
+        Raises
+        ------
+        Sd2Error
+            When there is none yet.
+        """
+        if self._loaded is None:
+            raise Sd2Error("No model denoises this recording", "one", "Choose it under Model")
+        self._loaded.denoiser.denoise(self._synthesis.whole_map()).save(path)
+
+    def close(self) -> None:
+        """Stop computing and let go of the models."""
+        self._patience.stop()
+        self._runner.cancel()
+        self._library.close()
+        self._runner.close()
+        self.map.close()
+        self.before_map.close()
+
+    # --- following the recording ----------------------------------------------------------
+
+    def _open(self) -> None:
+        # What was in use for another recording is nothing to compare with here.
+        previous, self._loaded, self._before = self._loaded, None, None
+        self._comparing = False
+        self._show_before()
+        self._follow(anew=True)
+        if previous is not None and previous.card.path == self._path:
+            self._loaded = previous
+        else:
+            self.map.use(None)
+
+    def _follow(self, anew: bool = False) -> None:
+        choice = DenoiserChoice.of(self._document.recording)
+        if choice == self._choice and not anew:
+            return
+        self._choice = choice
+        self._problem = ""
+        path = self._path_of(choice)
+        if path != self._path or path is None:
+            self._path = path
+            self._load()
+        self.changed.emit()
+
+    def _path_of(self, choice: DenoiserChoice) -> Path | None:
+        if self._document.recording is None or choice == NO_MODEL:
+            return None
+        if choice.path is not None:
+            # What is missing was said when the recording was opened.
+            there = choice.path.is_file()
+            self._problem = "" if there else f"The model {choice.path} is not there"
+            return choice.path if there else None
+        card = self._library.named(choice.bundled or DEFAULT_NAME)
+        if card is None and choice.bundled:
+            self._say_problem(
+                f"This recording was denoised with the model {choice.bundled}, which does not"
+                " come with this version. Choose another under Model."
+            )
+        return card.path if card is not None else None
+
+    def _load(self) -> None:
+        """Load what is chosen, once it can be used."""
+        self._runner.cancel()
+        path = self._path
+        if path is None:
+            self._set_model(None)
+        elif self._before is not None and self._before.card.path == path:
+            self._set_model(self._before)
+        elif self._awake:
+            library = self._library
+            self._runner.submit(lambda emit: Loaded(library.describe(path), library.load(path)))
+
+    def _watch(self) -> None:
+        if self._synthetic.map is None:
+            self._awake = False
+            self._patience.stop()
+            self.map.clear()
+            self.before_map.clear()
+        elif not self._awake and not self._patience.isActive():
+            self._patience.start()
+
+    def _wake(self) -> None:
+        """There is a map to denoise, and what is more urgent is done."""
+        self._patience.stop()
+        if self._awake or self._synthetic.map is None:
+            return
+        self._awake = True
+        loaded = self._loaded.card.path if self._loaded else None
+        if self._path is not None and loaded != self._path:
+            self._load()
+        self.changed.emit()
+
+    # --- the model ------------------------------------------------------------------------
+
+    def _set_model(self, loaded: Loaded | None) -> None:
+        if self._loaded is not None and loaded is not self._loaded:
+            self._before = self._loaded
+        self._loaded = loaded
+        # The model's name stands beside the title, on the button that chooses it.
+        if loaded is None:
+            self.map.use(None)
+        else:
+            self.map.use(loaded.denoiser, origin_words(loaded.card))
+        self._show_before()
+        self.changed.emit()
+
+    def _show_before(self) -> None:
+        shown = self._before if self._comparing else None
+        if shown is None:
+            self.before_map.use(None)
+        else:
+            self.before_map.use(shown.denoiser, track_words(shown.card))
+
+    def _fail(self, error: Exception) -> None:
+        self._set_model(None)
+        self._say_problem(str(error))
+
+    def _say_problem(self, words: str) -> None:
+        self._problem = words
+        if self._loaded is not None:
+            self._loaded = None
+        # Nobody asked for the default; that it cannot be used here is no failure.
+        if self._choice != UNSAID:
+            self.failed.emit(words)
+        self.changed.emit()
+
+    def _finish(self) -> None:
+        if self._synthesis.complete:
+            for one in (self.map, self.before_map):
+                one.finish()
+
+    # --- following the synthetic map ------------------------------------------------------
+
+    def _companion(self) -> Companion | None:
+        """Asked before a sweep: both maps in one go."""
+        parts = [one.companion() for one in (self.map, self.before_map)]
+        if not any(parts):
+            return None
+        return lambda start, values: [part and part(start, values) for part in parts]
+
+    def _take(self, part: Part) -> None:
+        source = self._synthetic.map
+        if source is None:
+            return
+        known = known_frames(source, self._synthetic.covered)
+        piece = (part.start, part.start + part.stretch.values.shape[1])
+        for number, one in enumerate((self.map, self.before_map)):
+            if self._synthesis.moving:
+                made = part.more[number] if part.more is not None else None
+                one.take_sweep(source, known, part.sensor, part.start, made)
+            else:
+                one.take(source, known, part.sensor, piece)
+
+    def _view(self) -> View:
+        source = self._synthetic.map
+        if source is None:
+            return (0, 0)
+        return source.timebase.frames_between(self._span.start_s, self._span.end_s)

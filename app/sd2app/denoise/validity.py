@@ -1,0 +1,54 @@
+"""Whether a map is of the sensor where it stands."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QObject, Signal
+
+from sd2app.denoise.model import DenoiseModel
+from sd2app.maps.model import SynthesisModel
+from sd2app.session.sensor import SensorModel
+from sd2app.session.tracks import TrackModel
+
+
+class Standing(QObject):
+    """A map stays on screen until there is a better one, also when the sensor has moved on.
+
+    Parameters
+    ----------
+    synthetic, denoised : TrackModel
+        Maps that follow the sensor; all others do not.
+
+    Signals
+    -------
+    changed
+    """
+
+    changed = Signal()
+
+    def __init__(
+        self,
+        sensor: SensorModel,
+        synthesis: SynthesisModel,
+        denoise: DenoiseModel,
+        synthetic: TrackModel,
+        denoised: TrackModel,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._synthesis, self._denoise = synthesis, denoise
+        self._synthetic, self._denoised = synthetic, denoised
+        for signal in (sensor.changed, synthesis.moving_changed, synthesis.completed):
+            signal.connect(self.changed)
+        synthesis.painted.connect(lambda _: self.changed.emit())
+
+    def of(self, track: TrackModel) -> bool:
+        """Whether a map is of the sensor where it stands, and no hand moves that."""
+        if track is self._synthetic:
+            return self._rests
+        if track is self._denoised:
+            return self._rests and self._denoise.map.shows_source
+        return True
+
+    @property
+    def _rests(self) -> bool:
+        return not self._synthesis.moving and self._synthesis.shows_sensor

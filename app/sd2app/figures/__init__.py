@@ -1,0 +1,1 @@
+"""Figures for papers: maps and strips of frames."""

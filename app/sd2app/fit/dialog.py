@@ -1,0 +1,234 @@
+"""New from video: who is meant, how tall, which camera, where to save."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from PySide6.QtCore import QSignalBlocker, Qt
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QDialog,
+    QDialogButtonBox,
+    QFileDialog,
+    QFormLayout,
+    QHBoxLayout,
+    QLabel,
+    QSlider,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from sd2app.fit.person_picker import PersonPicker
+from sd2app.fit.setup import ANGLES_DEG, DEFAULT_STATURE_M, STATURES_M, FitSetupModel
+from sd2app.palette import Palette
+from sd2app.widgets.elided import ElidedLabel
+from sd2app.widgets.inputs import Choice, NumberBox
+from sd2app.widgets.panel import side_by_side
+from sd2app.widgets.time_axis import clock_text
+
+VIDEOS = "Video (*.mp4 *.mkv *.mov *.avi *.webm *.m4v *.mpg *.ts *.wmv);;All files (*)"
+_CAMERAS = (
+    ("file", "as the file says, else {angle:.0f}°"),
+    ("angle", "field of view"),
+    ("focal", "focal length"),
+)
+
+
+class NewFromVideoDialog(QDialog):
+    """A view of :class:`FitSetupModel`; what is asked for is in the model."""
+
+    def __init__(
+        self, setup: FitSetupModel, palette: Palette, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._setup = setup
+        self.setWindowTitle("New from video")
+        self._build_picture(palette)
+        self._build_form()
+        self._buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel, self)
+        self._begin = self._buttons.addButton("Fit", QDialogButtonBox.ButtonRole.AcceptRole)
+        self._begin.setDefault(True)
+        self._buttons.accepted.connect(self.accept)
+        self._buttons.rejected.connect(self.reject)
+        self._lay_out()
+        setup.changed.connect(self._refresh)
+        self._refresh()
+        self.resize(960, 560)
+
+    # --- building -------------------------------------------------------------------------
+
+    def _build_picture(self, palette: Palette) -> None:
+        self.picker = PersonPicker(self._setup, palette, self)
+        self._slider = QSlider(Qt.Orientation.Horizontal, self)
+        self._slider.setAccessibleName("Frame")
+        self._slider.valueChanged.connect(self._setup.show_frame)
+        self._where = QLabel(self)
+        self._where.setObjectName("muted")
+        self._where.setMinimumWidth(
+            self._where.fontMetrics().horizontalAdvance("00:00.000 · frame 00000")
+        )
+
+    def _build_form(self) -> None:
+        setup = self._setup
+        self._video = ElidedLabel(self)
+        self._folder = ElidedLabel(self)
+        self._other_video = _small_button("Choose…", "Take another video", self._ask_video)
+        self._other_folder = _small_button("Choose…", "Save elsewhere", self._ask_folder)
+        self._person = QLabel(self)
+        self._person.setWordWrap(True)
+        self._clear = _small_button("Clear", "Have the person chosen", setup.clear_person)
+        self._known = QCheckBox("known:", self)
+        self._known.toggled.connect(
+            lambda known: setup.set_stature(self._stature.value() if known else None)
+        )
+        self._stature = NumberBox(*STATURES_M, " m", "Height of the person", step=0.01)
+        self._stature.setValue(DEFAULT_STATURE_M)
+        self._stature.valueChanged.connect(setup.set_stature)
+        self._camera = Choice("How the focal length of the camera is known", self)
+        for way, text in _CAMERAS:
+            self._camera.addItem(text.format(angle=setup.angle_deg), way)
+        self._camera.currentIndexChanged.connect(
+            lambda _: setup.set_camera(self._camera.currentData())
+        )
+        self._angle = NumberBox(
+            *ANGLES_DEG, "°", "Field of view across the longer side", decimals=1, step=1.0
+        )
+        self._angle.valueChanged.connect(setup.set_angle)
+        self._focal = NumberBox(
+            1.0, 100_000.0, " px", "Focal length in pixels of the video", decimals=0, step=10.0
+        )
+        self._focal.valueChanged.connect(setup.set_focal)
+        self._message = QLabel(self)
+        self._message.setWordWrap(True)
+
+    def _lay_out(self) -> None:
+        form = QFormLayout()
+        form.setVerticalSpacing(12)
+        form.setHorizontalSpacing(16)
+        form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+        form.addRow("Video", _row(self._video, self._other_video))
+        form.addRow("Person", _row(self._person, self._clear))
+        form.addRow("", _hint("Drag a rectangle around the person, where there are several."))
+        form.addRow("Body height", side_by_side(self._known, self._stature))
+        form.addRow(
+            "",
+            _hint(
+                f"{DEFAULT_STATURE_M:g} m where it is not known. It fixes the scale: all distances"
+                " and velocities are proportional to it."
+            ),
+        )
+        form.addRow("Camera", side_by_side(self._camera, self._angle, self._focal))
+        form.addRow("Save as", _row(self._folder, self._other_folder))
+        right = QVBoxLayout()
+        right.addLayout(form)
+        right.addStretch(1)
+        right.addWidget(self._message)
+        left = QVBoxLayout()
+        left.addWidget(self.picker, 1)
+        under = QHBoxLayout()
+        under.addWidget(self._slider, 1)
+        under.addWidget(self._where)
+        left.addLayout(under)
+        columns = QHBoxLayout()
+        columns.setSpacing(24)
+        columns.addLayout(left, 3)
+        columns.addLayout(right, 2)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(16, 16, 16, 16)
+        layout.setSpacing(16)
+        layout.addLayout(columns, 1)
+        layout.addWidget(self._buttons)
+
+    # --- following the model --------------------------------------------------------------
+
+    def _refresh(self) -> None:
+        setup = self._setup
+        self._video.setText(setup.video.name if setup.video is not None else "none")
+        self._folder.setText(str(setup.folder) if setup.folder is not None else "")
+        self._other_folder.setEnabled(setup.folder is not None)
+        with QSignalBlocker(self._slider):
+            self._slider.setRange(0, max(setup.frames - 1, 0))
+            self._slider.setValue(setup.frame)
+        self._slider.setEnabled(setup.frames > 1)
+        self._where.setText(
+            f"{clock_text(setup.time_s)} · frame {setup.frame}" if setup.frames else ""
+        )
+        person = setup.person
+        self._person.setText(
+            "who is seen best" if person is None else f"in the rectangle in frame {person.frame}"
+        )
+        self._clear.setVisible(person is not None)
+        with QSignalBlocker(self._known):
+            self._known.setChecked(setup.stature_m is not None)
+        self._stature.setEnabled(setup.stature_m is not None)
+        if setup.stature_m is not None:
+            self._stature.show_value(setup.stature_m)
+        with QSignalBlocker(self._camera):
+            self._camera.setCurrentIndex(self._camera.findData(setup.camera))
+        self._angle.setVisible(setup.camera == "angle")
+        self._angle.show_value(setup.angle_deg)
+        self._focal.setVisible(setup.camera == "focal")
+        if setup.focal_px is not None:
+            self._focal.show_value(setup.focal_px)
+        self._show_message()
+
+    def _show_message(self) -> None:
+        setup = self._setup
+        text, role = "", "muted"
+        if setup.problem:
+            text, role = setup.problem, "warning"
+        elif setup.continues:
+            text = "A fit of this video was stopped here: it will be continued."
+        elif setup.kept is not None:
+            text = "A fit with other choices was stopped here: it will begin anew."
+        elif setup.completes:
+            text = "The mesh will be added to this recording."
+        if self._message.objectName() != role:
+            self._message.setObjectName(role)
+            self._message.style().unpolish(self._message)
+            self._message.style().polish(self._message)
+        self._message.setText(text)
+        self._begin.setEnabled(setup.ready)
+        self._begin.setText("Continue" if setup.continues else "Fit")
+
+    # --- what is clicked ------------------------------------------------------------------
+
+    def _ask_video(self) -> None:
+        start = str(self._setup.video.parent) if self._setup.video is not None else ""
+        name, _ = QFileDialog.getOpenFileName(self, "Video of a person", start, VIDEOS)
+        if name:
+            self._setup.choose_video(Path(name))
+
+    def _ask_folder(self) -> None:
+        name, _ = QFileDialog.getSaveFileName(
+            self, "Save recording as", str(self._setup.folder), "Recording (*.sd2)"
+        )
+        if name:
+            self._setup.set_folder(Path(name))
+
+
+def _small_button(text: str, tip: str, run: Callable[[], object]) -> QToolButton:
+    button = QToolButton()
+    button.setObjectName("outlined")
+    button.setText(text)
+    button.setToolTip(tip)
+    button.setAccessibleName(tip)
+    button.clicked.connect(lambda: run())
+    return button
+
+
+def _row(*widgets: QWidget) -> QHBoxLayout:
+    row = QHBoxLayout()
+    row.setSpacing(8)
+    for number, widget in enumerate(widgets):
+        row.addWidget(widget, 0 if number else 1)
+    return row
+
+
+def _hint(text: str) -> QLabel:
+    label = QLabel(text)
+    label.setObjectName("muted")
+    label.setWordWrap(True)
+    return label

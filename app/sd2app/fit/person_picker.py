@@ -1,0 +1,144 @@
+"""A frame of the video on which a rectangle is drawn around a person."""
+
+from __future__ import annotations
+
+import numpy as np
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from sd2app.fit.setup import FitSetupModel
+from sd2app.palette import Palette
+
+_DIMMED = 110
+
+
+class PersonPicker(QWidget):
+    """Drag draws the rectangle; a click beside it removes it."""
+
+    def __init__(
+        self, setup: FitSetupModel, palette: Palette, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._setup = setup
+        self._colours = palette
+        self._from: QPointF | None = None
+        self._to = QPointF()
+        self.setMinimumSize(320, 240)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.setCursor(Qt.CursorShape.CrossCursor)
+        self.setAccessibleName("Drag a rectangle around the person")
+        setup.changed.connect(self.update)
+        setup.picture_changed.connect(self.update)
+
+    def sizeHint(self) -> QSize:
+        """VGA, a little smaller."""
+        return QSize(560, 420)
+
+    @property
+    def box(self) -> QRectF:
+        """Where the picture is."""
+        size = self._setup.size
+        if size is None:
+            return QRectF()
+        scale = min(self.width() / size[0], self.height() / size[1])
+        box = QRectF(0, 0, size[0] * scale, size[1] * scale)
+        box.moveCenter(QRectF(self.rect()).center())
+        return box
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """A corner of the rectangle."""
+        if event.button() == Qt.MouseButton.LeftButton and self._setup.picture is not None:
+            self._from = self._to = event.position()
+            self.update()
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """The opposite corner."""
+        if self._from is not None:
+            self._to = event.position()
+            self.update()
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        """Take the rectangle, or remove it where nothing was drawn."""
+        if self._from is None or event.button() != Qt.MouseButton.LeftButton:
+            return
+        corner, self._from = self._from, None
+        end = event.position()
+        self.update()
+        box, size = self.box, self._setup.size
+        if size is None:
+            return
+        if (end - corner).manhattanLength() < 6:
+            self._setup.clear_person()
+            return
+        scale = size[0] / box.width()
+        (x0, y0), (x1, y1) = (
+            ((point.x() - box.x()) * scale, (point.y() - box.y()) * scale)
+            for point in (corner, end)
+        )
+        self._setup.set_person(x0, y0, x1, y1)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """The picture, what is outside the rectangle dimmed."""
+        with QPainter(self) as painter:
+            self._paint(painter)
+
+    def _paint(self, painter: QPainter) -> None:
+        painter.fillRect(self.rect(), QColor(self._colours.well))
+        picture = self._setup.picture
+        if picture is None:
+            painter.setPen(QColor(self._colours.muted))
+            text = "Reading the video…" if self._setup.reading else ""
+            painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, text)
+            return
+        picture = np.ascontiguousarray(picture)
+        height, width = picture.shape[:2]
+        image = QImage(picture.data, width, height, 3 * width, QImage.Format.Format_RGB888)
+        painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
+        painter.drawImage(self.box, image)
+        rectangle = self._rectangle()
+        if rectangle is None:
+            return
+        person = self._setup.person
+        drawn_here = self._from is not None or (
+            person is not None and person.frame == self._setup.frame
+        )
+        if drawn_here:
+            self._dim_around(painter, rectangle)
+        pen = QPen(QColor(self._colours.overlay), 2)
+        # In another frame the person is elsewhere.
+        pen.setStyle(Qt.PenStyle.SolidLine if drawn_here else Qt.PenStyle.DotLine)
+        painter.setPen(pen)
+        painter.drawRect(rectangle)
+
+    def _dim_around(self, painter: QPainter, inside: QRectF) -> None:
+        box, shade = self.box, QColor(0, 0, 0, _DIMMED)
+        painter.fillRect(
+            QRectF(box.left(), box.top(), box.width(), inside.top() - box.top()), shade
+        )
+        painter.fillRect(
+            QRectF(box.left(), inside.bottom(), box.width(), box.bottom() - inside.bottom()), shade
+        )
+        painter.fillRect(
+            QRectF(box.left(), inside.top(), inside.left() - box.left(), inside.height()), shade
+        )
+        painter.fillRect(
+            QRectF(inside.right(), inside.top(), box.right() - inside.right(), inside.height()),
+            shade,
+        )
+
+    def _rectangle(self) -> QRectF | None:
+        """The one being drawn, or the one that holds, on the widget."""
+        if self._from is not None:
+            return QRectF(self._from, self._to).normalized().intersected(self.box)
+        person, size = self._setup.person, self._setup.size
+        if person is None or size is None:
+            return None
+        box = self.box
+        scale = box.width() / size[0]
+        return QRectF(
+            box.x() + person.x * scale,
+            box.y() + person.y * scale,
+            person.width * scale,
+            person.height * scale,
+        )

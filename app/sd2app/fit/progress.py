@@ -1,0 +1,103 @@
+"""How far a fit is, over all of its stages, and how long it will still take."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+
+from sd2app.fit.messages import Progressed, Started
+
+WORDS = {
+    "models": "fetching the landmark models",
+    "find": "finding the person",
+    "refine": "looking again",
+    "lift": "working out depth",
+    "fit": "fitting the body",
+    "write": "writing the mesh",
+}
+_WEIGHTS = {"models": 0.0, "find": 1.0, "refine": 4.0, "lift": 0.1, "fit": 3.0, "write": 0.3}
+"""About how long a frame takes in each stage, relative to the others."""
+_UNKNOWN_WEIGHT = 0.5
+_SETTLING_S = 2.0
+"""Before that, an estimate says nothing."""
+
+
+class FitProgress:
+    """Follows the messages of one run."""
+
+    def __init__(self, clock_s: Callable[[], float] = time.monotonic) -> None:
+        self._clock_s = clock_s
+        self._stages: tuple[str, ...] = ()
+        self._began: list[tuple[float, float]] = []  # time and share at a stage's first report
+        self.stage = ""
+        self.done = 0
+        self.total = 0
+        self.unit = ""
+
+    def start(self, message: Started) -> None:
+        """Learn which stages are to come."""
+        self._stages = message.stages
+
+    def report(self, message: Progressed) -> None:
+        """Take a report."""
+        another = message.stage != self.stage
+        self.stage, self.done = message.stage, message.done
+        self.total, self.unit = message.total, message.unit
+        share = self.share
+        if share is not None and (another or not self._began):
+            self._began.append((self._clock_s(), share))
+
+    @property
+    def share(self) -> float | None:
+        """Share of the whole work that is done, None while it is not known."""
+        if self.stage not in self._stages:
+            return None
+        weights = [_WEIGHTS.get(stage, _UNKNOWN_WEIGHT) for stage in self._stages]
+        here = self._stages.index(self.stage)
+        within = min(self.done / self.total, 1.0) if self.total else 0.0
+        total = math.fsum(weights)
+        return (math.fsum(weights[:here]) + within * weights[here]) / total if total else None
+
+    @property
+    def left_s(self) -> float | None:
+        """Seconds to the end at the speed of this stage, None while it is not known.
+
+        At the beginning of a stage the speed is that since the one before, or before that.
+        """
+        share = self.share
+        if share is None:
+            return None
+        for began_s, began_share in reversed(self._began):
+            elapsed_s, gained = self._clock_s() - began_s, share - began_share
+            if elapsed_s >= _SETTLING_S and gained > 0:
+                return elapsed_s * (1.0 - share) / gained
+        return None
+
+    @property
+    def text(self) -> str:
+        """Stage and count in words."""
+        words = WORDS.get(self.stage, self.stage)
+        if not words:
+            return "starting"
+        if self.unit == "byte":
+            megabytes = f"{self.done / 1e6:.1f}"
+            return f"{words}, {megabytes} of {self.total / 1e6:.1f} MB" if self.total else words
+        if not self.total:
+            return words
+        unit = {"frame": "frame ", "step": "step "}.get(self.unit, "")
+        return f"{words}, {unit}{self.done} of {self.total}"
+
+
+def left_in_words(left_s: float | None) -> str:
+    """Time left, rounded as an estimate deserves."""
+    if left_s is None:
+        return ""
+    if left_s < 10:
+        return "a few seconds left"
+    if left_s < 60:
+        return f"about {5 * round(left_s / 5)} s left"
+    if left_s < 3600:
+        return f"about {max(round(left_s / 60), 1)} min left"
+    hours, minutes = divmod(round(left_s / 60), 60)
+    return f"about {hours} h {minutes} min left"

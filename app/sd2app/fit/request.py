@@ -1,0 +1,174 @@
+"""What is to be fitted, and where it is put; kept on disk until the recording is made."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_write_text
+from sd2core.files.paths import free_path, plain_path, remove
+from sd2core.recording.recording import FILE_NAME, SUFFIX, open_recording
+
+REQUEST_NAME = "fit-request.json"
+LOCK_NAME = "fit.lock"
+MESH_NAME = "mesh.zarr"
+_VERSION = 1
+_SAME_FOCAL_PX = 0.01
+
+
+@dataclass(frozen=True)
+class Person:
+    """A rectangle around the person in one frame, in pixels of the upright picture."""
+
+    frame: int
+    x: int
+    y: int
+    width: int
+    height: int
+
+
+@dataclass(frozen=True)
+class FitRequest:
+    """One body from one video.
+
+    Parameters
+    ----------
+    video : Path
+    folder : Path
+        The recording ``NAME.sd2``: to be made, or one of this video without a mesh.
+    stature_m : float, optional
+        How tall the person is; estimated by default.
+    focal_px : float, optional
+        Focal length in pixels of the upright picture; by default as the file says, or
+        the usual field of view.
+    person : Person, optional
+        Who is meant; by default who is seen best.
+    mesh_name : str
+        In ``folder``.
+    """
+
+    video: Path
+    folder: Path
+    stature_m: float | None = None
+    focal_px: float | None = None
+    person: Person | None = None
+    mesh_name: str = MESH_NAME
+
+    @property
+    def mesh(self) -> Path:
+        """The mesh to be written."""
+        return self.folder / self.mesh_name
+
+    @property
+    def partial(self) -> Path:
+        """What a stopped fit leaves, and continues with."""
+        return self.folder / f"{self.mesh_name}.partial"
+
+    def arguments(self) -> list[str]:
+        """The same as a command line."""
+        words = ["fit", str(self.video), "--out", str(self.mesh), "--progress-json"]
+        if self.stature_m is not None:
+            words += ["--stature-m", f"{self.stature_m:.3f}"]
+        if self.focal_px is not None:
+            words += ["--focal-px", f"{self.focal_px:.2f}"]
+        if self.person is not None:
+            p = self.person
+            words += ["--person", f"{p.x},{p.y},{p.width},{p.height}"]
+            words += ["--person-frame", str(p.frame)]
+        return words
+
+    def asks_the_same(self, other: FitRequest) -> bool:
+        """Whether the other's work can be continued for this one."""
+        focal_px, other_px = self.focal_px or 0.0, other.focal_px or 0.0
+        return (
+            self.video == other.video
+            and self.stature_m == other.stature_m
+            and abs(focal_px - other_px) < _SAME_FOCAL_PX
+            and self.person == other.person
+        )
+
+    def save(self) -> None:
+        """Keep it in its folder, which is made; what was done for other choices goes."""
+        kept = read_request(self.folder)
+        if kept is not None and not self.asks_the_same(kept):
+            remove(kept.partial)
+        self.folder.mkdir(exist_ok=True)
+        content = asdict(self) | {"version": _VERSION, "video": str(self.video)}
+        del content["folder"]
+        atomic_write_text(self.folder / REQUEST_NAME, json.dumps(content, indent=2) + "\n")
+
+    def forget(self) -> None:
+        """Remove what was kept; the recording is made."""
+        (self.folder / REQUEST_NAME).unlink(missing_ok=True)
+
+    def discard(self) -> None:
+        """Remove all that a stopped fit has left."""
+        remove(self.partial)
+        self.forget()
+        if self.folder.is_dir() and not any(self.folder.iterdir()):
+            self.folder.rmdir()
+
+    @property
+    def unfinished(self) -> bool:
+        """Whether there is something to continue with, or a mesh without its recording."""
+        return (self.folder / REQUEST_NAME).exists() and self.video.exists()
+
+
+def read_request(folder: Path) -> FitRequest | None:
+    """The request that a folder keeps; None where there is none that can be read."""
+    try:
+        content = json.loads((folder / REQUEST_NAME).read_text(encoding="utf-8"))
+        return _request(plain_path(folder), content)
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def _request(folder: Path, content: dict[str, Any]) -> FitRequest | None:
+    if content["version"] != _VERSION:
+        return None
+    person = content["person"]
+    return FitRequest(
+        video=Path(content["video"]),
+        folder=folder,
+        stature_m=content["stature_m"],
+        focal_px=content["focal_px"],
+        person=None if person is None else Person(**person),
+        mesh_name=str(content["mesh_name"]),
+    )
+
+
+def settled(request: FitRequest) -> FitRequest:
+    """The request with full paths, its folder a recording that can take the mesh.
+
+    Raises
+    ------
+    Sd2Error
+        When the folder cannot be made, or is a recording of something else.
+    """
+    folder = plain_path(request.folder)
+    if folder.suffix != SUFFIX:
+        folder = folder.with_name(folder.name + SUFFIX)
+    video = plain_path(request.video)
+    if not folder.parent.is_dir():
+        raise Sd2Error(f"The folder {folder.parent} does not exist", "an existing folder")
+    if folder.exists() and not folder.is_dir():
+        raise Sd2Error(f"{folder} is a file", "the name of a new recording")
+    if (folder / FILE_NAME).exists():
+        recording = open_recording(folder)
+        if recording.video is None or plain_path(recording.video) != video:
+            raise Sd2Error(
+                f"{folder} is a recording of something else", "a new name", "Choose another name"
+            )
+        if recording.mesh is not None:
+            raise Sd2Error(
+                f"{folder} has a mesh already", "a new name", "Save the new recording elsewhere"
+            )
+    kept = read_request(folder)
+    if kept is not None and kept.video == video:
+        return replace(request, video=video, folder=folder, mesh_name=kept.mesh_name)
+    # A mesh that lies there is somebody's.
+    name = free_path(folder, MESH_NAME, "fitted", reserved=FILE_NAME).name
+    return replace(request, video=video, folder=folder, mesh_name=name)

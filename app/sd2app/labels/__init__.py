@@ -1,0 +1,1 @@
+"""Labels of spans in time: timeline, table, label set, files, crash safety."""

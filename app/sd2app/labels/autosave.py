@@ -1,0 +1,298 @@
+"""Who may edit the labels that are open, where every edit is kept, and what was left behind."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+
+from PySide6.QtCore import QObject, Signal
+
+from sd2app.labels.model import LabelsModel
+from sd2app.session.content import UNTITLED
+from sd2app.session.document import DocumentModel
+from sd2app.training.text import clock_text
+from sd2core.errors import Sd2Error
+from sd2core.labels.journal import Journal
+from sd2core.labels.recovery import RecoveryPlace, offers_in
+from sd2core.labels.recovery_offers import Found, Offer
+from sd2core.labels.spans import Labels
+from sd2core.recording.recording import Recording
+
+_NOTHING_OPEN = "Nothing is open: labels belong to a recording"
+
+
+class LabelSession(QObject):
+    """The labels of one recording in this window, from opening to closing.
+
+    One window edits; another shows why it does not. A journal begins with the first edit.
+
+    Parameters
+    ----------
+    document : DocumentModel
+    labels : LabelsModel
+        Shows them.
+    root : Path
+        Recovery folder, which all windows that are to see each other share.
+
+    Signals
+    -------
+    changed
+        Who may edit, what is offered, or what is to be known.
+    noted, failed : str
+        Sentences for the user.
+    """
+
+    changed = Signal()
+    noted = Signal(str)
+    failed = Signal(str)
+
+    def __init__(
+        self,
+        document: DocumentModel,
+        labels: LabelsModel,
+        root: Path,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._document, self._labels, self._root = document, labels, root
+        self._place: RecoveryPlace | None = None
+        self._journal: Journal | None = None
+        self._keeping = True
+        self._refusal = ""
+        self._offers: tuple[Offer, ...] = ()
+        self._wanted: Offer | None = None
+        self._notes: tuple[str, ...] = ()
+        self._waiting = Found()
+        document.saved.connect(self._follow_saving)
+
+    @property
+    def refusal(self) -> str:
+        """Why labels cannot be edited here; empty where they can."""
+        return _NOTHING_OPEN if self._document.content is None else self._refusal
+
+    @property
+    def read_only(self) -> bool:
+        """Whether labels are on show that cannot be edited here."""
+        return self._document.content is not None and bool(self._refusal)
+
+    @property
+    def offer(self) -> Offer | None:
+        """What an earlier session left behind and nobody has decided about."""
+        return self._offers[0] if self._offers else None
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What could not be read of earlier sessions, or is not kept of this one."""
+        return self._notes
+
+    @property
+    def waiting(self) -> Found:
+        """What was found at the start, until something is open."""
+        return self._waiting
+
+    # --- opening and closing --------------------------------------------------------------
+
+    def take_over(self) -> None:
+        """Something was opened: its labels are this window's, unless another has them."""
+        recording = self._document.recording
+        if recording is not None and not self._document.goes_on:
+            self.close()
+            self._waiting = Found()
+            self._begin_at(_labelled_path(recording), reread=True)
+        self._labels.open(self._document.labels)
+
+    def try_again(self) -> None:
+        """Take the labels as they are now, once the other window has let go of them."""
+        if self._place is None or not self.read_only:
+            return
+        self._take(reread=True)
+        if self.read_only:
+            self.noted.emit(self._refusal)
+        else:
+            self._labels.open(self._document.labels)
+
+    def close(self) -> None:
+        """End the session: all is saved, or the user wants none of it."""
+        self._go_on_in(None)
+        if self._place is not None:
+            self._place.release()
+        self._place = None
+        self._refusal, self._offers, self._notes, self._keeping = "", (), (), True
+
+    def _begin_at(self, path: Path, *, reread: bool) -> None:
+        self._place = RecoveryPlace(self._root, path)
+        self._take(reread=reread)
+
+    def _take(self, *, reread: bool) -> None:
+        place, recording = self._place, self._document.recording
+        assert place is not None
+        assert recording is not None
+        self._refusal = ""
+        try:
+            if not place.take():
+                self._refusal = _held_words(place, recording.title)
+            elif reread:  # another window may have saved since they were read
+                self._document.read_labels_again()
+        except OSError as error:
+            # No journal is no reason not to edit.
+            self._notes = (f"Edits of labels are not kept until they are saved ({error}).",)
+        except Sd2Error as error:
+            place.release()
+            self._refusal = str(error)
+        recording.labels_elsewhere = bool(self._refusal)
+        if place.held:
+            self._look_for_offers(place)
+        self.changed.emit()
+
+    def _follow_saving(self) -> None:
+        recording = self._document.recording
+        if recording is None:
+            return
+        path = _labelled_path(recording)
+        if self._place is None or self._place.recording != path.resolve():
+            self.close()
+            self._begin_at(path, reread=False)
+        elif self._journal is not None:
+            # Unwritten, what is in the file is offered, found to be the same, and dropped.
+            with suppress(OSError):
+                self._journal.saved()
+
+    # --- every edit -----------------------------------------------------------------------
+
+    def keep(self, name: str, before: Labels, after: Labels) -> None:
+        """Have an edit on disk before it counts as made; where that fails, say so."""
+        place = self._place
+        try:
+            if place is None or not place.take():
+                return
+            if self._journal is None:
+                self._journal = place.begin(before)
+            self._journal.write(name, after)
+        except OSError as error:
+            self._tell_unkept(error)
+        else:
+            if not self._keeping:
+                self.noted.emit("Edits of labels are kept again.")
+            self._keeping = True
+
+    def _tell_unkept(self, error: OSError) -> None:
+        if self._keeping:
+            self.failed.emit(
+                f"The edit is made, but could not be kept for the case of a crash ({error})."
+                " Save the recording; free space where that is missing."
+            )
+        self._keeping = False
+
+    def _go_on_in(self, journal: Journal | None) -> None:
+        before, self._journal = self._journal, journal
+        if before is not None:
+            with suppress(OSError):
+                before.close()
+
+    # --- what was left behind -------------------------------------------------------------
+
+    def look_around(self) -> None:
+        """At the start: find out which recordings have labels that were not saved."""
+        self._waiting = offers_in(self._root)
+        self.changed.emit()
+
+    def recoveries(self) -> Found:
+        """What can be recovered of all recordings, also what was declined before."""
+        others = offers_in(self._root, declined=True)
+        if self._place is None or not self._place.held:
+            return others
+        own = self._place.offers(declined=True)
+        offers = sorted((*own.offers, *others.offers), key=lambda one: -one.time_unix_s)
+        return Found(tuple(offers), (*own.notes, *others.notes))
+
+    def is_of_open(self, offer: Offer) -> bool:
+        """Whether it is of the recording that is open."""
+        return self._place is not None and self._place.recording == offer.recording
+
+    def give_up(self, offer: Offer) -> None:
+        """Decline any of the recoveries; what was declined before is deleted."""
+        own = self._place if self.is_of_open(offer) else None
+        place = own or RecoveryPlace(self._root, offer.recording)
+        try:
+            if place.take():
+                (place.delete if offer.declined else place.decline)(offer)
+        except OSError as error:
+            self.failed.emit(str(error))
+        finally:
+            if own is None:
+                place.release()
+        self._offers = tuple(one for one in self._offers if one != offer)
+        self._waiting = Found(tuple(one for one in self._waiting.offers if one != offer))
+        self.changed.emit()
+
+    def ask_for(self, offer: Offer) -> None:
+        """Offer this one, now or when its recording is open."""
+        self._wanted = offer
+        if self._place is not None and self._place.held:
+            self._look_for_offers(self._place)
+            self.changed.emit()
+
+    def take_offer(self) -> Labels:
+        """Go on with the labels that are offered: they are on disk anew, and no longer offered."""
+        offer, place = self._offers[0], self._place
+        assert place is not None
+        try:
+            journal = place.begin(offer.labels, offer)
+        except OSError as error:
+            self._tell_unkept(error)
+        else:
+            self._go_on_in(journal)
+        self.postpone()
+        return offer.labels
+
+    def decline(self) -> None:
+        """Offer it no more; it is kept, and :meth:`recoveries` still has it."""
+        if self._offers[0].declined:
+            self.postpone()
+        else:
+            self.give_up(self._offers[0])
+
+    def postpone(self) -> None:
+        """Offer it again when the recording is opened the next time."""
+        self._offers = self._offers[1:]
+        self.changed.emit()
+
+    def dismiss(self) -> None:
+        """What was to be known was read."""
+        self._notes, self._waiting = (), Found()
+        self.changed.emit()
+
+    def _look_for_offers(self, place: RecoveryPlace) -> None:
+        wanted = self._wanted.files if self._wanted is not None else ()
+        found = place.offers(declined=bool(wanted))
+        asked = [one for one in found.offers if one.files == wanted]
+        if asked:
+            self._wanted = None
+        others = (one for one in found.offers if not one.declined and one not in asked)
+        self._offers = tuple(self._other_than_open(place, (*asked, *others)))
+        self._notes = found.notes
+
+    def _other_than_open(self, place: RecoveryPlace, offers: Iterable[Offer]) -> Iterable[Offer]:
+        """Those that hold something else than what is open; nothing is lost with the others."""
+        for offer in offers:
+            if offer.labels != self._document.labels:
+                yield offer
+            else:
+                with suppress(OSError):
+                    place.delete(offer)
+
+
+def _labelled_path(recording: Recording) -> Path:
+    """What a recording's recoveries go by: its folder, or the file that it was made of so far."""
+    if recording.folder != UNTITLED:
+        return recording.folder
+    parts = (recording.video, recording.mesh, recording.radar)
+    return next((path for path in parts if path is not None), recording.folder)
+
+
+def _held_words(place: RecoveryPlace, title: str) -> str:
+    holder = place.holder()
+    who = str(holder) if holder and holder.host else "somebody else"
+    since = f" since {clock_text(holder.since_unix_s)}" if holder and holder.since_unix_s else ""
+    return f"The labels of {title} are edited by {who}{since}; here they can only be looked at"

@@ -1,0 +1,183 @@
+"""Spans being cut out into a folder, in the background."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from PySide6.QtCore import QObject, Signal
+
+from sd2app.background.latest import Emit, LatestRunner
+from sd2app.session.document import DocumentModel
+from sd2app.session.tasks import Job, JobsModel
+from sd2app.session.tracks import TrackModel
+from sd2core.cutouts.cutting import Cut, cut_out, plan_cuts
+from sd2core.cutouts.source import CutSource, Part
+from sd2core.labels.spans import Labels, Span
+
+
+class _Plan(NamedTuple):
+    source: CutSource
+    cuts: list[Cut]
+    folder: Path
+
+    @property
+    def others(self) -> int:
+        """Folders that hold something else."""
+        return sum(one.state == "other" for one in self.cuts)
+
+
+class _Done(NamedTuple):
+    folder: Path
+    written: int
+    same: int
+
+
+class CutOutModel(QObject):
+    """Looks at the folder first; where it holds something else, somebody has to decide.
+
+    Parameters
+    ----------
+    document : DocumentModel
+    maps : dict of str to TrackModel
+        By the name of their file.
+    jobs : JobsModel
+
+    Signals
+    -------
+    asked : int, str
+        How many folders hold something else, and one of them: :meth:`go_on` or :meth:`give_up`.
+    noted, failed : str
+    """
+
+    asked = Signal(int, str)
+    noted = Signal(str)
+    failed = Signal(str)
+
+    def __init__(
+        self,
+        document: DocumentModel,
+        maps: dict[str, TrackModel],
+        jobs: JobsModel,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._document, self._maps, self._jobs = document, maps, jobs
+        self._plan: _Plan | None = None
+        self._job: Job | None = None
+        self._runner = LatestRunner("cut", self)
+        self._runner.partial.connect(self._report)
+        self._runner.finished.connect(self._receive)
+        self._runner.failed.connect(self._fail)
+
+    @property
+    def busy(self) -> bool:
+        """Whether spans are being cut out."""
+        return self._runner.busy
+
+    def source(self, parts: Iterable[Part] = ("video", "mesh", "maps")) -> CutSource | None:
+        """What there is to cut from; maps that are still computed are not among it."""
+        content = self._document.content
+        if content is None:
+            return None
+        maps = {
+            name: track.map.shifted(track.offset_s)
+            for name, track in self._maps.items()
+            if track.map is not None and track.covered is None
+        }
+        recording = content.recording
+        whole = CutSource(
+            recording.title,
+            recording.simulated,
+            content.timebase,
+            recording.video if content.video is not None else None,
+            content.mesh,
+            maps,
+            recording.sensor.position_m,
+        )
+        return whole.only(parts)
+
+    def start(self, spans: Sequence[Span], parts: Iterable[Part], folder: Path) -> None:
+        """Look what is in the folder, then cut."""
+        source = self.source(parts)
+        if source is None:
+            return
+        self._begin(f"Cutting out {len(spans)} span{'s' * (len(spans) != 1)}")
+        self._runner.submit(lambda emit: _Plan(source, plan_cuts(source, spans, folder), folder))
+
+    def go_on(self, *, replace_others: bool) -> None:
+        """Cut; what holds something else is replaced, or stays."""
+        plan, self._plan = self._plan, None
+        if plan is None:
+            return
+
+        def cut(emit: Emit) -> _Done:
+            written = cut_out(
+                plan.source,
+                plan.cuts,
+                plan.folder,
+                replace_others=replace_others,
+                progress=lambda done, total: emit((done, total)),
+            )
+            return _Done(plan.folder, len(written), len(plan.cuts) - len(written))
+
+        self._runner.submit(cut)
+
+    def give_up(self) -> None:
+        """Stop; what is complete stays, and another time goes on from there."""
+        self._runner.cancel()
+        self._plan = None
+        self._end()
+
+    def close(self) -> None:
+        """Stop, and wait until nothing is being written."""
+        self._runner.close()
+        self._end()
+
+    # --- inside ---------------------------------------------------------------------------
+
+    def _begin(self, title: str) -> None:
+        self._end()
+        self._job = self._jobs.start(title, self.give_up)
+
+    def _end(self) -> None:
+        if self._job is not None:
+            self._jobs.finish(self._job)
+            self._job = None
+
+    def _report(self, progress: Any) -> None:
+        if self._job is not None:
+            self._jobs.report(self._job, *progress)
+
+    def _receive(self, result: _Plan | _Done) -> None:
+        if isinstance(result, _Plan):
+            self._plan = result
+            if result.others:
+                one = next(cut for cut in result.cuts if cut.state == "other")
+                self.asked.emit(result.others, one.path.name)
+            else:
+                self.go_on(replace_others=False)
+            return
+        self._end()
+        count, same = result.written, result.same
+        words = f"{count} span{'s' * (count != 1)} cut out into {result.folder}."
+        self.noted.emit(f"{words} {same} stayed as they were." if same else words)
+
+    def _fail(self, error: Exception) -> None:
+        self._end()
+        self.failed.emit(str(error))
+
+
+def groups(labels: Labels, selected: Sequence[Span]) -> list[tuple[str, tuple[Span, ...]]]:
+    """What one may want to cut out: the selection, all, or the spans of one label."""
+    decided = [span for span in labels.spans if span.origin != "suggestion"]
+    chosen = tuple(span for span in selected if span.origin != "suggestion")
+    found = [("the selected", chosen)] if chosen else []
+    found.append(("all", tuple(decided)))
+    by_label: dict[str, list[Span]] = {
+        name: [] for name in dict.fromkeys(span.label for span in decided)
+    }
+    for span in decided:
+        by_label[span.label].append(span)
+    return found + [(name, tuple(spans)) for name, spans in by_label.items()]

@@ -1,0 +1,227 @@
+"""Every edit of labels: done first, then pushed to the history as one step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Literal
+
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtGui import QUndoCommand
+
+from sd2app.labels.autosave import LabelSession
+from sd2app.labels.model import LabelsModel
+from sd2app.session.document import DocumentModel
+from sd2app.session.playback import PlaybackModel
+from sd2core.errors import Sd2Error
+from sd2core.labels import edits, span_fields
+from sd2core.labels.comparison import changed_stretch
+from sd2core.labels.edits import Edit, Side
+from sd2core.labels.group_edits import duplicate_together, nudge_together
+from sd2core.labels.spans import Labels, Span
+from sd2core.timebase import Timebase
+
+Change = Callable[[Labels, Timebase], Edit]
+
+
+class _Step(QUndoCommand):
+    """One edit, taken back and done again."""
+
+    def __init__(
+        self,
+        name: str,
+        become: Callable[[str, Labels, Labels], None],
+        before: Labels,
+        after: Labels,
+    ) -> None:
+        super().__init__(name)
+        self._become, self._before, self._after = become, before, after
+
+    def undo(self) -> None:
+        self._become(f"Undo {self.text().lower()}", self._after, self._before)
+
+    def redo(self) -> None:
+        self._become(self.text(), self._before, self._after)
+
+
+class LabelEdits(QObject):
+    """What the user can do to labels by keys and menus.
+
+    A hand on the timeline is :class:`sd2app.labels.dragging.LabelDragging`, marking while it
+    plays :class:`sd2app.labels.marking.LabelMarking`; both come here with what they have made.
+    Each edit is on disk when it is made (see :class:`.models.label_session.LabelSession`).
+    Times are the frames of the playback clock. What cannot be done changes nothing, and
+    ``failed`` says why. ``applying`` comes before an edit: a hand that drags is to let go.
+    ``done_at`` comes after one, also when it is taken back: from when to when spans differ.
+    """
+
+    failed = Signal(str)
+    applying = Signal()
+    done_at = Signal(float, float)
+
+    def __init__(
+        self,
+        document: DocumentModel,
+        labels: LabelsModel,
+        playback: PlaybackModel,
+        session: LabelSession,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._document, self._labels, self._playback = document, labels, playback
+        self._session = session
+
+    @property
+    def refusal(self) -> str:
+        """Why nothing can be edited; empty where it can."""
+        return self._session.refusal
+
+    # --- keys -----------------------------------------------------------------------------
+
+    def relabel(self, label: str) -> None:
+        """Give the selected spans another label."""
+        self._labels.set_label(label)
+        ids = self._ids()
+        self.apply(lambda labels, base: span_fields.relabel(labels, ids, label))
+
+    def edge_here(self, side: Side) -> None:
+        """Put an edge of the selected span at the frame on screen."""
+        chosen, base = self._labels.selected, self._playback.timebase
+        if not chosen:
+            return
+        # The frame on screen is the first of the span, or its last.
+        frame = self._playback.frame + (side == "end")
+        time_s = base.time_of(frame) if frame < len(base) else base.end_s
+        self.apply(lambda labels, base: edits.resize(labels, base, chosen[0].id, side, time_s))
+
+    def split(self) -> None:
+        """Cut the selected span, or the one on the track, in two at the frame on screen."""
+        now_s = self._now_s
+        here = [span for span in self._candidates() if span.start_s < now_s < span.end_s]
+        if here:
+            self.apply(lambda labels, base: edits.split(labels, base, here[0].id, now_s))
+
+    def delete(self) -> None:
+        """Delete the selected spans."""
+        if ids := self._ids():
+            self.apply(lambda labels, base: edits.delete(labels, ids))
+
+    def merge(self) -> None:
+        """Join the selected spans."""
+        ids = self._ids()
+        self.apply(lambda labels, base: edits.merge(labels, ids))
+
+    def nudge(self, frames: int) -> None:
+        """Move the selected spans by frames, as one."""
+        ids = self._ids()
+        if len(ids) == 1:
+            self.apply(lambda labels, base: edits.nudge(labels, base, ids[0], frames))
+        elif ids:
+            self.apply(lambda labels, base: nudge_together(labels, base, ids, frames))
+
+    def duplicate(self) -> None:
+        """Copy the selected spans to the frame on screen; behind them where that is within them."""
+        chosen = self._labels.selected
+        if not chosen:
+            return
+        ids, now_s = self._ids(), self._now_s
+        first_s, last_s = chosen[0].start_s, max(span.end_s for span in chosen)
+        start_s = last_s if first_s <= now_s < last_s else now_s
+        self.apply(lambda labels, base: duplicate_together(labels, base, ids, start_s))
+
+    def meet(self) -> None:
+        """Let the two selected neighbours meet at the frame on screen."""
+        ids, now_s = self._ids(), self._now_s
+        if len(ids) == 2:
+            self.apply(lambda labels, base: edits.meet(labels, base, ids[0], ids[1], now_s))
+
+    def fill_gaps(self) -> None:
+        """Make a span of background in every gap of the track."""
+        track = self._labels.track
+        if track:
+            label = self._labels.background
+            self.apply(lambda labels, base: edits.fill_gaps(labels, base, track, label))
+
+    def restore(self) -> None:
+        """Take over what an earlier session left behind."""
+        recording = self._document.recording
+        if recording is None or self._session.offer is None or self.refused():
+            return
+        self.applying.emit()
+        before = self._labels.labels
+        recording.labels = self._session.take_offer()  # on disk already, as a session of its own
+        self._labels.set_labels(recording.labels)
+        self.make(Edit("Restore labels", recording.labels), before)
+
+    # --- finding one's way ----------------------------------------------------------------
+
+    def step(self, towards: Literal[-1, 1]) -> None:
+        """Select the next span of the track, or the one before, and go to its start."""
+        spans = self._labels.labels.of_track(self._labels.track) if self._labels.track else ()
+        chosen = self._labels.selected
+        from_s = chosen[0].start_s if chosen else self._now_s
+        if towards > 0:
+            found = next((one for one in spans if one.start_s > from_s), None)
+        else:
+            found = next((one for one in reversed(spans) if one.start_s < from_s), None)
+        if found is not None:
+            self.go_to(found)
+
+    def go_to(self, span: Span) -> None:
+        """Select a span and show its first frame."""
+        self._labels.select((span.id,))
+        self._playback.seek(span.start_s)
+
+    # --- doing ----------------------------------------------------------------------------
+
+    @property
+    def _now_s(self) -> float:
+        return self._playback.timebase.time_of(self._playback.frame)
+
+    def _candidates(self) -> Iterable[Span]:
+        return self._labels.selected or self._labels.labels.of_track(self._labels.track)
+
+    def _ids(self) -> tuple[int, ...]:
+        return tuple(span.id for span in self._labels.selected)
+
+    def apply(self, change: Change) -> bool:
+        """Make an edit, one step in the history; False where it was refused.
+
+        What a hand has dragged until then is a step before it.
+        """
+        if self.refused():
+            return False
+        self.applying.emit()
+        before = self._labels.labels
+        try:
+            done = change(before, self._playback.timebase)
+        except Sd2Error as error:
+            self.failed.emit(str(error))
+            return False
+        self.make(done, before)
+        return True
+
+    def refused(self) -> bool:
+        """Whether nothing can be edited; says why."""
+        if self.refusal:
+            self.failed.emit(self.refusal)
+        return bool(self.refusal)
+
+    def make(self, done: Edit, before: Labels) -> None:
+        """Let what has been worked out be so, as one step in the history."""
+        if done.labels is not before:
+            step = _Step(done.name, self._become, before, done.labels)
+            step.redo()
+            self._document.undo_stack.push(step)
+        if done.ids:
+            self._labels.select(done.ids)
+
+    def _become(self, name: str, before: Labels, after: Labels) -> None:
+        """The one way by which labels of a recording change: on disk first, then on screen."""
+        recording = self._document.recording
+        if recording is None or recording.labels is after:
+            return
+        self._session.keep(name, before, after)
+        recording.labels = after
+        self._labels.set_labels(after)
+        if (stretch := changed_stretch(before, after)) is not None:
+            self.done_at.emit(*stretch)

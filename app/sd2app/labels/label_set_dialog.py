@@ -1,0 +1,63 @@
+"""What the page of the label set asks: a colour, a file to read or to write."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from PySide6.QtGui import QColor
+from PySide6.QtWidgets import QColorDialog, QFileDialog, QWidget
+
+from sd2app.labels.columns import Change
+from sd2app.labels.model import LabelsModel
+from sd2core.errors import Sd2Error
+from sd2core.labels.files import read_label_set, write_label_set
+from sd2core.labels.label_set import GESTURES, LabelSet
+from sd2core.labels.label_set_edits import set_label_set
+
+_FILES = "Label set (*.json);;All files (*)"
+
+
+class LabelSetDialogs:
+    """Asks, then makes the edit; a failure is handed to ``report`` as a sentence."""
+
+    def __init__(
+        self,
+        parent: QWidget,
+        labels: LabelsModel,
+        apply: Callable[[Change], bool],
+        report: Callable[[str], None],
+    ) -> None:
+        self._parent, self._labels, self._apply, self._report = parent, labels, apply, report
+
+    def ask_colour(self, colour: str) -> str:
+        """Let the user choose any colour; empty where there is none."""
+        chosen = QColorDialog.getColor(QColor(colour), self._parent, "Colour of the label")
+        return chosen.name() if chosen.isValid() else ""
+
+    def import_set(self) -> None:
+        """Use the set of a file."""
+        name, _ = QFileDialog.getOpenFileName(self._parent, "Import label set", "", _FILES)
+        if name:
+            self._attempt(lambda: self._use(read_label_set(Path(name))))
+
+    def export_set(self) -> None:
+        """Write the set to a file."""
+        shown = self._labels.labels.label_set
+        start = f"{shown.name or 'labels'}.json".replace("/", "-")
+        name, _ = QFileDialog.getSaveFileName(self._parent, "Export label set", start, _FILES)
+        if name:
+            self._attempt(lambda: write_label_set(Path(name), shown))
+
+    def usual_set(self) -> None:
+        """Use the set that comes with the program."""
+        self._use(GESTURES)
+
+    def _use(self, label_set: LabelSet) -> None:
+        self._apply(lambda labels, _: set_label_set(labels, label_set))
+
+    def _attempt(self, work: Callable[[], object]) -> None:
+        try:
+            work()
+        except (Sd2Error, OSError) as error:
+            self._report(str(error))

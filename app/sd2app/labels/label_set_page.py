@@ -1,0 +1,259 @@
+"""The label set: its labels with name, key, colour and class, in an order of one's own."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from PySide6.QtCore import (
+    QAbstractItemModel,
+    QEvent,
+    QModelIndex,
+    QPersistentModelIndex,
+    QPoint,
+    Qt,
+    QTimer,
+    Signal,
+)
+from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QHBoxLayout,
+    QLineEdit,
+    QMenu,
+    QStyleOptionViewItem,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from sd2app.labels.label_set_model import CLASS, COLOUR, KEY, NAME, NO_CLASS, LabelSetModel
+from sd2app.widgets.cell_table import CellTable
+from sd2app.widgets.elided import ElidedLabel
+from sd2app.widgets.icons import swatch_icon
+from sd2app.widgets.own_keys import claims
+from sd2app.widgets.panel import outlined
+from sd2app.widgets.table import Choosable, FramedCells, ListedEditor
+
+_WIDE = ("■ a longer name", "Key", "■ vermilion (alike)", "background", "Spans")
+_PADDING_PX = 14
+_OTHER = "other"
+_OWN_KEYS = (Qt.Key.Key_Escape, Qt.Key.Key_Return, Qt.Key.Key_Enter)
+
+
+class Asks(Protocol):
+    """What the page leaves to dialogs."""
+
+    def ask_colour(self, colour: str) -> str:
+        """Let the user choose any colour; empty where there is none."""
+
+    def import_set(self) -> None:
+        """Use the set of a file."""
+
+    def export_set(self) -> None:
+        """Write the set to a file."""
+
+    def usual_set(self) -> None:
+        """Use the set that comes with the program."""
+
+
+class LabelSetPage(QWidget):
+    """The table, what was noticed about colours, and buttons."""
+
+    def __init__(self, model: LabelSetModel, asks: Asks, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._model = model
+        self._name = NameLine("Name of the label set", self)
+        self._name.editingFinished.connect(lambda: model.rename_set(self._name.text()))
+        self._name.given_up.connect(lambda: self._name.setText(model.label_set.name))
+        self.table = table = LabelSetTable(model, asks, self)
+        table.removed.connect(self._remove)
+        self._warning = ElidedLabel(self)
+        self._warning.setObjectName("warning")
+        self._add = outlined("Add", "Add a label", self._added, self)
+        self._less = outlined("Remove", "Remove the label of the current row", self._remove, self)
+        self._up = outlined("Up", "Offer it earlier", lambda: self._move(-1), self)
+        self._down = outlined("Down", "Offer it later", lambda: self._move(1), self)
+        file = outlined("File", "Share the set as a file, or take another", None, self)
+        file.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        file.setMenu(self._file_menu(asks))
+        top, below = QHBoxLayout(), QHBoxLayout()
+        for row in (top, below):
+            row.setSpacing(6)
+        top.addWidget(self._name, 1)
+        top.addWidget(file)
+        for button in (self._add, self._less, self._up, self._down):
+            below.addWidget(button)
+        below.addStretch(1)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(6)
+        layout.addLayout(top)
+        layout.addWidget(table, 1)
+        layout.addWidget(self._warning)
+        layout.addLayout(below)
+        model.modelReset.connect(self._refresh)
+        model.dataChanged.connect(self._refresh)
+        table.selectionModel().currentRowChanged.connect(self._refresh)
+        self._refresh()
+
+    def _file_menu(self, asks: Asks) -> QMenu:
+        menu = QMenu(self)
+        menu.addAction("Import label set…").triggered.connect(lambda _: asks.import_set())
+        menu.addAction("Export label set…").triggered.connect(lambda _: asks.export_set())
+        menu.addSeparator()
+        menu.addAction("Usual label set").triggered.connect(lambda _: asks.usual_set())
+        return menu
+
+    # --- what the buttons do --------------------------------------------------------------
+
+    def _added(self) -> None:
+        if self._model.add():
+            index = self._model.index(self._model.rowCount() - 1, NAME)
+            self.table.setCurrentIndex(index)
+            self.table.setFocus()
+            self.table.edit(index)
+
+    def _move(self, towards: int) -> None:
+        index = self.table.currentIndex()
+        if self._model.move(index.row(), towards):
+            self.table.setCurrentIndex(index.siblingAtRow(index.row() + towards))
+
+    def _remove(self) -> None:
+        row = self.table.currentIndex().row()
+        if row < 0:
+            return
+        if self._model.spans_of(row):
+            menu = self.menu_to_remove(row)
+            menu.exec(self._less.mapToGlobal(QPoint(0, self._less.height())))
+        else:
+            self._gone(row)
+
+    def menu_to_remove(self, row: int) -> QMenu:
+        """What can become of the spans of a label that is removed."""
+        count = self._model.spans_of(row)
+        whose = "The span keeps" if count == 1 else f"The {count:,} spans keep"
+        menu = QMenu(self)
+        menu.addAction(f"{whose} the label, shown in grey").triggered.connect(
+            lambda _: self._gone(row)
+        )
+        others = menu.addMenu("Give the span another label" if count == 1 else "Give them another")
+        for label in self._model.label_set.labels:
+            if label != self._model.label_set.labels[row]:
+                others.addAction(swatch_icon(label.colour), label.name).triggered.connect(
+                    lambda _, name=label.name: self._gone(row, name)
+                )
+        return menu
+
+    def _gone(self, row: int, instead: str | None = None) -> None:
+        if self._model.remove(row, instead):
+            last = self._model.rowCount() - 1
+            self.table.setCurrentIndex(self._model.index(min(row, last), NAME))
+
+    # --- following ------------------------------------------------------------------------
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Somebody looks."""
+        super().showEvent(event)
+        self._model.set_watched(True)
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        """Nobody looks."""
+        super().hideEvent(event)
+        self._model.set_watched(False)
+
+    def _refresh(self) -> None:
+        row, count = self.table.currentIndex().row(), self._model.rowCount()
+        self._less.setEnabled(row >= 0)
+        self._up.setEnabled(row > 0)
+        self._down.setEnabled(0 <= row < count - 1)
+        self._warning.setText(self._model.warnings)
+        self._warning.setVisible(bool(self._model.warnings))
+        if not self._name.hasFocus():
+            self._name.setText(self._model.label_set.name)
+
+
+class NameLine(QLineEdit):
+    """Return takes what was typed, Escape takes it back; either gives the keyboard back."""
+
+    given_up = Signal()
+
+    def __init__(self, name: str, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.setAccessibleName(name)
+        self.setToolTip(name)
+
+    def event(self, event: QEvent) -> bool:
+        """Escape and Return are its own."""
+        return claims(event, _OWN_KEYS) or super().event(event)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Leave."""
+        if event.key() == Qt.Key.Key_Escape:
+            self.given_up.emit()
+        else:
+            super().keyPressEvent(event)
+        if event.key() in _OWN_KEYS:
+            self.clearFocus()
+
+
+class LabelSetTable(CellTable):
+    """A row per label; Delete removes the current one."""
+
+    removed = Signal()
+
+    def __init__(self, model: LabelSetModel, asks: Asks, parent: QWidget) -> None:
+        super().__init__("Label set", (Qt.Key.Key_Delete, Qt.Key.Key_Backspace), parent)
+        self.setModel(model)
+        self.setItemDelegate(_LabelSetCells(model, asks, self))
+        self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+        metrics = self.fontMetrics()
+        for column, text in enumerate(_WIDE):
+            self.setColumnWidth(column, metrics.horizontalAdvance(text) + _PADDING_PX)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Delete is for labels here, not for spans."""
+        if event.key() in (Qt.Key.Key_Delete, Qt.Key.Key_Backspace):
+            self.removed.emit()
+        else:
+            super().keyPressEvent(event)
+
+
+class _LabelSetCells(FramedCells):
+    """Colours and classes from lists, names and keys as text."""
+
+    def __init__(self, model: LabelSetModel, asks: Asks, parent: QWidget) -> None:
+        super().__init__(parent)
+        self._model, self._asks = model, asks
+
+    def createEditor(
+        self, parent: QWidget, option: QStyleOptionViewItem, index: QModelIndex
+    ) -> QWidget:
+        """A list, or a line."""
+        if index.column() == CLASS:
+            choices = [Choosable(one or NO_CLASS, one) for one in self._model.classes()]
+            return self.listed(choices, "Class", parent)
+        if index.column() == COLOUR:
+            choices = [
+                Choosable(name, one, swatch_icon(one)) for name, one in self._model.colours()
+            ]
+            return self.listed([*choices, Choosable("Other…", _OTHER)], "Colour", parent)
+        line = super().createEditor(parent, option, index)
+        if index.column() == KEY and isinstance(line, QLineEdit):
+            line.setMaxLength(1)
+        line.setAccessibleName("Key" if index.column() == KEY else "Name of the label")
+        return line
+
+    def setModelData(self, editor: QWidget, model: QAbstractItemModel, index: QModelIndex) -> None:
+        """What was chosen or typed; any other colour is asked for once the list is gone."""
+        if isinstance(editor, ListedEditor) and editor.currentData() == _OTHER:
+            place = QPersistentModelIndex(index)
+            QTimer.singleShot(0, lambda: self._ask(place))
+        else:
+            super().setModelData(editor, model, index)
+
+    def _ask(self, place: QPersistentModelIndex) -> None:
+        if not place.isValid():
+            return
+        colour = self._asks.ask_colour(place.data(Qt.ItemDataRole.EditRole))
+        if colour and place.isValid():
+            self._model.setData(place, colour)

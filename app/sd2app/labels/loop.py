@@ -1,0 +1,55 @@
+"""The span that is played again and again."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QObject, Signal
+
+from sd2app.labels.model import LabelsModel
+from sd2app.session.playback import PlaybackModel
+from sd2core.labels.spans import Span
+
+
+class SpanLoop(QObject):
+    """Plays one span in a loop, also while its edges are moved, until the clock leaves it."""
+
+    changed = Signal()
+
+    def __init__(
+        self, labels: LabelsModel, playback: PlaybackModel, parent: QObject | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._labels, self._playback = labels, playback
+        self._span: Span | None = None
+        labels.changed.connect(self._follow_span)
+        playback.stretch_changed.connect(self._follow_clock)
+
+    @property
+    def span(self) -> Span | None:
+        """The span that is played, if one is."""
+        return self._span
+
+    def play(self, span: Span) -> None:
+        """Play a span from its start, again and again."""
+        self._span = span
+        self._playback.play_stretch(span.start_s, span.end_s)
+        self.changed.emit()
+
+    def end(self) -> None:
+        """Play on beyond the span."""
+        self._playback.set_stretch(None)
+
+    def _follow_span(self) -> None:
+        if self._span is None:
+            return
+        now = next((one for one in self._labels.labels.spans if one.id == self._span.id), None)
+        if now is None:
+            self.end()
+        elif now != self._span:
+            self._span = now
+            self._playback.set_stretch((now.start_s, now.end_s))
+            self.changed.emit()
+
+    def _follow_clock(self) -> None:
+        if self._playback.stretch_s is None and self._span is not None:
+            self._span = None
+            self.changed.emit()

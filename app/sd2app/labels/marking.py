@@ -1,0 +1,80 @@
+"""Marking while it plays: a key begins a span with what is on screen, and ends it."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QObject
+
+from sd2app.labels.edits import LabelEdits
+from sd2app.labels.model import LabelsModel, Mark
+from sd2app.labels.reaction import ReactionModel
+from sd2app.session.playback import PlaybackModel
+from sd2core.labels import edits
+from sd2core.labels.reaction import seen_at
+
+
+class LabelMarking(QObject):
+    """Begins and ends marks, at the frame that is on screen or that was when one reacted.
+
+    A reaction takes time of the clock on the wall: played at half speed, half as much of the
+    recording goes by.
+    """
+
+    def __init__(
+        self,
+        labels: LabelsModel,
+        playback: PlaybackModel,
+        reaction: ReactionModel,
+        edits: LabelEdits,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._labels, self._playback, self._reaction = labels, playback, reaction
+        self._edits = edits
+
+    def mark(self, label: str) -> None:
+        """Begin a span with this label, or end the one that has begun.
+
+        On a track without overlaps what else is being marked ends where this begins.
+        """
+        track = self._labels.track
+        if not track or self._edits.refused():
+            return
+        self._labels.set_label(label)
+        seen_s = self._seen_s(track)
+        exclusive = self._labels.labels.track(track).overlap == "exclusive"
+        ended = [
+            mark
+            for mark in self._labels.marks
+            if mark.track == track and (mark.label == label or exclusive)
+        ]
+        for mark in ended:
+            self._end(mark, seen_s)
+        if not any(mark.label == label for mark in ended):
+            # What has just ended may reach further than what was seen.
+            seen_s = self._seen_s(track)
+            self._labels.set_marks((*self._labels.marks, Mark(track, label, seen_s)))
+
+    def end_marks(self, *, cutting: bool = False) -> None:
+        """End all that is being marked; ``cutting`` what else is on the track there."""
+        for mark in self._labels.marks:
+            self._end(mark, self._seen_s(mark.track), cutting=cutting)
+
+    def drop_marks(self) -> None:
+        """Forget what is being marked."""
+        self._labels.set_marks(())
+
+    def _seen_s(self, track: str) -> float:
+        playback = self._playback
+        now_s = playback.timebase.time_of(playback.frame)
+        reaction_s = self._reaction.reaction_s * playback.speed if playback.playing else 0.0
+        return seen_at(self._labels.labels, playback.timebase, track, now_s, reaction_s)
+
+    def _end(self, mark: Mark, seen_s: float, *, cutting: bool = False) -> None:
+        self._labels.set_marks(one for one in self._labels.marks if one != mark)
+        make = edits.carve if cutting else edits.create
+        # A reaction does not end what had not begun; going back and ending it there does.
+        went_back = self._playback.time_s < mark.start_s
+        end_s = seen_s if went_back else max(mark.start_s, seen_s)
+        self._edits.apply(
+            lambda labels, base: make(labels, base, mark.track, mark.start_s, end_s, mark.label)
+        )

@@ -1,0 +1,228 @@
+"""The labels of the recording that is open, what is selected, and what is being marked."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QObject, Signal
+
+from sd2app.labels.arrays import UNKNOWN_COLOUR, SpanArrays, SpanColumns
+from sd2core.labels.spans import Labels, Span
+
+_COLUMNS_KEPT = 4
+"""Maps, timeline and overview ask for few scales, but at every frame that is played."""
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A span that has begun and not ended.
+
+    Parameters
+    ----------
+    track, label : str
+    start_s : float
+    """
+
+    track: str
+    label: str
+    start_s: float
+
+
+class LabelsModel(QObject):
+    """Labels as they are now; only :class:`sd2app.labels.edits.LabelEdits` changes them.
+
+    Signals
+    -------
+    changed
+        Spans, tracks or the label set.
+    selection_changed
+        Which spans are selected, on which track new ones come, or with which label.
+    marks_changed
+        What is being marked.
+    """
+
+    changed = Signal()
+    selection_changed = Signal()
+    marks_changed = Signal()
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._labels = Labels()
+        self._selected: frozenset[int] = frozenset()
+        self._track = self._labels.tracks[0].name
+        self._label = self._labels.label_set.labels[0].name
+        self._marks: tuple[Mark, ...] = ()
+        self._arrays = SpanArrays.of(self._labels)
+        self._columns: dict[object, SpanColumns] = {}
+
+    @property
+    def labels(self) -> Labels:
+        """All of them."""
+        return self._labels
+
+    @property
+    def selected(self) -> tuple[Span, ...]:
+        """The spans that are selected, in the order of time."""
+        spans = self._labels.spans
+        return tuple(spans[row] for row in self.selected_rows)
+
+    @property
+    def selected_rows(self) -> NDArray[np.int64]:
+        """The same as rows of :attr:`arrays`."""
+        chosen = np.fromiter(self._selected, np.int64, len(self._selected))
+        return np.flatnonzero(np.isin(self._arrays.ids, chosen))
+
+    @property
+    def arrays(self) -> SpanArrays:
+        """The spans as arrays."""
+        return self._arrays
+
+    @property
+    def track(self) -> str:
+        """Where new spans come; empty where there is no track."""
+        return self._track
+
+    @property
+    def label(self) -> str:
+        """What a span is called that a hand draws: the label that was used last."""
+        return self._label
+
+    @property
+    def background(self) -> str:
+        """What gaps are filled with: the label of that class, or the one that was used last."""
+        offered = self._labels.label_set.labels
+        named = (one.name for one in offered if one.gesture_class == "background")
+        return next(named, self._label)
+
+    @property
+    def marks(self) -> tuple[Mark, ...]:
+        """What has begun and not ended, in the order of beginning."""
+        return self._marks
+
+    def is_selected(self, span_id: int) -> bool:
+        """Whether a span is selected."""
+        return span_id in self._selected
+
+    def within(self, start_s: float, end_s: float) -> list[Span]:
+        """The spans of which something lies between two times, in order."""
+        return [self._labels.spans[row] for row in self._arrays.within(start_s, end_s)]
+
+    def at(self, time_s: float) -> Span | None:
+        """The span at a time: one on the track where new ones come, otherwise the shortest."""
+        arrays = self._arrays
+        rows = np.flatnonzero((arrays.starts_s <= time_s) & (time_s < arrays.ends_s))
+        found = [self._labels.spans[row] for row in rows]
+        return min(found, key=lambda one: (one.track != self._track, one.duration_s), default=None)
+
+    def columns(
+        self,
+        start_s: float,
+        end_s: float,
+        columns: int,
+        wide_columns: float,
+        *,
+        together: bool = False,
+    ) -> SpanColumns:
+        """What of the spans is to be seen at a scale (:meth:`SpanArrays.columns`), and kept."""
+        key = start_s, end_s, columns, wide_columns, together
+        found = self._columns.get(key)
+        if found is None:
+            while len(self._columns) >= _COLUMNS_KEPT:
+                del self._columns[next(iter(self._columns))]
+            found = self._columns[key] = self._arrays.columns(
+                start_s, end_s, columns, wide_columns, self.selected_rows, together=together
+            )
+        return found
+
+    def colour_of(self, label: str) -> str:
+        """``#rrggbb`` of a label."""
+        known = self._labels.label_set.find(label)
+        return known.colour if known is not None else UNKNOWN_COLOUR
+
+    # --- changing -------------------------------------------------------------------------
+
+    def open(self, labels: Labels) -> None:
+        """Take over another recording's labels; nothing is selected or being marked."""
+        self._marks = ()
+        self._choose(frozenset())
+        self._assign(labels)
+        self.selection_changed.emit()
+        self.marks_changed.emit()
+
+    def set_labels(self, labels: Labels) -> None:
+        """Assign labels; what is gone is no longer selected."""
+        if labels is self._labels:
+            return
+        there = {span.id for span in labels.spans}
+        pruned = not self._selected <= there
+        self._choose(self._selected & there)
+        self._assign(labels)
+        if pruned:
+            self.selection_changed.emit()
+
+    def select(self, ids: Iterable[int]) -> None:
+        """Select these spans and no others; new ones come on the track of the first."""
+        wanted = frozenset(ids) & frozenset(self._arrays.ids.tolist())
+        if wanted == self._selected:
+            return
+        self._choose(wanted)
+        if wanted:
+            self._track = self._labels.spans[self.selected_rows[0]].track
+        self.selection_changed.emit()
+
+    def select_all(self) -> None:
+        """Select every span."""
+        self.select(self._arrays.ids.tolist())
+
+    def select_up_to(self, span: Span) -> None:
+        """Select from what is selected to a span: what lies between in time, on tracks between."""
+        names = [track.name for track in self._labels.tracks]
+        corners = [*self.selected, span]
+        rows = [names.index(one.track) for one in corners]
+        first_s, last_s = min(one.start_s for one in corners), max(one.end_s for one in corners)
+        self.select(
+            one.id
+            for one in self.within(first_s, last_s)
+            if min(rows) <= names.index(one.track) <= max(rows)
+        )
+
+    def set_track(self, name: str) -> None:
+        """Choose where new spans come."""
+        if name != self._track:
+            self._track = self._labels.track(name).name
+            self.selection_changed.emit()
+
+    def set_label(self, name: str) -> None:
+        """Choose what a span is called that a hand draws."""
+        if name != self._label:
+            self._label = name
+            self.selection_changed.emit()
+
+    def set_marks(self, marks: Iterable[Mark]) -> None:
+        """Say what is being marked."""
+        marks = tuple(marks)
+        if marks != self._marks:
+            self._marks = marks
+            self.marks_changed.emit()
+
+    def _choose(self, ids: frozenset[int]) -> None:
+        self._selected = ids
+        self._columns.clear()
+
+    def _assign(self, labels: Labels) -> None:
+        self._labels = labels
+        self._arrays = SpanArrays.of(labels)
+        self._columns.clear()
+        names = [track.name for track in labels.tracks]
+        left = tuple(mark for mark in self._marks if mark.track in names)
+        dropped, self._marks = left != self._marks, left
+        if self._track not in names:
+            self._track = names[0] if names else ""
+        if labels.label_set.find(self._label) is None and labels.label_set.labels:
+            self._label = labels.label_set.labels[0].name
+        self.changed.emit()
+        if dropped:
+            self.marks_changed.emit()

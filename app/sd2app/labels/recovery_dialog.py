@@ -1,0 +1,162 @@
+"""Labels that can be recovered, of all recordings: opened, written to a file, or given up."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtWidgets import (
+    QDialog,
+    QDialogButtonBox,
+    QFileDialog,
+    QHeaderView,
+    QMessageBox,
+    QTreeWidget,
+    QTreeWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from sd2app.labels.autosave import LabelSession
+from sd2app.labels.recovery_text import edits_text, spans_text
+from sd2app.widgets.panel import sentence
+from sd2core.errors import Sd2Error
+from sd2core.labels.files import write_labels
+from sd2core.labels.recovery_offers import Offer
+
+_SAID = (
+    "Edits of labels that were not saved when the program ended. Open a recording to see what"
+    " they change."
+)
+_NOTHING = "There is nothing to recover: whatever was edited was saved, or was not wanted."
+_ROW_PX, _MARGIN_PX = 24, 16
+_HEADINGS = ("Recording", "Edits that were not saved", "Holds", "")
+
+
+def choose_recovery(session: LabelSession, parent: QWidget) -> Offer | None:
+    """Show what can be recovered; what the user wants to see in its recording."""
+    dialog = RecoverLabelsDialog(session, parent)
+    accepted = dialog.exec() == QDialog.DialogCode.Accepted
+    dialog.deleteLater()
+    return dialog.chosen if accepted else None
+
+
+class RecoverLabelsDialog(QDialog):
+    """A row for each session that ended with edits that were not saved.
+
+    ``chosen`` is what the user wants to see in its recording.
+    """
+
+    def __init__(self, session: LabelSession, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._session = session
+        self.chosen: Offer | None = None
+        self.setWindowTitle("Recover labels")
+        self._said, self._notes = sentence(""), sentence("", "warning")
+        self._said.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self._list = QTreeWidget(self)
+        self._list.setHeaderLabels(_HEADINGS)
+        self._list.setAccessibleName("Labels that can be recovered")
+        self._list.setRootIsDecorated(False)
+        self._list.setUniformRowHeights(True)
+        self._list.setAllColumnsShowFocus(True)
+        self._list.header().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        self._list.currentItemChanged.connect(self._follow)
+        self._list.itemActivated.connect(lambda *_: self._open.isEnabled() and self._accept())
+        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, self)
+        roles = QDialogButtonBox.ButtonRole
+        self._open = buttons.addButton("Open recording", roles.AcceptRole)
+        self._write = buttons.addButton("Write to file…", roles.ActionRole)
+        self._discard = buttons.addButton("Discard", roles.ActionRole)
+        self._open.clicked.connect(self._accept)
+        self._write.clicked.connect(self._write_file)
+        self._discard.clicked.connect(self._give_up)
+        buttons.rejected.connect(self.reject)
+        layout = QVBoxLayout(self)
+        for one in (self._said, self._list, self._notes, buttons):
+            layout.addWidget(one)
+        self.resize(800, 320)
+        self._fill()
+
+    def _fill(self) -> None:
+        found = self._session.recoveries()
+        self._list.clear()
+        for offer in found.offers:
+            item = QTreeWidgetItem(
+                [
+                    offer.recording.name,
+                    edits_text(offer),
+                    spans_text(offer.labels),
+                    "discarded" if offer.declined else "",
+                ]
+            )
+            item.setData(0, Qt.ItemDataRole.UserRole, offer)
+            item.setToolTip(0, str(offer.recording))
+            width = self._list.fontMetrics().horizontalAdvance(offer.recording.name)
+            item.setSizeHint(0, QSize(width + _MARGIN_PX, _ROW_PX))
+            self._list.addTopLevelItem(item)
+        self._said.setText(_SAID if found.offers else _NOTHING)
+        self._list.setVisible(bool(found.offers))
+        self._notes.setText("\n".join(found.notes))
+        self._notes.setVisible(bool(found.notes))
+        self._list.setCurrentItem(self._list.topLevelItem(0))
+        self._follow()
+
+    @property
+    def _offer(self) -> Offer | None:
+        item = self._list.currentItem()
+        return None if item is None else item.data(0, Qt.ItemDataRole.UserRole)
+
+    def _follow(self) -> None:
+        offer = self._offer
+        there = offer is not None and offer.recording.exists()
+        self._open.setEnabled(there)
+        self._open.setToolTip(
+            f"{offer.recording} is not there any more; its labels can be written to a file"
+            if offer is not None and not there
+            else "Its labels are offered there beside those that were saved"
+        )
+        self._write.setEnabled(offer is not None)
+        self._discard.setEnabled(offer is not None)
+        declined = offer is not None and offer.declined
+        self._discard.setText("Delete…" if declined else "Discard")
+        self._discard.setToolTip(
+            "Delete them for good" if declined else "Offer them no more; this list keeps them"
+        )
+
+    # --- what is clicked ------------------------------------------------------------------
+
+    def _accept(self) -> None:
+        self.chosen = self._offer
+        self.accept()
+
+    def _write_file(self) -> None:
+        offer = self._offer
+        assert offer is not None
+        name, _ = QFileDialog.getSaveFileName(
+            self, "Write labels", f"{offer.recording.stem}-labels.json", "Labels (*.json)"
+        )
+        if name:
+            try:
+                write_labels(Path(name), offer.labels, recording=offer.recording)
+            except (OSError, Sd2Error) as error:
+                QMessageBox.warning(self, "Write labels", str(error))
+
+    def _give_up(self) -> None:
+        offer = self._offer
+        assert offer is not None
+        if offer.declined and not self._sure(offer):
+            return
+        self._session.give_up(offer)
+        self._fill()
+
+    def _sure(self, offer: Offer) -> bool:
+        buttons = QMessageBox.StandardButton
+        answer = QMessageBox.question(
+            self,
+            "Delete for good?",
+            f"{edits_text(offer)} of {offer.recording.name} are deleted and cannot be had back.",
+            buttons.Discard | buttons.Cancel,
+            buttons.Cancel,
+        )
+        return answer == buttons.Discard

@@ -1,0 +1,209 @@
+"""The table of spans: what is selected here is selected on the timeline, and the other way."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+
+from PySide6.QtCore import QItemSelection, QItemSelectionModel, QModelIndex, Qt
+from PySide6.QtGui import QAction, QContextMenuEvent, QFocusEvent, QPainter, QPaintEvent
+from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QMenu, QWidget
+
+from sd2app.labels.cells import SpanCells
+from sd2app.labels.columns import COLUMNS
+from sd2app.labels.edits import LabelEdits
+from sd2app.labels.model import LabelsModel
+from sd2app.labels.table_model import SpanTableModel
+from sd2app.session.playback import PlaybackModel
+from sd2app.session.time_window import VisibleSpanModel
+from sd2app.settings import Settings
+from sd2app.widgets.cell_table import CellTable
+from sd2core.labels import span_fields
+
+_PADDING_PX = 12
+_HIDDEN = "span_table/hidden"
+
+
+class SpanTable(CellTable):
+    """The window follows the current cell.
+
+    It shows the first frame of the span in that row, in a column of ends the last one.
+    """
+
+    def __init__(
+        self,
+        model: SpanTableModel,
+        labels: LabelsModel,
+        edits: LabelEdits,
+        playback: PlaybackModel,
+        visible: VisibleSpanModel,
+        settings: Settings,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__("Spans", parent=parent)
+        self._model, self._labels, self._edits = model, labels, edits
+        self._playback, self._visible, self._settings = playback, visible, settings
+        self._mirroring = False
+        self._menu_actions: Sequence[QAction] = ()
+        self.setModel(model)
+        self.setItemDelegate(SpanCells(model, labels, self))
+        self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
+        self._arrange_columns()
+        self.clicked.connect(self._go)
+        labels.selection_changed.connect(self.mirror)
+        labels.changed.connect(self.mirror)
+
+    def set_menu(self, actions: Sequence[QAction]) -> None:
+        """Actions of the window that the context menu offers too."""
+        self._menu_actions = actions
+
+    # --- columns --------------------------------------------------------------------------
+
+    def _arrange_columns(self) -> None:
+        header = self.horizontalHeader()
+        # Asked which headings are selected, it would look at every cell of all selected rows.
+        header.setSelectionModel(QItemSelectionModel(self._model, self))
+        header.setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
+        header.setMinimumSectionSize(40)
+        header.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
+        header.customContextMenuRequested.connect(
+            lambda at: self.columns_menu.exec(header.mapToGlobal(at))
+        )
+        metrics = self.fontMetrics()
+        hidden = self._hidden()
+        for place, column in enumerate(COLUMNS):
+            widest_px = max(map(metrics.horizontalAdvance, (column.wide, column.heading)))
+            self.setColumnWidth(place, widest_px + _PADDING_PX)
+            self.setColumnHidden(place, column.id in hidden)
+        self.columns_menu = self._made_columns_menu()
+        """Which columns are shown."""
+        self.sortByColumn(0, Qt.SortOrder.AscendingOrder)
+        self.setSortingEnabled(True)
+
+    def _made_columns_menu(self) -> QMenu:
+        menu = QMenu("Columns", self)
+        menu.setToolTipsVisible(True)
+        for place, column in enumerate(COLUMNS):
+            action = menu.addAction(column.heading)
+            action.setToolTip(column.tip)
+            action.setCheckable(True)
+            action.setChecked(not self.isColumnHidden(place))
+            action.setEnabled(column.id != "start")  # one is always there
+            action.toggled.connect(lambda shown, place=place: self._show_column(place, shown))
+        return menu
+
+    def _show_column(self, place: int, shown: bool) -> None:
+        self.setColumnHidden(place, not shown)
+        hidden = [one.id for k, one in enumerate(COLUMNS) if self.isColumnHidden(k)]
+        self._settings.set_value(_HIDDEN, " ".join(hidden))
+
+    def _hidden(self) -> list[str]:
+        usual = " ".join(column.id for column in COLUMNS if column.hidden)
+        return self._settings.stored(_HIDDEN, usual).split()
+
+    # --- one selection --------------------------------------------------------------------
+
+    def selectionChanged(self, selected: QItemSelection, deselected: QItemSelection) -> None:
+        """The user has chosen rows: these spans are selected everywhere."""
+        super().selectionChanged(selected, deselected)
+        if not (self._mirroring or self._model.following):
+            # By ranges: rows one by one are asked for every cell, which takes seconds.
+            spans = self._model.spans
+            ranges = self.selectionModel().selection()
+            self._labels.select(
+                span.id for part in ranges for span in spans[part.top() : part.bottom() + 1]
+            )
+
+    def currentChanged(self, current: QModelIndex, previous: QModelIndex) -> None:
+        """The user has gone to another cell: the window goes there too."""
+        super().currentChanged(current, previous)
+        if not (self._mirroring or self._model.following):
+            self._go(current)
+
+    def _go(self, index: QModelIndex) -> None:
+        if not index.isValid():
+            return
+        span, column = self._model.spans[index.row()], COLUMNS[index.column()]
+        base = self._playback.timebase
+        first, stop = base.frames_between(span.start_s, span.end_s)
+        at_end = column.edge is not None and column.edge.side == "end"
+        if stop > first:
+            self._playback.seek_frame(stop - 1 if at_end else first)
+            self._visible.reveal(self._playback.time_s)
+
+    def mirror(self) -> None:
+        """Select the rows of what is selected elsewhere."""
+        if not self.isVisible() or self._model.following:
+            return
+        rows = sorted(
+            row for one in self._labels.selected if (row := self._model.row_of(one.id)) is not None
+        )
+        chosen = QItemSelection()
+        last_column = self._model.columnCount() - 1
+        breaks = [0, *(k for k, (a, b) in enumerate(pairwise(rows), 1) if b != a + 1), len(rows)]
+        for first, stop in pairwise(breaks):
+            if stop > first:
+                top = self._model.index(rows[first], 0)
+                chosen.select(top, self._model.index(rows[stop - 1], last_column))
+        flags = QItemSelectionModel.SelectionFlag
+        self._mirroring = True
+        try:
+            self.selectionModel().select(chosen, flags.ClearAndSelect)
+            if rows and self.currentIndex().row() not in rows:
+                column = max(self.currentIndex().column(), 0)
+                current = self._model.index(rows[0], column)
+                self.selectionModel().setCurrentIndex(current, flags.NoUpdate)
+                self.scrollTo(current)
+        finally:
+            self._mirroring = False
+
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        """With a row to begin from: the selected one, else that of the frame on screen."""
+        super().focusInEvent(event)
+        if self.currentIndex().isValid() or not self._model.spans:
+            return
+        now_s = self._playback.time_s
+        nearest = min(
+            range(len(self._model.spans)),
+            key=lambda row: abs(self._model.spans[row].start_s - now_s),
+        )
+        self._mirroring = True
+        self.selectionModel().setCurrentIndex(
+            self._model.index(nearest, 0), QItemSelectionModel.SelectionFlag.NoUpdate
+        )
+        self._mirroring = False
+
+    # --- the rest -------------------------------------------------------------------------
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """The rows, or why there are none."""
+        super().paintEvent(event)
+        if not self._model.spans:
+            with QPainter(self.viewport()) as painter:
+                painter.setPen(self.palette().color(self.palette().ColorRole.PlaceholderText))
+                words = "No span is like that" if self._model.total else "Nothing is labelled yet"
+                place = Qt.AlignmentFlag.AlignCenter
+                painter.drawText(self.viewport().rect(), place, words)
+
+    def contextMenuEvent(self, event: QContextMenuEvent) -> None:
+        """What can be done to the selected rows."""
+        if not self._labels.selected:
+            return
+        menu = QMenu(self)
+        for title, place in (("Give label", "label"), ("Put on track", "track")):
+            column = next(one for one in COLUMNS if one.id == place)
+            submenu = menu.addMenu(title)
+            for choice in self._model.choices(column):
+                run = self._edits.relabel if place == "label" else self._put_on_track
+                submenu.addAction(choice).triggered.connect(_called(run, choice))
+        menu.addSeparator()
+        menu.addActions(list(self._menu_actions))
+        menu.exec(event.globalPos())
+
+    def _put_on_track(self, track: str) -> None:
+        ids = [span.id for span in self._labels.selected]
+        self._edits.apply(lambda labels, _: span_fields.set_track(labels, ids, track))
+
+
+def _called(run: Callable[[str], object], choice: str) -> Callable[..., object]:
+    return lambda _=False: run(choice)

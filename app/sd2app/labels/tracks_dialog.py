@@ -1,0 +1,101 @@
+"""What is asked about the tracks of labels, and about the reaction time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QDialog,
+    QDialogButtonBox,
+    QFormLayout,
+    QInputDialog,
+    QLineEdit,
+    QWidget,
+)
+
+from sd2app.labels.reaction import LONGEST_MS
+
+if TYPE_CHECKING:
+    from sd2app.shell.wiring import Context
+    from sd2app.widgets.message_bar import MessageBar
+    from sd2core.labels.spans import Overlap
+
+
+class TrackDialog(QDialog):
+    """Name of a new track, and whether its spans may overlap."""
+
+    def __init__(self, name: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Add track")
+        self._name = QLineEdit(name, self)
+        self._name.setAccessibleName("Name of the track")
+        self._name.selectAll()
+        self._free = QCheckBox("Spans may overlap, e.g. of two hands", self)
+        buttons = QDialogButtonBox(
+            QDialogButtonBox.StandardButton.Ok | QDialogButtonBox.StandardButton.Cancel, self
+        )
+        buttons.accepted.connect(self.accept)
+        buttons.rejected.connect(self.reject)
+        accept = buttons.button(QDialogButtonBox.StandardButton.Ok)
+        accept.setText("Add track")
+        self._name.textChanged.connect(lambda text: accept.setEnabled(bool(text.strip())))
+        layout = QFormLayout(self)
+        layout.addRow("Name", self._name)
+        layout.addRow("", self._free)
+        layout.addRow(buttons)
+
+    @property
+    def name(self) -> str:
+        """What it is to be called."""
+        return self._name.text().strip()
+
+    @property
+    def overlap(self) -> Overlap:
+        """Whether its spans may overlap."""
+        return "free" if self._free.isChecked() else "exclusive"
+
+
+class TrackDialogs:
+    """Asks, then calls the edits."""
+
+    def __init__(self, parent: QWidget, context: Context, messages: MessageBar) -> None:
+        self._parent, self._context, self._messages = parent, context, messages
+
+    def add(self) -> None:
+        """Ask for a name, and add a track."""
+        dialog = TrackDialog(self._context.label_tracks.new_name, self._parent)
+        if dialog.exec() == QDialog.DialogCode.Accepted:
+            self._context.label_tracks.add(dialog.name, dialog.overlap)
+        dialog.deleteLater()
+
+    def rename(self) -> None:
+        """Ask for another name of the track on which new spans come."""
+        name, accepted = QInputDialog.getText(
+            self._parent, "Rename track", "Name", text=self._context.labels.track
+        )
+        if accepted:
+            self._context.label_tracks.rename(name.strip())
+
+    def remove(self) -> None:
+        """Remove the track on which new spans come, and say what went with it."""
+        labels = self._context.labels
+        track, count = labels.track, len(labels.labels.of_track(labels.track))
+        if self._context.label_tracks.remove() and count:
+            spans = "1 span" if count == 1 else f"{count} spans"
+            self._messages.note(f"Removed {track!r} with {spans}; undo brings them back.")
+
+    def reaction(self) -> None:
+        """Ask for a reaction time that the menu does not offer."""
+        reaction = self._context.reaction
+        chosen_ms, accepted = QInputDialog.getInt(
+            self._parent,
+            "Reaction time",
+            "Marks made while it plays begin and end earlier by so many milliseconds.",
+            reaction.reaction_ms,
+            0,
+            LONGEST_MS,
+            10,
+        )
+        if accepted:
+            reaction.set_reaction_ms(chosen_ms)

@@ -1,0 +1,1 @@
+"""Doppler maps on screen: synthesis, heatmaps, spectrum, difference, uncertainty."""

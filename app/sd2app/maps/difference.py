@@ -1,0 +1,150 @@
+"""Denoised minus real: the difference of what is shown of the two."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QObject, Signal
+
+from sd2app.session.display import DisplayModel, HeatmapLevels
+from sd2app.session.tracks import Reading, TrackModel
+from sd2app.settings import Settings
+
+_SHOWN = "difference"
+
+
+class DifferenceModel(QObject):
+    """Two maps in levels below their own 0 dB, on the clock of the first.
+
+    Counted and measured energies have no common unit, so each is taken relative to its
+    own reference, as the heatmaps show it; what is below the faintest level shown counts
+    as that level. On a linear scale it is the difference of shares of the references.
+
+    Signals
+    -------
+    changed
+        Its values.
+    state_changed
+        Whether there is one, or whether it is shown.
+    """
+
+    changed = Signal()
+    state_changed = Signal()
+
+    def __init__(
+        self,
+        denoised: TrackModel,
+        real: TrackModel,
+        display: DisplayModel,
+        settings: Settings,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self.denoised = denoised
+        self.real = real
+        self._display = display
+        self._settings = settings
+        self._wanted = settings.flag(_SHOWN, False)
+        self._state = self._wanted, self.why_not
+        for signal in (denoised.changed, real.changed, display.levels_changed):
+            signal.connect(self._follow)
+
+    def _follow(self) -> None:
+        self.changed.emit()
+        state = self._wanted, self.why_not
+        if state != self._state:
+            self._state = state
+            self.state_changed.emit()
+
+    @property
+    def wanted(self) -> bool:
+        """Whether it is to be shown where it can be."""
+        return self._wanted
+
+    @property
+    def why_not(self) -> str:
+        """Why there is no difference; empty where there is one."""
+        if self.denoised.map is None:
+            return "There is no denoised map: choose a model under Model"
+        if self.real.map is None:
+            return "There is no radar capture to compare with"
+        if self.denoised.map.axis != self.real.map.axis:
+            return "The two maps have different velocity axes"
+        return ""
+
+    @property
+    def shown(self) -> bool:
+        """Whether it is on screen."""
+        return self._wanted and not self.why_not
+
+    @property
+    def against(self) -> str:
+        """What it is taken from, as it is called."""
+        return self.real.title.lower()
+
+    @property
+    def blank_bins(self) -> tuple[int, ...]:
+        """Bins in which one of the two says nothing."""
+        bins: set[int] = set()
+        for track in (self.denoised, self.real):
+            if track.map is not None:
+                bins |= {*track.map.null_bins, *track.map.unseen_bins}
+        return tuple(sorted(bins))
+
+    def set_wanted(self, wanted: bool) -> None:
+        """Show it or not, and remember it."""
+        if wanted != self._wanted:
+            self._wanted = wanted
+            self._settings.set_value(_SHOWN, wanted)
+            self._follow()
+
+    def full_scale(self, levels: HeatmapLevels) -> tuple[float, str]:
+        """Difference that has the strongest colour, and its unit."""
+        if levels.scale == "dB":
+            return levels.high_db - levels.low_db, "dB"
+        return 100.0 * 10.0 ** (levels.high_db / 10.0), "%"
+
+    def shades(
+        self,
+        denoised: NDArray[np.float32],
+        real: NDArray[np.float32],
+        levels: HeatmapLevels,
+    ) -> NDArray[np.float32]:
+        """Difference of values (bins, n) each, from −1 to 1; zero where one says nothing."""
+        difference = self.denoised.shade(denoised, levels) - self.real.shade(real, levels)
+        difference[list(self.blank_bins)] = 0.0
+        return difference
+
+    def read(self, time_s: float, velocity_mps: float) -> Reading | None:
+        """What stands under the pointer, both levels included."""
+        if self.why_not:
+            return None
+        one = self.denoised.read(time_s, velocity_mps)
+        other = self.real.read(time_s, velocity_mps)
+        if one is None or other is None:
+            return None
+        note = one.note or other.note
+        levels = self._display.levels
+        full, unit = self.full_scale(levels)
+        assert self.denoised.map is not None
+        shade = float(
+            (
+                self.denoised.shade(np.array([one.value], np.float32), levels)
+                - self.real.shade(np.array([other.value], np.float32), levels)
+            )[0]
+        )
+        text = "not defined" if note else f"{full * shade:+.1f} {unit}".replace("-", "−")
+        return Reading(
+            track=f"Denoised − {self.against}",
+            time_s=one.time_s,
+            frame=one.frame,
+            velocity_mps=one.velocity_mps,
+            value=one.value,
+            level_db=one.level_db - other.level_db,
+            note=note or f"{_level(one)} − ({_level(other)})",
+            text=text,
+        )
+
+
+def _level(reading: Reading) -> str:
+    return f"{reading.level_db:.1f} dB".replace("-", "−") if reading.value > 0 else "−∞ dB"

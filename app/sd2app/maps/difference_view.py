@@ -1,0 +1,105 @@
+"""The difference of two Doppler maps in signed colours, zero in the middle."""
+
+from __future__ import annotations
+
+import numpy as np
+from PySide6.QtCore import QRectF, Qt
+from PySide6.QtGui import QColor, QImage, QPainter
+from PySide6.QtWidgets import QWidget
+
+from sd2app.labels.model import LabelsModel
+from sd2app.maps.difference import DifferenceModel
+from sd2app.maps.heatmap import HeatmapView
+from sd2app.maps.heatmap_image import difference_image
+from sd2app.session.display import DisplayModel
+from sd2app.session.playback import PlaybackModel
+from sd2app.session.time_window import VisibleSpanModel
+from sd2app.session.tracks import PointerModel, Reading
+from sd2app.widgets.colour_maps import signed_table
+
+_BAR_PX = 72
+
+
+class DifferenceView(HeatmapView):
+    """As the heatmaps above it, on the clock of the denoised one.
+
+    A colour names the track that shows more there: it is that of its curve.
+    """
+
+    def __init__(
+        self,
+        difference: DifferenceModel,
+        span: VisibleSpanModel,
+        playback: PlaybackModel,
+        display: DisplayModel,
+        pointer: PointerModel,
+        labels: LabelsModel,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(
+            difference.denoised, span, playback, display, pointer, labels, parent=parent
+        )
+        self._difference = difference
+        difference.changed.connect(self.invalidate)
+
+    def title(self) -> str:
+        """Which is taken from which."""
+        return f"Denoised − {self._difference.against}"
+
+    def make_image(self, start_s: float, end_s: float, columns: int) -> QImage:
+        """Signed colours; the background where one of the two has no frame."""
+        background = QColor(self._display.palette.well).rgb()
+        levels = self._display.levels
+        return difference_image(
+            self._difference, levels, start_s, end_s, columns, self._table(), background
+        )
+
+    def null_colour(self) -> QColor:
+        """No difference."""
+        return QColor.fromRgb(int(self._table()[127]))
+
+    def hatch_colour(self) -> QColor:
+        """Legible on the colour of no difference, which follows the theme."""
+        colour = QColor(self._display.palette.hatch)
+        colour.setAlpha(150)
+        return colour
+
+    def marked_bins(self) -> tuple[tuple[tuple[int, ...], Qt.BrushStyle], ...]:
+        """Bins in which one of the two says nothing."""
+        return ((self._difference.blank_bins, Qt.BrushStyle.BDiagPattern),)
+
+    def read(self, time_s: float, velocity_mps: float) -> Reading | None:
+        """Both levels, and their difference."""
+        return self._difference.read(time_s, velocity_mps)
+
+    def _table(self) -> np.ndarray:
+        colours = self._display.palette
+        return signed_table(colours.real, colours.level, colours.denoised)
+
+    def _status(self) -> str:
+        return "each relative to its own 0 dB, as shown above"
+
+    def _paint_corner(self, painter: QPainter, box: QRectF, left: float) -> float:
+        """What the colours mean."""
+        full, unit = self._difference.full_scale(self._display.levels)
+        metrics, against = painter.fontMetrics(), self._difference.against
+        for ends in (
+            (f"{against} stronger  −{full:g}", f"+{full:g} {unit}  denoised"),
+            (f"{against}  −{full:g}", f"+{full:g} {unit}  denoised"),
+            (f"−{full:g}", f"+{full:g} {unit}"),
+        ):
+            widths = [metrics.horizontalAdvance(text) + 8 for text in ends]
+            width = sum(widths) + _BAR_PX
+            if self.width() - 16 - left - width > 60:
+                break
+        else:
+            return 0.0
+        table = np.ascontiguousarray(self._table()[None])
+        bar = QImage(table.tobytes(), 255, 1, 1020, QImage.Format.Format_RGB32)
+        place = QRectF(box.right() - widths[1] - _BAR_PX, box.center().y() - 5, _BAR_PX, 10)
+        painter.drawImage(place, bar)
+        centred = Qt.AlignmentFlag.AlignVCenter
+        painter.drawText(box, centred | Qt.AlignmentFlag.AlignRight, ends[1])
+        before = QRectF(place.left() - widths[0], box.top(), widths[0] - 8, box.height())
+        painter.drawText(before, centred | Qt.AlignmentFlag.AlignRight, ends[0])
+        return width

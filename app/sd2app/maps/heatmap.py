@@ -1,0 +1,353 @@
+"""A Doppler map on the shared time axis: velocity up, time to the right."""
+
+from __future__ import annotations
+
+import math
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import (
+    QBrush,
+    QColor,
+    QMouseEvent,
+    QPainter,
+    QPaintEvent,
+    QPen,
+    QWheelEvent,
+)
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from sd2app.labels.model import LabelsModel
+from sd2app.labels.painting import paint_regions
+from sd2app.maps.map_widget import MapWidget, paint_cursor
+from sd2app.playback.wheel import turn_wheel
+from sd2app.session.display import DisplayModel
+from sd2app.session.playback import PlaybackModel
+from sd2app.session.time_window import VisibleSpanModel
+from sd2app.session.tracks import UNCERTAIN_SHARE, PointerModel, Reading, TrackModel
+from sd2app.widgets.cached_paint import Still
+from sd2app.widgets.colour_maps import lookup_table
+from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, signed_text, ticks
+
+_HEADER_PX = 24
+
+
+class HeatmapView(MapWidget):
+    """Shows one track; click or drag seeks, wheel zooms, Shift+wheel pans.
+
+    ``offset_dragged`` and ``offset_released`` are emitted while the user drags
+    the header of a track that can be aligned; the view itself moves nothing.
+    """
+
+    offset_grabbed = Signal()
+    offset_dragged = Signal(float)
+    offset_released = Signal()
+
+    def __init__(
+        self,
+        track: TrackModel,
+        span: VisibleSpanModel,
+        playback: PlaybackModel,
+        display: DisplayModel,
+        pointer: PointerModel,
+        labels: LabelsModel,
+        *,
+        alignable: bool = False,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(track, display, parent)
+        self._span = span
+        self._playback = playback
+        self._pointer = pointer
+        self._labels = labels
+        self._alignable = alignable
+        self._grab: tuple[str, float] | None = None
+        self._hint = ""
+        self._button: QWidget | None = None
+        self.setMinimumHeight(96)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self._still = Still(self)
+        self._room_px = 0
+        span.changed.connect(self.invalidate)
+        for signal in (track.status_changed, labels.changed, labels.selection_changed):
+            signal.connect(self.redraw)
+        for signal in (playback.frame_changed, pointer.changed):
+            signal.connect(self.update)
+
+    def sizeHint(self) -> QSize:
+        """Room for 32 bins of 5 pixels."""
+        return QSize(640, _HEADER_PX + 160)
+
+    def invalidate(self) -> None:
+        """Draw the map anew, and all that is around it."""
+        self._still.forget()
+        super().invalidate()
+
+    def redraw(self) -> None:
+        """Draw what is on the map and around it anew."""
+        self._still.forget()
+        self.update()
+
+    def set_hint(self, hint: str) -> None:
+        """What to say while there is no map."""
+        self._hint = hint
+        self.redraw()
+
+    def set_button(self, button: QWidget) -> None:
+        """Put a button beside the title."""
+        self._button = button
+        button.setParent(self)
+        self.redraw()
+
+    def title(self) -> str:
+        """What is shown."""
+        return self._track.title
+
+    def null_colour(self) -> QColor:
+        """Colour of nothing."""
+        return QColor.fromRgb(int(lookup_table(self._display.levels.colour_map)[0]))
+
+    def hatch_colour(self) -> QColor:
+        """Of the lines over bins that say nothing."""
+        return QColor(255, 255, 255, 80)
+
+    def marked_bins(self) -> tuple[tuple[tuple[int, ...], Qt.BrushStyle], ...]:
+        """Bins that say nothing, and how they are hatched."""
+        doppler_map = self._track.map
+        assert doppler_map is not None
+        return (
+            (doppler_map.null_bins, Qt.BrushStyle.BDiagPattern),
+            (doppler_map.unseen_bins, Qt.BrushStyle.DiagCrossPattern),
+        )
+
+    def plot_rect(self) -> QRectF:
+        """Where the map is drawn."""
+        return QRectF(
+            GUTTER_PX,
+            _HEADER_PX,
+            max(self.width() - GUTTER_PX - MARGIN_PX, 1),
+            max(self.height() - _HEADER_PX - 4, 1),
+        )
+
+    @property
+    def scale(self) -> TimeScale:
+        """Time axis of this widget."""
+        return TimeScale(self._span.start_s, self._span.end_s, self.width())
+
+    def y_of(self, velocity_mps: float) -> float:
+        """Pixel of a velocity."""
+        assert self._track.map is not None
+        plot, v_max = self.plot_rect(), self._track.map.axis.v_max_mps
+        return plot.top() + plot.height() * (v_max - velocity_mps) / (2.0 * v_max)
+
+    def velocity_of(self, y_px: float) -> float:
+        """Velocity of a pixel."""
+        assert self._track.map is not None
+        plot, v_max = self.plot_rect(), self._track.map.axis.v_max_mps
+        return v_max - 2.0 * v_max * (y_px - plot.top()) / plot.height()
+
+    # --- painting -------------------------------------------------------------------------
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Header, map, marked bins, axis, labels; over what is kept of them, the cursors."""
+        if self._button_px != self._room_px:
+            self._still.forget()
+        with QPainter(self) as painter:
+            self._still.paint(painter, self._paint)
+            if self._track.map is not None:
+                self._paint_cursors(painter, self.plot_rect())
+
+    def _paint(self, painter: QPainter) -> None:
+        colours = self._display.palette
+        painter.fillRect(self.rect(), QColor(colours.panel))
+        if self._track.map is None:
+            painter.setPen(QColor(colours.muted))
+            painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, self._hint)
+            return
+        self._paint_header(painter)
+        plot = self.plot_rect()
+        self.paint_map(painter, plot, self._span.start_s, self._span.end_s)
+        self._paint_marked_bins(painter, plot)
+        self.paint_gaps(painter, plot, self.scale)
+        paint_regions(painter, plot, self.scale, self._labels)
+        self._paint_axis(painter, plot)
+
+    def _paint_header(self, painter: QPainter) -> None:
+        colours = self._display.palette
+        font = painter.font()
+        font.setBold(True)
+        painter.setFont(font)
+        painter.setPen(QColor(colours.text))
+        box = QRectF(8, 0, self.width() - 16, _HEADER_PX)
+        centred = Qt.AlignmentFlag.AlignVCenter
+        painter.drawText(box, centred | Qt.AlignmentFlag.AlignLeft, self.title())
+        left = 8 + painter.fontMetrics().horizontalAdvance(self.title()) + 12
+        font.setBold(False)
+        painter.setFont(font)
+        painter.setPen(QColor(colours.muted))
+        left += self._place_button(left)
+        room = self.width() - 16 - left - self._paint_corner(painter, box, left)
+        status = painter.fontMetrics().elidedText(
+            self._status(), Qt.TextElideMode.ElideRight, int(max(room - 16, 40))
+        )
+        painter.drawText(
+            QRectF(left, 0, self.width(), _HEADER_PX), centred | Qt.AlignmentFlag.AlignLeft, status
+        )
+
+    @property
+    def _button_px(self) -> int:
+        """Room that the button wants."""
+        if self._button is None or self._button.isHidden():
+            return 0
+        return self._button.sizeHint().width() + 4
+
+    def _place_button(self, left: int) -> int:
+        """Room that the button takes."""
+        self._room_px = self._button_px
+        if self._room_px:
+            assert self._button is not None
+            size = self._button.sizeHint()
+            height = min(size.height(), _HEADER_PX - 2)
+            self._button.setGeometry(left - 4, (_HEADER_PX - height) // 2, size.width(), height)
+        return self._room_px
+
+    def _paint_corner(self, painter: QPainter, box: QRectF, left: float) -> float:
+        """What stands on the right of the header; returns its width."""
+        text = "approaching +  /  receding −   m/s"
+        width = painter.fontMetrics().horizontalAdvance(text)
+        if self.width() - 16 - left - width <= 60:
+            return 0.0
+        painter.drawText(box, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight, text)
+        return width
+
+    def _status(self) -> str:
+        """What the map is worth, and why nothing shows where nothing shows."""
+        strongest_db, lowest_db = self._track.strongest_db, self._display.levels.low_db
+        parts = [self._track.status]
+        if gaps_s := self._track.gaps_s:
+            parts.append(f"no person in {sum(end - start for start, end in gaps_s):.2f} s")
+        if self._track.uncertainty is not None:
+            colour = "amber" if self._display.levels.colour_map == "gray" else "grey"
+            parts.append(f"{colour}: ±{100 * UNCERTAIN_SHARE:.0f} % or worse")
+        if self._track.covered is None and -math.inf < strongest_db < lowest_db:
+            level = f"{strongest_db:.0f}".replace("-", "−")
+            parts.append(f"strongest bin {level} dB, below the scale: R sets 0 dB here")
+        return " · ".join(filter(None, parts))
+
+    def _paint_marked_bins(self, painter: QPainter, plot: QRectF) -> None:
+        doppler_map = self._track.map
+        assert doppler_map is not None
+        edges = doppler_map.axis.edges_mps
+        stretches = [
+            (self.scale.x_of(start_s), self.scale.x_of(end_s))
+            for start_s, end_s in self._track.covered_s
+        ]
+        nothing = self.null_colour()
+        hatch = self.hatch_colour()
+        painter.save()
+        painter.setClipRect(plot)
+        painter.setPen(Qt.PenStyle.NoPen)
+        for bins, pattern in self.marked_bins():
+            for index in bins:
+                top, bottom = self.y_of(edges[index + 1]), self.y_of(edges[index])
+                for left, right in stretches:
+                    band = QRectF(left, top, right - left, bottom - top)
+                    painter.fillRect(band, nothing)
+                    painter.fillRect(band, QBrush(hatch, pattern))
+        painter.restore()
+
+    def _paint_axis(self, painter: QPainter, plot: QRectF) -> None:
+        doppler_map = self._track.map
+        assert doppler_map is not None
+        colours = self._display.palette
+        v_max = doppler_map.axis.v_max_mps
+        painter.setPen(QPen(QColor(colours.border), 1))
+        painter.drawRect(plot.adjusted(-0.5, -0.5, 0.5, 0.5))
+        line_px = painter.fontMetrics().height()
+        for velocity in ticks(-v_max, v_max, max(int(plot.height() / (line_px * 1.8)), 2)):
+            y = self.y_of(velocity)
+            painter.setPen(QPen(QColor(colours.muted), 1))
+            painter.drawLine(QPointF(plot.left() - 4, y), QPointF(plot.left(), y))
+            y_text = min(max(y, plot.top() + line_px / 2 - 2), plot.bottom() - line_px / 2 + 2)
+            painter.drawText(
+                QRectF(0, y_text - line_px / 2, GUTTER_PX - 8, line_px),
+                Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter,
+                signed_text(velocity),
+            )
+
+    def _paint_cursors(self, painter: QPainter, plot: QRectF) -> None:
+        painter.save()
+        painter.setClipRect(plot)
+        scale = self.scale
+        if self._pointer.time_s is not None:
+            painter.setPen(QPen(QColor(255, 255, 255, 120), 1, Qt.PenStyle.DotLine))
+            x = scale.x_of(self._pointer.time_s)
+            painter.drawLine(QPointF(x, plot.top()), QPointF(x, plot.bottom()))
+            if self._pointer.velocity_mps is not None:
+                y = self.y_of(self._pointer.velocity_mps)
+                painter.drawLine(QPointF(plot.left(), y), QPointF(plot.right(), y))
+        paint_cursor(painter, plot, scale.x_of(self._playback.time_s))
+        painter.restore()
+
+    # --- mouse ----------------------------------------------------------------------------
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Take hold of the cursor, the time axis or the alignment."""
+        position = event.position()
+        if event.button() == Qt.MouseButton.MiddleButton:
+            self._grab = ("pan", position.x())
+        elif event.button() == Qt.MouseButton.LeftButton:
+            if self._alignable and position.y() < _HEADER_PX:
+                self._grab = ("offset", position.x())
+                self.offset_grabbed.emit()
+            else:
+                self._grab = ("seek", position.x())
+                self._playback.seek(self.scale.time_of(position.x()))
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """Drag what is held, and read what is under the pointer."""
+        position = event.position()
+        self._read(position)
+        if self._grab is None:
+            over_header = self._alignable and position.y() < _HEADER_PX
+            self.setCursor(
+                Qt.CursorShape.SizeHorCursor if over_header else Qt.CursorShape.CrossCursor
+            )
+            return
+        what, start_x = self._grab
+        if what == "seek":
+            self._playback.seek(self.scale.time_of(position.x()))
+        elif what == "pan":
+            self._span.pan((start_x - position.x()) * self.scale.seconds_per_px)
+            self._grab = ("pan", position.x())
+        else:
+            self.offset_dragged.emit((position.x() - start_x) * self.scale.seconds_per_px)
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        """Let go."""
+        if self._grab is not None and self._grab[0] == "offset":
+            self.offset_released.emit()
+        self._grab = None
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        """Show the whole recording."""
+        if event.position().y() >= _HEADER_PX:
+            self._span.fit()
+
+    def leaveEvent(self, event: object) -> None:
+        """Nothing is under the pointer any more."""
+        self._pointer.leave()
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Zoom about the pointer, or pan with Shift or a sideways wheel."""
+        turn_wheel(event, self._span, self.scale)
+
+    def _read(self, position: QPointF) -> None:
+        if self._track.map is None or not self.plot_rect().contains(position):
+            self._pointer.leave()
+            return
+        time_s, velocity_mps = self.scale.time_of(position.x()), self.velocity_of(position.y())
+        self._pointer.point_at(time_s, velocity_mps, self.read(time_s, velocity_mps))
+
+    def read(self, time_s: float, velocity_mps: float) -> Reading | None:
+        """What stands at a time and velocity."""
+        return self._track.read(time_s, velocity_mps)

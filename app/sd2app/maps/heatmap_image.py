@@ -1,0 +1,178 @@
+"""From a Doppler map to the pixels of the stretch in view."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtGui import QImage
+
+from sd2app.maps.difference import DifferenceModel
+from sd2app.session.display import HeatmapLevels
+from sd2app.session.tracks import TrackModel
+from sd2app.widgets.colour_maps import lookup_table, uncertain_table
+
+
+def column_frames(
+    times_s: NDArray[np.float64], end_s: float, start_s: float, stop_s: float, columns: int
+) -> NDArray[np.int64]:
+    """First frame on screen in every pixel column, and one past the last, (columns + 1,).
+
+    A column shows frames ``[edges[k], max(edges[k] + 1, edges[k + 1]))``. Minus
+    one marks columns before the first frame, ``len(times_s)`` those past the end.
+    """
+    edges_s = start_s + (stop_s - start_s) * np.arange(columns + 1) / columns
+    frames = np.searchsorted(times_s, edges_s + 1e-9, side="right") - 1
+    frames[edges_s >= end_s] = len(times_s)
+    return frames
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """Which frames of a map share a pixel column.
+
+    Parameters
+    ----------
+    filled : bool array, shape (columns,)
+        Columns with a frame.
+    begin, end : int
+        Frames that are in view, half-open.
+    starts : int64 array, shape (filled columns,)
+        First frame of every filled column, counted from ``begin``.
+    """
+
+    filled: NDArray[np.bool_]
+    begin: int
+    end: int
+    starts: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, track: TrackModel, start_s: float, stop_s: float, columns: int) -> Columns:
+        """Of the stretch in view."""
+        assert track.map is not None
+        timebase = track.map.timebase
+        frames = column_frames(
+            timebase.times_s,
+            timebase.end_s,
+            start_s - track.offset_s,
+            stop_s - track.offset_s,
+            columns,
+        )
+        first = frames[:-1]
+        filled = (first >= 0) & (first < len(timebase))
+        if not filled.any():
+            return cls(filled, 0, 0, np.zeros(0, np.int64))
+        begin, end = int(first[filled][0]), int(frames[1:][filled][-1])
+        end = min(max(end, int(first[filled][-1]) + 1), len(timebase))
+        return cls(filled, begin, end, first[filled] - begin)
+
+    def strongest(self, values: NDArray[Any]) -> NDArray[Any]:
+        """The largest of every column's frames, (bins, filled columns), of (bins, end - begin)."""
+        if values.shape[1] > self.starts.size:
+            largest: NDArray[Any] = np.maximum.reduceat(values, self.starts, axis=1)
+            return largest
+        return values[:, self.starts]
+
+
+def shade_columns(
+    track: TrackModel, levels: HeatmapLevels, start_s: float, stop_s: float, columns: int
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Shades of the stretch in view, and which columns have something to show.
+
+    Where several frames share a column the strongest value is shown, so that a
+    short gesture does not vanish when zoomed out.
+
+    Returns
+    -------
+    shades : float32 array, shape (bins, columns)
+    filled : bool array, shape (columns,)
+    """
+    values, filled = _strongest_columns(track, start_s, stop_s, columns)
+    return track.shade(values, levels), filled
+
+
+def uncertain_columns(
+    track: TrackModel, levels: HeatmapLevels, start_s: float, stop_s: float, columns: int
+) -> NDArray[np.bool_] | None:
+    """Where what is shown is uncertain, bool (bins, columns); None where that is not known.
+
+    Of several frames that share a column the one that is shown decides.
+    """
+    assert track.map is not None
+    view = Columns.of(track, start_s, stop_s, columns)
+    uncertain = track.uncertain(levels, view.begin, view.end)
+    if uncertain is None:
+        return None
+    found = np.zeros((track.map.axis.bins, columns), bool)
+    if view.filled.any():
+        values = track.map.values[:, view.begin : view.end]
+        known = view.strongest(np.where(uncertain, np.float32(-1.0), values))
+        unknown = view.strongest(np.where(uncertain, values, np.float32(-1.0)))
+        found[:, view.filled] = unknown >= np.maximum(known, 0.0)
+    return found
+
+
+def heatmap_image(
+    track: TrackModel,
+    levels: HeatmapLevels,
+    start_s: float,
+    stop_s: float,
+    columns: int,
+    background: int,
+) -> QImage:
+    """One pixel per column and bin, fastest approach on top; uncertain cells without colour."""
+    shades, filled = shade_columns(track, levels, start_s, stop_s, columns)
+    numbers = (shades * 255.0).astype(np.uint8)
+    colours = lookup_table(levels.colour_map)[numbers]
+    uncertain = uncertain_columns(track, levels, start_s, stop_s, columns)
+    if uncertain is not None:
+        colours = np.where(uncertain, uncertain_table(levels.colour_map)[numbers], colours)
+    colours[:, ~filled] = background
+    return image_of(colours)
+
+
+def difference_image(
+    difference: DifferenceModel,
+    levels: HeatmapLevels,
+    start_s: float,
+    stop_s: float,
+    columns: int,
+    table: NDArray[np.uint32],
+    background: int,
+) -> QImage:
+    """The difference of what is shown of two maps, in signed colours (255,), zero in the middle.
+
+    Where several frames share a column, of the strongest of each, as the maps show them.
+    """
+    (denoised, there), (real, as_well) = (
+        _strongest_columns(track, start_s, stop_s, columns)
+        for track in (difference.denoised, difference.real)
+    )
+    shades = difference.shades(denoised, real, levels)
+    colours = table[127 + np.rint(127.0 * shades).astype(np.int16)]
+    colours[:, ~(there & as_well)] = background
+    return image_of(colours)
+
+
+def _strongest_columns(
+    track: TrackModel, start_s: float, stop_s: float, columns: int
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Values of every pixel column (bins, columns), and which columns have some."""
+    assert track.map is not None
+    view = Columns.of(track, start_s, stop_s, columns)
+    values = np.zeros((track.map.axis.bins, columns), np.float32)
+    filled = view.filled.copy()
+    if filled.any():
+        values[:, filled] = view.strongest(track.map.values[:, view.begin : view.end])
+        if track.covered is not None:
+            filled[filled] = track.covered[view.starts + view.begin]
+    return values, filled
+
+
+def image_of(colours: NDArray[np.uint32]) -> QImage:
+    """Colours (bins, columns), the fastest approach on top."""
+    pixels = np.ascontiguousarray(colours[::-1])
+    height, width = pixels.shape
+    return QImage(pixels.data, width, height, 4 * width, QImage.Format.Format_RGB32).copy()

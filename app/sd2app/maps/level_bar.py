@@ -1,0 +1,122 @@
+"""One control of level and colour map for all heatmaps."""
+
+from __future__ import annotations
+
+import numpy as np
+from PySide6.QtCore import QRectF, QSignalBlocker, QSize
+from PySide6.QtGui import QAction, QColor, QImage, QPainter, QPaintEvent
+from PySide6.QtWidgets import (
+    QGridLayout,
+    QHBoxLayout,
+    QVBoxLayout,
+    QWidget,
+)
+
+from sd2app.session.display import COLOUR_MAPS, DisplayModel
+from sd2app.session.tracks import TrackModel
+from sd2app.widgets.colour_maps import lookup_table, uncertain_table
+from sd2app.widgets.elided import ElidedLabel
+from sd2app.widgets.inputs import Choice, NumberBox, action_button
+
+_STRIP_PX = 14
+
+
+class _ColourStrip(QWidget):
+    """The colours of the levels; below them those of uncertain cells, where there are any."""
+
+    def __init__(
+        self,
+        display: DisplayModel,
+        tracks: tuple[TrackModel, ...],
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._display = display
+        self._tracks = tracks
+        self.setFixedHeight(_STRIP_PX)
+        display.levels_changed.connect(self.update)
+        for track in tracks:
+            track.changed.connect(self.update)
+
+    def sizeHint(self) -> QSize:
+        return QSize(200, _STRIP_PX)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        with QPainter(self) as painter:
+            self._paint(painter)
+
+    def _paint(self, painter: QPainter) -> None:
+        name = self._display.levels.colour_map
+        strips = [lookup_table(name)]
+        if any(track.uncertainty is not None for track in self._tracks):
+            strips.append(uncertain_table(name))
+        pixels = np.ascontiguousarray(strips)
+        image = QImage(pixels.tobytes(), 256, len(strips), 1024, QImage.Format.Format_RGB32)
+        painter.drawImage(QRectF(self.rect()), image)
+        painter.setPen(QColor(self._display.palette.border))
+        painter.drawRect(self.rect().adjusted(0, 0, -1, -1))
+
+
+class LevelBar(QWidget):
+    """Colour strip with its two ends, scale, colour map, and what 0 dB means."""
+
+    def __init__(
+        self,
+        display: DisplayModel,
+        tracks: tuple[TrackModel, ...],
+        uncertain: QAction,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._display = display
+        self._tracks = tracks
+        self._low, self._high = (
+            NumberBox(-90.0, 20.0, " dB", tip, decimals=0, step=3.0)
+            for tip in ("Level shown as the first colour", "Level shown as the last colour")
+        )
+        self._low.valueChanged.connect(lambda value: display.set_levels(low_db=value))
+        self._high.valueChanged.connect(lambda value: display.set_levels(high_db=value))
+        self._scale = Choice("Logarithmic or linear levels, for all heatmaps", self)
+        self._scale.addItems(["dB", "linear"])
+        self._scale.currentTextChanged.connect(lambda text: display.set_levels(scale=text))
+        self._colours = Choice("Colour map of all heatmaps", self)
+        self._colours.addItems(list(COLOUR_MAPS))
+        self._colours.currentTextChanged.connect(lambda text: display.set_levels(colour_map=text))
+        # One line each: the plot above needs the height.
+        self._references = [ElidedLabel(self) for _ in tracks]
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(8, 4, 8, 8)
+        layout.setSpacing(4)
+        layout.addWidget(_ColourStrip(display, tracks, self))
+        ends = QHBoxLayout()
+        ends.addWidget(self._low)
+        ends.addStretch(1)
+        ends.addWidget(action_button(uncertain, "Uncertain"))
+        ends.addStretch(1)
+        ends.addWidget(self._high)
+        layout.addLayout(ends)
+        choices = QGridLayout()
+        choices.addWidget(self._scale, 0, 0)
+        choices.addWidget(self._colours, 0, 1)
+        layout.addLayout(choices)
+        for label in self._references:
+            label.setObjectName("muted")
+            layout.addWidget(label)
+        display.levels_changed.connect(self._refresh)
+        for track in tracks:
+            track.changed.connect(self._refresh)
+        self._refresh()
+
+    def _refresh(self) -> None:
+        levels = self._display.levels
+        self._low.show_value(levels.low_db)
+        self._high.show_value(levels.high_db)
+        self._low.setEnabled(levels.scale == "dB")
+        for combo, text in ((self._scale, levels.scale), (self._colours, levels.colour_map)):
+            with QSignalBlocker(combo):
+                combo.setCurrentText(text)
+        for label, track in zip(self._references, self._tracks, strict=True):
+            label.setVisible(track.map is not None)
+            if track.map is not None:
+                text = f"0 dB {track.title.lower()}: {track.reference:.3g} {track.map.unit}"
+                label.setText(text.rstrip())

@@ -1,0 +1,437 @@
+"""The synthetic Doppler map that follows the sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from sd2app.accuracy.model import TradeModel
+from sd2app.background.latest import LatestRunner
+from sd2app.maps.compiling import CompilerModel
+from sd2app.maps.partial_map import FINAL, View
+from sd2app.maps.quality import budget_ms, distance_m, final_way, final_words, rough_way
+from sd2app.maps.readout import FrameReader, Readout
+from sd2app.maps.refine import Companion, Part, Way, is_swept_whole, refine, worked_out
+from sd2app.maps.shown_map import PaintedMap
+from sd2app.maps.synthesizers import Carriers
+from sd2app.maps.warm_up import Readier
+from sd2app.session.document import DocumentModel
+from sd2app.session.playback import PlaybackModel
+from sd2app.session.sensor import SensorModel
+from sd2app.session.tasks import Job, JobsModel
+from sd2app.session.time_window import VisibleSpanModel
+from sd2app.session.tracks import TrackModel
+from sd2core.doppler.options import PRESETS
+from sd2core.doppler.synthesizer import FrameScattering, Synthesizer
+from sd2core.doppler_map import DopplerMap
+from sd2core.errors import Sd2Error
+from sd2core.progress import Cancelled
+from sd2core.sensor import Vector, VirtualSensor
+
+if TYPE_CHECKING:
+    from sd2core.accuracy.plans import Plan
+
+_REST_MS = 300
+"""A hand that holds the sensor still for so long is at rest."""
+
+
+class SynthesisModel(QObject):
+    """Recomputes when the sensor moves: at once roughly, as the plan says when the hand rests.
+
+    While a hand moves the sensor, one sweep runs at a time and the newest
+    position follows it. At rest the plan in use is carried out in the
+    background, the stretch in view first; then a plan is chosen for the new
+    place, carried out if it is another, and at last one for the next drag. Any
+    new move interrupts all of it. A map stays until it is replaced.
+
+    Signals
+    -------
+    painted : Part
+        A stretch came onto the map.
+    """
+
+    frame_changed = Signal()
+    target_changed = Signal()
+    readout_changed = Signal()
+    moving_changed = Signal()
+    completed = Signal()
+    painted = Signal(object)
+    failed = Signal(str)
+
+    def __init__(
+        self,
+        document: DocumentModel,
+        sensor: SensorModel,
+        playback: PlaybackModel,
+        span: VisibleSpanModel,
+        track: TrackModel,
+        jobs: JobsModel,
+        trade: TradeModel,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._document = document
+        self._sensor = sensor
+        self._span = span
+        self._track = track
+        self._painted = PaintedMap(track)
+        self._companion: Callable[[], Companion | None] = lambda: None
+        self._jobs = jobs
+        self._trade = trade
+        self._reader = FrameReader(document, sensor, playback)
+        self._job: Job | None = None
+        self._carriers: Carriers | None = None
+        self._moving = False
+        self._readier = Readier(self)
+        self._readier.failed.connect(self.failed)
+        self._forget()
+        self._runner = LatestRunner("synthesis", self)
+        self._runner.partial.connect(self._receive)
+        self._runner.finished.connect(self._finish)
+        self._runner.failed.connect(self._fail)
+        self._compiler = CompilerModel(self)
+        self._compiler.finished.connect(self._follow)
+        self._rest = QTimer(self)
+        self._rest.setSingleShot(True)
+        self._rest.setInterval(_REST_MS)
+        self._rest.timeout.connect(self._settle)
+        sensor.changed.connect(self._follow)
+        sensor.dragging_changed.connect(lambda _: self._follow())
+        span.changed.connect(self._reorder)
+        playback.frame_changed.connect(self._follow_clock)
+        trade.plan_changed.connect(self._take_plan)
+        trade.decided.connect(self._go_on)
+        trade.wished.connect(self._go_on)
+
+    # --- what is known --------------------------------------------------------------------
+
+    @property
+    def v_max_mps(self) -> float:
+        """Edge of the velocity axis."""
+        return self._carriers.options.axis.v_max_mps if self._carriers else 2.0
+
+    @property
+    def busy(self) -> bool:
+        """Whether a better map is on its way."""
+        return self._runner.busy or self._compiler.busy
+
+    @property
+    def moving(self) -> bool:
+        """Whether the sensor moves, so that the budget rules; else the tolerance does."""
+        return self._moving
+
+    @property
+    def complete(self) -> bool:
+        """Whether every frame is as the plan says for the sensor where it stands."""
+        canvas = self._painted.canvas
+        return canvas.final and canvas.sensor == self._sensor.sensor
+
+    @property
+    def shows_sensor(self) -> bool:
+        """Whether what is on the map is of the sensor where it stands, exact or not."""
+        return self._painted.canvas.sensor == self._sensor.sensor
+
+    @property
+    def torso_m(self) -> Vector | None:
+        """Median vertex of the frame on screen: inside the torso whatever the limbs do."""
+        return self._reader.torso_m()
+
+    @property
+    def frame(self) -> FrameScattering | None:
+        """Velocity, range and visibility of every vertex in the frame on screen."""
+        if self._carriers is None:
+            return None
+        full = self._carriers.full
+        if full.options.visibility == "none":
+            return self._reader.scattering(full, "none")
+        if self._compiler.ready and not self._moving:
+            return self._reader.scattering(full, full.options.visibility)
+        # The mask of the map, where the map has one and all vertices.
+        carrier = self._carriers.ready(self._plan)
+        same = carrier is not None and carrier.mesh is full.mesh
+        return self._reader.scattering(carrier if same and carrier else full, "frozen")
+
+    def readout(self) -> Readout | None:
+        """Numbers beside the sensor, None without a mesh on screen."""
+        return self._reader.readout(self.frame, self.v_max_mps)
+
+    # --- requests -------------------------------------------------------------------------
+
+    def take_over(self) -> None:
+        """Start on the mesh of the document that is open now."""
+        self._stop()
+        self._carriers = None
+        self._forget()
+        self._set_moving(False)
+        self._track.set_map(None)
+        mesh, options = self._document.mesh, PRESETS["paper"]
+        if mesh is not None and mesh.faces is None:
+            options = replace(options, visibility="none")
+        self._trade.take_over(mesh, options)
+        if mesh is None:
+            self._announce()
+            return
+        try:
+            self._carriers = Carriers(mesh, options, self._trade.ladder)
+        except Sd2Error as error:
+            self.failed.emit(str(error))
+            return
+        self._painted.begin(options, mesh)
+        self._compiler.start()
+        self._announce()
+        self._follow()
+
+    def made_by(self) -> tuple[Callable[[], Synthesizer], VirtualSensor] | None:
+        """What made the map that is shown, and from where; None until it is complete.
+
+        Asking for the synthesizer may take long.
+        """
+        carriers, plan = self._carriers, self._plan
+        if carriers is None or self._moving or not self.complete:
+            return None
+        return lambda: carriers.of(plan), self._sensor.sensor
+
+    def accompany(self, companion: Callable[[], Companion | None]) -> None:
+        """Ask ``companion`` before each sweep what is to be made of it, in step with it."""
+        self._companion = companion
+
+    def export(self, path: Path) -> None:
+        """Write the map that is shown with its provenance."""
+        self.whole_map().save(path)
+
+    def whole_map(self) -> DopplerMap:
+        """The map that is shown, made anew with its provenance, the plan included.
+
+        Raises
+        ------
+        Sd2Error
+            When it is not complete.
+        """
+        if self._carriers is None or not self.complete:
+            raise Sd2Error("The synthetic map is not complete yet", "a final map", "Wait for it")
+        made = self._carriers.of(self._plan).map(self._sensor.sensor)
+        in_use = self._trade.in_use
+        if in_use is not None:
+            made = replace(made, meta=made.meta | in_use.plan.provenance(in_use.error))
+        return replace(made, uncertainty=self._track.uncertainty)
+
+    def close(self) -> None:
+        """Stop computing."""
+        self._stop()
+        self._compiler.stop()
+        self._runner.close()
+        self._readier.close()
+
+    def _stop(self) -> None:
+        self._rest.stop()
+        self._runner.cancel()
+        self._readier.cancel()
+        self._end_job()
+
+    # --- following ------------------------------------------------------------------------
+
+    def _forget(self) -> None:
+        self._painted.forget()
+        self._reader.forget()
+        self._plan: Plan | None = None
+        self._dragging_plan: Plan | None = None
+        self._readier.forget()
+        self._again = False
+        self._sweeping = False
+
+    def _announce(self) -> None:
+        self.target_changed.emit()
+        self.frame_changed.emit()
+        self.readout_changed.emit()
+
+    def _follow_clock(self) -> None:
+        if self._carriers is not None:
+            self._announce()
+
+    def _follow(self) -> None:
+        if self._carriers is None:
+            return
+        self._trade.hold()
+        self._readier.cancel()
+        if self._sensor.dragging:
+            self._rest.start()
+            self._set_moving(self._moving or self._sensor.sensor != self._painted.canvas.sensor)
+            self._follow_clock()
+            if self._sweeping and self._runner.busy:
+                self._again = True
+            elif self._moving:
+                self._sweep()
+        else:
+            self._settle()
+            self._follow_clock()
+
+    def _set_moving(self, moving: bool) -> None:
+        if moving != self._moving:
+            self._moving = moving
+            self.moving_changed.emit()
+
+    def _sweep(self) -> None:
+        """One rough pass for the sensor where it is now, never interrupted."""
+        self._end_job()
+        self._again, self._sweeping = False, True
+        sensor, way, (start, stop) = self._sensor.sensor, self._rough_way(), self._swept()
+        companion = self._companion()
+        self._runner.submit(lambda emit: worked_out(way, sensor, start, stop, companion=companion))
+
+    def _settle(self) -> None:
+        """Rough where nothing is known yet, then as planned; the stretch in view first."""
+        if self._carriers is None:
+            return
+        self._rest.stop()
+        self._end_job()
+        self._again = self._sweeping = False
+        sensor = self._sensor.sensor
+        self._trade.rest_at(sensor)
+        rank = self._painted.canvas.ranks_for(sensor)
+        if rank.min() >= FINAL:
+            self._set_moving(False)
+            self._go_on()
+            return
+        view, rough, vertices = self._frames_in_view(), self._rough_way(), self._vertices
+        self._set_moving(False)
+        final = self._final_way()
+        if final is not None:
+            self._job = self._jobs.start("Synthesising the map", self._cancel)
+        # Much of a long clip can wait until it is known how it is to be done.
+        long = not is_swept_whole(vertices, len(rank))
+        only_view = final is None and not self._compiler.busy and long
+        self._runner.submit(
+            lambda emit: refine(
+                sensor, rank, view, rough, final, vertices, emit, only_view=only_view
+            )
+        )
+
+    def _go_on(self) -> None:
+        """What is to be done next while the sensor rests."""
+        if self._carriers is None or self._moving or self.busy:
+            return
+        if self._may_choose():
+            self._trade.choose(self._sensor.sensor, self._budget_ms())
+        elif not self.complete:
+            self._settle()
+        elif self._dragging_plan is not None and self._readier.ready_at != self._sensor.sensor:
+            self._readier.make_ready(
+                self._carriers, self._dragging_plan, self._sensor.sensor, self._swept()
+            )
+
+    def _may_choose(self) -> bool:
+        """Whether the plans are for another place, and there is machine code to find others."""
+        decided = self._trade.is_decided(self._sensor.sensor, self._budget_ms())
+        return self._compiler.ready and not decided
+
+    def _take_plan(self) -> None:
+        """Follow the plans; what was made by another stays until it is replaced."""
+        plan, dragging = (
+            use.plan if use is not None else None
+            for use in (self._trade.in_use, self._trade.while_dragging)
+        )
+        if dragging != self._dragging_plan:
+            self._dragging_plan = dragging
+            self._readier.forget()
+        if self._carriers is None or plan == self._plan:
+            self._say_quality()
+            return
+        self._plan = plan
+        self._painted.demote()
+        if not self._moving:
+            self._settle()
+
+    def _reorder(self) -> None:
+        start, stop = self._frames_in_view()
+        if self._carriers is None or self._moving or stop <= start:
+            return
+        self._say_quality()
+        canvas = self._painted.canvas
+        if canvas.rank[start:stop].min() < FINAL and canvas.frames > stop - start:
+            self._settle()
+
+    def _cancel(self) -> None:
+        self._runner.cancel()
+        self._end_job()
+        self._say_quality()
+
+    # --- results --------------------------------------------------------------------------
+
+    def _receive(self, result: Any) -> None:
+        if isinstance(result, Part):
+            self._take(result)
+        elif self._job is not None:
+            self._jobs.report(self._job, *result)
+
+    def _finish(self, result: Any) -> None:
+        if isinstance(result, Part):
+            self._take(result)
+        self._sweeping = False
+        self._end_job()
+        if self._again and self._sensor.dragging:
+            self._sweep()
+            return
+        if self.complete:
+            self.completed.emit()
+        self._go_on()
+
+    def _take(self, part: Part) -> None:
+        self._painted.take(part)
+        self._say_quality()
+        self.painted.emit(part)
+        self.readout_changed.emit()
+
+    def _say_quality(self) -> None:
+        if self._carriers is not None:
+            final = final_words(self._carriers, self._trade.in_use)
+            self._painted.say_quality(self._frames_in_view(), final, self._compiler.busy)
+
+    def _fail(self, error: Exception) -> None:
+        self._sweeping = False
+        self._end_job()
+        if not isinstance(error, Cancelled):
+            self.failed.emit(str(error))
+
+    def _end_job(self) -> None:
+        if self._job is not None:
+            self._jobs.finish(self._job)
+            self._job = None
+
+    # --- helpers --------------------------------------------------------------------------
+
+    def _rough_way(self) -> Way:
+        assert self._carriers is not None
+        moved_m = distance_m(self._readier.ready_at, self._sensor.sensor)
+        return rough_way(self._carriers, self._plan, self._trade.while_dragging, moved_m)
+
+    def _final_way(self) -> Way | None:
+        """What the tolerance asks for; None while that is open."""
+        if self._carriers is None or self._compiler.busy:
+            return None
+        if self._plan is None and self._may_choose():
+            return None
+        return final_way(self._carriers, self._plan, self._trade.in_use)
+
+    @property
+    def _vertices(self) -> int:
+        assert self._carriers is not None
+        return self._carriers.mesh.vertex_count
+
+    def _swept(self) -> View:
+        """Frames that follow a hand: the whole clip when it is short, else what is in view."""
+        frames = self._painted.canvas.frames
+        return (0, frames) if is_swept_whole(self._vertices, frames) else self._frames_in_view()
+
+    def _budget_ms(self) -> float:
+        start, stop = self._swept()
+        return budget_ms(stop - start)
+
+    def _frames_in_view(self) -> View:
+        mesh = self._document.mesh
+        if mesh is None:
+            return (0, 0)
+        return mesh.timebase.frames_between(self._span.start_s, self._span.end_s)

@@ -1,0 +1,83 @@
+"""What the sensor makes of the frame on screen, vertex by vertex."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sd2app.session.document import DocumentModel
+from sd2app.session.playback import PlaybackModel
+from sd2app.session.sensor import SensorModel
+from sd2core.doppler.synthesizer import FrameScattering, Synthesizer, Visibility
+from sd2core.sensor import Vector
+
+
+@dataclass(frozen=True)
+class Readout:
+    """What the sensor makes of the frame on screen."""
+
+    torso_range_m: float
+    visible_share: float
+    beyond_share: float
+
+
+class FrameReader:
+    """Reads the frame on screen; what was read last is kept."""
+
+    def __init__(
+        self, document: DocumentModel, sensor: SensorModel, playback: PlaybackModel
+    ) -> None:
+        self._document = document
+        self._sensor = sensor
+        self._playback = playback
+        self.forget()
+
+    def forget(self) -> None:
+        """Another recording is open."""
+        self._frame: tuple[Any, FrameScattering] | None = None
+        self._torso: tuple[int, Vector] | None = None
+
+    def index(self) -> int | None:
+        """Frame of the mesh on screen, None where there is no person."""
+        mesh, time_s = self._document.mesh, self._playback.time_s
+        if mesh is None or not mesh.timebase.covers(time_s):
+            return None
+        frame = mesh.timebase.frame_at(time_s)
+        return frame if mesh.presence.there[frame] else None
+
+    def torso_m(self) -> Vector | None:
+        """Median vertex: inside the torso whatever the limbs do."""
+        index, mesh = self.index(), self._document.mesh
+        if index is None or mesh is None:
+            return None
+        if self._torso is None or self._torso[0] != index:
+            x, y, z = np.median(mesh.frame(index), axis=0)
+            self._torso = (index, (float(x), float(y), float(z)))
+        return self._torso[1]
+
+    def scattering(
+        self, synthesizer: Synthesizer, visibility: Visibility
+    ) -> FrameScattering | None:
+        """Velocity, range and visibility of every vertex."""
+        index = self.index()
+        if index is None:
+            return None
+        key = (index, self._sensor.sensor, id(synthesizer), visibility)
+        if self._frame is None or self._frame[0] != key:
+            self._frame = (key, synthesizer.frame(key[1], index, visibility))
+        return self._frame[1]
+
+    def readout(self, frame: FrameScattering | None, v_max_mps: float) -> Readout | None:
+        """Numbers beside the sensor, None without a mesh on screen."""
+        torso = self.torso_m()
+        if frame is None or torso is None:
+            return None
+        offset = np.subtract(self._sensor.sensor.position_m, torso)
+        seen = np.abs(frame.velocity_mps[frame.visible])
+        return Readout(
+            torso_range_m=float(np.linalg.norm(offset)),
+            visible_share=float(frame.visible.mean()),
+            beyond_share=float((seen > v_max_mps).mean()) if seen.size else 0.0,
+        )

@@ -1,0 +1,282 @@
+"""The mesh of the recording and another of the same video, measured against each other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QObject, Signal
+
+from sd2app.background.latest import Emit, LatestRunner
+from sd2app.session.content import UNTITLED, reference_of
+from sd2app.session.document import DocumentModel
+from sd2app.session.sensor import SensorModel
+from sd2app.session.tasks import Job, JobsModel
+from sd2app.session.tracks import TrackModel
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.recording.recording import MeshReading, Recording, is_recording, open_recording
+
+if TYPE_CHECKING:
+    from sd2core.compare.meshes import Comparison
+
+JOINT = "hand.R"
+"""Whose curves are shown at first."""
+
+
+@dataclass(frozen=True)
+class JointRow:
+    """One line of the table."""
+
+    name: str
+    distance_m: float
+    velocity_rms_mps: float
+    correlation: float
+    jitter_mps3: tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class _Result:
+    meshes: tuple[MeshSequence, MeshSequence]
+    comparison: Comparison
+
+
+class ComparisonModel(QObject):
+    """Two meshes: number 0 is the recording's, number 1 the other.
+
+    Signals
+    -------
+    changed
+        Result, reference, joint, or whether it is being worked on.
+    """
+
+    changed = Signal()
+
+    def __init__(
+        self,
+        document: DocumentModel,
+        sensor: SensorModel,
+        jobs: JobsModel,
+        other: Path,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._document = document
+        self._sensor = sensor
+        self._jobs = jobs
+        self._job: Job | None = None
+        self._other = other
+        self._reference = 0
+        self._joint = JOINT
+        self._result: _Result | None = None
+        self._problem = ""
+        self._closed = False
+        self.tracks = (TrackModel("", self), TrackModel("", self))
+        self._runner = LatestRunner("compare", self)
+        self._runner.partial.connect(self._report)
+        self._runner.finished.connect(self._receive)
+        self._runner.failed.connect(self._refuse)
+        sensor.changed.connect(self._follow_sensor)
+        sensor.dragging_changed.connect(self._follow_sensor)
+        self.work_out()
+
+    # --- what is there --------------------------------------------------------------------
+
+    @property
+    def labels(self) -> tuple[str, str]:
+        """What the two are called."""
+        recording = self._document.recording
+        own = name_of(recording.mesh) if recording and recording.mesh else "this recording"
+        other = name_of(self._other)
+        return (own, other) if own != other else (f"{own} (open)", f"{other} (other)")
+
+    @property
+    def reference(self) -> int:
+        """Which of the two the other is measured against."""
+        return self._reference
+
+    @property
+    def busy(self) -> bool:
+        """Whether it is being worked out."""
+        return self._runner.busy
+
+    @property
+    def problem(self) -> str:
+        """Why it cannot be worked out."""
+        return self._problem
+
+    @property
+    def comparison(self) -> Comparison | None:
+        """What was found."""
+        return self._result.comparison if self._result else None
+
+    @property
+    def joint(self) -> str:
+        """Joint whose velocity is shown."""
+        return self._joint
+
+    def mesh(self, number: int) -> MeshSequence | None:
+        """One of the two, all of its frames."""
+        return self._result.meshes[number] if self._result else None
+
+    @property
+    def rows(self) -> tuple[JointRow, ...]:
+        """The table, joint by joint."""
+        comparison = self.comparison
+        if comparison is None:
+            return ()
+        from sd2core.compare.joints import JOINTS
+
+        found = comparison.differences[1 - self._reference]
+        jitters = [one.jitter_mps3 for one in comparison.differences]
+        return tuple(
+            JointRow(
+                name,
+                float(found.distance_m[k]),
+                float(found.velocity_rms_mps[k]),
+                float(found.correlation[k]),
+                (float(jitters[0][k]), float(jitters[1][k])),
+            )
+            for k, name in enumerate(JOINTS)
+        )
+
+    @property
+    def map_l1(self) -> float | None:
+        """Relative difference of the two Doppler maps."""
+        comparison = self.comparison
+        return comparison.differences[1 - self._reference].map_l1 if comparison else None
+
+    def curve(self, number: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Times, and velocities of the joint towards the sensor; NaN where nobody is."""
+        comparison = self.comparison
+        if comparison is None:
+            return np.zeros(0), np.zeros(0)
+        from sd2core.compare.joints import JOINTS
+
+        velocity = comparison.velocity_mps[number][:, JOINTS.index(self._joint)]
+        return comparison.times_s, np.where(comparison.measured, velocity, np.nan)
+
+    # --- what one can do ------------------------------------------------------------------
+
+    def set_joint(self, joint: str) -> None:
+        """Show another joint."""
+        if joint != self._joint:
+            self._joint = joint
+            self.changed.emit()
+
+    def set_reference(self, number: int) -> None:
+        """Measure against the other one."""
+        if number != self._reference:
+            self._reference = number
+            self.work_out()
+
+    def work_out(self) -> None:
+        """Compare anew, with the sensor where it is."""
+        recording = self._document.recording
+        own = self._document.mesh
+        if recording is None or own is None:
+            return
+        known = self._result.meshes[1] if self._result else None
+        other, sensor, reference = self._other, self._sensor.sensor, self._reference
+        labels, focal_px = self.labels, self._document.camera.focal_px
+
+        def compare(emit: Emit) -> _Result:
+            from sd2core.compare.meshes import compare_meshes
+
+            mesh = known or load_other(other, recording, focal_px)
+            comparison = compare_meshes(
+                (own, mesh),
+                labels,
+                reference=reference,
+                sensor=sensor,
+                progress=lambda done, total: emit((done, total)),
+            )
+            return _Result((own, mesh), comparison)
+
+        self._problem = ""
+        self._end_job()
+        self._job = self._jobs.start(f"Comparing with {self._other.name}", self._cancel)
+        self._runner.submit(compare)
+        self.changed.emit()
+
+    def save_figure(self, path: Path) -> None:
+        """Write maps and curves; raises Sd2Error and OSError."""
+        from sd2core.compare.figure import draw_comparison
+        from sd2core.files.figure_files import save_figure
+
+        if self.comparison is not None:
+            save_figure(draw_comparison(self.comparison), path)
+
+    def close(self) -> None:
+        """Stop working."""
+        if self._closed:
+            return
+        self._closed = True
+        self._end_job()
+        self._runner.close()
+        self._sensor.changed.disconnect(self._follow_sensor)
+        self._sensor.dragging_changed.disconnect(self._follow_sensor)
+
+    # --- inside ---------------------------------------------------------------------------
+
+    def _follow_sensor(self) -> None:
+        if self._sensor.dragging:
+            return
+        comparison = self.comparison
+        if comparison is None or comparison.sensor != self._sensor.sensor:
+            self.work_out()
+
+    def _report(self, progress: Any) -> None:
+        if self._job is not None:
+            self._jobs.report(self._job, *progress)
+
+    def _receive(self, result: _Result) -> None:
+        self._end_job()
+        self._result = result
+        comparison = result.comparison
+        top = max(reference_of(one.values, one.null_bins) for one in comparison.maps)
+        for number, (track, label) in enumerate(zip(self.tracks, self.labels, strict=True)):
+            track.title = label
+            l1 = comparison.differences[number].map_l1
+            is_reference = number == comparison.reference
+            track.set_status("reference" if is_reference else f"relative L1 {l1:.2f}")
+            track.set_map(comparison.maps[number])
+            track.set_reference(top)  # one level for both
+        self.changed.emit()
+
+    def _refuse(self, error: Exception) -> None:
+        self._end_job()
+        self._problem = str(error)
+        self.changed.emit()
+
+    def _cancel(self) -> None:
+        self._runner.cancel()
+        self._end_job()
+        self.changed.emit()
+
+    def _end_job(self) -> None:
+        if self._job is not None:
+            self._jobs.finish(self._job)
+            self._job = None
+
+
+def name_of(path: Path) -> str:
+    """What a mesh is called: by its folder where the file's own name says nothing."""
+    plain = path.name in ("mesh.zarr", "mesh.npz") and path.parent != UNTITLED
+    return path.parent.name if plain else path.name
+
+
+def load_other(path: Path, recording: Recording, focal_px: float) -> MeshSequence:
+    """Load the mesh of another recording, or a file placed by the video of this one.
+
+    Raises
+    ------
+    Sd2Error
+        When it cannot be read.
+    """
+    if is_recording(path):
+        return open_recording(path).load_mesh()
+    reading = MeshReading(focal_px=recording.mesh_reading.focal_px or focal_px)
+    return Recording(UNTITLED, video=recording.video, mesh=path, mesh_reading=reading).load_mesh()

@@ -1,0 +1,169 @@
+"""The window in which two meshes of one video stand side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtGui import QAction, QCloseEvent
+from PySide6.QtWidgets import (
+    QFileDialog,
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from sd2app.maps.heatmap import HeatmapView
+from sd2app.mesh_comparison.curves import JointCurves
+from sd2app.mesh_comparison.model import ComparisonModel
+from sd2app.mesh_comparison.pictures import ComparedPicture
+from sd2app.mesh_comparison.table import JointTable
+from sd2app.playback.timeline import TimeRuler
+from sd2app.widgets.elided import ElidedLabel
+from sd2app.widgets.figure_file import FIGURES
+from sd2app.widgets.frames import fill, panel, splitter
+from sd2app.widgets.inputs import Choice
+
+if TYPE_CHECKING:
+    from sd2app.shell.wiring import Context
+
+
+class ComparisonWindow(QWidget):
+    """Pictures, maps and curves follow the clock of the main window, and move it."""
+
+    closed = Signal()
+
+    def __init__(
+        self,
+        model: ComparisonModel,
+        context: Context,
+        keys: list[QAction],
+        attempt: Callable[[Callable[[], None]], object],
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent, Qt.WindowType.Window)
+        self._model = model
+        self._context = context
+        self._attempt = attempt
+        simulated = " (simulated)" if context.document.simulated else ""
+        self.setWindowTitle(f"{context.document.title}{simulated}: compare meshes")
+        self.addActions(keys)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(8, 8, 8, 8)
+        layout.setSpacing(8)
+        layout.addLayout(self._head())
+        left = splitter(Qt.Orientation.Vertical, [self._pictures(), self._tracks()], (320, 420))
+        body = splitter(Qt.Orientation.Horizontal, [left, self._table()], (820, 400))
+        layout.addWidget(body, 1)
+        self._notes = QLabel(self)
+        self._notes.setWordWrap(True)
+        layout.addWidget(self._notes)
+        model.changed.connect(self._refresh)
+        self._refresh()
+        self.resize(1240, 820)
+
+    def _head(self) -> QHBoxLayout:
+        row = QHBoxLayout()
+        row.setSpacing(8)
+        self._summary = ElidedLabel(self)
+        self._summary.setObjectName("title")
+        self._reference = Choice("The mesh that is taken to be right", self)
+        # However long the names of the meshes are.
+        self._reference.setSizeAdjustPolicy(
+            Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
+        )
+        self._reference.setMinimumContentsLength(14)
+        self._reference.addItems(list(self._model.labels))
+        self._reference.currentIndexChanged.connect(self._model.set_reference)
+        self._export = QToolButton(self)
+        self._export.setObjectName("outlined")
+        self._export.setText("Export figure…")
+        self._export.setToolTip("Write maps and velocities of both (.png, .svg, .pdf)")
+        self._export.clicked.connect(self._ask)
+        row.addWidget(self._summary, 1)
+        row.addWidget(QLabel("measured against", self))
+        row.addWidget(self._reference)
+        row.addWidget(self._export)
+        return row
+
+    def _pictures(self) -> QFrame:
+        c, frame = self._context, panel("pictures")
+        row = QHBoxLayout()
+        for number in (0, 1):
+            row.addWidget(
+                ComparedPicture(
+                    number, self._model, c.document, c.video, c.playback, c.display, c.overlay
+                ),
+                1,
+            )
+        fill(frame, row)
+        return frame
+
+    def _tracks(self) -> QFrame:
+        c, frame = self._context, panel("tracks")
+        column = QVBoxLayout()
+        for track in self._model.tracks:
+            view = HeatmapView(track, c.span, c.playback, c.display, c.pointer, c.labels)
+            column.addWidget(view, 1)
+        column.addWidget(JointCurves(self._model, c.span, c.playback, c.display), 1)
+        column.addWidget(TimeRuler(c.span, c.playback, c.display))
+        fill(frame, column)
+        return frame
+
+    def _table(self) -> QFrame:
+        frame = panel("joints")
+        fill(frame, JointTable(self._model, self._context.display))
+        return frame
+
+    # --- following the model --------------------------------------------------------------
+
+    def _refresh(self) -> None:
+        model, comparison = self._model, self._model.comparison
+        with QSignalBlocker(self._reference):
+            self._reference.setCurrentIndex(model.reference)
+        self._reference.setEnabled(comparison is not None)
+        self._export.setEnabled(comparison is not None and not model.busy)
+        self._summary.setText(self._words())
+        notes = " ".join(comparison.notes) if comparison is not None else ""
+        self._say(model.problem or notes, "warning" if model.problem else "muted")
+
+    def _words(self) -> str:
+        model = self._model
+        if model.busy:
+            return "Comparing…"
+        if model.problem:
+            return "These cannot be compared"
+        rows = model.rows
+        if not rows:
+            return ""
+        hands = [row for row in rows if row.name.startswith("hand.")]
+        distance_cm = 100 * sum(row.distance_m for row in rows) / len(rows)
+        error = (sum(row.velocity_rms_mps**2 for row in hands) / len(hands)) ** 0.5
+        return (
+            f"Joints {distance_cm:.1f} cm apart · hands' velocity off by {error:.2f} m/s ·"
+            f" Doppler maps differ by {model.map_l1:.2f}"
+        )
+
+    def _say(self, text: str, role: str) -> None:
+        if self._notes.objectName() != role:
+            self._notes.setObjectName(role)
+            self._notes.style().unpolish(self._notes)
+            self._notes.style().polish(self._notes)
+        self._notes.setText(text)
+        self._notes.setVisible(bool(text))
+
+    def _ask(self) -> None:
+        name, _ = QFileDialog.getSaveFileName(self, "Export comparison", "comparison.png", FIGURES)
+        if name:
+            self._attempt(lambda: self._model.save_figure(Path(name)))
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        """Stop working; nothing of it is kept."""
+        self._model.close()
+        event.accept()
+        self.closed.emit()

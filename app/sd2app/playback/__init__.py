@@ -1,0 +1,1 @@
+"""Transport bar, timeline and time wheel."""

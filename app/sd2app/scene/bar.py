@@ -1,0 +1,67 @@
+"""What the colour of the mesh means, over the 3D view."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QSignalBlocker, Qt
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QToolButton, QWidget
+
+from sd2app.session.display import DisplayModel
+from sd2app.shell.menus import ActionSet
+from sd2app.widgets.inputs import Choice, action_button
+from sd2app.widgets.panel import title
+
+_COLOURS = (
+    ("velocity", "radial velocity"),
+    ("range", "range"),
+    ("visibility", "visibility"),
+    ("plain", "plain"),
+)
+_VIEWS = ("view_three_quarter", "view_camera", "view_sensor", "view_side", "view_top")
+
+
+class SceneBar(QWidget):
+    """Colour, dots, and where one looks from."""
+
+    def __init__(
+        self,
+        display: DisplayModel,
+        actions: ActionSet,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._display = display
+        self._colour = Choice("What the colour of the mesh means (1 to 4)", self)
+        for value, text in _COLOURS:
+            self._colour.addItem(text, value)
+        self._colour.currentIndexChanged.connect(
+            lambda _: display.set_mesh_colour(self._colour.currentData())
+        )
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(8, 2, 4, 2)
+        layout.setSpacing(4)
+        layout.addWidget(title("Scene"))
+        layout.addSpacing(8)
+        layout.addWidget(QLabel("colour", self))
+        layout.addWidget(self._colour)
+        layout.addWidget(action_button(actions["dots"], "Dots"))
+        layout.addStretch(1)
+        layout.addWidget(_view_menu(actions))
+        display.mesh_changed.connect(self._refresh)
+        self._refresh()
+
+    def _refresh(self) -> None:
+        with QSignalBlocker(self._colour):
+            self._colour.setCurrentIndex(self._colour.findData(self._display.mesh_colour))
+
+
+def _view_menu(actions: ActionSet) -> QToolButton:
+    button = QToolButton()
+    button.setText("Look from")
+    button.setToolTip("Where to look at the scene from")
+    button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+    button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+    menu = QMenu(button)
+    for name in _VIEWS:
+        menu.addAction(actions[name])
+    button.setMenu(menu)
+    return button

@@ -1,0 +1,185 @@
+"""Draws off-screen and paints the picture: for software OpenGL and for tests.
+
+Plain VTK, because importing pyvista's plotter costs a second (matplotlib).
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+import vtkmodules.vtkRenderingOpenGL2 as opengl
+from PySide6.QtCore import QSize, Qt, QTimer
+from PySide6.QtGui import QImage, QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtWidgets import QWidget
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkLogger, vtkObject, vtkUnsignedCharArray
+from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow
+
+from sd2app.scene.backend import NoOpenGL, Prepare
+from sd2app.scene.backend_choice import GL_BROKEN, GL_MISSING, missing_library
+
+_IDLE_MS = 160
+_SUPERSAMPLING = 2
+_MOST_PIXELS = 4_000_000
+
+
+class ImageBackend(QWidget):
+    """A widget whose paint event renders when something changed.
+
+    Qt merges the updates of one turn of the event loop and paints nothing that
+    is hidden, so rendering here is coalesced and free while invisible. When
+    nothing has moved for a moment the picture is drawn again with
+    supersampling.
+    """
+
+    name = "image"
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        # Before the widget: one that was made half must not remain in its parent.
+        library = missing_library("image")
+        if library is not None:
+            raise NoOpenGL(GL_MISSING.format(library=library))
+        window = _off_screen_window()
+        super().__init__(parent)
+        self._window: vtkRenderWindow | None = window
+        self.renderer = vtkRenderer()
+        window.AddRenderer(self.renderer)
+        self._pixels = vtkUnsignedCharArray()
+        self._prepare: Prepare | None = None
+        self._picture: QImage | None = None
+        self._dirty = True
+        self._fine = False
+        self._renderings = 0
+        self._idle = QTimer(self)
+        self._idle.setSingleShot(True)
+        self._idle.setInterval(_IDLE_MS)
+        self._idle.timeout.connect(self._refine)
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
+        self.setMouseTracking(True)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+
+    @property
+    def widget(self) -> QWidget:
+        """Itself."""
+        return self
+
+    @property
+    def renderings(self) -> int:
+        """How often the scene was rendered."""
+        return self._renderings
+
+    def sizeHint(self) -> QSize:
+        """A comfortable size."""
+        return QSize(600, 450)
+
+    def start(self, prepare: Prepare) -> None:
+        """Draw from now on."""
+        self._prepare = prepare
+        self.request_render()
+
+    def request_render(self) -> None:
+        """Draw anew in the next turn of the event loop, once, if visible."""
+        self._dirty = True
+        self._fine = False
+        self.update()
+
+    def shut_down(self) -> None:
+        """Release everything of VTK; the widget stays, blank."""
+        self._idle.stop()
+        self._prepare = None
+        self._picture = None
+        if self._window is not None:
+            self.renderer.RemoveAllViewProps()
+            self._window.RemoveRenderer(self.renderer)
+            self._window.Finalize()
+            self._window = None
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """The picture no longer fits."""
+        self.request_render()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Render if something changed, then paint the picture."""
+        if self._prepare is not None and self._window is not None and self._dirty:
+            self._picture = self._rendered(self._prepare, self._window)
+            self._dirty = False
+            if not self._fine:
+                self._idle.start()
+        painter = QPainter(self)
+        if self._picture is None:
+            painter.fillRect(self.rect(), self.palette().window())
+            return
+        painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
+        painter.drawImage(self.rect(), self._picture)
+
+    def _refine(self) -> None:
+        if self.isVisible():
+            self._fine = True
+            self._dirty = True
+            self.update()
+
+    def _rendered(self, prepare: Prepare, window: vtkRenderWindow) -> QImage:
+        ratio = self.devicePixelRatioF()
+        size = QSize(max(self.width(), 1), max(self.height(), 1))
+        target = QSize(round(size.width() * ratio), round(size.height() * ratio))
+        factor = _SUPERSAMPLING if self._fine else 1
+        if factor**2 * target.width() * target.height() > _MOST_PIXELS:
+            factor = 1
+        width, height = factor * target.width(), factor * target.height()
+        window.SetSize(width, height)
+        prepare((size.width(), size.height()), factor * ratio)
+        window.Render()
+        self._renderings += 1
+        window.GetRGBACharPixelData(0, 0, width - 1, height - 1, 0, self._pixels, 0)
+        rows = vtk_to_numpy(self._pixels).reshape(height, width, 4)
+        upright = np.ascontiguousarray(rows[::-1])  # OpenGL counts rows from below
+        picture = QImage(upright.data, width, height, 4 * width, QImage.Format.Format_RGBX8888)
+        if factor == 1:
+            return picture.copy()
+        return picture.scaled(
+            target,
+            Qt.AspectRatioMode.IgnoreAspectRatio,
+            Qt.TransformationMode.SmoothTransformation,
+        )
+
+
+def _off_screen_window() -> vtkRenderWindow:
+    """A render window that needs no screen.
+
+    Raises
+    ------
+    NoOpenGL
+        When no driver answers: rendering would end the program.
+    """
+    uses_egl = sys.platform.startswith("linux") and hasattr(opengl, "vtkEGLRenderWindow")
+    with _quiet_vtk():
+        # Left to itself VTK tries the X server first and complains when there is none.
+        window = opengl.vtkEGLRenderWindow() if uses_egl else vtkRenderWindow()
+        window.SetOffScreenRendering(True)
+        window.SetMultiSamples(0)
+        window.SetSize(64, 48)
+        if _answers(window):
+            return window
+        del window  # here, where it complains unheard
+    raise NoOpenGL(GL_BROKEN)
+
+
+def _answers(window: vtkRenderWindow) -> bool:
+    """Whether OpenGL works."""
+    return bool(window.SupportsOpenGL())
+
+
+@contextmanager
+def _quiet_vtk() -> Iterator[None]:
+    # What VTK prints about a missing driver helps no user; the view says it in words.
+    heard, warned = vtkLogger.GetCurrentVerbosityCutoff(), vtkObject.GetGlobalWarningDisplay()
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
+    vtkObject.GlobalWarningDisplayOff()
+    try:
+        yield
+    finally:
+        vtkObject.SetGlobalWarningDisplay(warned)
+        vtkLogger.SetStderrVerbosity(heard)

@@ -1,0 +1,380 @@
+"""The 3D view of the window."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from typing import TYPE_CHECKING, get_args
+
+import numpy as np
+from PySide6.QtCore import QEvent, QObject, QSize, Qt
+from PySide6.QtGui import QCloseEvent, QMouseEvent, QResizeEvent, QWheelEvent
+from PySide6.QtWidgets import QLabel, QWidget
+
+from sd2app.scene.backend import Backend, NoOpenGL
+from sd2app.scene.backend_choice import chosen_backend
+from sd2app.scene.colours import SceneColours
+from sd2app.scene.navigation import Button, Navigator, Position
+from sd2app.scene.overlay import Overlay
+from sd2app.scene.scene import Preset, Scene
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    from sd2app.maps.model import SynthesisModel
+    from sd2app.sensor.placements import PlacementsModel
+    from sd2app.session.display import DisplayModel
+    from sd2app.session.document import DocumentModel
+    from sd2app.session.playback import PlaybackModel
+    from sd2app.session.sensor import SensorModel
+    from sd2core.mesh.sequence import MeshSequence
+
+_BUTTONS: dict[Qt.MouseButton, Button] = {
+    Qt.MouseButton.LeftButton: "left",
+    Qt.MouseButton.MiddleButton: "middle",
+    Qt.MouseButton.RightButton: "right",
+}
+_MOUSE = (
+    QEvent.Type.MouseMove,
+    QEvent.Type.MouseButtonPress,
+    QEvent.Type.MouseButtonRelease,
+    QEvent.Type.MouseButtonDblClick,
+)
+_NOTCH = 120.0
+"""Qt's measure of one notch of a wheel."""
+
+
+class SceneView(QWidget):
+    """Mesh, sensor, camera and planned places; the sensor can be dragged, a place picked.
+
+    It changes no model: a drag goes to the three callables, a click on a place to the model of
+    placements, which makes it an edit, and what is on screen follows the models' signals.
+    Vertices and colours are fetched when the picture is drawn, so a hidden view costs nothing.
+
+    Parameters
+    ----------
+    begin_drag, drag, end_drag : callables
+        Receive a drag of the sensor; ``drag`` gets its position in metres.
+    """
+
+    def __init__(
+        self,
+        document: DocumentModel,
+        playback: PlaybackModel,
+        sensor: SensorModel,
+        display: DisplayModel,
+        synthesis: SynthesisModel,
+        placements: PlacementsModel,
+        *,
+        begin_drag: Callable[[], None],
+        drag: Callable[[Position], None],
+        end_drag: Callable[[], None],
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._document = document
+        self._playback = playback
+        self._sensor = sensor
+        self._display = display
+        self._synthesis = synthesis
+        self._placements = placements
+        self._backend: Backend | None = None
+        self.setMinimumSize(200, 150)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        try:
+            self._backend = make_backend(self)
+        except NoOpenGL as problem:
+            self._explain(str(problem))
+            return
+        self.scene = Scene(self._backend.renderer)
+        self.navigator = Navigator(
+            self.scene,
+            begin_drag,
+            drag,
+            end_drag,
+            placements.use,
+            size_px=self._size_px,
+            changed=self._moved,
+        )
+        self.overlay = Overlay(self.scene, self.navigator, self)
+        self._preset: Preset | None = "overview"
+        self._framed: tuple[object, ...] | None = None
+        self._frame: int | None = None
+        self._stale_scattering = True
+        self._planned: object = None
+        self._backend.widget.installEventFilter(self)
+        self._followed = (
+            (document.opened, self._take_over),
+            (playback.time_changed, self._follow_clock),
+            (sensor.changed, self._follow_sensor),
+            (display.mesh_changed, self._follow_colour),
+            (display.theme_changed, self._follow_theme),
+            (synthesis.frame_changed, self._follow_scattering),
+            (placements.changed, self._follow_placements),
+        )
+        for signal, slot in self._followed:
+            signal.connect(slot)
+        self._follow_theme()
+        self._follow_colour()
+        self._take_over()
+        self._follow_placements()
+        self._lay_out()
+        self._backend.start(self._prepare)
+
+    @property
+    def backend_name(self) -> str | None:
+        """``gl``, ``image``, or None when there is no OpenGL."""
+        return self._backend.name if self._backend is not None else None
+
+    def sizeHint(self) -> QSize:
+        """A comfortable size."""
+        return QSize(600, 450)
+
+    def set_view(self, preset: Preset) -> None:
+        """Look from one of the ready-made places."""
+        if preset not in get_args(Preset):
+            raise ValueError(f"view {preset!r} is not one of {get_args(Preset)}")
+        if self._backend is not None:
+            self._preset, self._framed = preset, None
+            self.request_render()
+
+    def reset_view(self) -> None:
+        """Look at sensor, camera and body from beside them."""
+        self.set_view("overview")
+
+    def request_render(self) -> None:
+        """Draw anew."""
+        if self._backend is not None:
+            self._backend.request_render()
+            self.overlay.update()
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        """Release everything of VTK."""
+        self._shut_down()
+        event.accept()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Fill the view."""
+        self._lay_out()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Handle the mouse for the widget that shows the picture."""
+        if self._backend is None:
+            return False
+        kind = event.type()
+        if isinstance(event, QMouseEvent) and kind in _MOUSE:
+            self._handle_mouse(event)
+        elif isinstance(event, QWheelEvent):
+            self.navigator.wheel(*_place(event), event.angleDelta().y() / _NOTCH)
+        elif kind == QEvent.Type.Leave:
+            self.navigator.leave()
+        elif kind in (QEvent.Type.KeyPress, QEvent.Type.KeyRelease):
+            # QtInteractor would take them; they belong to the window.
+            event.ignore()
+            return True
+        else:
+            if kind == QEvent.Type.Hide:
+                self.navigator.let_go()
+            return False
+        self._choose_cursor()
+        return True
+
+    def _handle_mouse(self, event: QMouseEvent) -> None:
+        kind, place = event.type(), _place(event)
+        if kind == QEvent.Type.MouseMove:
+            self.navigator.move(*place, *_modifiers(event))
+            return
+        button = _BUTTONS.get(event.button())
+        if button is None:
+            return
+        if kind == QEvent.Type.MouseButtonRelease:
+            self.navigator.release(*place, button)
+        elif kind == QEvent.Type.MouseButtonDblClick and not self._at_something(place):
+            self.reset_view()
+        else:
+            # Also the second press of a double click: a hurried hand takes the sensor.
+            self.navigator.press(*place, button, *_modifiers(event))
+
+    def _at_something(self, place: tuple[float, float]) -> bool:
+        at_marker = self.navigator.marker_at(*place) is not None
+        return at_marker or self.navigator.sensor_at(*place)
+
+    # What changed
+
+    def _take_over(self) -> None:
+        self._preset, self._framed = "overview", None
+        self._frame = None
+        self.scene.clear_mesh()
+        self.overlay.message = ""
+        mesh = self._document.mesh
+        if mesh is None:
+            self.overlay.message = "No mesh in this recording"
+        else:
+            frame = mesh.timebase.frame_at(self._playback.time_s)
+            with self._explaining():
+                self.scene.set_mesh(mesh, frame)
+                self._frame = frame
+        self._follow_sensor()
+
+    def _follow_clock(self) -> None:
+        if self._document.mesh is not None:
+            self._stale_scattering = True
+            self.request_render()
+
+    def _follow_sensor(self) -> None:
+        self.scene.set_sensor(self._sensor.sensor)
+        self.navigator.look_again()
+        self._follow_scattering()
+
+    def _follow_scattering(self) -> None:
+        self._stale_scattering = True
+        self.request_render()
+
+    def _follow_colour(self) -> None:
+        self.scene.set_mode(self._display.mesh_colour)
+        self.scene.set_as_dots(self._display.as_dots)
+        self._follow_scattering()
+
+    def _follow_theme(self) -> None:
+        self.scene.set_colours(SceneColours.of(self._display.palette, self._display.dark))
+        self.request_render()
+
+    def _follow_placements(self) -> None:
+        model, radar = self._placements, self._placements.radar
+        planned = (model.planned, model.shown, radar)
+        if planned == self._planned:
+            return
+        self._planned = planned
+        sensors = model.planned.sensors if model.shown else ()
+        range_m = np.array([place.range_m for place in model.planned.places])
+        sight = model.planned.sight
+        self.scene.set_markers(sensors, range_m, None if sight is None else sight.beyond(radar))
+        self.overlay.marker_words = [place.words for place in model.planned.places]
+        self._framed = None
+        self.navigator.look_again()
+        self.request_render()
+
+    def _moved(self) -> None:
+        if self.navigator.turning:
+            self._preset = None
+        self.request_render()
+
+    # Drawing
+
+    def _prepare(self, size_px: tuple[float, float], pixel_scale: float) -> None:
+        """Fetch what changed since the last picture, right before the next."""
+        mesh = self._document.mesh
+        if mesh is not None and self.scene.has_mesh:
+            with self._explaining():
+                self._fetch(mesh)
+        # A ready-made view is kept when the widget is resized. While the sensor moves
+        # the view stands still, or the sensor would slip from under the pointer;
+        # only the view from the sensor goes with it.
+        framed = (self._preset, size_px, self.scene.sensor if self._preset == "sensor" else None)
+        if self._preset is not None and self._framed != framed:
+            self._framed = framed
+            self.scene.margins = replace(self.scene.margins, right=self.overlay.legend_room_px)
+            self.scene.pose = self.scene.preset_pose(self._preset, size_px)
+        self.scene.prepare(size_px, pixel_scale)
+
+    def _fetch(self, mesh: MeshSequence) -> None:
+        time_s = self._playback.time_s
+        frame = mesh.timebase.frame_at(time_s)
+        covered, someone = mesh.timebase.covers(time_s), bool(mesh.presence.there[frame])
+        self.scene.show_mesh(covered and someone)
+        why = "No person at this time" if covered else "No mesh at this time"
+        self.overlay.message = "" if covered and someone else why
+        if frame != self._frame:
+            self._frame = frame
+            self.scene.set_vertices(mesh.frame(frame))
+        if self._stale_scattering:
+            self._fetch_scattering()
+
+    def _fetch_scattering(self) -> None:
+        self._stale_scattering = False
+        if self.scene.mode == "plain":
+            return
+        scattering = self._synthesis.frame
+        self.scene.set_v_max(self._synthesis.v_max_mps)
+        if scattering is None:
+            self.scene.set_scattering(None, None)
+        else:
+            self.scene.set_scattering(scattering.velocity_mps, scattering.visible)
+
+    @contextmanager
+    def _explaining(self) -> Iterator[None]:
+        # A mesh that is read from disk frame by frame can go away.
+        try:
+            yield
+        except (Sd2Error, OSError) as error:
+            self.overlay.message = f"The mesh cannot be read: {error}"
+
+    def _size_px(self) -> tuple[float, float]:
+        return (max(self.width(), 1), max(self.height(), 1))
+
+    def _lay_out(self) -> None:
+        for child in self.findChildren(QWidget, options=Qt.FindChildOption.FindDirectChildrenOnly):
+            child.setGeometry(self.rect())
+
+    def _choose_cursor(self) -> None:
+        if self._backend is None:
+            return
+        if self.navigator.holds_sensor:
+            shape = Qt.CursorShape.ClosedHandCursor
+        elif self.navigator.hovers_sensor:
+            shape = Qt.CursorShape.OpenHandCursor
+        elif self.navigator.marker is not None:
+            shape = Qt.CursorShape.PointingHandCursor
+        else:
+            shape = Qt.CursorShape.ArrowCursor
+        if self._backend.widget.cursor().shape() != shape:
+            self._backend.widget.setCursor(shape)
+
+    def _explain(self, problem: str) -> None:
+        label = QLabel(problem, self)
+        label.setObjectName("muted")
+        label.setWordWrap(True)
+        label.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        label.setMargin(24)
+
+    def _shut_down(self) -> None:
+        if self._backend is None:
+            return
+        backend, self._backend = self._backend, None
+        for signal, slot in self._followed:
+            signal.disconnect(slot)
+        backend.widget.removeEventFilter(self)
+        backend.shut_down()
+
+
+def make_backend(parent: QWidget) -> Backend:
+    """The way to draw that suits the machine, off-screen when the other one fails.
+
+    Raises
+    ------
+    NoOpenGL
+        When neither works; its message is for the user.
+    """
+    try:
+        if chosen_backend() == "gl":
+            with suppress(NoOpenGL, ImportError):
+                from sd2app.scene.opengl_backend import InteractorBackend
+
+                return InteractorBackend(parent)
+        from sd2app.scene.offscreen_backend import ImageBackend
+
+        return ImageBackend(parent)
+    except ImportError as error:
+        raise NoOpenGL(f"The 3D view cannot be loaded: {error}.") from error
+
+
+def _place(event: QMouseEvent | QWheelEvent) -> tuple[float, float]:
+    return (event.position().x(), event.position().y())
+
+
+def _modifiers(event: QMouseEvent) -> tuple[bool, bool]:
+    held = event.modifiers()
+    return (
+        bool(held & Qt.KeyboardModifier.ShiftModifier),
+        bool(held & Qt.KeyboardModifier.ControlModifier),
+    )

@@ -1,0 +1,1 @@
+"""The virtual sensor's panel, and planned placements."""

@@ -1,0 +1,141 @@
+"""A plan of placements as fields to type into."""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+from PySide6.QtCore import QObject, Signal
+
+from sd2app.sensor.placements import PlacementsModel
+from sd2core.errors import Sd2Error
+from sd2core.files.number_lists import interval_of, numbers_of, text_of
+from sd2core.placements.placements import PlacementCloud, PlacementGrid, Placements
+
+Kind = Literal["none", "grid", "cloud"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+Name = Literal["range", "azimuth", "elevation", "count", "seed"]
+NAMES: tuple[Name, ...] = get_args(Name)
+
+_FIRST: dict[Kind, Placements | None] = {
+    "none": None,
+    "grid": PlacementGrid((1.0, 2.0, 3.0, 4.0), (-60.0, -30.0, 0.0, 30.0, 60.0)),
+    "cloud": PlacementCloud(100, (1.0, 4.0), (-60.0, 60.0), (-10.0, 40.0)),
+}
+"""What a plan begins with."""
+
+
+class PlacementFields(QObject):
+    """What was typed, and what is wrong with it; what is right becomes the plan.
+
+    Another plan, as after an undo or in another recording, takes the place of what was typed.
+    """
+
+    changed = Signal()
+
+    def __init__(self, placements: PlacementsModel, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._placements = placements
+        self._last = dict(_FIRST)
+        self._plan: Placements | None = None
+        self._texts: dict[Name, str] = {}
+        self._problem = ""
+        placements.changed.connect(self._follow)
+        self._follow()
+
+    @property
+    def kind(self) -> Kind:
+        """What is planned."""
+        return "none" if self._plan is None else _kind(self._plan)
+
+    @property
+    def names(self) -> tuple[Name, ...]:
+        """Fields that this kind has."""
+        return tuple(self._texts)
+
+    @property
+    def problem(self) -> str:
+        """Why what was typed is not the plan; empty when it is."""
+        return self._problem
+
+    def text(self, name: Name) -> str:
+        """What a field holds."""
+        return self._texts.get(name, "")
+
+    def set_kind(self, kind: Kind) -> None:
+        """Plan something else; what was typed for a kind comes back with it."""
+        if kind != self.kind:
+            self._placements.edits.plan_placements(self._last[kind])
+
+    def set_text(self, name: Name, text: str) -> None:
+        """Type into a field; :meth:`end` makes it one step."""
+        if name not in self._texts or text == self._texts[name]:
+            return
+        self._texts[name] = text
+        try:
+            plan = _plan_of(self.kind, self._texts)
+        except Sd2Error as error:
+            self._problem = str(error)
+            self.changed.emit()
+            return
+        self._problem = ""
+        # What was typed stays as it was typed.
+        self._plan = self._last[self.kind] = plan
+        self._placements.edits.type_placements(plan)
+        self.changed.emit()
+
+    def end(self) -> None:
+        """Typing has ended."""
+        self._placements.edits.end_typing_placements()
+
+    def _follow(self) -> None:
+        plan = self._placements.plan
+        if plan == self._plan:
+            return
+        self._plan = plan
+        self._problem = ""
+        self._texts = {} if plan is None else _texts_of(plan)
+        if plan is not None:
+            self._last[_kind(plan)] = plan
+        self.changed.emit()
+
+
+def _kind(plan: Placements) -> Kind:
+    return "grid" if isinstance(plan, PlacementGrid) else "cloud"
+
+
+def _texts_of(plan: Placements) -> dict[Name, str]:
+    if isinstance(plan, PlacementGrid):
+        return {
+            "range": text_of(plan.ranges_m),
+            "azimuth": text_of(plan.azimuths_deg),
+            "elevation": text_of(plan.elevations_deg),
+        }
+    return {
+        "range": _interval_text(plan.range_m),
+        "azimuth": _interval_text(plan.azimuth_deg),
+        "elevation": _interval_text(plan.elevation_deg),
+        "count": str(plan.count),
+        "seed": str(plan.seed),
+    }
+
+
+def _plan_of(kind: Kind, texts: dict[Name, str]) -> Placements:
+    around = (texts["range"], texts["azimuth"], texts["elevation"])
+    if kind == "grid":
+        ranges_m, azimuths_deg, elevations_deg = map(numbers_of, around)
+        return PlacementGrid(ranges_m, azimuths_deg, elevations_deg)
+    range_m, azimuth_deg, elevation_deg = map(interval_of, around)
+    count, seed = (_whole(name, texts[name]) for name in ("count", "seed"))
+    return PlacementCloud(count, range_m, azimuth_deg, elevation_deg, seed)
+
+
+def _whole(name: str, text: str) -> int:
+    digits = text.strip()
+    if not (digits.isascii() and digits.isdigit() and len(digits) < 20):
+        raise Sd2Error(f"{text!r} is the {name}", "a whole number")
+    return int(digits)
+
+
+def _interval_text(interval: tuple[float, float]) -> str:
+    low, high = (text_of([edge]) for edge in interval)
+    return low if low == high else f"{low}:{high}"

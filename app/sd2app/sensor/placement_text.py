@@ -1,0 +1,78 @@
+"""Placements in words: how many, what is wrong with some, and what their maps cost."""
+
+from __future__ import annotations
+
+from sd2app.accuracy.text import InUse, seconds
+from sd2app.sensor.placements import PlacementsModel
+from sd2app.training.text import duration_text
+from sd2core.placements.cost import PlacementCost
+
+_SHORT_S = 10.0
+
+
+def counted(number: int, what: str) -> str:
+    """``1 map``, ``2,000 maps``."""
+    return f"{number:,} {what}" + ("" if number == 1 else "s")
+
+
+def count_text(model: PlacementsModel) -> str:
+    """How many places there are."""
+    if model.plan is None:
+        return ""
+    count = len(model.planned.places)
+    return counted(count, "placement") if count else "Working out the placements…"
+
+
+def limit_facts(model: PlacementsModel) -> list[tuple[str, str]]:
+    """What is wrong with how many of them."""
+    sight, radar = model.planned.sight, model.radar
+    if sight is None:
+        return []
+    facts = (
+        ("In the body", sight.inside),
+        (f"Beyond R max {radar.range_max_m:.1f} m", sight.out_of_range(radar)),
+        (f"Faster than ±{radar.v_max_mps:.2f} m/s", sight.aliasing(radar)),
+    )
+    return [(name, f"{int(some.sum()):,}") for name, some in facts if some.any()]
+
+
+def limits_text(model: PlacementsModel) -> str:
+    """Whose limits these are, and what is done about it."""
+    sight, radar = model.planned.sight, model.radar
+    if sight is None:
+        return "Looking at what they see…" if model.planned.places else ""
+    where = f"{radar.name}: {radar.range_max_m:.1f} m, ±{radar.v_max_mps:.2f} m/s."
+    if not sight.beyond(radar).any():
+        return f"All within the limits of the radar. {where}"
+    return f"Beyond the radar, part of the body is seen at another range or velocity. {where}"
+
+
+def current_text(model: PlacementsModel) -> str:
+    """Which of the places the sensor is at."""
+    current, places = model.current, model.planned.places
+    if current is None:
+        return "The sensor is elsewhere"
+    return f"{current + 1:,} of {len(places):,}: {places[current].words}"
+
+
+def cost_text(cost: PlacementCost) -> str:
+    """One line."""
+    time = seconds(cost.total_s) if cost.total_s < _SHORT_S else duration_text(cost.total_s)
+    return f"{counted(cost.maps, 'map')} in about {time}, {bytes_text(cost.total_bytes)}"
+
+
+def cost_source_text(cost: PlacementCost, in_use: InUse) -> str:
+    """Where that is known from."""
+    return (
+        f"{counted(cost.frames, 'frame')} each, with the plan in use on this machine: {in_use}."
+        " Bytes before compression."
+    )
+
+
+def bytes_text(count: int) -> str:
+    """In the unit one would say it in."""
+    for unit, size in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
+        if count >= size:
+            value = count / size
+            return f"{value:.0f} {unit}" if value >= 100 else f"{value:.2g} {unit}"
+    return f"{count} bytes"

@@ -1,0 +1,225 @@
+"""Where else sensors are planned: their places, what they see, and what their maps cost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, Protocol
+
+from PySide6.QtCore import QObject, Signal
+
+from sd2app.accuracy.model import TradeModel
+from sd2app.background.latest import Emit, LatestRunner
+from sd2app.session.document import DocumentModel
+from sd2app.session.sensor import SensorModel
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.placements.body_extent import Sight, Whereabouts
+from sd2core.placements.cost import PlacementCost
+from sd2core.placements.placements import Place, Placements
+from sd2core.sensor import PAPER_RADAR, RadarConfig, VelocityAxis, VirtualSensor
+
+
+@dataclass(frozen=True, eq=False)
+class Planned:
+    """The places of a plan around one body.
+
+    Parameters
+    ----------
+    places : tuple of Place
+    sensors : tuple of VirtualSensor
+        One per place.
+    sight : Sight or None
+        What each sees; None while that is being found out.
+    """
+
+    places: tuple[Place, ...] = ()
+    sensors: tuple[VirtualSensor, ...] = ()
+    sight: Sight | None = None
+
+
+class PlanEdits(Protocol):
+    """What the user can change here, as steps that can be undone."""
+
+    def plan_placements(self, placements: Placements | None) -> None:
+        """Plan other places, or none."""
+
+    def type_placements(self, placements: Placements | None) -> None:
+        """The same while it is typed."""
+
+    def end_typing_placements(self) -> None:
+        """It has been typed."""
+
+    def place_sensor(self, sensor: VirtualSensor, text: str) -> None:
+        """Put the sensor somewhere."""
+
+
+class _Wish(NamedTuple):
+    mesh: MeshSequence
+    plan: Placements
+
+
+class PlacementsModel(QObject):
+    """Follows the plan of the recording that is open; places are worked out beside the window.
+
+    Parameters
+    ----------
+    document, sensor, trade
+    edits : PlanEdits
+
+    Signals
+    -------
+    changed
+        Places, what is known of them, or their cost.
+    current_changed
+        The sensor is at another of them, or elsewhere.
+    failed : str
+    """
+
+    changed = Signal()
+    current_changed = Signal()
+    failed = Signal(str)
+
+    def __init__(
+        self,
+        document: DocumentModel,
+        sensor: SensorModel,
+        trade: TradeModel,
+        edits: PlanEdits,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._document = document
+        self._sensor = sensor
+        self._trade = trade
+        self.edits = edits
+        self._shown = True
+        self._wish: _Wish | None = None
+        self._body: tuple[MeshSequence, Whereabouts] | None = None
+        self._planned = Planned()
+        self._runner = LatestRunner("placements", self)
+        self._runner.partial.connect(self._receive)
+        self._runner.finished.connect(self._receive)
+        self._runner.failed.connect(self._fail)
+        document.opened.connect(self._follow)
+        document.changed.connect(self._follow)
+        sensor.changed.connect(self.current_changed)
+        trade.plan_changed.connect(self.changed)
+
+    # --- what is planned ------------------------------------------------------------------
+
+    @property
+    def plan(self) -> Placements | None:
+        """The recording's plan."""
+        recording = self._document.recording
+        return recording.placements if recording is not None else None
+
+    @property
+    def possible(self) -> bool:
+        """Whether there is a body to place sensors around."""
+        return self._document.mesh is not None
+
+    @property
+    def busy(self) -> bool:
+        """Whether places are being worked out."""
+        return self._runner.busy
+
+    @property
+    def planned(self) -> Planned:
+        """Places of the plan; empty until they are worked out."""
+        return self._planned
+
+    @property
+    def radar(self) -> RadarConfig:
+        """Whose limits hold: that of the recording's capture, or the paper's."""
+        capture = self._document.capture
+        return PAPER_RADAR if capture is None else capture.config
+
+    @property
+    def current(self) -> int | None:
+        """Which of the places the sensor is at."""
+        position = self._sensor.sensor.position_m
+        for number, sensor in enumerate(self._planned.sensors):
+            if sensor.position_m == position:
+                return number
+        return None
+
+    @property
+    def cost(self) -> PlacementCost | None:
+        """Of a map per place with the plan in use; None while the ladder has none."""
+        in_use = self._trade.in_use
+        if in_use is None or not self._planned.sensors:
+            return None
+        return PlacementCost(
+            len(self._planned.sensors), self._trade.frames, in_use.cost_ms, VelocityAxis().bins
+        )
+
+    @property
+    def shown(self) -> bool:
+        """Whether the places are drawn in the scene."""
+        return self._shown
+
+    # --- requests -------------------------------------------------------------------------
+
+    def set_shown(self, shown: bool) -> None:
+        """Draw the places in the scene, or not."""
+        if shown != self._shown:
+            self._shown = shown
+            self.changed.emit()
+
+    def use(self, number: int) -> None:
+        """Put the sensor at one of the places."""
+        sensors = self._planned.sensors
+        if 0 <= number < len(sensors):
+            view_deg = self._sensor.sensor.field_of_view_deg
+            sensor = replace(sensors[number], field_of_view_deg=view_deg)
+            self.edits.place_sensor(sensor, "Sensor to placement")
+
+    def step(self, by: int) -> None:
+        """Put the sensor at the next place, or the one before; from elsewhere at the first."""
+        count = len(self._planned.sensors)
+        if count:
+            current = self.current
+            self.use(0 if current is None else (current + by) % count)
+
+    def close(self) -> None:
+        """Stop working places out."""
+        self._runner.close()
+
+    # --- following ------------------------------------------------------------------------
+
+    def _follow(self) -> None:
+        mesh, plan = self._document.mesh, self.plan
+        wish = _Wish(mesh, plan) if mesh is not None and plan is not None else None
+        if wish == self._wish:
+            return
+        if wish is None or self._wish is None or wish.mesh is not self._wish.mesh:
+            self._planned = Planned()  # places of another body say nothing of this one
+        self._wish = wish
+        if wish is None:
+            self._runner.cancel()
+        else:
+            known = self._body
+            self._runner.submit(lambda emit: _worked_out(wish, known, emit))
+        self.changed.emit()
+
+    def _receive(self, result: Any) -> None:
+        self._body, self._planned = result
+        self.changed.emit()
+
+    def _fail(self, error: Exception) -> None:
+        self._planned = Planned()
+        self.failed.emit(str(error))
+        self.changed.emit()
+
+
+def _worked_out(
+    wish: _Wish, known: tuple[MeshSequence, Whereabouts] | None, emit: Emit
+) -> tuple[tuple[MeshSequence, Whereabouts], Planned]:
+    """In the background; the places come before what they see."""
+    body = known if known is not None and known[0] is wish.mesh else None
+    if body is None:
+        body = (wish.mesh, Whereabouts.of(wish.mesh))
+    places = wish.plan.places()
+    sensors = tuple(place.sensor(body[1].target_m) for place in places)
+    emit((body, Planned(places, sensors)))
+    sight = body[1].seen_by(sensors, lambda done, total: emit(None))
+    return body, Planned(places, sensors, sight)

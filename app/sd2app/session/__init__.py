@@ -1,0 +1,1 @@
+"""State that all features share: document, clock, sensor, display, undo, tasks. QtCore only."""

@@ -1,0 +1,214 @@
+"""What a window shows of one recording, read from disk in the background."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sd2core.doppler_map import DopplerMap
+from sd2core.errors import Sd2Error
+from sd2core.files.resources import is_bundled
+from sd2core.io.kinds import Kind, kind_of
+from sd2core.labels.spans import Labels
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.progress import Progress
+from sd2core.recording.recording import Recording, open_recording
+from sd2core.sensor import VelocityAxis
+from sd2core.timebase import Timebase
+
+if TYPE_CHECKING:
+    from sd2core.fmcw.processing import Clutter
+    from sd2core.io.radar import RadarCapture
+    from sd2core.io.video import VideoReader
+
+UNTITLED = Path()
+"""Folder of a recording that was not saved yet."""
+
+_TOLD: dict[str, tuple[str, str]] = {
+    "map": ("is a Doppler map", "Look at it with `sd2 info`"),
+    "pairs": ("holds pairs to learn from", "Train with them in the Train panel"),
+    "dataset": ("is a data set", "Look at its card and its preview sheet, or use `sd2 info`"),
+    "model": ("is a model", "Open a recording, then choose the model under Model"),
+}
+"""Kinds that no recording is made of: what to say, and where they belong."""
+
+CLUTTER_CHOICES: tuple[Clutter, ...] = ("mean", "moving", "none")
+
+
+@dataclass(frozen=True, eq=False)
+class Content:
+    """A recording with its parts opened; what could not be opened is in ``problems``.
+
+    ``radar_labels`` are those that a radar file brings with it, on the radar's clock.
+    """
+
+    recording: Recording
+    timebase: Timebase
+    video: VideoReader | None = None
+    mesh: MeshSequence | None = None
+    capture: RadarCapture | None = None
+    radar_map: DopplerMap | None = None
+    radar_labels: Labels | None = None
+    notes: tuple[str, ...] = ()
+    problems: tuple[str, ...] = ()
+
+    @property
+    def saved(self) -> bool:
+        """Whether the recording has a folder of its own that may be written to."""
+        return self.recording.folder != UNTITLED and not is_bundled(self.recording.folder)
+
+    def close(self) -> None:
+        """Release the video file."""
+        if self.video is not None:
+            self.video.close()
+
+
+def recording_of(paths: Sequence[Path], base: Recording | None = None) -> Recording:
+    """A recording made of the paths, added to those of ``base``.
+
+    Raises
+    ------
+    Sd2Error
+        When a path is of no known kind, two are of the same, or a recording is to be added.
+    """
+    kinds: dict[Kind, Path] = {}
+    for path in paths:
+        kind = kind_of(path)
+        if kind in _TOLD:
+            words, remedy = _TOLD[kind]
+            raise Sd2Error(f"{path} {words}", "a recording, video, mesh or radar capture", remedy)
+        if kind in kinds:
+            raise Sd2Error(
+                f"{kinds[kind]} and {path} are both a {kind}", "at most one file of each kind"
+            )
+        kinds[kind] = Path(path)
+    if "recording" in kinds:
+        if len(kinds) > 1:
+            raise Sd2Error(
+                f"{kinds['recording']} was given together with other files",
+                "a recording alone",
+                "Open it first, then add the others",
+            )
+        if base is not None:
+            raise Sd2Error(
+                f"{kinds['recording']} is a recording: it cannot be added to another",
+                "a video, mesh or radar capture",
+                "Open it with File → Open folder…",
+            )
+        return open_recording(kinds["recording"])
+    recording = base or Recording(UNTITLED, title=Path(paths[0]).stem)
+    for kind, path in kinds.items():
+        setattr(recording, kind, path)
+    return recording
+
+
+def load_content(recording: Recording, clutter: Clutter, progress: Progress) -> Content:
+    """Open every part of a recording.
+
+    A part that is missing or damaged does not keep the others from being
+    shown; it is named in ``problems``. Only when nothing can be opened the
+    first problem is raised.
+    """
+    from sd2core.fmcw.processing import doppler_map
+
+    problems: list[Sd2Error] = []
+
+    recording.learn_camera()
+    missing = recording.missing()
+    for role, path in missing.items():
+        problems.append(
+            Sd2Error(
+                f"The {role} is not at {path}",
+                remedy="File → Find missing files… looks for it in another folder",
+            )
+        )
+
+    def attempt(present: object, read: Callable[[], Any]) -> Any:
+        if present is None or present in missing.values():
+            return None
+        try:
+            return read()
+        except Sd2Error as error:
+            problems.append(error)
+            return None
+
+    def step(number: int) -> Progress:
+        """Progress of one of four parts; it is also where cancelling takes effect."""
+        return lambda done, total: progress(
+            100 * number + (100 * min(done, total) // total if total else 0), 400
+        )
+
+    video = attempt(recording.video, lambda: recording.open_video(step(0)))
+    mesh = attempt(recording.mesh, lambda: recording.load_mesh(step(1)))
+    capture = recorded = None
+    if recording.holds_radar_map:
+        recorded = attempt(recording.radar, recording.load_radar_map)
+        radar_map = None if recorded is None else recorded.doppler
+    else:
+        capture = attempt(recording.radar, recording.load_capture)
+        radar_map = attempt(
+            capture,
+            lambda: doppler_map(capture, axis=VelocityAxis(), clutter=clutter, progress=step(3)),
+        )
+    progress(400, 400)
+    parts = [part for part in (video, mesh, capture, recorded) if part is not None]
+    if not parts:
+        raise (
+            problems[0]
+            if problems
+            else Sd2Error(
+                f"{recording.folder} holds nothing to show", "a video, a mesh or a radar capture"
+            )
+        )
+    notes = [*recording.notes] if recording.folder != UNTITLED else []
+    for part in parts:
+        notes.extend(part.notes)
+    clocks = [part.timebase for part in (video, mesh) if part is not None]
+    clocks.extend(
+        radar.timebase.shifted(recording.radar_offset_s)
+        for radar in (capture, recorded)
+        if radar is not None
+    )
+    return Content(
+        recording=recording,
+        timebase=common_clock(clocks),
+        video=video,
+        mesh=mesh,
+        capture=capture,
+        radar_map=radar_map,
+        radar_labels=None if recorded is None else recorded.labels,
+        notes=tuple(notes),
+        problems=tuple(str(problem) for problem in problems),
+    )
+
+
+def common_clock(clocks: Sequence[Timebase]) -> Timebase:
+    """Frames of the first clock, and of the others where they reach beyond it.
+
+    A clock that does not touch the ones before it is left out: nobody wants to
+    play through the gap.
+    """
+    times_s = clocks[0].times_s
+    start_s, end_s = clocks[0].start_s, clocks[0].end_s
+    for clock in clocks[1:]:
+        if clock.end_s < start_s or clock.start_s > end_s:
+            continue
+        # Less than half a frame beyond an end is rounding, not another frame.
+        slack_s = 0.5 * min(clock.frame_duration_s, clocks[0].frame_duration_s)
+        before = clock.times_s[clock.times_s < start_s - slack_s]
+        after = clock.times_s[clock.times_s > end_s - slack_s]
+        times_s = np.concatenate([before[before < times_s[0]], times_s, after[after > times_s[-1]]])
+        start_s, end_s = min(start_s, clock.start_s), max(end_s, clock.end_s)
+    return Timebase(times_s)
+
+
+def reference_of(values: np.ndarray, bins: Iterable[int] = ()) -> float:
+    """Largest value of a map outside ``bins``: what is shown as 0 dB."""
+    keep = np.ones(values.shape[0], bool)
+    keep[list(bins)] = False
+    top = float(values[keep].max(initial=0.0))
+    return top if top > 0 else 1.0

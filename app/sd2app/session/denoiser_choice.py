@@ -1,0 +1,51 @@
+"""Which model a recording is denoised with, as it is kept in the recording."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sd2core.files.resources import is_bundled
+
+if TYPE_CHECKING:
+    from sd2core.recording.recording import Recording
+
+
+@dataclass(frozen=True)
+class DenoiserChoice:
+    """A file, a model that comes with the program, no model, or nothing said.
+
+    Parameters
+    ----------
+    path : Path or None
+        Model file.
+    bundled : str or None
+        Name of a model that comes with the program; empty for none at all.
+    """
+
+    path: Path | None = None
+    bundled: str | None = None
+
+    @classmethod
+    def of(cls, recording: Recording | None) -> DenoiserChoice:
+        """What was chosen for a recording."""
+        if recording is None:
+            return UNSAID
+        return cls(recording.denoiser, None if recording.denoiser else recording.bundled_denoiser)
+
+    @classmethod
+    def of_file(cls, path: Path) -> DenoiserChoice:
+        """A model file; one that comes with the program is kept by its name."""
+        path = Path(path)
+        return cls(bundled=path.stem) if is_bundled(path) else cls(path=path.absolute())
+
+    def put_into(self, recording: Recording) -> None:
+        """Remember it with a recording."""
+        recording.denoiser, recording.bundled_denoiser = self.path, self.bundled
+
+
+UNSAID = DenoiserChoice()
+"""The bundled default, where there is one."""
+NO_MODEL = DenoiserChoice(bundled="")
+"""The map is not denoised."""

@@ -1,0 +1,281 @@
+"""The Doppler maps that stand one above the other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QObject, Signal
+
+from sd2app.session.display import HeatmapLevels
+from sd2core.doppler_map import CellUncertainty, DopplerMap
+from sd2core.mesh.presence import runs
+
+UNCERTAIN_SHARE = 0.5
+"""A cell is uncertain where the truth may be farther from its value than this share of it."""
+
+_FAINT_SHARE = 0.05
+"""Of the highest level: what is fainter does not show on a linear scale."""
+
+_SHOWS_SHARE = 0.1
+"""Of the highest level: what may be there although nothing shows."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One cell of a map under the pointer.
+
+    ``deviation`` is how far from the value the truth may be, where that is known;
+    ``text`` stands in place of level and value.
+    """
+
+    track: str
+    time_s: float
+    frame: int
+    velocity_mps: float
+    value: float
+    level_db: float
+    note: str = ""
+    deviation: float | None = None
+    text: str = ""
+
+
+class TrackModel(QObject):
+    """One Doppler map on the shared time axis.
+
+    ``reference`` is the value shown as 0 dB. It is set when a recording is
+    opened and stays, so that a placement farther away looks weaker. ``revision`` counts
+    how often the map was set, also to one whose values changed in place.
+    """
+
+    changed = Signal()
+    status_changed = Signal()
+
+    def __init__(self, title: str, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self.title = title
+        self.revision = 0
+        self._map: DopplerMap | None = None
+        self._covered: NDArray[np.bool_] | None = None
+        self._uncertainty: CellUncertainty | None = None
+        self._gaps: tuple[tuple[int, int], ...] = ()
+        self._offset_s = 0.0
+        self._reference = 1.0
+        self._status = ""
+        self._strongest: float | None = None
+
+    @property
+    def map(self) -> DopplerMap | None:
+        """The map on its own clock, without the offset."""
+        return self._map
+
+    @property
+    def covered(self) -> NDArray[np.bool_] | None:
+        """Frames that are computed already, shape (frames,); None when all are."""
+        return self._covered
+
+    @property
+    def offset_s(self) -> float:
+        """How much later the map's clock starts than the recording's."""
+        return self._offset_s
+
+    @property
+    def reference(self) -> float:
+        """Value shown as 0 dB."""
+        return self._reference
+
+    @property
+    def status(self) -> str:
+        """A few words on what the map is worth, e.g. ``exact``."""
+        return self._status
+
+    @property
+    def uncertainty(self) -> CellUncertainty | None:
+        """How well the map's cells are known; None while that is not known or not asked for."""
+        return self._uncertainty
+
+    @property
+    def gaps_s(self) -> tuple[tuple[float, float], ...]:
+        """Stretches without a person, half-open on the recording's clock."""
+        return self._seconds(self._gaps)
+
+    @property
+    def covered_s(self) -> tuple[tuple[float, float], ...]:
+        """Stretches that are computed already, half-open on the recording's clock."""
+        if self._map is None:
+            return ()
+        whole = ((0, len(self._map.timebase)),)
+        return self._seconds(whole if self._covered is None else runs(self._covered))
+
+    def _seconds(self, stretches: Iterable[tuple[int, int]]) -> tuple[tuple[float, float], ...]:
+        if self._map is None:
+            return ()
+        timebase, offset_s = self._map.timebase, self._offset_s
+        return tuple(
+            (
+                timebase.time_of(start) + offset_s,
+                (timebase.time_of(stop) if stop < len(timebase) else timebase.end_s) + offset_s,
+            )
+            for start, stop in stretches
+        )
+
+    @property
+    def strongest_db(self) -> float:
+        """Level of the strongest bin of the map, minus infinity for an empty one."""
+        if self._strongest is None:
+            self._strongest = float(self._map.values.max()) if self._map is not None else 0.0
+        return float(self.levels_db(np.array(self._strongest, np.float32)))
+
+    def set_map(
+        self, doppler_map: DopplerMap | None, covered: NDArray[np.bool_] | None = None
+    ) -> None:
+        """Show another map, or none."""
+        self.revision += 1
+        self._map = doppler_map
+        self._covered = covered
+        self._uncertainty = None
+        present = None if doppler_map is None else doppler_map.present
+        self._gaps = () if present is None else runs(~present)
+        self._strongest = None
+        self.changed.emit()
+
+    def set_uncertainty(self, uncertainty: CellUncertainty | None) -> None:
+        """Say how well the cells of this map are known."""
+        if uncertainty is not self._uncertainty:
+            self._uncertainty = uncertainty
+            self.changed.emit()
+
+    def set_offset(self, offset_s: float) -> None:
+        """Align the map in time."""
+        if offset_s != self._offset_s:
+            self._offset_s = offset_s
+            self.changed.emit()
+
+    def set_status(self, status: str) -> None:
+        """Say what the map is worth."""
+        if status != self._status:
+            self._status = status
+            self.status_changed.emit()
+
+    def set_reference(self, reference: float) -> None:
+        """Choose the value shown as 0 dB."""
+        self._reference = reference if reference > 0 else 1.0
+        self.changed.emit()
+
+    def frame_at(self, time_s: float) -> int | None:
+        """Frame of the map at a time of the recording, or None outside."""
+        if self._map is None or not self._map.timebase.covers(time_s - self._offset_s):
+            return None
+        return self._map.timebase.frame_at(time_s - self._offset_s)
+
+    def levels_db(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Values in dB above the reference; minus infinity for zero."""
+        with np.errstate(divide="ignore"):
+            levels: NDArray[np.float32] = 10.0 * np.log10(values / np.float32(self._reference))
+        return levels
+
+    def shade(self, values: NDArray[np.float32], levels: HeatmapLevels) -> NDArray[np.float32]:
+        """Values on the scale of the colour map, 0 to 1."""
+        if levels.scale == "dB":
+            shade = (self.levels_db(values) - levels.low_db) / (levels.high_db - levels.low_db)
+        else:
+            shade = values / np.float32(self._reference * 10.0 ** (levels.high_db / 10.0))
+        return np.clip(shade, 0.0, 1.0).astype(np.float32)
+
+    def _deviation(self, index: int, frame: int) -> float | None:
+        if self._map is None or self._uncertainty is None:
+            return None
+        column = self._map.values[:, frame : frame + 1]
+        return float(self._uncertainty.between(frame, frame + 1).deviation(column)[index, 0])
+
+    def uncertain(self, levels: HeatmapLevels, start: int, stop: int) -> NDArray[np.bool_] | None:
+        """Cells that are known to worse than :data:`UNCERTAIN_SHARE` of their value.
+
+        Where nothing shows, being fainter than the faintest level, those that may well
+        show after all: whose deviation is a tenth of the highest level.
+        Deviations are those of :meth:`CellUncertainty.deviation`.
+
+        Returns
+        -------
+        bool array, shape (bins, stop - start), or None
+            None where nothing is known of uncertainty.
+        """
+        if self._map is None or self._uncertainty is None:
+            return None
+        values = self._map.values[:, start:stop]
+        highest = self._reference * 10.0 ** (levels.high_db / 10.0)
+        faintest = _FAINT_SHARE * highest
+        if levels.scale == "dB":
+            faintest = self._reference * 10.0 ** (levels.low_db / 10.0)
+        shows = np.float32(UNCERTAIN_SHARE) * values
+        limit = np.where(values >= faintest, shows, np.float32(_SHOWS_SHARE * highest))
+        deviation = self._uncertainty.between(start, stop).deviation(values)
+        found: NDArray[np.bool_] = deviation > limit
+        return found
+
+    def read(self, time_s: float, velocity_mps: float) -> Reading | None:
+        """What stands at a time and velocity, or None where there is nothing."""
+        frame = self.frame_at(time_s)
+        if self._map is None or frame is None:
+            return None
+        index = self._map.axis.bin_of(velocity_mps)
+        if index is None or (self._covered is not None and not self._covered[frame]):
+            return None
+        value = self._map.values[index, frame]
+        note = ""
+        if self._map.present is not None and not self._map.present[frame]:
+            note = "no person"
+        elif index in self._map.null_bins:
+            note = "nulled bin"
+        elif index in self._map.unseen_bins:
+            note = "beyond the radar's v_max"
+        return Reading(
+            track=self.title,
+            time_s=self._map.timebase.time_of(frame) + self._offset_s,
+            frame=frame,
+            velocity_mps=float(self._map.axis.centres_mps[index]),
+            value=float(value),
+            level_db=float(self.levels_db(value)),
+            note=note,
+            deviation=self._deviation(index, frame),
+        )
+
+
+class PointerModel(QObject):
+    """What the pointer reads from the tracks."""
+
+    changed = Signal()
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._time_s: float | None = None
+        self._velocity_mps: float | None = None
+        self._reading: Reading | None = None
+
+    @property
+    def time_s(self) -> float | None:
+        """Time under the pointer, None when it is elsewhere."""
+        return self._time_s
+
+    @property
+    def velocity_mps(self) -> float | None:
+        """Velocity under the pointer."""
+        return self._velocity_mps
+
+    @property
+    def reading(self) -> Reading | None:
+        """Cell under the pointer."""
+        return self._reading
+
+    def point_at(self, time_s: float, velocity_mps: float, reading: Reading | None) -> None:
+        """The pointer is over a track."""
+        self._time_s, self._velocity_mps, self._reading = time_s, velocity_mps, reading
+        self.changed.emit()
+
+    def leave(self) -> None:
+        """The pointer is elsewhere."""
+        if self._time_s is not None:
+            self._time_s = self._velocity_mps = self._reading = None
+            self.changed.emit()

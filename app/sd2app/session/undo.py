@@ -1,0 +1,161 @@
+"""Every edit of a recording: done first, then pushed to the history as one step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from PySide6.QtGui import QUndoCommand
+
+from sd2app.session.denoiser_choice import DenoiserChoice
+from sd2app.session.document import DocumentModel
+from sd2app.session.sensor import SensorModel
+from sd2core.placements.placements import Placements
+from sd2core.sensor import Vector, VirtualSensor, aimed_at
+
+if TYPE_CHECKING:
+    from sd2core.fmcw.processing import Clutter
+    from sd2core.recording.recording import Recording
+
+
+class Assign(QUndoCommand):
+    """Sets one value of a model; models ignore a value that they have already."""
+
+    def __init__(
+        self, text: str, assign: Callable[[Any], None], before: object, after: object
+    ) -> None:
+        super().__init__(text)
+        self._assign, self._before, self._after = assign, before, after
+
+    def undo(self) -> None:
+        """Assign what was there before."""
+        self._assign(self._before)
+
+    def redo(self) -> None:
+        """Assign what was there after."""
+        self._assign(self._after)
+
+
+class Edits:
+    """What the user can change. A drag is one step in the history."""
+
+    def __init__(self, document: DocumentModel, sensor: SensorModel) -> None:
+        self._document = document
+        self._sensor = sensor
+        self._before: Any = None
+        self._planned_before: tuple[Recording, Placements | None] | None = None
+
+    # --- sensor ---------------------------------------------------------------------------
+
+    def place_sensor(self, sensor: VirtualSensor, text: str = "Move sensor") -> None:
+        """Put the sensor somewhere."""
+        before = self._sensor.sensor
+        self._assign_sensor(sensor)
+        self._push(text, self._assign_sensor, before, sensor)
+
+    def sensor_to_camera(self) -> None:
+        """Put the sensor at the camera, looking along the optical axis."""
+        view = self._sensor.sensor.field_of_view_deg
+        self.place_sensor(VirtualSensor(field_of_view_deg=view), "Sensor to camera")
+
+    def aim_sensor(self, target_m: Vector) -> None:
+        """Turn the sensor towards a point."""
+        self.place_sensor(aimed_at(self._sensor.sensor, target_m), "Aim sensor")
+
+    def begin_sensor_drag(self) -> None:
+        """A hand takes hold of the sensor."""
+        self._before = self._sensor.sensor
+        self._sensor.set_dragging(True)
+
+    def drag_sensor(self, position_m: Vector) -> None:
+        """The hand moves it."""
+        self._assign_sensor(replace(self._sensor.sensor, position_m=position_m))
+
+    def end_sensor_drag(self) -> None:
+        """The hand lets go."""
+        self._sensor.set_dragging(False)
+        self._push("Move sensor", self._assign_sensor, self._before, self._sensor.sensor)
+
+    def _assign_sensor(self, sensor: VirtualSensor) -> None:
+        self._sensor.set_sensor(sensor)
+        if self._document.recording is not None:
+            self._document.recording.sensor = sensor
+
+    # --- placements -----------------------------------------------------------------------
+
+    def plan_placements(self, placements: Placements | None) -> None:
+        """Plan other places for sensors around the body, or none."""
+        self.type_placements(placements)
+        self.end_typing_placements()
+
+    def type_placements(self, placements: Placements | None) -> None:
+        """The same while it is typed: all until the end is one step."""
+        recording = self._document.recording
+        if recording is None:
+            return
+        if self._planned_before is None or self._planned_before[0] is not recording:
+            self._planned_before = (recording, recording.placements)
+        self._document.set_placements(placements)
+
+    def end_typing_placements(self) -> None:
+        """It has been typed."""
+        recording, before = self._document.recording, self._planned_before
+        self._planned_before = None
+        # Another recording may have been opened while somebody typed.
+        if recording is not None and before is not None and before[0] is recording:
+            self._push(
+                "Plan placements", self._document.set_placements, before[1], recording.placements
+            )
+
+    # --- alignment of the real capture ----------------------------------------------------
+
+    def set_radar_offset(self, offset_s: float) -> None:
+        """Align the capture."""
+        if self._document.recording is None:
+            return
+        before = self._document.recording.radar_offset_s
+        self._document.set_radar_offset(offset_s)
+        self._push("Align radar", self._document.set_radar_offset, before, offset_s)
+
+    def begin_offset_drag(self) -> None:
+        """A hand takes hold of the real track."""
+        if self._document.recording is not None:
+            self._before = self._document.recording.radar_offset_s
+
+    def drag_offset(self, seconds: float) -> None:
+        """The hand has moved it by ``seconds`` since it took hold."""
+        self._document.set_radar_offset(round(self._before + seconds, 3))
+
+    def end_offset_drag(self) -> None:
+        """The hand lets go."""
+        recording = self._document.recording
+        if recording is not None:
+            self._push(
+                "Align radar",
+                self._document.set_radar_offset,
+                self._before,
+                recording.radar_offset_s,
+            )
+
+    # --- processing of the capture --------------------------------------------------------
+
+    def set_clutter(self, clutter: Clutter) -> None:
+        """Remove static echoes another way."""
+        before = self._document.clutter
+        self._document.set_clutter(clutter)
+        self._push("Choose clutter removal", self._document.set_clutter, before, clutter)
+
+    # --- denoising ------------------------------------------------------------------------
+
+    def choose_denoiser(self, choice: DenoiserChoice) -> None:
+        """Denoise the recording with another model, or with none."""
+        before = DenoiserChoice.of(self._document.recording)
+        self._document.set_denoiser(choice)
+        self._push("Choose denoiser", self._document.set_denoiser, before, choice)
+
+    def _push(
+        self, text: str, assign: Callable[[Any], None], before: object, after: object
+    ) -> None:
+        if before != after and self._document.content is not None:
+            self._document.undo_stack.push(Assign(text, assign, before, after))

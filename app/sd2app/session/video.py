@@ -1,0 +1,96 @@
+"""The picture on screen, decoded beside the window."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QObject, Signal
+
+from sd2app.background.latest import Emit, LatestRunner
+from sd2app.session.playback import PlaybackModel
+from sd2core.io.video import VideoReader
+
+
+class VideoModel(QObject):
+    """Follows the clock: one picture at a time is decoded, then the newest wanted one."""
+
+    frame_changed = Signal()
+    failed = Signal(str)
+
+    def __init__(self, playback: PlaybackModel, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._playback = playback
+        self._reader: VideoReader | None = None
+        self._picture: NDArray[np.uint8] | None = None
+        self._shown = -1
+        self._wanted = -1
+        self._runner = LatestRunner("video", self)
+        self._runner.finished.connect(self._receive)
+        self._runner.failed.connect(self._report)
+        playback.frame_changed.connect(self._follow)
+
+    @property
+    def reader(self) -> VideoReader | None:
+        """The open video."""
+        return self._reader
+
+    @property
+    def picture(self) -> NDArray[np.uint8] | None:
+        """RGB picture on screen, (H, W, 3)."""
+        return self._picture
+
+    @property
+    def busy(self) -> bool:
+        """Whether a picture is being decoded."""
+        return self._runner.busy
+
+    @property
+    def shown_frame(self) -> int:
+        """Frame of the video that :attr:`picture` is, minus one for none."""
+        return self._shown
+
+    def set_reader(self, reader: VideoReader | None) -> None:
+        """Show another video, or none; the one before is closed by its owner."""
+        self._runner.cancel()
+        self._reader = reader
+        self._picture = None
+        self._shown = self._wanted = -1
+        self.frame_changed.emit()
+        self._follow()
+
+    def close(self) -> None:
+        """Stop decoding."""
+        self._runner.close()
+
+    def _follow(self) -> None:
+        reader = self._reader
+        if reader is None:
+            return
+        frame = reader.timebase.frame_at(self._playback.time_s)
+        if frame == self._wanted:
+            return
+        self._wanted = frame
+        # One picture at a time: cancelling would show none while scrubbing fast.
+        if not self._runner.busy:
+            self._request(frame)
+
+    def _request(self, frame: int) -> None:
+        reader = self._reader
+        assert reader is not None
+
+        def decode(emit: Emit) -> tuple[int, NDArray[np.uint8]]:
+            emit(None)
+            return frame, reader.read(frame)
+
+        self._runner.submit(decode)
+
+    def _receive(self, result: Any) -> None:
+        self._shown, self._picture = result
+        self.frame_changed.emit()
+        if self._wanted != self._shown and self._reader is not None:
+            self._request(self._wanted)
+
+    def _report(self, error: Exception) -> None:
+        self.failed.emit(str(error))

@@ -1,0 +1,222 @@
+"""Which keys do what: the usual ones, those the user chose instead, and those of labels."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Protocol
+
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtGui import QKeySequence
+
+from sd2app.labels.model import LabelsModel
+from sd2app.settings import Settings
+from sd2core.errors import Sd2Error
+
+_CHOSEN = "keys"
+_RESERVED = {
+    "Tab": "goes from field to field",
+    "Backtab": "goes from field to field",
+    "Shift+Tab": "goes from field to field",
+    "Shift+Backtab": "goes from field to field",
+    "Return": "ends typing",
+    "Enter": "ends typing",
+}
+
+
+class Bindable(Protocol):
+    """An action that keys can do."""
+
+    @property
+    def id(self) -> str:
+        """Its own name."""
+
+    @property
+    def menu(self) -> str:
+        """Where it stands."""
+
+    @property
+    def text(self) -> str:
+        """What it is called."""
+
+    @property
+    def tip(self) -> str:
+        """What it does."""
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Its usual keys."""
+
+
+class KeyBindings(QObject):
+    """The keys of every action. No key does two things.
+
+    A key that the user gives to an action is free, or is refused with the name of who has it.
+    Labels come with the recording: where one has a key of an action, it has it for as long.
+
+    Signals
+    -------
+    changed
+        Some action has other keys.
+    """
+
+    changed = Signal()
+
+    def __init__(
+        self,
+        actions: Iterable[Bindable],
+        labels: LabelsModel,
+        settings: Settings,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._actions = {one.id: one for one in actions}
+        self._labels, self._settings = labels, settings
+        self._chosen = _stored(settings.stored(_CHOSEN, "{}"), self._actions)
+        self._of_labels: dict[str, str] = {}
+        self._keys: dict[str, tuple[str, ...]] = {}
+        self._follow()
+        labels.changed.connect(self._follow_labels)
+
+    @property
+    def actions(self) -> Sequence[Bindable]:
+        """All of them, in the order of the menus."""
+        return tuple(self._actions.values())
+
+    def keys_of(self, action_id: str) -> tuple[str, ...]:
+        """The keys that do an action now."""
+        return self._keys[action_id]
+
+    def lent(self, action_id: str) -> Mapping[str, str]:
+        """Keys of an action that a label has taken, each with the label's name."""
+        return {
+            key: self._of_labels[key] for key in self._wanted(action_id) if key in self._of_labels
+        }
+
+    def is_usual(self, action_id: str) -> bool:
+        """Whether the user has left its keys as they are."""
+        return action_id not in self._chosen
+
+    def owner(self, key: str, besides: str = "") -> str:
+        """Who has a key, in words; nobody: empty. ``besides`` is an action that may have it."""
+        key = canonical(key)
+        if key in self._of_labels:
+            return f"the label “{self._of_labels[key]}”"
+        for action in self._actions.values():
+            if action.id != besides and key in self._wanted(action.id):
+                return f"“{action.text}” in the menu {action.menu}"
+        for menu in dict.fromkeys(action.menu for action in self._actions.values()):
+            if key == f"Alt+{menu[0]}":
+                return f"the menu {menu} itself"
+        return ""
+
+    # --- changing -------------------------------------------------------------------------
+
+    def bind(self, action_id: str, keys: Iterable[str]) -> None:
+        """Give an action these keys, and no others.
+
+        Raises
+        ------
+        Sd2Error
+            When one is none, is needed elsewhere, or is somebody's; nothing is changed then.
+        """
+        wanted = tuple(dict.fromkeys(canonical(key) for key in keys))
+        text = self._actions[action_id].text
+        for key in wanted:
+            self.check(key, f"“{text}”", besides=action_id)
+        if wanted == self._usual(action_id):
+            self._chosen.pop(action_id, None)
+        else:
+            self._chosen[action_id] = wanted
+        self._store()
+
+    def check(self, key: str, what: str, besides: str = "") -> None:
+        """Refuse a key that cannot be given to something; see :meth:`bind`."""
+        shown = native(key)
+        if not key:
+            raise Sd2Error(f"{what} was to get a key that this program does not know", "one key")
+        if key in _RESERVED:
+            raise Sd2Error(f"{shown} {_RESERVED[key]}", f"another key for {what}")
+        if owner := self.owner(key, besides):
+            raise Sd2Error(f"{shown} belongs to {owner}", f"a key for {what} that nobody has")
+
+    def for_label(self, name: str, key: str) -> str:
+        """The key that a label is to get, as labels have it; errors are those of :meth:`bind`."""
+        label, key = self._labels.labels.label_set.find(name), canonical(key)
+        if label is not None and label.key and canonical(label.key) == key:
+            return label.key
+        if len(key) > 1:
+            raise Sd2Error(f"{native(key)} was to mark “{name}”", "one character, without Ctrl")
+        self.check(key, f"the label “{name}”")
+        return key.lower()
+
+    def reset(self, action_id: str) -> None:
+        """Give an action its usual keys back; errors are those of :meth:`bind`."""
+        self.bind(action_id, self._usual(action_id))
+
+    def reset_all(self) -> None:
+        """Give every action its usual keys back."""
+        self._chosen.clear()
+        self._store()
+
+    # --- following ------------------------------------------------------------------------
+
+    def _store(self) -> None:
+        self._settings.set_value(_CHOSEN, json.dumps(self._chosen))
+        self._follow()
+
+    def _follow_labels(self) -> None:
+        of_labels = self._label_keys()
+        if of_labels != self._of_labels:
+            self._follow()
+
+    def _follow(self) -> None:
+        self._of_labels = self._label_keys()
+        self._keys = {
+            one: tuple(key for key in self._wanted(one) if key not in self._of_labels)
+            for one in self._actions
+        }
+        self.changed.emit()
+
+    def _label_keys(self) -> dict[str, str]:
+        labels = self._labels.labels.label_set.labels
+        return {canonical(label.key): label.name for label in labels if label.key}
+
+    def _usual(self, action_id: str) -> tuple[str, ...]:
+        return tuple(canonical(key) for key in self._actions[action_id].keys)
+
+    def _wanted(self, action_id: str) -> tuple[str, ...]:
+        """The chosen keys, or the usual ones but those that were chosen for another action."""
+        if action_id in self._chosen:
+            return self._chosen[action_id]
+        taken = {key for keys in self._chosen.values() for key in keys}
+        return tuple(key for key in self._usual(action_id) if key not in taken)
+
+
+def canonical(key: str) -> str:
+    """A key as Qt writes it, the same on every machine; empty where it is none."""
+    sequence = QKeySequence(key)
+    one = sequence.count() == 1
+    return sequence.toString(QKeySequence.SequenceFormat.PortableText) if one else ""
+
+
+def native(key: str) -> str:
+    """A key as it is written on this machine."""
+    return QKeySequence(key).toString(QKeySequence.SequenceFormat.NativeText)
+
+
+def _stored(text: str, known: Mapping[str, object]) -> dict[str, tuple[str, ...]]:
+    """What was stored, as far as it can be understood; of two with one key the first has it."""
+    try:
+        content = json.loads(text)
+    except ValueError:
+        return {}
+    chosen: dict[str, tuple[str, ...]] = {}
+    taken: set[str] = set(_RESERVED)
+    for action_id, keys in content.items() if isinstance(content, dict) else ():
+        if action_id not in known or not isinstance(keys, list):
+            continue
+        kept = dict.fromkeys(canonical(key) for key in keys if isinstance(key, str))
+        chosen[action_id] = tuple(key for key in kept if key and key not in taken)
+        taken.update(chosen[action_id])
+    return chosen

@@ -1,0 +1,182 @@
+"""All keys: found, changed, given back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtCore import QModelIndex, QObject, Qt
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QDialog,
+    QDialogButtonBox,
+    QHBoxLayout,
+    QHeaderView,
+    QLabel,
+    QPushButton,
+    QStyledItemDelegate,
+    QStyleOptionViewItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from sd2app.shell.keys.bindings import KeyBindings
+from sd2app.shell.keys.capture import KeyCapture
+from sd2app.shell.keys.model import KEYS, KeyListModel
+from sd2app.widgets.cell_table import CellTable
+from sd2app.widgets.search_line import SearchLine
+from sd2core.errors import Sd2Error
+
+_KEYS_PX = 250
+
+
+class KeysDialog(QDialog):
+    """A list of what keys and mouse do; Return or a double click waits for another key."""
+
+    def __init__(
+        self, model: KeyListModel, bindings: KeyBindings, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Keys")
+        self._model = model
+        model.setParent(self)
+        self._search = SearchLine("Search actions and keys", self)
+        self._search.textChanged.connect(self._find)
+        self._table = KeyTable(model, self)
+        self._cells = KeyCells(self._take, self._table)
+        self._table.setItemDelegateForColumn(KEYS, self._cells)
+        self._table.selectionModel().currentRowChanged.connect(self._refresh)
+        bindings.changed.connect(self._refresh)
+        model.modelReset.connect(self._refresh)
+        self._said = QLabel(self)
+        self._said.setObjectName("warning")
+        self._said.setWordWrap(True)
+        self._change = self._button("Change", "Wait for another key", self._begin)
+        self._add = self._button("Add", "Wait for a key besides", lambda: self._begin(besides=True))
+        self._clear = self._button("Remove", "Leave it without a key", self._take_away)
+        self._reset = self._button("Reset", "Give it its usual keys back", self._give_back)
+        every = self._button("Reset all", "Give everything its usual keys", bindings.reset_all)
+        close = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, self)
+        close.rejected.connect(self.reject)
+        for button in close.buttons():
+            button.setAutoDefault(False)
+        row = QHBoxLayout()
+        for button in (self._change, self._add, self._clear, self._reset):
+            row.addWidget(button)
+        row.addStretch(1)
+        row.addWidget(every)
+        row.addWidget(close)
+        layout = QVBoxLayout(self)
+        layout.addWidget(self._search)
+        layout.addWidget(self._table, 1)
+        layout.addWidget(self._said)
+        layout.addLayout(row)
+        self.resize(760, 620)
+        self._find()
+
+    def _button(self, text: str, tip: str, run: Callable[[], object]) -> QPushButton:
+        button = QPushButton(text, self)
+        button.setToolTip(tip)
+        button.setAccessibleDescription(tip)
+        button.setAutoDefault(False)
+        button.clicked.connect(lambda: run())
+        return button
+
+    # --- what the buttons do --------------------------------------------------------------
+
+    def _find(self) -> None:
+        self._model.set_search(self._search.text())
+        if self._model.rowCount():
+            self._table.setCurrentIndex(self._model.index(0, KEYS))
+        self._refresh()
+
+    def _begin(self, besides: bool = False) -> None:
+        self._said.clear()
+        self._cells.besides = besides
+        self._table.edit(self._table.currentIndex().siblingAtColumn(KEYS))
+
+    def _take(self, row: int, key: str) -> None:
+        self._attempt(lambda: self._model.change(row, key, besides=self._cells.besides))
+        self._cells.besides = False
+
+    def _take_away(self) -> None:
+        self._attempt(lambda: self._model.clear(self._row))
+
+    def _give_back(self) -> None:
+        self._attempt(lambda: self._model.reset(self._row))
+
+    def _attempt(self, change: Callable[[], None]) -> None:
+        self._said.clear()
+        try:
+            change()
+        except Sd2Error as error:
+            self._said.setText(str(error))
+
+    @property
+    def _row(self) -> int:
+        return self._table.currentIndex().row()
+
+    def _refresh(self) -> None:
+        there = 0 <= self._row < self._model.rowCount()
+        can = there and self._model.can_change(self._row)
+        for button in (self._change, self._clear):
+            button.setEnabled(can)
+        self._add.setEnabled(can and bool(self._model.rows[self._row].action))
+        self._reset.setEnabled(can and not self._model.is_usual(self._row))
+
+
+class KeyTable(CellTable):
+    """The list; Tab leaves it, Escape closes the dialog."""
+
+    def __init__(self, model: KeyListModel, parent: QWidget) -> None:
+        super().__init__("Keys", parent=parent)
+        self.setModel(model)
+        self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+        self.setTabKeyNavigation(False)
+        header = self.horizontalHeader()
+        header.setStretchLastSection(False)
+        header.setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
+        header.setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)
+        self.setColumnWidth(KEYS, _KEYS_PX)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Return waits for another key."""
+        if event.key() == Qt.Key.Key_Escape:
+            event.ignore()
+            return
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            self.setCurrentIndex(self.currentIndex().siblingAtColumn(KEYS))
+        super().keyPressEvent(event)
+
+
+class KeyCells(QStyledItemDelegate):
+    """Waits for a key in the cell."""
+
+    def __init__(self, take: Callable[[int, str], None], parent: QWidget) -> None:
+        super().__init__(parent)
+        self._take = take
+        self.besides = False
+
+    def createEditor(
+        self, parent: QWidget, option: QStyleOptionViewItem, index: QModelIndex
+    ) -> QWidget:
+        """A field that takes the next key."""
+        field, row = KeyCapture(parent), index.row()
+
+        def captured(key: str) -> None:
+            self.closeEditor.emit(field)
+            self._take(row, key)
+
+        field.captured.connect(captured)
+        field.given_up.connect(lambda: self.closeEditor.emit(field))
+        return field
+
+    def eventFilter(self, watched: QObject, event: object) -> bool:
+        """Tab and Return are keys like others here."""
+        return False
+
+    def setEditorData(self, editor: QWidget, index: QModelIndex) -> None:
+        """It begins empty."""
+
+    def setModelData(self, editor: QWidget, model: object, index: QModelIndex) -> None:
+        """The key has been taken already."""

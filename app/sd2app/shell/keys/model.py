@@ -1,0 +1,199 @@
+"""Actions, labels and what the mouse does, each with its keys, as the rows of a list."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from PySide6.QtCore import QAbstractTableModel, QModelIndex, QObject, QPersistentModelIndex, Qt
+from PySide6.QtGui import QFont
+
+from sd2app.labels.columns import Change
+from sd2app.labels.model import LabelsModel
+from sd2app.shell.keys.bindings import KeyBindings, canonical, native
+from sd2core.labels.label_set_edits import set_key
+
+Index = QModelIndex | QPersistentModelIndex
+
+HEADINGS = ("Menu", "What it does", "Keys")
+KEYS = 2
+_NOWHERE = QModelIndex()
+
+
+@dataclass(frozen=True)
+class KeyRow:
+    """One row: an action, a label, or something the mouse does.
+
+    Parameters
+    ----------
+    menu, text, tip : str
+    action : str
+        Id of the action, if it is one.
+    label : str
+        Name of the label, if it is one.
+    mouse : str
+        What the hand does, if it is neither.
+    """
+
+    menu: str
+    text: str
+    tip: str
+    action: str = ""
+    label: str = ""
+    mouse: str = ""
+
+
+class KeyListModel(QAbstractTableModel):
+    """Every row that a search leaves; keys are changed through :class:`KeyBindings`."""
+
+    def __init__(
+        self,
+        bindings: KeyBindings,
+        labels: LabelsModel,
+        mouse: Sequence[tuple[str, str]],
+        apply: Callable[[Change], bool],
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._bindings, self._labels, self._mouse, self._apply = bindings, labels, mouse, apply
+        self._search = ""
+        self._rows = self._listed()
+        bindings.changed.connect(self._follow)
+
+    @property
+    def rows(self) -> Sequence[KeyRow]:
+        """What is listed."""
+        return self._rows
+
+    def set_search(self, text: str) -> None:
+        """List what has these words in its menu, name, tip or keys."""
+        self._search = text
+        self._follow()
+
+    # --- changing -------------------------------------------------------------------------
+
+    def can_change(self, row: int) -> bool:
+        """Whether something else than a hand does it."""
+        return not self._rows[row].mouse
+
+    def is_usual(self, row: int) -> bool:
+        """Whether there is nothing to be given back."""
+        action = self._rows[row].action
+        return not action or self._bindings.is_usual(action)
+
+    def change(self, row: int, key: str, *, besides: bool = False) -> None:
+        """Give a row another key, or one besides those it has.
+
+        Raises
+        ------
+        Sd2Error
+            When the key is somebody else's, or cannot be one.
+        """
+        at = self._rows[row]
+        if at.action:
+            kept = self._bindings.keys_of(at.action) if besides else ()
+            self._bindings.bind(at.action, (*kept, key))
+        elif at.label:
+            wanted = self._bindings.for_label(at.label, key)
+            self._apply(lambda labels, _: set_key(labels, at.label, wanted))
+
+    def clear(self, row: int) -> None:
+        """Take all keys of a row away."""
+        at = self._rows[row]
+        if at.action:
+            self._bindings.bind(at.action, ())
+        elif at.label:
+            self._apply(lambda labels, _: set_key(labels, at.label, ""))
+
+    def reset(self, row: int) -> None:
+        """Give a row its usual keys back; errors are those of :meth:`change`."""
+        if action := self._rows[row].action:
+            self._bindings.reset(action)
+
+    # --- the list -------------------------------------------------------------------------
+
+    def _follow(self) -> None:
+        rows = self._listed()
+        if rows == self._rows:
+            last = self.index(len(rows) - 1, len(HEADINGS) - 1)
+            self.dataChanged.emit(self.index(0, 0), last)
+            return
+        self.beginResetModel()
+        self._rows = rows
+        self.endResetModel()
+
+    def _listed(self) -> list[KeyRow]:
+        actions = [
+            KeyRow(one.menu, one.text, one.tip, action=one.id) for one in self._bindings.actions
+        ]
+        labels = [
+            KeyRow("Labels", f"Mark or relabel: {one.name}", "Begin or end a span", label=one.name)
+            for one in self._labels.labels.label_set.labels
+        ]
+        first = next((k for k, row in enumerate(actions) if row.menu == "Labels"), len(actions))
+        mouse = [KeyRow("Mouse", meaning, meaning, mouse=hand) for hand, meaning in self._mouse]
+        rows = [*actions[:first], *labels, *actions[first:], *mouse]
+        words = self._search.casefold().split()
+        return [
+            row
+            for row in rows
+            if all(
+                word in f"{row.menu} {row.text} {row.tip} {self.keys_text(row)}".casefold()
+                for word in words
+            )
+        ]
+
+    def keys_text(self, row: KeyRow) -> str:
+        """The keys of a row, as they are written on this machine."""
+        if row.mouse:
+            return row.mouse
+        if row.label:
+            label = self._labels.labels.label_set.find(row.label)
+            return "" if label is None else native(canonical(label.key))
+        lent = self._bindings.lent(row.action)
+        taken = [f"{native(key)}: now “{label}”" for key, label in lent.items()]
+        return ", ".join([*map(native, self._bindings.keys_of(row.action)), *taken])
+
+    # --- Qt's questions -------------------------------------------------------------------
+
+    def rowCount(self, parent: Index = _NOWHERE) -> int:
+        """Rows that the search leaves."""
+        return 0 if parent.isValid() else len(self._rows)
+
+    def columnCount(self, parent: Index = _NOWHERE) -> int:
+        """Menu, what it does, keys."""
+        return 0 if parent.isValid() else len(HEADINGS)
+
+    def headerData(
+        self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole
+    ) -> Any:
+        """Headings."""
+        if orientation != Qt.Orientation.Horizontal:
+            return None
+        if role == Qt.ItemDataRole.TextAlignmentRole:
+            return Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
+        return HEADINGS[section] if role == Qt.ItemDataRole.DisplayRole else None
+
+    def flags(self, index: Index) -> Qt.ItemFlag:
+        """Keys can be changed, but what the hand does."""
+        if not index.isValid():
+            return Qt.ItemFlag.NoItemFlags
+        read = Qt.ItemFlag.ItemIsSelectable | Qt.ItemFlag.ItemIsEnabled
+        editable = index.column() == KEYS and self.can_change(index.row())
+        return read | Qt.ItemFlag.ItemIsEditable if editable else read
+
+    def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
+        """A cell; keys that the user chose are bold."""
+        if not index.isValid():
+            return None
+        row = self._rows[index.row()]
+        if role == Qt.ItemDataRole.DisplayRole:
+            return (row.menu, row.text, self.keys_text(row))[index.column()]
+        if role == Qt.ItemDataRole.ToolTipRole:
+            return row.tip
+        if role == Qt.ItemDataRole.FontRole and index.column() == KEYS:
+            font = QFont()
+            font.setBold(not self.is_usual(index.row()))
+            return font
+        return None

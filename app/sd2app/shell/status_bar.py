@@ -1,0 +1,126 @@
+"""The last line of the window: what the pointer reads, the plan in use, what is under way."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QToolButton, QWidget
+
+from sd2app.accuracy.model import TradeModel
+from sd2app.maps.model import SynthesisModel
+from sd2app.session.tasks import JobsModel
+from sd2app.session.tracks import PointerModel, Reading
+from sd2app.widgets.elided import ElidedLabel
+from sd2app.widgets.time_axis import clock_text
+
+_QUIET_MS = 300
+
+
+class StatusLine(QWidget):
+    """Pointer read-out, plan in use, and the oldest job with a cancel button on the right."""
+
+    def __init__(
+        self,
+        pointer: PointerModel,
+        jobs: JobsModel,
+        trade: TradeModel,
+        synthesis: SynthesisModel,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._pointer = pointer
+        self._jobs = jobs
+        self._trade = trade
+        self._synthesis = synthesis
+        self._reading = ElidedLabel(self)
+        self._plan = ElidedLabel(self)
+        for label in (self._reading, self._plan):
+            label.setObjectName("muted")
+        self._title = QLabel(self)
+        self._title.setObjectName("muted")
+        self._bar = QProgressBar(self)
+        self._bar.setFixedWidth(140)
+        self._bar.setMaximumHeight(14)
+        self._bar.setTextVisible(False)
+        self._cancel = QToolButton(self)
+        self._cancel.setText("Cancel")
+        self._cancel.clicked.connect(self._cancel_job)
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(12, 0, 8, 4)
+        layout.setSpacing(16)
+        layout.addWidget(self._reading)
+        layout.addStretch(1)
+        layout.addWidget(self._plan)
+        for widget in (self._title, self._bar, self._cancel):
+            layout.addWidget(widget)
+            widget.hide()
+        self.setFixedHeight(28)
+        # Work that is over at once should not flicker.
+        self._delay = QTimer(self)
+        self._delay.setSingleShot(True)
+        self._delay.setInterval(_QUIET_MS)
+        self._delay.timeout.connect(self._show_job)
+        pointer.changed.connect(self._read)
+        for signal in (trade.changed, trade.plan_changed, synthesis.moving_changed):
+            signal.connect(self._show_plan)
+        jobs.changed.connect(self._follow)
+
+    def _read(self) -> None:
+        reading = self._pointer.reading
+        self._reading.setText(reading_text(reading) if reading is not None else "")
+
+    def _show_plan(self) -> None:
+        """While the sensor moves the budget rules, at rest the tolerance does."""
+        trade, moving = self._trade, self._synthesis.moving
+        in_use = trade.while_dragging if moving else trade.in_use
+        text = ""
+        if in_use is not None:
+            text = f"While dragging: {in_use}" if moving else f"Plan: {in_use}"
+        self._plan.setText(text)
+
+    def _follow(self) -> None:
+        if self._jobs.jobs and not self._bar.isVisible():
+            if not self._delay.isActive():
+                self._delay.start()
+        else:
+            self._show_job()
+
+    def _show_job(self) -> None:
+        job = self._jobs.jobs[0] if self._jobs.jobs else None
+        for widget in (self._title, self._bar, self._cancel):
+            widget.setVisible(job is not None)
+        if job is None:
+            return
+        self._title.setText("Cancelling…" if job.cancelling else job.title)
+        self._cancel.setEnabled(not job.cancelling)
+        self._bar.setRange(0, job.total)
+        self._bar.setValue(job.done)
+
+    def _cancel_job(self) -> None:
+        if self._jobs.jobs:
+            self._jobs.cancel(self._jobs.jobs[0])
+
+
+def _value_text(reading: Reading) -> str:
+    if reading.deviation is None:
+        return f"{reading.value:.3g}"
+    return f"{reading.value:.3g} ± {reading.deviation:.2g}"
+
+
+def reading_text(reading: Reading) -> str:
+    """Time, frame, velocity with sign, and level, in words."""
+    if reading.velocity_mps > 0:
+        direction = "approaching"
+    else:
+        direction = "receding" if reading.velocity_mps < 0 else "still"
+    velocity = f"{reading.velocity_mps:+.3f}".replace("-", "−")
+    level = f"{reading.level_db:.1f} dB".replace("-", "−") if reading.value > 0 else "−∞ dB"
+    parts = [
+        reading.track,
+        clock_text(reading.time_s),
+        f"frame {reading.frame}",
+        f"{velocity} m/s ({direction})",
+        reading.text or f"{level} ({_value_text(reading)})",
+    ]
+    if reading.note:
+        parts.append(reading.note)
+    return "   ".join(parts)

@@ -1,0 +1,1 @@
+"""Suggested spans, to be accepted or rejected."""

@@ -1,0 +1,99 @@
+"""Over the labels while there are suggestions: how many, from what, and what to do with them."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QSignalBlocker, Qt
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QWidget
+
+from sd2app.shell.menus import ActionSet
+from sd2app.suggestions.model import SuggestionsModel
+from sd2app.widgets.elided import ElidedLabel
+from sd2app.widgets.inputs import Choice, NumberBox, action_button
+
+_BUTTONS = (
+    ("accept_suggestion", "Accept"),
+    ("reject_suggestion", "Reject"),
+    ("accept_suggestions", "Accept all"),
+    ("reject_suggestions", "Reject all"),
+)
+
+
+class SuggestionBar(QWidget):
+    """A view of :class:`SuggestionsModel`; hidden until suggestions are asked for."""
+
+    def __init__(
+        self, model: SuggestionsModel, actions: ActionSet, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._model = model
+        self._text = ElidedLabel(self)
+        self._text.setAccessibleName("Suggestions")
+        self._as = QLabel(self)
+        self._as.setObjectName("muted")
+        self._source = Choice("The map in which suggestions are looked for", self)
+        self._source.activated.connect(lambda at: model.set_source(model.sources[at]))
+        self._by = Choice("What suggests spans: motion in a map, or the classifier", self)
+        self._by.addItems([f"by {finder.title}" for finder in model.finders])
+        self._by.activated.connect(lambda at: model.set_finder(model.finders[at]))
+        self._threshold = NumberBox(0.0, 100.0, "", "")
+        self._threshold.valueChanged.connect(model.set_threshold)
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(8, 2, 8, 2)
+        layout.setSpacing(6)
+        layout.addWidget(self._text, 1)
+        layout.addWidget(self._as)
+        for name, text in _BUTTONS:
+            layout.addWidget(_outlined(action_button(actions[name], text)))
+        layout.addSpacing(8)
+        layout.addWidget(self._by)
+        layout.addWidget(self._source)
+        layout.addWidget(self._threshold)
+        layout.addWidget(self._close_button())
+        model.changed.connect(self._refresh)
+        self._refresh()
+
+    def _close_button(self) -> QToolButton:
+        close = QToolButton(self)
+        close.setText("✕")
+        close.setToolTip("Close; the suggestions stay")
+        close.setAccessibleName("Close the suggestions")
+        close.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        close.clicked.connect(self._model.stop)
+        return close
+
+    def _refresh(self) -> None:
+        model = self._model
+        self.setVisible(model.active)
+        self._text.setText(model.text)
+        self._as.setText(f"accepted as {model.accepted_as}" if model.accepted_as else "")
+        self._as.setToolTip(
+            "The label that was used last; the key of another label accepts as that"
+        )
+        titles = [track.title for track in model.sources]
+        with QSignalBlocker(self._source):
+            if titles != [self._source.itemText(at) for at in range(self._source.count())]:
+                self._source.clear()
+                self._source.addItems(titles)
+            if model.source is not None:
+                self._source.setCurrentText(model.source.title)
+        self._source.setVisible(len(titles) > 1)
+        with QSignalBlocker(self._by):
+            self._by.setCurrentIndex(model.finders.index(model.finder))
+        self._show_threshold()
+
+    def _show_threshold(self) -> None:
+        box, limits = self._threshold, self._model.limits
+        with QSignalBlocker(box):
+            box.setRange(limits.low, limits.high)
+            box.setDecimals(limits.decimals)
+            box.setSingleStep(limits.step)
+            box.setSuffix(limits.unit)
+        box.setToolTip(limits.tip)
+        box.setAccessibleName(limits.tip)
+        box.show_value(self._model.threshold)
+
+
+def _outlined(button: QToolButton) -> QToolButton:
+    button.setObjectName("outlined")
+    button.setAccessibleName(button.text())
+    return button

@@ -1,0 +1,1 @@
+"""Training of denoisers in a background process."""

@@ -1,0 +1,124 @@
+"""What the Train panel asks: a folder of pairs, whether to delete, what becomes of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from PySide6.QtWidgets import QApplication, QCheckBox, QFileDialog, QMessageBox, QWidget
+
+from sd2app.training.model import TrainingModel
+from sd2app.training.result import TrainingUse
+from sd2app.widgets.confirm import may_delete
+from sd2core.errors import Sd2Error
+
+
+class TrainingDialogs:
+    """Asks, then calls the models; a failure is handed to ``report`` as a sentence."""
+
+    def __init__(
+        self,
+        parent: QWidget,
+        training: TrainingModel,
+        use: TrainingUse,
+        report: Callable[[str], None],
+    ) -> None:
+        self._parent = parent
+        self._training = training
+        self._use = use
+        self._report = report
+
+    def ask_store(self) -> None:
+        """Let the user choose a store of pairs."""
+        name = QFileDialog.getExistingDirectory(self._parent, "Folder of pairs to learn from")
+        if name:
+            self._training.setup.add_store(Path(name))
+
+    def ask_recordings(self) -> None:
+        """Let the user choose recordings to make pairs of."""
+        name = QFileDialog.getExistingDirectory(self._parent, "A recording, or a folder of some")
+        if name:
+            self._attempt(lambda: self._training.pair_maker.make(Path(name)))
+
+    def start(self) -> None:
+        """Begin as it is set up."""
+        self._attempt(self._training.start)
+
+    def resume(self) -> None:
+        """Go on with the run in view."""
+        self._attempt(self._training.resume)
+
+    def open_run(self) -> None:
+        """Let the user choose a run that lies elsewhere, as of a command in a terminal."""
+        name = QFileDialog.getExistingDirectory(self._parent, "Folder of a run")
+        if name:
+            self._attempt(lambda: self._training.open_run(Path(name)))
+
+    def use(self) -> None:
+        """Use the model of the run in view."""
+        self._use.use()
+
+    def copy_command(self) -> None:
+        """Put the command on the clipboard."""
+        self._attempt(lambda: QApplication.clipboard().setText(self._training.command))
+
+    def delete(self) -> None:
+        """Ask, then delete the run in view."""
+        run = self._training.run
+        if run is None:
+            return
+        what = (
+            f"{run.folder.path.name} is deleted with its best model and its curves. A model that"
+            " was put to use stays among your models."
+        )
+        if may_delete(self._parent, "Delete this run?", what):
+            self._training.delete()
+
+    def may_leave(self) -> bool:
+        """Whether the window may close; says what becomes of a run under way."""
+        training = self._training
+        run = training.to_be_left()
+        if run is None or run.phase in ("stopping", "cancelling"):
+            return True  # it ends by itself
+        if training.closing == "ask":
+            return self._ask_what_becomes(training, run.folder.path.name)
+        if training.closing == "stop":
+            training.stop()
+        return True
+
+    def _ask_what_becomes(self, training: TrainingModel, name: str) -> bool:
+        box = QMessageBox(self._parent)
+        box.setIcon(QMessageBox.Icon.Question)
+        box.setWindowTitle("A training is under way")
+        box.setText(f"{name} is being trained.")
+        box.setInformativeText(
+            "It needs no window: it can go on in the background, and is found again when the"
+            " program is started the next time."
+        )
+        roles = QMessageBox.ButtonRole
+        keep = box.addButton("Keep training in the background", roles.AcceptRole)
+        stop = box.addButton("Stop and keep the best", roles.AcceptRole)
+        discard = box.addButton("Cancel and discard", roles.DestructiveRole)
+        stay = box.addButton("Don't close", roles.RejectRole)
+        box.setDefaultButton(keep)
+        box.setEscapeButton(stay)
+        always = QCheckBox("Do so every time, unless it is to be discarded", box)
+        box.setCheckBox(always)
+        box.exec()
+        chosen = box.clickedButton()
+        box.deleteLater()
+        if chosen is discard:
+            training.cancel()
+        elif chosen is stop:
+            training.stop()
+        elif chosen is not keep:
+            return False
+        if always.isChecked() and chosen is not discard:
+            training.set_closing("stop" if chosen is stop else "keep")
+        return True
+
+    def _attempt(self, work: Callable[[], object]) -> None:
+        try:
+            work()
+        except (Sd2Error, OSError) as error:
+            self._report(str(error))

@@ -1,0 +1,348 @@
+"""Training of denoisers, in processes that outlive the window."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Literal
+
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from sd2app.background.detached import launch
+from sd2app.background.step_times import COMMAND as TIMING_COMMAND
+from sd2app.background.step_times import PatientTiming, StepKey, StepTimes
+from sd2app.settings import Settings
+from sd2app.training.command import (
+    new_run_folder,
+    output_of,
+    quoted,
+    resume_arguments,
+    train_arguments,
+)
+from sd2app.training.library import TrainingLibrary, user_runs_folder
+from sd2app.training.pair_maker import PairMaker
+from sd2app.training.run import TrainingFollower
+from sd2app.training.setup import TrainingSetupModel
+from sd2core.errors import Sd2Error
+from sd2core.processes import ONE_THREAD
+from sd2core.train.folder import RunFolder
+
+Closing = Literal["ask", "keep", "stop"]
+
+COMMAND = (sys.executable, "-u", "-m", "sd2app.background.run_command")
+CLOSING: tuple[Closing, ...] = ("ask", "keep", "stop")
+"""What happens to a run when the window is closed."""
+_LIBRARY_MS = 3000
+
+
+class TrainingModel(QObject):
+    """One run in view, the others in a list; one that the window started at a time.
+
+    Parameters
+    ----------
+    settings : Settings
+    command, timing_command : sequence of str
+        What runs ``sd2`` commands, and what times a step.
+    folder : Path, optional
+        Where runs are; by default as the settings say, or the user's data directory.
+
+    Signals
+    -------
+    changed
+        Anything that is shown.
+    phase_changed
+        How the run in view stands, or another one is in view.
+    noted, failed : str
+        Sentences for the user.
+    """
+
+    changed = Signal()
+    phase_changed = Signal()
+    noted = Signal(str)
+    failed = Signal(str)
+
+    def __init__(
+        self,
+        settings: Settings,
+        parent: QObject | None = None,
+        command: Sequence[str] = COMMAND,
+        timing_command: Sequence[str] = TIMING_COMMAND,
+        folder: Path | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._settings = settings
+        self._command = tuple(command)
+        self.step_times = StepTimes(settings, self, timing_command)
+        self.setup = TrainingSetupModel(settings, self.step_times, self)
+        chosen = settings.stored("training/folder", "")
+        self.library = TrainingLibrary(
+            folder or (Path(chosen) if chosen else user_runs_folder()), self
+        )
+        self.pair_maker = PairMaker(self.library.folder.parent / "pairs", self, command)
+        self.pair_maker.changed.connect(self.changed)
+        self.pair_maker.made.connect(self.setup.add_store)
+        self.pair_maker.failed.connect(self.failed)
+        self._follower: TrainingFollower | None = None
+        self._was_under_way = False
+        self._looking_for_runs = False
+        self._watched = False
+        self._timer = QTimer(self)
+        self._timer.setInterval(_LIBRARY_MS)
+        self._timer.timeout.connect(self.library.refresh)
+        self.library.changed.connect(self.changed)
+        self.library.refreshed.connect(self._take_up)
+        self.setup.changed.connect(self.changed)
+        self._timing = PatientTiming(self.step_times, self._to_be_timed, self)
+        self.setup.changed.connect(self._timing.wait)
+
+    # --- what is known --------------------------------------------------------------------
+
+    @property
+    def run(self) -> TrainingFollower | None:
+        """The run in view; None while a new one is being set up."""
+        return self._follower
+
+    @property
+    def under_way(self) -> bool:
+        """Whether the run in view has a process."""
+        return self._follower is not None and self._follower.known and self._follower.under_way
+
+    def to_be_left(self) -> TrainingFollower | None:
+        """The run that would go on when the window is closed, brought into view.
+
+        What was started from a terminal is nobody's business here unless it is in view.
+        """
+        if not self.under_way:
+            live = self.library.live
+            if live is None or not output_of(live.path).exists():
+                return None
+            self.select(live.path)
+        return self._follower
+
+    @property
+    def mark(self) -> str:
+        """How far the run in view is, in a word; empty when none is under way."""
+        if not self.under_way or self._follower is None:
+            return ""
+        share = self._follower.history.share
+        if self._follower.phase == "paused":
+            return "paused"
+        return "…" if share is None else f"{100 * share:.0f} %"
+
+    @property
+    def closing(self) -> Closing:
+        """What happens to the run when the window is closed."""
+        stored = self._settings.stored("training/closing", "ask")
+        return next((name for name in CLOSING if name == stored), "ask")
+
+    def set_closing(self, closing: Closing) -> None:
+        """Choose what happens to the run when the window is closed."""
+        self._settings.set_value("training/closing", closing)
+        self.changed.emit()
+
+    @property
+    def why_not_start(self) -> str:
+        """Why no run can be started; empty when it can."""
+        live = self.library.live
+        path = self._follower.folder.path if self._follower and self.under_way else None
+        if live is not None or path is not None:
+            name = (path or live.path).name  # type: ignore[union-attr]
+            return f"{name} is being trained. Wait for it, or stop it."
+        return self.setup.problem
+
+    @property
+    def command(self) -> str:
+        """What is set up, as a command for a terminal.
+
+        Raises
+        ------
+        Sd2Error
+            When it cannot be started.
+        """
+        config = self.setup.config
+        return quoted(train_arguments(config, Path(new_run_folder(Path(), config).name)))
+
+    def set_watched(self, watched: bool) -> None:
+        """Somebody looks at the panel, or no longer: a step is timed for nobody else."""
+        self._watched = watched
+        if watched:
+            self.setup.refresh()
+            self.library.refresh()
+        self._timing.look()
+
+    def _to_be_timed(self) -> StepKey | None:
+        wanted = self._watched and self._follower is None and not self.why_not_start
+        return self.setup.step_key if wanted else None
+
+    # --- one run after another ------------------------------------------------------------
+
+    def look_for_runs(self) -> None:
+        """At the start of the program: find what is under way, or what was in view last."""
+        self._looking_for_runs = True
+        self.library.refresh()
+        self._timer.start()
+
+    def select(self, path: Path | None) -> None:
+        """Show a run; None is a new one, to be set up."""
+        if path is None:
+            self._follow(None)
+            self._settings.set_value("training/run", "")
+        elif self._follower is None or self._follower.folder.path != path:
+            self._follow(TrainingFollower(path, self))
+
+    def open_run(self, path: Path) -> None:
+        """Show a run that lies elsewhere.
+
+        Raises
+        ------
+        Sd2Error
+            When there is none.
+        """
+        RunFolder(path).state()
+        self.select(path)
+
+    def start(self) -> None:
+        """Begin as it is set up.
+
+        Raises
+        ------
+        Sd2Error
+            When it cannot be started.
+        OSError
+            When the folder of the runs cannot be made.
+        """
+        if self.why_not_start:
+            raise Sd2Error(self.why_not_start)
+        config = self.setup.config
+        self.step_times.stop()
+        self.library.folder.mkdir(parents=True, exist_ok=True)
+        path = new_run_folder(self.library.folder, config)
+        self._launch(path, train_arguments(config, path))
+
+    def resume(self) -> None:
+        """Go on with the run in view where it ended; raises what :meth:`start` does."""
+        run = self._follower
+        if run is None or run.under_way:
+            return
+        if self.library.live is not None:
+            raise Sd2Error(self.why_not_start)
+        self._launch(run.folder.path, resume_arguments(run.folder.path))
+
+    def _launch(self, path: Path, arguments: list[str]) -> None:
+        # What moves on the screen comes first: the training gets by with one processor.
+        pid = launch([*self._command, *arguments], output_of(path), ONE_THREAD)
+        self._follow(TrainingFollower(path, self, pid=pid))
+        self.library.refresh()
+
+    # --- steering -------------------------------------------------------------------------
+
+    def pause(self) -> None:
+        """Rest, and give the processor back; the memory is kept."""
+        self._attempt(lambda run: run.tell("pause"))
+
+    def go_on(self) -> None:
+        """End the pause."""
+        self._attempt(lambda run: run.tell("run"))
+
+    def stop(self) -> None:
+        """End it now, and keep the best model so far."""
+        self._attempt(lambda run: run.tell("stop"))
+
+    def cancel(self) -> None:
+        """End it now, and delete what it made."""
+        self._attempt(lambda run: run.tell("cancel"))
+
+    def delete(self) -> None:
+        """Delete the run in view, which has ended, with its model."""
+        run = self._follower
+        if run is not None and not run.under_way:
+            self._attempt(lambda run: run.delete())
+            self.select(None)
+            self.library.refresh()
+
+    def close(self) -> None:
+        """Look no more; what is being trained goes on."""
+        self._timer.stop()
+        self._timing.stop()
+        self.pair_maker.close()
+        self.setup.close()
+        self.library.close()
+        if self._follower is not None:
+            self._follower.close()
+
+    def _attempt(self, work: Callable[[TrainingFollower], None]) -> None:
+        if self._follower is not None:
+            try:
+                work(self._follower)
+            except (OSError, Sd2Error) as error:
+                self.failed.emit(str(error))
+
+    # --- following ------------------------------------------------------------------------
+
+    def _follow(self, follower: TrainingFollower | None) -> None:
+        if self._follower is not None:
+            self._follower.close()
+            self._follower.deleteLater()
+        self._follower = follower
+        self._was_under_way = False
+        if follower is not None:
+            self._settings.set_value("training/run", str(follower.folder.path))
+            follower.changed.connect(self._tell)
+            follower.phase_changed.connect(self._notice)
+        self.phase_changed.emit()
+        self.changed.emit()
+
+    def _tell(self) -> None:
+        run = self._follower
+        if run is not None and run.under_way and run.history.epoch_points:
+            self._learn_step_time(run)
+        self.changed.emit()
+
+    def _notice(self) -> None:
+        run = self._follower
+        if run is None:
+            return
+        if run.phase == "gone":
+            # Cancelled: there is nothing to show any more.
+            self.library.refresh()
+            self.select(None)
+            return
+        ended = run.known and self._was_under_way and not run.under_way
+        self._was_under_way = run.known and run.under_way
+        self.library.refresh()
+        self.phase_changed.emit()
+        if ended:
+            self._learn_step_time(run)
+            self._say_ended(run)
+
+    def _say_ended(self, run: TrainingFollower) -> None:
+        if self._watched:
+            return  # it is seen
+        name = run.folder.path.name
+        if run.phase == "finished":
+            self.noted.emit(f"{name} is trained. The Train panel puts its model to use.")
+        elif run.phase in ("failed", "died"):
+            self.failed.emit(f"{name} could not be trained to its end. The Train panel says more.")
+
+    def _learn_step_time(self, run: TrainingFollower) -> None:
+        """What a step takes here is the best estimate for the next run."""
+        step_s, config = run.history.step_s, run.config
+        if step_s is not None and config is not None:
+            key = StepKey.of_denoiser(config.model.name, config.training.batch_size)
+            self.step_times.learn(key, step_s)
+
+    def _take_up(self) -> None:
+        """After the first look at all runs."""
+        if not self._looking_for_runs:
+            return
+        self._looking_for_runs = False
+        live = self.library.live
+        if live is not None:
+            self.select(live.path)
+            self.noted.emit(f"{live.path.name} is being trained. The Train panel shows it.")
+            return
+        last = self._settings.stored("training/run", "")
+        # It may lie elsewhere.
+        if last and RunFolder(Path(last)).exists:
+            self.select(Path(last))

@@ -1,0 +1,82 @@
+"""The Train panel: a new run to be set up, or one that is under way or has ended."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from PySide6.QtWidgets import QWidget
+
+from sd2app.session.display import DisplayModel
+from sd2app.training.improvement_view import TrainingGainView
+from sd2app.training.model import TrainingModel
+from sd2app.training.result import TrainingUse
+from sd2app.training.run_view import TrainingRunView
+from sd2app.training.setup_view import TrainingSetupView
+from sd2app.widgets.run_list import RunPanel
+
+
+class Asks(Protocol):
+    """What the panel leaves to dialogs."""
+
+    def ask_store(self) -> None:
+        """Let the user choose a store of pairs."""
+
+    def ask_recordings(self) -> None:
+        """Let the user choose recordings to make pairs of."""
+
+    def start(self) -> None:
+        """Begin as it is set up."""
+
+    def copy_command(self) -> None:
+        """Put the command on the clipboard."""
+
+    def use(self) -> None:
+        """Use the model of the run in view."""
+
+    def open_run(self) -> None:
+        """Let the user choose a run that lies elsewhere."""
+
+    def resume(self) -> None:
+        """Go on with the run in view."""
+
+    def delete(self) -> None:
+        """Ask, then delete the run in view."""
+
+
+class TrainingPanel(RunPanel):
+    """Trainings of denoisers; the model that is in use says what it gains."""
+
+    def __init__(
+        self,
+        training: TrainingModel,
+        use: TrainingUse,
+        display: DisplayModel,
+        asks: Asks,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(
+            training,
+            lambda: [(known.path, known.title) for known in training.library.runs],
+            lambda: training.run.folder.path if training.run is not None else None,
+            "Runs: those under way, and those that have ended",
+            asks.open_run,
+            parent,
+        )
+        self._training, self._use = training, use
+        self._gain = TrainingGainView(use, self)
+        self._run_view = TrainingRunView(
+            training, display, asks.use, asks.resume, asks.delete, self._gain, self
+        )
+        setup = TrainingSetupView(
+            training, asks.ask_store, asks.ask_recordings, asks.start, asks.copy_command, self
+        )
+        self.fill(setup, self._run_view)
+        use.changed.connect(self.refresh)
+
+    def refresh(self) -> None:
+        """Follow the models."""
+        super().refresh()
+        run = self._training.run
+        in_use = run is not None and self._use.run == run.folder.path
+        self._gain.setVisible(in_use)
+        self._run_view.set_in_use(in_use)

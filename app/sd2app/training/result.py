@@ -1,0 +1,259 @@
+"""A trained model put to use, and what it gains over what was there before."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QObject, QTimer, Signal, SignalInstance
+
+from sd2app.session.tracks import TrackModel
+from sd2app.training.model import TrainingModel
+from sd2core.doppler_map import DopplerMap
+from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_write
+
+CALM_MS = 150
+
+
+class Denoising(Protocol):
+    """What is asked of the model that denoises the recording."""
+
+    changed: SignalInstance
+
+    @property
+    def path(self) -> Path | None:
+        """File of the model in use."""
+
+    @property
+    def busy(self) -> bool:
+        """Whether a map is on its way."""
+
+    @property
+    def comparing(self) -> bool:
+        """Whether the map of the model before is shown as well."""
+
+    def use(self, path: Path | None) -> None:
+        """Denoise with a model, or with none."""
+
+    def set_comparing(self, comparing: bool) -> None:
+        """Show the map of the model before as well, or not."""
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Mean error of the peak velocity per frame, against the radar's map of the recording.
+
+    Parameters
+    ----------
+    plain_mps : float
+        Of the synthetic map as it is.
+    before_mps : float or None
+        Of the model that was in use before; None where there was none.
+    now_mps : float
+    before_title : str
+    frames : int
+        That could be judged.
+    simulated : bool
+        Whether the radar's map is simulated.
+    """
+
+    plain_mps: float
+    before_mps: float | None
+    now_mps: float
+    before_title: str
+    frames: int
+    simulated: bool
+
+
+class TrainingUse(QObject):
+    """Keeps the best model of a run among the user's models, and denoises with it.
+
+    Parameters
+    ----------
+    training : TrainingModel
+    denoise : Denoising
+    plain, before, now, radar : TrackModel
+        The synthetic map, that denoised by the model before, by the model in use, and
+        the radar's.
+    models : callable
+        Folder of the user's models.
+
+    Signals
+    -------
+    changed
+        What is in use, or what it gains.
+    noted, failed : str
+        Sentences for the user.
+    """
+
+    changed = Signal()
+    noted = Signal(str)
+    failed = Signal(str)
+
+    def __init__(
+        self,
+        training: TrainingModel,
+        denoise: Denoising,
+        plain: TrackModel,
+        before: TrackModel,
+        now: TrackModel,
+        radar: TrackModel,
+        models: Callable[[], Path],
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._training = training
+        self._denoise = denoise
+        self._plain, self._before, self._now, self._radar = plain, before, now, radar
+        self._models = models
+        self._kept: Path | None = None
+        self._run: Path | None = None
+        self._previous: Path | None = None
+        self._gain: Gain | None = None
+        self._before_mps: float | None = None
+        # Maps change many times while one is denoised piece by piece.
+        self._calm = QTimer(self)
+        self._calm.setSingleShot(True)
+        self._calm.setInterval(CALM_MS)
+        self._calm.timeout.connect(self._compare)
+        for signal in (denoise.changed, now.changed, before.changed, radar.changed):
+            signal.connect(self._wait)
+
+    # --- what is known --------------------------------------------------------------------
+
+    @property
+    def run(self) -> Path | None:
+        """The run whose model is in use; None when it is another one's."""
+        return self._run if self._kept is not None and self._denoise.path == self._kept else None
+
+    @property
+    def gain(self) -> Gain | None:
+        """What it gains; None until it is known, or where no radar was there."""
+        return self._gain if self.run is not None else None
+
+    @property
+    def has_radar(self) -> bool:
+        """Whether there is a map of a radar to compare with."""
+        return self._radar.map is not None
+
+    @property
+    def comparing(self) -> bool:
+        """Whether the map of the model before is shown as well."""
+        return self._denoise.comparing
+
+    @property
+    def can_compare(self) -> bool:
+        """Whether there was a model before."""
+        return self._previous is not None
+
+    # --- what one can do ------------------------------------------------------------------
+
+    def use(self) -> None:
+        """Denoise with the best model of the run in view, beside what was there before."""
+        run = self._training.run
+        if run is None or not run.has_model:
+            return
+        try:
+            kept = self._keep(run.folder.path.name, run.folder.best)
+            previous = self._denoise.path
+            self._denoise.use(kept)
+        except (OSError, Sd2Error) as error:
+            self.failed.emit(str(error))
+            return
+        self._kept, self._run = kept, run.folder.path
+        if previous != kept:
+            self._previous = previous
+        self._gain = self._before_mps = None
+        if self._denoise.path != kept:
+            self.noted.emit(
+                f"The model is kept as {kept.stem}. Open a recording to denoise it with that."
+            )
+        else:
+            self._denoise.set_comparing(self._previous is not None)
+        self._compare()
+
+    def go_back(self) -> None:
+        """Denoise with what was in use before."""
+        try:
+            self._denoise.use(self._previous)
+            self._denoise.set_comparing(False)
+        except Sd2Error as error:
+            self.failed.emit(str(error))
+        self.changed.emit()
+
+    def set_comparing(self, comparing: bool) -> None:
+        """Show the map of the model before as well, or not."""
+        self._denoise.set_comparing(comparing)
+
+    def close(self) -> None:
+        """Compare no more."""
+        self._calm.stop()
+
+    def _keep(self, name: str, best: Path) -> Path:
+        """Copy it to where it is found by name, whatever becomes of the run."""
+        folder = self._models()
+        folder.mkdir(parents=True, exist_ok=True)
+        kept = folder / f"{name}{best.suffix}"
+        with atomic_write(kept) as stream:
+            stream.write(best.read_bytes())
+        return kept
+
+    # --- what it gains --------------------------------------------------------------------
+
+    def _wait(self) -> None:
+        if self._kept is not None:
+            self._calm.start()
+
+    def _compare(self) -> None:
+        plain, now, radar = self._plain.map, self._now.map, self._radar.map
+        ready = self.run is not None and not self._denoise.busy
+        if ready and plain is not None and now is not None and radar is not None:
+            target = _radar_at(plain, radar, self._radar.offset_s)
+            before = self._before.map
+            if before is not None:
+                self._before_mps = _peak_error(before, *target)[0]
+            plain_mps, frames = _peak_error(plain, *target)
+            now_mps, _ = _peak_error(now, *target)
+            gain = Gain(
+                plain_mps,
+                self._before_mps,
+                now_mps,
+                self._previous.stem if self._previous is not None else "",
+                frames,
+                radar.kind == "simulated",
+            )
+            # Without a frame in which the radar saw a movement there is nothing to tell.
+            self._gain = gain if frames else None
+        elif radar is None:
+            self._gain = None
+        self.changed.emit()
+
+
+def _radar_at(
+    doppler: DopplerMap, radar: DopplerMap, offset_s: float
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """What the radar saw at the frames of a map, (frames, bins), and where it was on."""
+    times_s = doppler.timebase.times_s
+    there_s = radar.timebase.times_s + offset_s
+    right = np.clip(np.searchsorted(there_s, times_s), 1, max(len(there_s) - 1, 1))
+    left = right - 1
+    right = np.minimum(right, len(there_s) - 1)
+    nearest = np.where(times_s - there_s[left] < there_s[right] - times_s, left, right)
+    spacing_s = np.median(np.diff(there_s)) if len(there_s) > 1 else 1.0
+    inside = np.abs(there_s[nearest] - times_s) <= 0.51 * spacing_s
+    return radar.values.T[nearest], inside
+
+
+def _peak_error(
+    doppler: DopplerMap, target: NDArray[np.float32], inside: NDArray[np.bool_]
+) -> tuple[float, int]:
+    """Mean error of the peak velocity in m/s, and of how many frames."""
+    from sd2core.denoise.metrics import peak_error
+
+    error = peak_error(doppler.values.T, target, doppler.axis, inside)
+    return error.mae_mps, error.frames

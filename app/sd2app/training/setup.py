@@ -1,0 +1,288 @@
+"""What a training run is to be: pairs, kind of model, settings, and how long it will take."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtCore import QObject, Signal
+
+from sd2app.background.latest import LatestRunner
+from sd2app.background.step_times import StepKey, StepTime, StepTimes
+from sd2app.settings import Settings
+from sd2app.stored_choices import StoredChoices
+from sd2core.errors import Sd2Error
+from sd2core.files.paths import plain_path
+from sd2core.pairs.summary import PairFacts, pair_facts
+from sd2core.train.config import (
+    DataConfig,
+    MachineConfig,
+    ModelConfig,
+    TrainConfig,
+    TrainingConfig,
+)
+from sd2core.train.data import Split, split_subjects
+
+MODELS = ("s4", "s4d", "gru", "unet", "swin", "s4-serial")
+_DATA = DataConfig(pairs=(Path(),))
+_DEFAULTS: dict[str, str | int | float] = {
+    "model": "s4",
+    "epochs": TrainingConfig().epochs,
+    "batch_size": TrainingConfig().batch_size,
+    "learning_rate": TrainingConfig().learning_rate,
+    "early_stopping_epochs": 0,
+    "range_factor": 1.0,
+    "seed": TrainingConfig().seed,
+}
+"""The paper's, where it has them; nought epochs of patience is no early stopping."""
+
+
+@dataclass(frozen=True)
+class Store:
+    """A store of pairs that was chosen.
+
+    Parameters
+    ----------
+    path : Path
+    facts : PairFacts or None
+        None while it is being read, and where it cannot be.
+    problem : str
+        Why it cannot be used.
+    """
+
+    path: Path
+    facts: PairFacts | None = None
+    problem: str = ""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """How long a run will take, and where that is known from.
+
+    Parameters
+    ----------
+    segments : int
+        To learn from, once per epoch.
+    steps_per_epoch : int
+    step : StepTime or None
+        None until a step has been timed.
+    seconds : float or None
+    """
+
+    segments: int
+    steps_per_epoch: int
+    step: StepTime | None
+    seconds: float | None
+
+
+class TrainingSetupModel(QObject):
+    """The choices, kept from one start to the next."""
+
+    changed = Signal()
+
+    def __init__(
+        self, settings: Settings, step_times: StepTimes, parent: QObject | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._settings = settings
+        self._times = step_times
+        self._values = StoredChoices(settings, "training", _DEFAULTS, {"model": MODELS})
+        self._stores: tuple[Store, ...] = tuple(
+            Store(path) for path in settings.paths("training/pairs")
+        )
+        self._runner = LatestRunner("pairs", self)
+        self._runner.finished.connect(self._take)
+        step_times.changed.connect(self.changed)
+        self._read()
+
+    # --- what is chosen -------------------------------------------------------------------
+
+    @property
+    def stores(self) -> tuple[Store, ...]:
+        """Stores of pairs to learn from."""
+        return self._stores
+
+    @property
+    def reading(self) -> bool:
+        """Whether a store has not been looked into yet."""
+        return self._runner.busy
+
+    @property
+    def known_stores(self) -> list[Path]:
+        """Stores that were chosen before."""
+        chosen = {store.path for store in self._stores}
+        return [path for path in self._settings.paths("training/known_pairs") if path not in chosen]
+
+    def value(self, name: str) -> Any:
+        """One of the settings."""
+        return self._values[name]
+
+    @property
+    def differs(self) -> bool:
+        """Whether a setting, the kind of model apart, is not as the paper has it."""
+        return bool(self._values.others.keys() - {"model"})
+
+    def set_value(self, name: str, value: Any) -> None:
+        """Choose a setting.
+
+        Raises
+        ------
+        KeyError
+            When there is no such setting.
+        """
+        if self._values.set(name, value):
+            self.changed.emit()
+
+    def reset(self) -> None:
+        """All settings but the kind of model as they were at first."""
+        for name, default in _DEFAULTS.items():
+            if name != "model":
+                self.set_value(name, default)
+
+    def add_store(self, path: Path) -> None:
+        """Learn from these pairs as well."""
+        path = plain_path(path)
+        if path.name == "zarr.json":
+            path = path.parent
+        if path not in [store.path for store in self._stores]:
+            self._stores = (*self._stores, Store(path))
+            known = [path, *(one for one in self._settings.paths("training/known_pairs"))]
+            self._settings.set_paths("training/known_pairs", list(dict.fromkeys(known))[:10])
+            self._keep_stores()
+
+    def remove_store(self, path: Path) -> None:
+        """Do not learn from these."""
+        self._stores = tuple(store for store in self._stores if store.path != path)
+        self._keep_stores()
+
+    def _keep_stores(self) -> None:
+        self._settings.set_paths("training/pairs", [store.path for store in self._stores])
+        self._read()
+        self.changed.emit()
+
+    def refresh(self) -> None:
+        """Look into the stores again: a campaign grows while it is being made."""
+        self._read()
+
+    def close(self) -> None:
+        """Stop reading."""
+        self._runner.close()
+
+    # --- what follows ---------------------------------------------------------------------
+
+    @property
+    def problem(self) -> str:
+        """Why it cannot be started; empty when it can."""
+        if not self._stores:
+            return "Add pairs to learn from."
+        problems = [store.problem for store in self._stores if store.problem]
+        if problems:
+            return problems[0]
+        facts = [store.facts for store in self._stores if store.facts is not None]
+        if len(facts) < len(self._stores):
+            return "Reading the pairs…"
+        if len({(one.bins, one.v_max_mps, one.frame_rate_hz) for one in facts}) > 1:
+            return (
+                "These pairs differ in their velocity axis or frame rate. Choose pairs of one kind."
+            )
+        division = self.division
+        if division is not None and division.by_take and not any(one.divisible for one in facts):
+            return "All of it is one take. Add another to choose the best model by."
+        if not self.estimate.segments:
+            return "Every take is shorter than one segment of 72 frames."
+        return ""
+
+    @property
+    def config(self) -> TrainConfig:
+        """As the library takes it.
+
+        Raises
+        ------
+        Sd2Error
+            When it cannot be started.
+        """
+        if self.problem:
+            raise Sd2Error(self.problem)
+        values = self._values
+        return TrainConfig(
+            DataConfig(
+                pairs=tuple(store.path for store in self._stores),
+                range_factor=values["range_factor"],
+            ),
+            ModelConfig(name=values["model"]),
+            TrainingConfig(
+                batch_size=values["batch_size"],
+                epochs=values["epochs"],
+                learning_rate=values["learning_rate"],
+                early_stopping_epochs=values["early_stopping_epochs"] or None,
+                seed=values["seed"],
+            ),
+            MachineConfig(threads=1, nice=10),
+        )
+
+    @property
+    def step_key(self) -> StepKey:
+        """What the time of a step depends on."""
+        return StepKey.of_denoiser(self._values["model"], self._values["batch_size"])
+
+    @property
+    def estimate(self) -> Estimate:
+        """How long it will take."""
+        segments = self._segments()
+        steps = -(-segments // self._values["batch_size"])
+        step = self._times.of(self.step_key)
+        seconds = None
+        if step is not None and steps:
+            seconds = step.seconds * steps * self._values["epochs"]
+        return Estimate(segments, steps, step, seconds)
+
+    @property
+    def division(self) -> Split | None:
+        """Who is learnt from and who is kept out; None until the pairs are known."""
+        people = self._people()
+        return split_subjects([name for name, _, _ in people]) if people else None
+
+    def _people(self) -> list[tuple[str, PairFacts, str]]:
+        """Everybody, as the library calls them, with their store and their name in it."""
+        found = [store.facts for store in self._stores if store.facts is not None]
+        names = [subject for facts in found for subject in facts.subjects]
+        return [
+            (
+                f"{facts.path.stem}:{subject}" if names.count(subject) > 1 else subject,
+                facts,
+                subject,
+            )
+            for facts in found
+            for subject in facts.subjects
+        ]
+
+    def _segments(self) -> int:
+        """To learn from."""
+        division = self.division
+        if division is None:
+            return 0
+        count = sum(
+            facts.segments([subject], _DATA.segment_frames, _DATA.overlap_frames)
+            for name, facts, subject in self._people()
+            if name in division.training
+        )
+        return round(0.8 * count) if division.by_take else count
+
+    # --- reading --------------------------------------------------------------------------
+
+    def _read(self) -> None:
+        paths = [store.path for store in self._stores]
+        if paths:
+            self._runner.submit(lambda emit: [_looked_into(path) for path in paths])
+
+    def _take(self, stores: list[Store]) -> None:
+        self._stores = tuple(stores)
+        self.changed.emit()
+
+
+def _looked_into(path: Path) -> Store:
+    try:
+        return Store(path, pair_facts(path))
+    except (Sd2Error, OSError) as error:
+        return Store(path, problem=str(error))

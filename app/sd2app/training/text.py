@@ -1,0 +1,278 @@
+"""Durations, phases and kinds of model in words."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import TYPE_CHECKING
+
+from sd2app.training.history import EpochPoint
+from sd2app.training.phase import Phase
+
+if TYPE_CHECKING:
+    from sd2app.background.step_times import StepKey, StepTime, StepTimes
+    from sd2app.training.history import TrainingHistory
+    from sd2app.training.result import Gain
+    from sd2app.training.run import TrainingFollower
+    from sd2core.pairs.summary import PairFacts
+    from sd2core.train.data import Split
+    from sd2core.train.folder import State
+
+MODEL_WORDS = {
+    "s4": ("S4", "The paper's: a structured state space. It also runs frame by frame."),
+    "s4d": ("S4, diagonal", "S4 with a diagonal state matrix: faster, often as good."),
+    "s4-serial": ("S4, serialised", "All cells as one long channel; slow, kept for comparison."),
+    "gru": ("GRU", "A recurrent network of the same size. It also runs frame by frame."),
+    "unet": ("U-Net", "Convolutions over windows of 72 frames."),
+    "swin": ("Swin transformer", "Attention over windows of 72 frames."),
+}
+
+_PHASES: dict[Phase, str] = {
+    "starting": "Starting…",
+    "running": "Training",
+    "pausing": "Pausing…",
+    "paused": "Paused",
+    "resuming": "Going on…",
+    "stopping": "Stopping, the best model is kept…",
+    "cancelling": "Cancelling…",
+    "finished": "Finished",
+    "stopped": "Stopped",
+    "failed": "Failed",
+    "died": "Ended unexpectedly",
+    "gone": "Cancelled",
+}
+
+
+def model_name(model: str) -> str:
+    """What a kind of model is called."""
+    return MODEL_WORDS.get(model, (model, ""))[0]
+
+
+def phase_text(phase: Phase) -> str:
+    """How a run stands."""
+    return _PHASES[phase]
+
+
+def state_text(state: State) -> str:
+    """How a run stands, in a list."""
+    return {"died": "ended unexpectedly", "running": "training"}.get(state, state)
+
+
+def duration_text(seconds: float) -> str:
+    """Rounded as an estimate deserves."""
+    if seconds < 10:
+        return "a few seconds"
+    if seconds < 57.5:
+        return f"{5 * round(seconds / 5)} s"
+    if seconds < 3570:
+        return f"{max(round(seconds / 60), 1)} min"
+    hours, minutes = divmod(round(seconds / 60), 60)
+    if hours < 10:
+        return f"{hours} h {minutes} min" if minutes else f"{hours} h"
+    if hours < 48:
+        return f"{round(seconds / 3600)} h"
+    return f"{seconds / 86400:.1f} days"
+
+
+def about(seconds: float) -> str:
+    """A duration, called an estimate."""
+    text = duration_text(seconds)
+    return text if text.startswith("a ") else f"about {text}"
+
+
+def exact_text(seconds: float) -> str:
+    """Time that has passed."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
+
+
+def clock_text(unix_s: float) -> str:
+    """Date and time, without the date when it is today's."""
+    then, now = time.localtime(unix_s), time.localtime()
+    if then[:3] == now[:3]:
+        return time.strftime("%H:%M", then)
+    return time.strftime("%Y-%m-%d %H:%M", then)
+
+
+def point_text(point: EpochPoint) -> str:
+    """What an epoch came to, a line each."""
+    lines = [f"Epoch {point.epoch}" + (", better than all before" if point.best else "")]
+    for name, value, unit in (
+        ("Training RMSE", point.train_rmse, ""),
+        ("Validation RMSE", point.validation_rmse, ""),
+        ("Peak velocity off by", point.validation_mae_mps, " m/s on average"),
+    ):
+        if math.isfinite(value):
+            lines.append(f"{name} {error_text(value)}{unit}")
+    return "\n".join(lines)
+
+
+def error_text(value: float) -> str:
+    """An error with three digits."""
+    return f"{value:.3g}" if value < 1000 else f"{value:.0f}"
+
+
+def store_text(facts: PairFacts | None) -> str:
+    """What a store of pairs holds."""
+    if facts is None:
+        return "…"
+    people = len(facts.subjects)
+    parts = [
+        facts.kind,
+        f"{people} {'person' if people == 1 else 'people'}",
+        duration_text(facts.duration_s),
+    ]
+    if facts.placements > 1:
+        parts.append(f"{facts.placements} placements")
+    return " · ".join(parts)
+
+
+def division_text(
+    division: Split, judged_by: str = "sd2 eval", kept_takes: str = "the last takes"
+) -> str:
+    """Who is learnt from, and who is not; ``kept_takes`` choose where there is one person."""
+    if division.by_take:
+        return (
+            f"All of it is of one person: {kept_takes} choose the best model, and how good it is"
+            " with other people stays unknown."
+        )
+    count = len(division.training)
+    text = f"Learns from {count} {'person' if count == 1 else 'people'}"
+    text += f"; the best model is chosen by {_listed(division.validation)}"
+    if division.test:
+        text += f"; {_listed(division.test)} kept for {judged_by}"
+    return text + "."
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    if len(names) > 3:
+        return f"{len(names)} others"
+    return " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
+
+
+def estimate_text(seconds: float | None) -> str:
+    """How long it will take."""
+    return "Time: not known yet" if seconds is None else f"Takes {about(seconds)}"
+
+
+def estimate_source_text(count: str, step: StepTime | None, key: StepKey, times: StepTimes) -> str:
+    """Where that is known from; ``count`` says of what, and ends with the number of steps."""
+    if step is not None:
+        known = "as in the last run here" if step.source == "run" else "timed here"
+        return f"{count} of about {step_text(step.seconds)}, {known}."
+    if times.timing == key:
+        return f"{count}. Timing a few of them…"
+    why_not = times.why_not(key)
+    return f"{count}. They could not be timed: {why_not}" if why_not else f"{count}."
+
+
+def steps_text(steps: int) -> str:
+    """Such as ``160 steps``."""
+    return f"{steps:,} {'step' if steps == 1 else 'steps'}"
+
+
+def step_text(seconds: float) -> str:
+    """Time of a step."""
+    if seconds >= 0.95:
+        return f"{seconds:.1f} s"
+    return f"{float(f'{1000 * seconds:.2g}'):g} ms"
+
+
+def headline(run: TrainingFollower) -> str:
+    """How a run stands, and how far it is."""
+    phase, history = run.phase, run.history
+    if not run.known:
+        return "Looking…"
+    text = phase_text(phase)
+    if phase in ("running", "pausing", "paused", "resuming") and history.epoch:
+        of = f" of {history.epochs:,}" if history.epochs else ""
+        return f"{text} · epoch {history.epoch:,}{of}"
+    if phase in ("finished", "stopped", "failed", "died") and history.epoch_points:
+        done = history.epoch_points[-1].epoch
+        return f"{text} after {done:,} {'epoch' if done == 1 else 'epochs'}"
+    return text
+
+
+def time_text(run: TrainingFollower) -> str:
+    """Time that has passed, and what is left."""
+    history, parts = run.history, []
+    if run.phase in ("running", "pausing", "paused", "resuming") and history.left_s is not None:
+        parts.append(f"{about(history.left_s)} left")
+    if history.elapsed_s is not None:
+        parts.append(f"{exact_text(history.elapsed_s)} so far" if parts else "")
+        parts[-1] = parts[-1] or f"trained for {exact_text(history.elapsed_s)}"
+    return " · ".join(parts)
+
+
+def remedy_text(run: TrainingFollower) -> str:
+    """What to do about a run that has not come to its end."""
+    if run.phase == "died":
+        text = "Its process is gone: it was killed, or the machine was switched off."
+        if run.resumable:
+            return f"{text} Resume goes on from the last checkpoint, with the same result."
+        return f"{text} It had not come to its first checkpoint: start it again."
+    if run.phase == "failed" and run.has_model:
+        return "The best model up to then is kept."
+    if run.phase == "stopped" and run.has_model:
+        return "The best model is kept. Resume goes on where it ended."
+    return ""
+
+
+def metric_rows(history: TrainingHistory) -> list[tuple[str, str]]:
+    """The best epoch in figures."""
+    best = history.best
+    if best is None:
+        return []
+    rows = [("Best epoch", f"{best.epoch:,}")]
+    if math.isfinite(best.validation_rmse):
+        rows.append(("Validation RMSE", error_text(best.validation_rmse)))
+    if math.isfinite(best.validation_mae_mps):
+        rows.append(("Peak velocity, MAE", f"{error_text(best.validation_mae_mps)} m/s"))
+    return rows
+
+
+def about_text(run: TrainingFollower) -> str:
+    """What is being trained, on what."""
+    history, config = run.history, run.config
+    parts = [model_name(history.model)] if history.model else []
+    if history.parameters:
+        parts.append(f"{history.parameters:,} parameters")
+    if config is not None:
+        parts.append(", ".join(path.name for path in config.data.pairs))
+        parts.append(f"batch {config.training.batch_size}, seed {config.training.seed}")
+    if history.segments:
+        parts.append(f"{history.segments:,} segments")
+    if history.device:
+        parts.append("GPU" if history.device.startswith("cuda") else history.device.upper())
+    return " · ".join(parts)
+
+
+def gain_summary(gain: Gain | None, has_radar: bool) -> str:
+    """What the figures below are, or why there are none."""
+    if gain is not None:
+        radar = "the simulated radar's" if gain.simulated else "the radar's"
+        worse = " Here it is worse than no denoising." if gain.now_mps > gain.plain_mps else ""
+        return (
+            f"Peak velocity off {radar}, on average over {gain.frames:,} frames of this"
+            f" recording.{worse}"
+        )
+    if not has_radar:
+        return "Open a recording with a radar capture to see how much nearer it comes to that."
+    return "Denoising this recording…"
+
+
+def gain_rows(gain: Gain) -> list[tuple[str, str]]:
+    """Before and after."""
+
+    def row(name: str, value_mps: float) -> tuple[str, str]:
+        text = f"{value_mps:.3f} m/s"
+        if name != "not denoised" and gain.plain_mps > 0:
+            change = round(100 * (value_mps / gain.plain_mps - 1))
+            text += f" ({change:+d} %)".replace("-", "−")
+        return name, text
+
+    rows = [row("not denoised", gain.plain_mps)]
+    if gain.before_mps is not None:
+        rows.append(row(f"before, {gain.before_title}", gain.before_mps))
+    return [*rows, row("this model", gain.now_mps)]

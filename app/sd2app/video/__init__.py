@@ -1,0 +1,1 @@
+"""The video and what is drawn over it."""

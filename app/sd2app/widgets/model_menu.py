@@ -1,0 +1,220 @@
+"""Models to choose from, as a menu, and as a button that says which one is in use."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+from PySide6.QtCore import Qt, SignalInstance
+from PySide6.QtGui import QAction, QActionGroup
+from PySide6.QtWidgets import QMenu, QToolButton, QWidget
+
+from sd2app.classify.model import ClassifyModel
+from sd2app.classify.text import classifier_title, learned_text, network_text
+from sd2app.denoise.model import DenoiseModel
+from sd2app.denoise.text import kind_words, model_title, origin_words
+
+Use = Callable[[Path | None], None]
+
+_LONGEST = 14
+
+
+class Entry(NamedTuple):
+    """A model in the menu."""
+
+    text: str
+    tip: str
+    path: Path | None
+
+
+class Face(NamedTuple):
+    """What the button says."""
+
+    text: str
+    tip: str
+
+
+class Chooser(Protocol):
+    """What there is to choose from, in words.
+
+    Attributes
+    ----------
+    title : str
+        Of the menu.
+    role : str
+        What a model does, for screen readers.
+    none_tip : str
+        What becomes of it without a model.
+    """
+
+    title: str
+    role: str
+    none_tip: str
+
+    @property
+    def changed(self) -> SignalInstance:
+        """After which the words may be others."""
+
+    @property
+    def path(self) -> Path | None:
+        """The model in use."""
+
+    def entries(self) -> Sequence[Entry]:
+        """The models as they are on disk now."""
+
+    def face(self) -> Face:
+        """Which one is in use."""
+
+
+class DenoiserChooser:
+    """Denoisers."""
+
+    title = "Denoise with"
+    role = "Denoiser"
+    none_tip = "Show no denoised map for this recording"
+
+    def __init__(self, denoise: DenoiseModel) -> None:
+        self._denoise = denoise
+
+    @property
+    def changed(self) -> SignalInstance:
+        """After which the words may be others."""
+        return self._denoise.changed
+
+    @property
+    def path(self) -> Path | None:
+        """The model in use."""
+        return self._denoise.path
+
+    def entries(self) -> Sequence[Entry]:
+        """The models as they are on disk now."""
+        return [
+            Entry(
+                f"{model_title(card)}\t{kind_words(card)}",
+                f"{kind_words(card)}, {origin_words(card)}\n{card.path}",
+                card.path,
+            )
+            for card in self._denoise.available()
+        ]
+
+    def face(self) -> Face:
+        """Which one is in use."""
+        card, path = self._denoise.card, self._denoise.path
+        if self._denoise.problem:
+            return Face("Denoiser not usable", self._denoise.problem)
+        if card is not None:
+            title = model_title(card)
+            return Face(title, f"{title}: {kind_words(card)}, {origin_words(card)}")
+        if path is not None and self._denoise.busy:
+            return Face(f"Loading {path.stem}…", str(path))
+        return Face("No denoiser", "Choose a model that denoises this map")
+
+
+class ClassifierChooser:
+    """Classifiers."""
+
+    title = "Classify with"
+    role = "Classifier"
+    none_tip = "Say nothing of gestures"
+
+    def __init__(self, classify: ClassifyModel) -> None:
+        self._classify = classify
+
+    @property
+    def changed(self) -> SignalInstance:
+        """After which the words may be others."""
+        return self._classify.changed
+
+    @property
+    def path(self) -> Path | None:
+        """The model in use."""
+        return self._classify.path
+
+    def entries(self) -> Sequence[Entry]:
+        """The models as they are on disk now."""
+        return [
+            Entry(
+                f"{classifier_title(card)}\t{network_text(card)}",
+                f"{network_text(card)}, {learned_text(card)}\n{card.path}",
+                card.path,
+            )
+            for card in self._classify.available()
+        ]
+
+    def face(self) -> Face:
+        """Which one is in use."""
+        card, path = self._classify.card, self._classify.path
+        if self._classify.problem:
+            return Face("Classifier not usable", self._classify.problem)
+        if card is not None:
+            title = classifier_title(card)
+            return Face(title, f"{title}: {network_text(card)}, {learned_text(card)}")
+        if path is not None:
+            return Face(f"Loading {path.stem}…", str(path))
+        return Face("No classifier", "Choose a model that says which gesture a frame shows")
+
+
+class ModelMenu(QMenu):
+    """None, every model that is known, and below them what else can be done with one."""
+
+    def __init__(
+        self, chooser: Chooser, use: Use, below: list[QAction], parent: QWidget | None = None
+    ) -> None:
+        super().__init__(chooser.title, parent)
+        self._chooser = chooser
+        self._use = use
+        self._below = below
+        self._group = QActionGroup(self)
+        self.setToolTipsVisible(True)
+        self.aboutToShow.connect(self.fill)
+
+    def fill(self) -> None:
+        """List the models as they are on disk now."""
+        self.clear()
+        path = self._chooser.path
+        none = self.addAction("No model")
+        none.setToolTip(self._chooser.none_tip)
+        none.triggered.connect(lambda: self._use(None))
+        chosen = [(none, path is None)]
+        entries = self._chooser.entries()
+        if entries:
+            self.addSeparator()
+        for entry in entries:
+            action = self.addAction(entry.text)
+            action.setToolTip(entry.tip)
+            action.triggered.connect(lambda _=False, path=entry.path: self._use(path))
+            chosen.append((action, entry.path == path))
+        for action, checked in chosen:
+            action.setCheckable(True)
+            action.setActionGroup(self._group)
+            action.setChecked(checked)
+        self.addSeparator()
+        self.addActions(self._below)
+
+
+class ModelButton(QToolButton):
+    """Says which model is in use; a click lists the others."""
+
+    def __init__(self, chooser: Chooser, menu: ModelMenu, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._chooser = chooser
+        self.setObjectName("model")
+        self.setMenu(menu)
+        self.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        self.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextOnly)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.setCursor(Qt.CursorShape.ArrowCursor)
+        chooser.changed.connect(self._refresh)
+        self._refresh()
+
+    def _refresh(self) -> None:
+        text, tip = self._chooser.face()
+        if len(text) > _LONGEST:
+            text = f"{text[: _LONGEST - 1]}…"
+        self.setText(text)
+        self.setToolTip(tip)
+        self.setAccessibleName(f"{self._chooser.role}: {text}")
+        self.updateGeometry()
+        if self.parentWidget() is not None:
+            self.parentWidget().update()

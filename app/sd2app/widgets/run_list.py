@@ -1,0 +1,92 @@
+"""Runs of one kind: something new to be set up, or one that is under way or has ended."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+from PySide6.QtGui import QHideEvent, QShowEvent
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+
+from sd2app.widgets.panel import outlined
+from sd2app.widgets.run_choice import RunChoice
+
+
+class Runs(Protocol):
+    """The model of such a panel; its signal ``changed`` is followed."""
+
+    changed: Any
+
+    def select(self, path: Path | None) -> None:
+        """Show a run; None is a new one, to be set up."""
+
+    def set_watched(self, watched: bool) -> None:
+        """Somebody looks at the panel, or no longer."""
+
+
+class RunPanel(QWidget):
+    """The list of runs on top, below it the one in view, or what a new one is to be.
+
+    Parameters
+    ----------
+    runs : Runs
+    known : callable
+        Path and title of every run, the newest first.
+    here : callable
+        Path of the run in view; None while a new one is being set up.
+    tip : str
+        What is in the list.
+    open_other : callable, optional
+        Lets the user choose a run that lies elsewhere.
+    """
+
+    def __init__(
+        self,
+        runs: Runs,
+        known: Callable[[], Sequence[tuple[Path, str]]],
+        here: Callable[[], Path | None],
+        tip: str,
+        open_other: Callable[[], object] | None = None,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self.setObjectName("page")
+        self._model, self._known, self._here = runs, known, here
+        self._list = RunChoice(tip, runs.select, open_other, self)
+        self._new = outlined("New", "Set up another training", lambda: runs.select(None), self)
+        self._column = QVBoxLayout(self)
+        self._column.setContentsMargins(8, 4, 8, 6)
+        self._column.setSpacing(8)
+        row = QHBoxLayout()
+        row.setSpacing(6)
+        row.addWidget(self._list, 1)
+        row.addWidget(self._new)
+        self._column.addLayout(row)
+
+    def fill(self, setup: QWidget, run: QWidget) -> None:
+        """Put in what a new run is to be, and the run in view."""
+        self._setup, self._run = setup, run
+        for part in (setup, run):
+            self._column.addWidget(part)
+        self._column.addStretch(1)
+        self._model.changed.connect(self.refresh)
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Follow the model."""
+        here = self._here()
+        self._setup.setVisible(here is None)
+        self._run.setVisible(here is not None)
+        self._new.setVisible(here is not None)
+        self._list.show_runs(self._known(), here)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Look again at what lies on disk, and time a step where that is not known."""
+        super().showEvent(event)
+        self._model.set_watched(True)
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        """Nobody looks."""
+        super().hideEvent(event)
+        self._model.set_watched(False)

@@ -1,1 +1,0 @@
-"""State of the window: what is open, where the clock stands, what is shown."""

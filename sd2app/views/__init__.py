@@ -1,1 +1,0 @@
-"""Widgets. They show models and hold no truth of their own."""

@@ -1,5 +1,0 @@
-"""The 3D view: mesh, sensor, camera and ground. The only place that knows VTK."""
-
-from sd2app.views.scene3d.view import SceneView
-
-__all__ = ["SceneView"]

@@ -1,0 +1,223 @@
+"""Cost and error of the FMCW plans, on single frames of a clip."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.accuracy.cost import in_turns, peak_bytes
+from sd2core.accuracy.deviation import errors
+from sd2core.accuracy.plans import Plan, reference_plan, wave_plans
+from sd2core.accuracy.results import Cost, Errors, Measurement, PlanResult
+from sd2core.accuracy.sample import take_sample
+from sd2core.accuracy.scene import scene_fingerprint, this_machine
+from sd2core.doppler.options import SynthesisOptions
+from sd2core.doppler.smoothing import velocity_kernel
+from sd2core.errors import Sd2Error
+from sd2core.fmcw.options import WaveOptions
+from sd2core.fmcw.reference import Converged, converged_frame
+from sd2core.fmcw.spectra import frame_spectra, signal_spectra
+from sd2core.fmcw.wave import WaveScene
+from sd2core.mesh.decimation import decimate
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.numerics.compiled import workers
+from sd2core.progress import Progress
+from sd2core.scattering.facets import visible_facets
+from sd2core.sensor import PAPER_RADAR, RadarConfig, VirtualSensor
+
+_FRAMES = 6
+_MOST_CUTS = 3
+"""64 pieces per facet: beyond it a frame takes minutes."""
+
+
+@dataclass(eq=False)
+class WaveTrial:
+    """FMCW plans on some frames of one scene.
+
+    Parameters
+    ----------
+    mesh : MeshSequence
+        With faces.
+    sensor : VirtualSensor
+    options : SynthesisOptions
+        Of which the axis and the smoothing along velocity are used.
+    frames : tuple of int
+    config : RadarConfig
+    wave : WaveOptions
+        What a plan does not choose: surface, antennas, mirror.
+    """
+
+    mesh: MeshSequence
+    sensor: VirtualSensor
+    options: SynthesisOptions
+    frames: tuple[int, ...]
+    config: RadarConfig = PAPER_RADAR
+    wave: WaveOptions = field(default_factory=WaveOptions)
+
+    def __post_init__(self) -> None:
+        self._meshes: dict[float, MeshSequence] = {}
+        self._setup_s: dict[float, float] = {}
+        bins, sigma_bins = self.options.axis.bins, self.options.velocity_sigma_bins
+        self._smoothing = velocity_kernel(bins, sigma_bins)
+
+    def reference(
+        self, progress: Callable[[], None]
+    ) -> tuple[NDArray[np.float64], list[Converged]]:
+        """Columns (bins, n) of the direct sum over subdivided facets, and how they converged."""
+        plan = reference_plan("fmcw")
+        scene = WaveScene(
+            self.mesh, self.config, self.sensor, self._visible(plan, None), plan.wave(self.wave)
+        )
+        found = []
+        for frame in self.frames:
+            time_s = float(self.mesh.times_s[frame])
+            found.append(converged_frame(scene, time_s, most_cuts=_MOST_CUTS, go_on=progress))
+        signals = np.stack([converged.signal for converged in found])
+        return self._shares(signal_spectra(signals, self.config, axis=self.options.axis)), found
+
+    def columns(self, plan: Plan, threads: int | None = None) -> NDArray[np.float64]:
+        """A plan's columns, each adding up to 1, (bins, n)."""
+        mesh = self.counted(plan)
+        return self._shares(
+            frame_spectra(
+                mesh,
+                self.config,
+                mesh.times_s[list(self.frames)],
+                sensor=self.sensor,
+                visibility=self._visible(plan, threads),
+                wave=plan.wave(self.wave),
+                axis=self.options.axis,
+                threads=1 if threads == 1 else "all",
+            )
+        )
+
+    def errors(self, plan: Plan, reference: NDArray[np.float64]) -> Errors:
+        """How far a plan's columns are from the reference's."""
+        found = self.columns(plan)
+        smooth, truth = self._smoothing @ found, self._smoothing @ reference
+        return errors(found, reference, smooth, truth, self.options.axis)
+
+    def counted(self, plan: Plan) -> MeshSequence:
+        """The mesh that a plan takes."""
+        if plan.vertices_kept not in self._meshes:
+            start = time.perf_counter()
+            self._meshes[plan.vertices_kept] = decimate(self.mesh, plan.vertices_kept)
+            self._setup_s[plan.vertices_kept] = time.perf_counter() - start
+        return self._meshes[plan.vertices_kept]
+
+    def setup_s(self, plan: Plan) -> float:
+        """How long it took to make that mesh."""
+        self.counted(plan)
+        return self._setup_s[plan.vertices_kept]
+
+    def _visible(self, plan: Plan, threads: int | None) -> NDArray[np.bool_] | Literal["facing"]:
+        """Visible facets where a plan wants to know more than which face the sensor."""
+        if plan.visibility == "facing":
+            return "facing"
+        mesh = self.counted(plan)
+        faces = mesh.faces
+        assert faces is not None  # refused before
+        seen = np.zeros((mesh.frame_count, len(faces)), np.bool_)
+
+        def fill(frame: int) -> None:
+            seen[frame] = visible_facets(mesh.frame(frame), faces, self.sensor.position_m)
+
+        if threads == 1:
+            for frame in self.frames:
+                fill(frame)
+        else:
+            list(workers().map(fill, self.frames))
+        return seen
+
+    def _shares(self, power: NDArray[np.float32]) -> NDArray[np.float64]:
+        values = power.astype(np.float64)
+        total = values.sum(axis=0)
+        return np.divide(values, total, out=np.zeros_like(values), where=total > 0)
+
+
+def measure_waves(
+    mesh: MeshSequence,
+    sensor: VirtualSensor,
+    options: SynthesisOptions,
+    repeats: int,
+    progress: Progress,
+) -> Measurement:
+    """Try the FMCW plans; see :func:`sd2core.accuracy.measure`.
+
+    Errors are of the Doppler marginal: every frame's power over velocity adds up to 1.
+    """
+    if mesh.faces is None:
+        raise Sd2Error(
+            f"{mesh.source or 'The mesh'} has no faces, it is a point cloud",
+            "a surface, whose facets echo",
+        )
+    runs = take_sample(mesh, options).runs
+    per_run = -(-_FRAMES // len(runs))
+    middles = {
+        run.frames[(2 * number + 1) * len(run.frames) // (2 * per_run)]
+        for run in runs
+        for number in range(per_run)
+    }
+    # Of frames without a person there is nothing to compare.
+    seen = {frame for frame in middles if mesh.presence.measured[frame]} or middles
+    trial = WaveTrial(mesh, sensor, options, tuple(sorted(seen)))
+    plans = [
+        plan
+        for plan in wave_plans()
+        if plan.vertices_kept == 1 or trial.counted(plan).vertex_count < mesh.vertex_count
+    ]
+    total = len(plans) * (repeats + 1) + 1
+    progress(0, total)
+    reference, converged = trial.reference(lambda: progress(0, total))
+    errors, memory = [], []
+    for number, plan in enumerate(plans):
+        progress(1 + number, total)
+        errors.append(trial.errors(plan, reference))
+        memory.append(peak_bytes(partial(trial.columns, plan)))
+    costs = in_turns(
+        plans,
+        repeats,
+        lambda plan: _milliseconds(trial, plan),
+        lambda done, of: progress(total - of + done, total),
+    )
+    results = [
+        PlanResult(plan, error, Cost(one, every, most, trial.setup_s(plan)))
+        for plan, error, (one, every), most in zip(plans, errors, costs, memory, strict=True)
+    ]
+    return Measurement(
+        family="fmcw",
+        reference=reference_plan("fmcw"),
+        results=tuple(sorted(results, key=lambda result: result.cost.all_cores_ms.median)),
+        scene=scene_fingerprint(mesh, sensor, options, "fmcw"),
+        machine=this_machine(),
+        frames=trial.frames,
+        source=Path(mesh.source).name,
+        convergence=_convergence(converged),
+    )
+
+
+def _milliseconds(trial: WaveTrial, plan: Plan) -> tuple[float, float]:
+    """Per frame: processor time of one thread, and time that passes on all cores."""
+    start = time.thread_time()
+    trial.columns(plan, threads=1)
+    one_s = time.thread_time() - start
+    start = time.perf_counter()
+    trial.columns(plan)
+    passed_s = time.perf_counter() - start
+    return 1e3 * one_s / len(trial.frames), 1e3 * passed_s / len(trial.frames)
+
+
+def _convergence(found: Sequence[Converged]) -> tuple[tuple[int, float], ...]:
+    """Largest change of any frame's marginal with each finer cut."""
+    largest: dict[int, float] = {}
+    for converged in found:
+        for pieces, change in zip(converged.pieces[1:], converged.changes, strict=True):
+            largest[pieces] = max(largest.get(pieces, 0.0), change)
+    return tuple(sorted(largest.items()))

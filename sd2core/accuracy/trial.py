@@ -1,0 +1,263 @@
+"""Trying counting plans out on sampled frames: what they make of them, and how long it takes."""
+
+from __future__ import annotations
+
+import copy
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.accuracy.deviation import errors
+from sd2core.accuracy.plans import VERTICES_KEPT, Plan, reference_plan, sights
+from sd2core.accuracy.results import Errors
+from sd2core.accuracy.sample import Run, Sample
+from sd2core.doppler.masks import Visibility
+from sd2core.doppler.options import SynthesisOptions
+from sd2core.doppler.reference import reference_stretch
+from sd2core.doppler.smoothing import smooth
+from sd2core.doppler.synthesizer import Synthesizer
+from sd2core.mesh.decimation import decimate
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.numerics.compiled import workers
+from sd2core.progress import Progress, silent
+from sd2core.sensor import VirtualSensor
+
+_ASIDE_M = 1e-7
+"""A place so near that nothing changes, and yet another one: its masks are made anew."""
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """Columns of a Doppler map, (bins, n) each, before and after smoothing.
+
+    ``milliseconds`` per frame is the processor time they took, all threads together.
+    """
+
+    raw: NDArray[np.float64]
+    smooth: NDArray[np.float64]
+    milliseconds: float = 0.0
+
+    def twice(self) -> Columns:
+        """The same columns again behind the first."""
+        return _joined([self, self])
+
+
+class Trial:
+    """Counting plans on one scene.
+
+    Smoothing stays within each run, in a plan's map as in the reference.
+
+    Parameters
+    ----------
+    mesh : MeshSequence
+    sensor : VirtualSensor
+    options : SynthesisOptions
+        What a plan does not choose.
+    sample : Sample
+    """
+
+    def __init__(
+        self,
+        mesh: MeshSequence,
+        sensor: VirtualSensor,
+        options: SynthesisOptions,
+        sample: Sample,
+    ) -> None:
+        self.mesh = mesh
+        self.sensor = sensor
+        self.sample = sample
+        self.options = options
+        # Smoothed here, within the runs: smoothing over time looks at other frames.
+        self._unsmoothed = replace(options, velocity_sigma_bins=0.0, time_sigma_s=0.0)
+        self._meshes: dict[float, MeshSequence] = {}
+        self._decimating_s: dict[float, float] = {}
+        self._prepared: dict[tuple[float, int], Synthesizer] = {}
+        self._references: dict[Run, Columns] = {}
+        self._tried = 0
+
+    @property
+    def vertices_kept(self) -> tuple[float, ...]:
+        """Shares that the mesh can be decimated to, and 1: a few faces cannot be."""
+        if self.mesh.faces is None:
+            return (1.0,)
+        # The whole mesh first, so that what is wrong in a frame is said of it.
+        every = self._sampled(1.0).vertex_count
+        return tuple(
+            kept for kept in VERTICES_KEPT if kept == 1 or self._sampled(kept).vertex_count < every
+        )
+
+    def at(self, sensor: VirtualSensor) -> Trial:
+        """The same plans from another place; what does not depend on it is shared."""
+        other = copy.copy(self)
+        other.sensor = sensor
+        other._references = {}
+        return other
+
+    def reference(self, runs: Sequence[Run], *, progress: Progress = silent) -> Columns:
+        """The reference plan's columns, in double precision."""
+        options = reference_plan("histogram", self.options.weight).options(self._unsmoothed)
+        mesh = self._sampled(1.0)
+
+        def work(frame: int) -> NDArray[np.float64]:
+            return reference_stretch(mesh, self.sensor, options, frame, frame + 1)
+
+        for run in runs:
+            if run in self._references:
+                continue
+            frames = range(run.start, run.stop)
+            columns = []
+            for number, column in enumerate(workers().map(work, frames)):
+                columns.append(column)
+                progress(number + 1, len(frames))
+            raw = np.concatenate(columns, axis=1)
+            self._references[run] = Columns(raw, self._smoothed(raw, run))
+        return _joined([self._references[run] for run in runs])
+
+    def columns(self, plan: Plan, runs: Sequence[Run], *, progress: Progress = silent) -> Columns:
+        """A plan's columns, with masks made for them alone.
+
+        A plan that reuses masks is tried with masks made to the left and to the
+        right of the sensor; both count.
+        """
+        synthesizer = self.synthesizer(plan, progress=progress)
+        if not plan.mask_reuse_m:
+            return self._counted(synthesizer, runs, self._aside(), progress=progress)
+        parts = []
+        for side in (-1.0, 1.0):
+            made_at = self._beside(side * plan.mask_reuse_m)
+            self._counted(synthesizer, runs, made_at, progress=progress)
+            parts.append(
+                self._counted(synthesizer, runs, self._aside(), reused=True, progress=progress)
+            )
+        return _joined(parts)
+
+    def errors(self, plan: Plan, runs: Sequence[Run], *, progress: Progress = silent) -> Errors:
+        """How far a plan is from the reference on some runs."""
+        reference = self.reference(runs, progress=progress)
+        found = self.columns(plan, runs, progress=progress)
+        if plan.mask_reuse_m:
+            reference = reference.twice()
+        return errors(found.raw, reference.raw, found.smooth, reference.smooth, self.options.axis)
+
+    def milliseconds(
+        self, plan: Plan, threads: int | None = None, *, progress: Progress = silent
+    ) -> float:
+        """How long a plan takes per frame, over all sampled frames, after the sensor has moved.
+
+        With one thread that thread's own processor time, otherwise the time that
+        passes.
+        """
+        synthesizer = self.synthesizer(plan, threads, progress=progress)
+        frames = synthesizer.mesh.frame_count
+        if plan.mask_reuse_m:
+            synthesizer.stretch(self.sensor, 0, frames, progress=progress)
+        visibility: Visibility | None = "frozen" if plan.mask_reuse_m else None
+        place = self._aside()
+        start = time.perf_counter()
+        stretch = synthesizer.stretch(place, 0, frames, visibility, progress)
+        passed_s = time.perf_counter() - start
+        return 1e3 * (stretch.processor_s if threads == 1 else passed_s) / frames
+
+    def load_kernels(self, progress: Progress = silent) -> None:
+        """Call what is compiled once, so that reading it from disk is not timed."""
+        for plan in (Plan(visibility="none"), *sights(surface=self.mesh.faces is not None)):
+            if plan.mask_stride == 1:
+                run = self.sample.runs[0]
+                self._counted(
+                    self.synthesizer(plan, progress=progress),
+                    [Run(run.start, run.start + 1, 0)],
+                    self._aside(),
+                    progress=progress,
+                )
+
+    def synthesizer(
+        self, plan: Plan, threads: int | None = None, *, progress: Progress = silent
+    ) -> Synthesizer:
+        """What carries a plan out on the sampled frames; prepared."""
+        key = plan.vertices_kept, plan.frame_rate_factor
+        like = self._prepared.get(key)
+        made = Synthesizer(
+            self._sampled(plan.vertices_kept),
+            plan.options(self._unsmoothed),
+            blocks_of=like,
+            threads=threads,
+        )
+        made.prepare(progress)
+        self._prepared.setdefault(key, made)
+        return made
+
+    def decimating_s(self, plan: Plan) -> float:
+        """How long it took to make the clip's mesh for a plan, once."""
+        self._sampled(plan.vertices_kept)
+        return self._decimating_s[plan.vertices_kept]
+
+    def forget(self) -> None:
+        """Let prepared frames go, so that their making can be watched."""
+        self._prepared.clear()
+
+    def _sampled(self, kept: float) -> MeshSequence:
+        if kept not in self._meshes:
+            start = time.perf_counter()
+            coarser = decimate(self.mesh, kept)
+            self._decimating_s[kept] = time.perf_counter() - start
+            self._meshes[kept] = self.sample.of(coarser)
+        return self._meshes[kept]
+
+    def _counted(
+        self,
+        synthesizer: Synthesizer,
+        runs: Sequence[Run],
+        place: VirtualSensor,
+        *,
+        reused: bool = False,
+        progress: Progress = silent,
+    ) -> Columns:
+        """Columns with masks made for this place, or with the last ones made."""
+        visibility: Visibility | None = "frozen" if reused else None
+        stretches = [
+            synthesizer.stretch(place, run.start, run.stop, visibility, progress) for run in runs
+        ]
+        frames = sum(len(run.frames) for run in runs)
+        raws = [stretch.raw for stretch in stretches]
+        smoothed = [self._smoothed(raw, run) for raw, run in zip(raws, runs, strict=True)]
+        return Columns(
+            np.concatenate(raws, axis=1),
+            np.concatenate(smoothed, axis=1),
+            1e3 * sum(stretch.processor_s for stretch in stretches) / frames,
+        )
+
+    def _smoothed(self, raw: NDArray[np.float64], run: Run) -> NDArray[np.float64]:
+        mesh = self._sampled(1.0)
+        times_s = mesh.times_s[run.start : run.stop]
+        presence = mesh.presence.between(run.start, run.stop)
+        return smooth(raw, times_s, 0, 0, len(times_s), self.options, presence)
+
+    def _aside(self) -> VirtualSensor:
+        self._tried += 1
+        return self._beside(self._tried * _ASIDE_M)
+
+    def _beside(self, distance_m: float) -> VirtualSensor:
+        """The sensor moved across its line of sight to the body, level."""
+        place = np.asarray(self.sensor.position_m)
+        ray = self._middle_m() - place
+        right = np.cross((0.0, 1.0, 0.0), ray)
+        length = float(np.linalg.norm(right))
+        right = right / length if length > 0 else np.array([1.0, 0.0, 0.0])
+        x, y, z = (place + distance_m * right).tolist()
+        return replace(self.sensor, position_m=(x, y, z))
+
+    def _middle_m(self) -> NDArray[np.float64]:
+        points = self._sampled(1.0).frame(self.sample.runs[0].start).astype(np.float64)
+        middle: NDArray[np.float64] = points.mean(axis=0)
+        return middle
+
+
+def _joined(parts: Sequence[Columns]) -> Columns:
+    return Columns(
+        np.concatenate([part.raw for part in parts], axis=1),
+        np.concatenate([part.smooth for part in parts], axis=1),
+        float(np.mean([part.milliseconds for part in parts])),
+    )

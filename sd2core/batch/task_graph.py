@@ -1,0 +1,388 @@
+"""What follows from what: from a recording to its meshes, maps and denoised maps."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sd2core.batch.exporting import dataset_key, dataset_path, is_exported, rows_of
+from sd2core.batch.fitting import fit_choices, fitted
+from sd2core.batch.folder import BatchFolder
+from sd2core.batch.inputs import Inspection, MeshInput, Origin, VideoInput, known_inspection
+from sd2core.batch.keys import key_of
+from sd2core.batch.plan import STEPS, BatchPlan, Simulate, Step
+from sd2core.batch.stretches import Stretch, stretches_of
+from sd2core.batch.tasks import Task
+from sd2core.errors import Sd2Error
+from sd2core.files.digests import file_digest
+from sd2core.sensor import VirtualSensor
+
+if TYPE_CHECKING:
+    from sd2core.datasets.simulating import Simulation
+
+_MAPS: tuple[Step, ...] = ("synthesise", "denoise", "simulate")
+
+
+@dataclass(frozen=True)
+class PlannedMap:
+    """The map of one recording from one place: one file per stretch.
+
+    Parameters
+    ----------
+    placement : int
+        0 is the recording's own sensor; 1 and up are the places of the plan.
+    sensor : VirtualSensor
+    stretches : tuple of (int, int)
+    synthesis : tuple of Task
+        One per stretch.
+    denoising : Task, optional
+        Of all stretches: a model remembers what was before.
+    simulation : tuple of Task
+        One per stretch, or none.
+    """
+
+    placement: int
+    sensor: VirtualSensor
+    stretches: tuple[Stretch, ...]
+    synthesis: tuple[Task, ...]
+    denoising: Task | None = None
+    simulation: tuple[Task, ...] = ()
+
+    @property
+    def tasks(self) -> tuple[Task, ...]:
+        """All of them."""
+        denoising = () if self.denoising is None else (self.denoising,)
+        return (*self.synthesis, *denoising, *self.simulation)
+
+    @property
+    def denoised(self) -> list[str]:
+        """Files of the denoised stretches, or none."""
+        return [] if self.denoising is None else list(self.denoising.details["outs"])
+
+
+class Flow:
+    """The tasks of a batch, each known as soon as what it depends on is done.
+
+    Parameters
+    ----------
+    plan : BatchPlan
+        With absolute paths.
+    folder : BatchFolder
+    origins : sequence of Origin
+
+    Attributes
+    ----------
+    total : Counter
+        Tasks per step that are known of so far; a map counts once until it is known into
+        how many stretches it is cut.
+
+    Raises
+    ------
+    Sd2Error
+        When the model or the radar of the plan cannot be used.
+    """
+
+    def __init__(self, plan: BatchPlan, folder: BatchFolder, origins: Sequence[Origin]) -> None:
+        self.plan, self.folder, self.origins = plan, folder, origins
+        told = plan.synthesise
+        self._told = None if told is None else told.model_dump(mode="json")
+        self._scene = (
+            {}
+            if told is None
+            else {
+                "options": asdict(told.options()),
+                "tolerance": told.tolerance,
+                "vertices_kept": told.vertices_kept,
+            }
+        )
+        self._model = None if plan.denoise is None else _model_of(plan.denoise.model)
+        self._simulation = None if plan.simulate is None else simulation_of(plan.simulate)
+        # Of a map whose stretches are not all there yet: how many are missing.
+        self._missing: dict[tuple[str, int], int] = {}
+        self._denoising: dict[tuple[str, int], Task] = {}
+        self.total: Counter[str] = Counter()
+        self.total["inspect"] = len(origins)
+        if plan.export is not None:
+            self.total["export"] = 1
+        self.total += Counter(self._maps_of_one(len(origins)))
+
+    @property
+    def model(self) -> tuple[str, str]:
+        """File of the denoiser and the hash of its content."""
+        assert self._model is not None
+        return self._model
+
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """What the plan has, in order."""
+        return ("inspect", *(step for step in STEPS[1:] if getattr(self.plan, step) is not None))
+
+    def first(self) -> Iterator[Task]:
+        """What can be done at once: every recording is looked at."""
+        for origin in self.origins:
+            key = key_of("inspect", {"path": origin.path})
+            yield Task("inspect", key, origin, {}, group=origin.name)
+
+    def last(self) -> Iterator[Task]:
+        """What is done when ``results.jsonl`` has been written: the data set."""
+        if self.plan.export is not None:
+            origin = Origin(str(self.folder.path), "data set", "")
+            out = str(dataset_path(self.folder, self.plan.export))
+            details = {"export": self.plan.export.model_dump(mode="json")}
+            key = dataset_key(self.folder, self.plan.export)
+            sources = sum(1 for _ in rows_of(self.folder))
+            yield Task("export", key, origin, details, frames=sources, out=out)
+
+    def is_done(self, task: Task) -> bool:
+        """Whether its result is there."""
+        if task.step == "inspect":
+            return known_inspection(self.folder, task.origin) is not None
+        if task.step == "fit":
+            return fitted(Path(task.out)) is not None
+        if task.step == "export":
+            assert self.plan.export is not None
+            return is_exported(self.folder, self.plan.export)
+        return os.path.exists(task.out)
+
+    def after(self, task: Task) -> Iterator[Task]:
+        """What can be done once a task is.
+
+        Raises
+        ------
+        Sd2Error
+            When the plan has no step for what was found.
+        """
+        if task.step == "inspect":
+            found = known_inspection(self.folder, task.origin)
+            if found is None:
+                raise _changing(task.origin)
+            return self._after_inspection(task.origin, found)
+        if task.step == "fit":
+            mesh, found = fitted(Path(task.out)), known_inspection(self.folder, task.origin)
+            if mesh is None or found is None:
+                raise _changing(task.origin)
+            return self._synthesis(task.origin, mesh, found.sensor)
+        if task.step == "synthesise":
+            return self._after_map(task)
+        return iter(())
+
+    def lost_with(self, task: Task) -> dict[str, int]:
+        """How many tasks per step cannot be done because this one failed."""
+        if task.step in ("inspect", "fit"):
+            return self._maps_of_one(1)
+        where = (task.origin.name, task.placement or 0)
+        if task.step == "synthesise" and where in self._missing:
+            del self._missing[where]
+            del self._denoising[where]
+            return {"denoise": 1}
+        return {}
+
+    def _maps_of_one(self, recordings: int) -> dict[str, int]:
+        maps = recordings * self.plan.placement_count
+        return {step: maps for step in _MAPS if step in self.steps}
+
+    def _after_inspection(self, origin: Origin, found: Inspection) -> Iterator[Task]:
+        if found.mesh is not None:
+            return self._synthesis(origin, found.mesh, found.sensor)
+        assert found.video is not None
+        if self.plan.fit is None:
+            raise Sd2Error(
+                f"{origin.path} is a video without a mesh",
+                "a section [fit] in the plan, which makes one",
+            )
+        self.total["fit"] += 1
+        return iter((self.fit_task(origin, found.video),))
+
+    def fit_task(self, origin: Origin, video: VideoInput) -> Task:
+        """What makes a mesh of a video."""
+        assert self.plan.fit is not None
+        choices = fit_choices(self.plan.fit, origin.subject, video.focal_px)
+        key = key_of("fit", {"video": video.identity, "choices": choices})
+        out = str(self.folder.result("meshes", key, ".zarr"))
+        details = {
+            "video": video.path,
+            "choices": choices,
+            "models": self.plan.fit.models,
+            "out": out,
+        }
+        return Task("fit", key, origin, details, None, video.frames, origin.name, out)
+
+    def _synthesis(self, origin: Origin, mesh: MeshInput, own: VirtualSensor) -> Iterator[Task]:
+        if self.plan.synthesise is None:
+            return
+        for planned in self.maps_of(origin, mesh, own):
+            self.total["synthesise"] += len(planned.stretches) - 1
+            if planned.denoising is not None:
+                where = (origin.name, planned.placement)
+                self._missing[where] = len(planned.stretches)
+                self._denoising[where] = planned.denoising
+            yield from planned.synthesis
+        if self._simulation is not None:
+            # After all that is quick, so that this can be given out together.
+            for planned in self.maps_of(origin, mesh, own):
+                self.total["simulate"] += len(planned.stretches) - 1
+                yield from planned.simulation
+
+    def _after_map(self, task: Task) -> Iterator[Task]:
+        where = (task.origin.name, task.placement or 0)
+        if where not in self._missing:
+            return iter(())
+        self._missing[where] -= 1
+        if self._missing[where]:
+            return iter(())
+        del self._missing[where]
+        return iter((self._denoising.pop(where),))
+
+    def maps_of(self, origin: Origin, mesh: MeshInput, own: VirtualSensor) -> Iterator[PlannedMap]:
+        """All maps of one recording.
+
+        Parameters
+        ----------
+        origin : Origin
+        mesh : MeshInput
+        own : VirtualSensor
+        """
+        stretches = tuple(stretches_of(mesh.frames))
+        sensors = self.plan.sensors(own, mesh.target_m)
+        choosing = self._choosing(mesh, list(sensors.values()))
+        for placement, sensor in sensors.items():
+            synthesis = tuple(
+                self._synthesis_task(origin, mesh, placement, sensor, one, choosing)
+                for one in stretches
+            )
+            denoising = None if self._model is None else self._denoising_task(synthesis)
+            simulation = (
+                ()
+                if self._simulation is None
+                else tuple(
+                    self._simulation_task(origin, mesh, placement, sensor, one) for one in stretches
+                )
+            )
+            yield PlannedMap(placement, sensor, stretches, synthesis, denoising, simulation)
+
+    def _choosing(self, mesh: MeshInput, sensors: Sequence[VirtualSensor]) -> dict[str, Any] | None:
+        """Which plan holds the tolerance, for all maps of a mesh; None where there is none."""
+        if self._scene["tolerance"] is None:
+            return None
+        from sd2core.accuracy.places import spread
+
+        places = [asdict(one) for one in spread(sensors)]
+        about = {"places": places, "frames": mesh.frames * len(sensors)}
+        key = key_of("synthesise", {"mesh": mesh.identity, **self._scene, **about})
+        return about | {"path": str(self.folder.result("plans", key, ".json"))}
+
+    def _synthesis_task(
+        self,
+        origin: Origin,
+        mesh: MeshInput,
+        placement: int,
+        sensor: VirtualSensor,
+        stretch: Stretch,
+        choosing: dict[str, Any] | None,
+    ) -> Task:
+        scene = {"mesh": mesh.identity, "sensor": asdict(sensor), **self._scene}
+        key = key_of("synthesise", scene | {"stretch": stretch})
+        out = str(self.folder.result("synthetic", key, ".npz"))
+        details = {
+            "mesh": asdict(mesh),
+            "sensor": asdict(sensor),
+            "told": self._told,
+            "stretch": list(stretch),
+            "choosing": choosing,
+            "out": out,
+        }
+        frames = stretch[1] - stretch[0]
+        return Task("synthesise", key, origin, details, placement, frames, origin.name, out)
+
+    def _denoising_task(self, synthesis: Sequence[Task]) -> Task:
+        model, digest = self.model
+        key = key_of("denoise", {"model": digest, "maps": [one.key for one in synthesis]})
+        ends = [".npz"] if len(synthesis) == 1 else [f"-{n}.npz" for n in range(len(synthesis))]
+        outs = [str(self.folder.result("denoised", key, end)) for end in ends]
+        details = {
+            "maps": [one.out for one in synthesis],
+            "model": model,
+            "digest": digest,
+            "outs": outs,
+        }
+        one = synthesis[0]
+        frames = sum(each.frames for each in synthesis)
+        return Task("denoise", key, one.origin, details, one.placement, frames, one.group, outs[-1])
+
+    def _simulation_task(
+        self,
+        origin: Origin,
+        mesh: MeshInput,
+        placement: int,
+        sensor: VirtualSensor,
+        stretch: Stretch,
+    ) -> Task:
+        assert self._simulation is not None
+        assert self.plan.synthesise is not None
+        axis = asdict(self.plan.synthesise.options().axis)
+        key = key_of(
+            "simulate",
+            {
+                "mesh": mesh.identity,
+                "sensor": asdict(sensor),
+                "axis": axis,
+                "simulation": self._simulation.as_json(),
+                "stretch": stretch,
+            },
+        )
+        out = str(self.folder.result("simulated", key, ".npz"))
+        details = {
+            "mesh": asdict(mesh),
+            "sensor": asdict(sensor),
+            "axis": axis,
+            "radar": asdict(self._simulation.radar),
+            "seed": self._simulation.seed,
+            "stretch": list(stretch),
+            "out": out,
+        }
+        frames = stretch[1] - stretch[0]
+        return Task("simulate", key, origin, details, placement, frames, origin.name, out)
+
+    def all_maps(self) -> Iterator[tuple[Origin, str, MeshInput, PlannedMap]]:
+        """Every map of every recording that has been looked at and fitted, in order.
+
+        With the hash of what else is in the recording.
+        """
+        for origin in self.origins:
+            found = known_inspection(self.folder, origin)
+            mesh = None if found is None else found.mesh
+            if found is not None and mesh is None and self.plan.fit is not None:
+                assert found.video is not None
+                mesh = fitted(Path(self.fit_task(origin, found.video).out))
+            if found is not None and mesh is not None:
+                for planned in self.maps_of(origin, mesh, found.sensor):
+                    yield origin, found.about, mesh, planned
+
+
+def _changing(origin: Origin) -> Sd2Error:
+    return Sd2Error(
+        f"{origin.path} changes while it is worked on",
+        "files that stay as they are",
+        "Start the batch again when it is complete",
+    )
+
+
+def simulation_of(told: Simulate) -> Simulation:
+    """The radar of a plan; refused before the work begins."""
+    from sd2core.datasets.simulating import Simulation
+    from sd2core.io.radar.named import named_radar
+
+    return Simulation(named_radar(told.radar), told.seed)
+
+
+def _model_of(name: str) -> tuple[str, str]:
+    """File of a model and the hash of its content; refused before the work begins."""
+    from sd2core.denoise.files import describe_model, find_model
+
+    path = find_model(name)
+    describe_model(path)
+    return str(path), file_digest(path)

@@ -1,0 +1,251 @@
+"""A table of trainings in words: for a terminal, as Markdown, as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.classify.comparison import Run, Table, gains
+from sd2core.classify.experiment import Condition
+from sd2core.classify.metrics import mean_recall, recalls, shares
+
+Rows = list[list[str]]
+"""A heading and what is under it."""
+
+
+def title_of(condition: Condition) -> str:
+    """What is learnt from, in words."""
+    words = {
+        "nothing": "radar only",
+        "synthetic": "+ synthetic",
+        "denoised": "+ denoised synthetic",
+        "radar": "+ radar of the same movements",
+    }[condition.added]
+    return words + (", moved sensors" if condition.moved else "")
+
+
+def network_of(condition: Condition) -> str:
+    """The network, what it is shown, and when it answers."""
+    network = condition.network
+    shown = "columns" if network.features == "columns" else "strongest bin"
+    late = f"after {network.delay_s:g} s" if network.delay_s else "at once"
+    return f"{network.model.upper()} {network.width}, {shown}, {late}"
+
+
+def as_json(table: Table) -> dict[str, Any]:
+    """Everything, with means and standard deviations over seeds."""
+    return {
+        "radar": table.kind,
+        "by_movement": table.by_movement,
+        "classes": list(table.classes),
+        "seeds": table.options.seeds,
+        "network": asdict(table.options.network),
+        "conditions": [
+            {
+                **condition.to_json(),
+                "title": title_of(condition),
+                "mean_recall_frames": _spread(_values(table, condition, frame_recall)),
+                "mean_recall_gestures": _spread(_values(table, condition, gesture_recall)),
+                "mean_recall_frames_moved": _spread(_values(table, condition, moved_recall)),
+                "gain": _spread(gains(table, condition, frame_recall)),
+                "confusion_frames": mean_confusion(table, condition).tolist(),
+                "runs": [run.to_json() for run in table.of(condition)],
+            }
+            for condition in table.conditions
+        ],
+    }
+
+
+def network_rows(table: Table) -> Rows:
+    """Networks and features at equal budget, all of the radar's data, nothing added."""
+    rows = [["network", "parameters", *_score_head(table), "CPU s"]]
+    for condition in table.conditions:
+        if condition.share == 1.0 and condition.added == "nothing":
+            runs = table.of(condition)
+            cpu = _number(np.array([run.cpu_s for run in runs]), 1.0, 1)
+            rows.append(
+                [network_of(condition), f"{runs[0].parameters:,}", *_scores(table, condition), cpu]
+            )
+    return rows
+
+
+def added_rows(table: Table) -> Rows:
+    """All of the radar's data, and what is added."""
+    rows = [["learnt from", "frames added", *_score_head(table), "gain, points", "moved, frames"]]
+    for condition in main_conditions(table):
+        if condition.share == 1.0:
+            added = np.mean([sum(run.added.values()) for run in table.of(condition)])
+            rows.append(
+                [
+                    title_of(condition),
+                    f"{added:,.0f}",
+                    *_scores(table, condition),
+                    _gain(table, condition),
+                    _number(_values(table, condition, moved_recall)),
+                ]
+            )
+    return rows
+
+
+def curve_rows(table: Table) -> Rows:
+    """Mean recall by the share of the radar's data, with and without what is added."""
+    titles = list(dict.fromkeys(title_of(one) for one in curve_conditions(table)))
+    rows = [["of the radar's data", "frames", *titles, *(f"gain {one}" for one in titles[1:])]]
+    for share in sorted({one.share for one in curve_conditions(table)}):
+        own = {title_of(one): one for one in curve_conditions(table) if one.share == share}
+        frames = np.mean([sum(run.real.values()) for run in table.of(own[titles[0]])])
+        cells = [_number(_values(table, own[name], frame_recall)) for name in titles]
+        cells += [_gain(table, own[name]) for name in titles[1:]]
+        rows.append([f"{share:.0%}", f"{frames:,.0f}", *cells])
+    return rows
+
+
+def confusion_rows(table: Table, condition: Condition) -> Rows:
+    """Share of each class that was taken for each, in per cent, over frames."""
+    mean, sd = mean_confusion(table, condition), _confusion_sd(table, condition)
+    rows = [["true", *(f"taken for {name}" for name in table.classes)]]
+    for number, name in enumerate(table.classes):
+        cells = [
+            "–" if np.isnan(value) else f"{100 * value:.1f} ± {100 * spread:.1f}"
+            for value, spread in zip(mean[number], sd[number], strict=True)
+        ]
+        rows.append([name, *cells])
+    return rows
+
+
+def as_text(table: Table) -> str:
+    """All tables for a terminal."""
+    return "\n".join(_lines(table, _plain))
+
+
+def as_markdown(table: Table) -> str:
+    """The same in Markdown."""
+    return "\n".join(_lines(table, _markdown)) + "\n"
+
+
+def mean_confusion(table: Table, condition: Condition) -> NDArray[np.float64]:
+    """Mean over seeds of confusion matrices whose rows add up to 1; NaN without such frames."""
+    return np.asarray(_confusions(table, condition).mean(axis=0))
+
+
+def frame_recall(run: Run) -> float:
+    """Mean over classes of the share of frames that were found."""
+    return run.score.mean_recall
+
+
+def gesture_recall(run: Run) -> float:
+    """The same of whole gestures."""
+    return mean_recall(run.score.gestures)
+
+
+def moved_recall(run: Run) -> float:
+    """Mean recall of frames where the sensor stands elsewhere."""
+    return float("nan") if run.moved is None else run.moved.mean_recall
+
+
+def _lines(table: Table, lines_of: Callable[[Rows], list[str]]) -> list[str]:
+    subjects = dict.fromkeys(name for run in table.runs for name in run.subjects)
+    who = (
+        "one person; movements are kept apart, which says nothing about other people"
+        if table.by_movement
+        else f"people who were not learnt from: {', '.join(subjects)}"
+    )
+    lines = [
+        f"Judged on a {table.kind} radar's maps of {who}. Numbers are per cent, mean ± standard"
+        f" deviation over {table.options.seeds} seeds (each other"
+        f" {'movements' if table.by_movement else 'people'}, another draw, another network)."
+        " Frames: mean over classes of the share of frames that were found. Gestures:"
+        " the same of whole gestures, by what most of their frames were taken for.",
+        "",
+        "Networks, all of the radar's data, equal steps of training:",
+        "",
+        *lines_of(network_rows(table)),
+    ]
+    if any(condition.added != "nothing" for condition in main_conditions(table)):
+        lines += ["", "What is added to all of the radar's data:", "", *lines_of(added_rows(table))]
+    if len({one.share for one in curve_conditions(table)}) > 1:
+        lines += ["", "Learning curve, frames:", "", *lines_of(curve_rows(table))]
+    for condition in main_conditions(table):
+        if condition.share == 1.0 and condition.added != "radar":
+            lines += ["", f"Confusion of frames, {title_of(condition)}:", ""]
+            lines += lines_of(confusion_rows(table, condition))
+    return lines
+
+
+def main_conditions(table: Table) -> list[Condition]:
+    """Conditions of the network that all data are compared with."""
+    return [one for one in table.conditions if one.network == table.options.network]
+
+
+def curve_conditions(table: Table) -> list[Condition]:
+    """Conditions of the learning curve."""
+    return [one for one in main_conditions(table) if one.added != "radar" and not one.moved]
+
+
+def _score_head(table: Table) -> list[str]:
+    return ["frames", *(f"{name}" for name in table.classes), "gestures", "latency s"]
+
+
+def _scores(table: Table, condition: Condition) -> list[str]:
+    each = np.array([recalls(run.score.frames) for run in table.of(condition)])
+    return [
+        _number(_values(table, condition, frame_recall)),
+        *(_number(column) for column in each.T),
+        _number(_values(table, condition, gesture_recall)),
+        _number(_values(table, condition, lambda run: run.score.latency_s), 1.0, 2),
+    ]
+
+
+def _gain(table: Table, condition: Condition) -> str:
+    if condition.added == "nothing":
+        return ""
+    values = 100.0 * gains(table, condition, frame_recall)
+    text = f"{values.mean():+.1f}"
+    return text if len(values) < 2 else f"{text} ± {values.std(ddof=1):.1f}"
+
+
+def _values(table: Table, condition: Condition, of: Callable[[Run], float]) -> NDArray[np.float64]:
+    return np.array([of(run) for run in table.of(condition)])
+
+
+def _confusions(table: Table, condition: Condition) -> NDArray[np.float64]:
+    return np.array([shares(run.score.frames) for run in table.of(condition)])
+
+
+def _confusion_sd(table: Table, condition: Condition) -> NDArray[np.float64]:
+    each = _confusions(table, condition)
+    return np.asarray(each.std(axis=0, ddof=1) if len(each) > 1 else np.zeros(each.shape[1:]))
+
+
+def _spread(values: NDArray[np.float64]) -> dict[str, float]:
+    """Mean and standard deviation over seeds."""
+    sd = float(values.std(ddof=1)) if len(values) > 1 else 0.0
+    return {"mean": float(values.mean()), "sd": sd}
+
+
+def _number(values: NDArray[np.float64], scale: float = 100.0, digits: int = 1) -> str:
+    known = scale * values[~np.isnan(values)]
+    if not known.size:
+        return "–"
+    text = f"{known.mean():.{digits}f}"
+    return text if len(known) < 2 else f"{text} ± {known.std(ddof=1):.{digits}f}"
+
+
+def _plain(rows: Sequence[Sequence[str]]) -> list[str]:
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        "  ".join(
+            text.rjust(width) if place else text.ljust(width)
+            for place, (text, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in rows
+    ]
+
+
+def _markdown(rows: Sequence[Sequence[str]]) -> list[str]:
+    rule = ["---", *["---:"] * (len(rows[0]) - 1)]
+    return [f"| {' | '.join(row)} |" for row in (rows[0], rule, *rows[1:])]

@@ -1,0 +1,159 @@
+"""``sd2 classify table``: confusion matrices and learning curves of many trainings."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sd2core.cli.classify.data import DATA_HELP, add_sources, clips_of
+from sd2core.cli.classify.network import add_network, network_of
+from sd2core.cli.options import add_command, add_json, positive_int, share
+from sd2core.cli.output import finite, print_json, progress_bar
+
+if TYPE_CHECKING:
+    from sd2core.classify.comparison import Table, TableOptions
+    from sd2core.classify.data import ClipSet
+    from sd2core.denoise.live import TrainedDenoiser
+    from sd2core.progress import Progress
+
+
+def add_table(kinds: argparse._SubParsersAction) -> None:
+    """Add ``table``."""
+    parser = add_command(
+        kinds,
+        "table",
+        "compare trainings with and without synthetic data",
+        handler=_table,
+        description=(
+            f"{DATA_HELP}\n\n"
+            "Trains on the radar's maps alone, and with synthetic maps of other movements added\n"
+            "(0.4 frames for each real one), denoised or not, seen from the radar's own place or\n"
+            "from others too; then with less and less of the real data. Everything is judged on\n"
+            "the radar's maps of people who were not learnt from, other ones for each seed. With\n"
+            "one person movements are kept apart instead.\n\n"
+            "OUT gets table.md, table.json, confusion.png and curve.png, and a small file for\n"
+            "every training: started again, only what is missing is trained."
+        ),
+        examples=(
+            "  sd2 classify table campaign.zarr --out tables\n"
+            "  sd2 classify table campaign.zarr --out tables --quick\n"
+            "  sd2 classify table anna=a.sd2 ben=b.sd2 --out own --seeds 2"
+        ),
+    )
+    add_sources(parser)
+    parser.add_argument("--out", type=Path, required=True, metavar="OUT", help="folder")
+    parser.add_argument(
+        "--seeds", type=positive_int, metavar="N", help="how often (default: 5; quick: 2)"
+    )
+    parser.add_argument(
+        "--shares",
+        type=_shares,
+        metavar="LIST",
+        help="of the real data, for the learning curve (default: 1%%,2%%,5%%,10%%,25%%,50%%,100%%;"
+        " quick: 10%%,100%%)",
+    )
+    parser.add_argument("--quick", action="store_true", help="few trainings, to see how it looks")
+    parser.add_argument(
+        "--radar-only",
+        action="store_true",
+        help="add nothing synthetic: networks and how much data they need, on all of the radar's",
+    )
+    add_network(parser)
+    parser.add_argument("--steps", type=positive_int, metavar="N", help="batches per training")
+    parser.add_argument(
+        "--progress-json",
+        action="store_true",
+        help="print what is done as JSON lines, for other programs (docs/formats.md)",
+    )
+    add_json(parser)
+
+
+def _shares(text: str) -> tuple[float, ...]:
+    found = tuple(share(part) for part in text.split(","))
+    if max(found) > 1.0:
+        raise argparse.ArgumentTypeError(f"{text!r} holds a share above 100%")
+    return tuple(sorted(set(found)))
+
+
+def _table(options: argparse.Namespace) -> None:
+    from sd2core.classify.comparison import make_table
+    from sd2core.classify.comparison_text import as_json, as_text
+
+    known = clips_of(options.data, ("radar",) if options.radar_only else None)
+    chosen = _options(options)
+    folder: Path = options.out
+    with _lines() if options.progress_json else progress_bar("Training", "run") as progress:
+        table = make_table(folder / "runs", known, chosen, _denoiser(options, known), progress)
+    content = finite(as_json(table))
+    _write(folder, table, content)
+    if options.progress_json:
+        print(json.dumps({"event": "written", "folder": str(folder)}), flush=True)
+    elif options.json:
+        print_json(content)
+    else:
+        print(as_text(table))
+        print(f"\nWrote {folder}")
+
+
+@contextmanager
+def _lines() -> Iterator[Progress]:
+    """A JSON line for every training that is done, on standard output."""
+    begun_s = time.monotonic()
+
+    def report(done: int, total: int) -> None:
+        told = {"done": done, "total": total, "elapsed_s": time.monotonic() - begun_s}
+        print(json.dumps({"event": "run", **told}), flush=True)
+
+    yield report
+
+
+def _options(options: argparse.Namespace) -> TableOptions:
+    from sd2core.classify.comparison import QUICK_SHARES, SHARES, TableOptions
+    from sd2core.classify.training import TrainOptions
+
+    training = TrainOptions() if options.steps is None else TrainOptions(steps=options.steps)
+    return TableOptions(
+        seeds=options.seeds or (2 if options.quick else 5),
+        shares=options.shares or (QUICK_SHARES if options.quick else SHARES),
+        network=network_of(options),
+        training=training,
+    )
+
+
+def _denoiser(options: argparse.Namespace, known: ClipSet) -> TrainedDenoiser | None:
+    """The denoiser that was asked for, or the bundled one where it knows such maps."""
+    from sd2core.classify.comparison import fits
+    from sd2core.classify.experiment import has_synthetic
+    from sd2core.denoise.files import DEFAULT_NAME, load_model
+    from sd2core.errors import Sd2Error
+
+    if not has_synthetic(known):
+        return None
+    denoiser = load_model(options.denoiser or DEFAULT_NAME)
+    if fits(known, denoiser):
+        return denoiser
+    if options.denoiser is not None:
+        raise Sd2Error(
+            f"The denoiser {options.denoiser} does not know maps of {known.axis.bins} bins up to"
+            f" ±{known.axis.v_max_mps:g} m/s at {known.frame_rate_hz:.4g} frames/s",
+            "a denoiser for such maps",
+        )
+    return None
+
+
+def _write(folder: Path, table: Table, content: dict[str, Any]) -> None:
+    from sd2core.classify.comparison_plots import draw_confusions, draw_curve
+    from sd2core.classify.comparison_text import as_markdown, curve_conditions
+    from sd2core.files.atomic import atomic_write_text
+    from sd2core.files.figure_files import save_figure
+
+    atomic_write_text(folder / "table.json", json.dumps(content, indent=1) + "\n")
+    atomic_write_text(folder / "table.md", as_markdown(table))
+    save_figure(draw_confusions(table), folder / "confusion.png")
+    if len({one.share for one in curve_conditions(table)}) > 1:
+        save_figure(draw_curve(table), folder / "curve.png")

@@ -1,0 +1,207 @@
+"""What ``sd2 classify`` learns from: data sets, pairs, recordings, files of a radar."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from sd2core.cli.recording_maps import MAP_NAMES, MapName, maps_of, parsed_maps, usual_maps
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    from sd2core.classify.data import ClipSet
+    from sd2core.datasets.labelled import LabelledSource
+    from sd2core.denoise.live import TrainedDenoiser
+    from sd2core.doppler_map import MapKind
+
+DATA_HELP = (
+    "DATA is one or several of: a data set (`sd2 export`), a store of pairs (`sd2 simulate\n"
+    "campaign`, `sd2 pairs`), a recording (.sd2) with labels, a labelled radar file (.h5 of a\n"
+    "K60168A), or a folder of recordings or radar files. A recording is taken for a person of\n"
+    "its own; who it is can be said as PERSON=PATH. Radar files without a person are taken for\n"
+    "one and the same person. The four swipes count as horizontal and vertical, other labels by\n"
+    "the class that the label set gives them; frames of a labelled recording without a label\n"
+    "are background."
+)
+
+_WITH_SUBJECTS = ("pairs", "dataset")
+_RADARS = ("simulated", "real")
+
+
+def source(text: str) -> LabelledSource:
+    """Parse ``PATH`` or ``PERSON=PATH``."""
+    from sd2core.datasets.labelled import LabelledSource
+
+    name, sign, path = text.partition("=")
+    if sign and name and path and "/" not in name and not Path(text).exists():
+        return LabelledSource(Path(path), name)
+    return LabelledSource(Path(text), "")
+
+
+def add_data(parser: argparse.ArgumentParser) -> None:
+    """Add what there is to learn from or to judge on, and which of its maps."""
+    add_sources(parser)
+    parser.add_argument(
+        "--maps",
+        default="radar",
+        metavar="NAMES",
+        help=f"some of {', '.join(MAP_NAMES)}, separated by commas (default: radar)",
+    )
+
+
+def add_sources(parser: argparse.ArgumentParser) -> None:
+    """Add what there is to learn from or to judge on, and the denoiser."""
+    parser.add_argument(
+        "data", nargs="+", type=source, metavar="DATA", help="labelled data, see above"
+    )
+    parser.add_argument(
+        "--denoiser",
+        metavar="FILE|NAME",
+        help="for denoised maps of pairs (default: the one that comes with SD² Studio)",
+    )
+
+
+def clips_of(
+    sources: Sequence[LabelledSource],
+    maps: Sequence[MapName] | None,
+    denoiser: TrainedDenoiser | None = None,
+) -> ClipSet:
+    """All clips of the sources, as one set.
+
+    Parameters
+    ----------
+    sources : sequence of LabelledSource
+    maps : sequence of str, optional
+        None: the radar's and, where there are some, synthetic ones.
+    denoiser : TrainedDenoiser, optional
+        For denoised maps of pairs.
+
+    Raises
+    ------
+    Sd2Error
+        When one cannot be read, holds no labels, or they cannot be mixed.
+    """
+    from sd2core.classify.data import clips_of_pairs, merged
+    from sd2core.datasets.labelled import unfolded
+    from sd2core.io.kinds import kind_of
+    from sd2core.train.data import read_mixed
+
+    stores: list[Path] = []
+    sets: list[ClipSet] = []
+    for one in unfolded(sources):
+        kind = kind_of(one.path)
+        if kind not in _WITH_SUBJECTS:
+            sets += _single(one, maps, sets[0].frame_rate_hz if sets else None)
+        elif one.subject:
+            raise Sd2Error(
+                f"{one.subject} is named for {one.path}",
+                "a person for recordings and radar files only; pairs and data sets say whose"
+                " they are",
+            )
+        elif kind == "dataset":
+            sets += _of_dataset(one.path, maps)
+        else:
+            stores.append(one.path)
+    if stores:
+        pairs = read_mixed(stores)
+        for name in maps or ("synthetic", "radar"):
+            sets.append(clips_of_pairs(pairs, pairs.kind if name == "radar" else name, denoiser))
+    return merged(sets)
+
+
+def denoiser_for(maps: Sequence[MapName], name: str | None) -> TrainedDenoiser | None:
+    """The denoiser, where one of the maps needs it."""
+    from sd2core.denoise.files import DEFAULT_NAME, load_model
+
+    return load_model(name or DEFAULT_NAME) if "denoised" in maps else None
+
+
+def asked_maps(options: argparse.Namespace) -> tuple[MapName, ...]:
+    """What ``--maps`` says."""
+    return parsed_maps(options.maps)
+
+
+def split_of(
+    sources: Sequence[LabelledSource], part: Literal["validation", "test"]
+) -> list[str] | None:
+    """Who validates or tests, where all sources are data sets: they say so themselves."""
+    from sd2core.datasets.reading import open_dataset
+    from sd2core.io.kinds import is_dataset
+
+    if not all(is_dataset(one.path) for one in sources):
+        return None
+    names: list[str] = []
+    for one in sources:
+        with open_dataset(one.path) as dataset:
+            names += dataset.header.splits.get(part, ())
+    return list(dict.fromkeys(names)) or None
+
+
+def _of_dataset(path: Path, maps: Sequence[MapName] | None) -> list[ClipSet]:
+    from sd2core.datasets.clips import clips_of_dataset
+    from sd2core.datasets.reading import open_dataset
+
+    with open_dataset(path) as dataset:
+        there = dataset.header.kinds
+        wanted: list[MapKind] = []
+        for name in maps or ("synthetic", "radar"):
+            found = [kind for kind in there if name == ("radar" if kind in _RADARS else kind)]
+            if not found and maps is not None:
+                raise Sd2Error(f"{path} holds no {name} maps", f"one of {', '.join(there)}")
+            wanted += found
+        return [clips_of_dataset(dataset, kind) for kind in wanted]
+
+
+def _single(
+    one: LabelledSource, maps: Sequence[MapName] | None, frame_rate_hz: float | None
+) -> list[ClipSet]:
+    """Of a recording, or of a radar's own file; at the frame rate of the first map."""
+    from sd2core.classify.data import clips_of_map
+    from sd2core.datasets.labelled import ONE_PERSON
+    from sd2core.io.radar import holds_map, load_recorded_map
+    from sd2core.recording.recording import is_recording, open_recording
+
+    if holds_map(one.path):
+        if maps is not None and tuple(maps) != ("radar",):
+            raise Sd2Error(f"{one.path} holds a radar's map only", "--maps radar")
+        recorded = load_recorded_map(one.path)
+        return [
+            clips_of_map(
+                recorded.doppler,
+                recorded.labels,
+                subject=one.subject or ONE_PERSON,
+                movement=one.path.stem,
+                frame_rate_hz=frame_rate_hz,
+            )
+        ]
+    if not is_recording(one.path):
+        raise Sd2Error(
+            f"{one.path} holds nothing with labels to learn from",
+            "pairs, a labelled recording, or a labelled radar file",
+        )
+    from sd2core.cli.labels.reading import labels_at
+    from sd2core.doppler import PRESETS
+
+    recording, labels = open_recording(one.path), labels_at(one.path)
+    # Beside maps of a mesh the radar's is on their axis, so that they can be mixed.
+    axis = None if recording.mesh is None else PRESETS["paper"].axis
+    if not any(span.origin != "suggestion" for span in labels.spans):
+        raise Sd2Error(
+            f"{one.path} has no labels",
+            "a recording in which gestures are labelled",
+            "Label it in the window, or leave it out",
+        )
+    found: list[ClipSet] = []
+    for doppler in maps_of(recording, tuple(maps or usual_maps(recording)), axis=axis).values():
+        found.append(
+            clips_of_map(
+                doppler,
+                labels,
+                subject=one.subject or recording.title,
+                movement=one.path.stem,
+                frame_rate_hz=found[0].frame_rate_hz if found else frame_rate_hz,
+            )
+        )
+    return found

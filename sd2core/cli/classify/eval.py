@@ -1,0 +1,145 @@
+"""``sd2 classify eval``: how good a classifier is on labelled maps."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sd2core.cli.classify.data import DATA_HELP, add_data, asked_maps, clips_of, denoiser_for
+from sd2core.cli.options import add_command
+from sd2core.cli.output import finite, print_rows
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    from sd2core.classify.card import ClassifierCard
+    from sd2core.classify.data import Clip, ClipSet
+    from sd2core.classify.metrics import Score
+
+_STANDARD_OUTPUT = Path("-")
+
+
+def add_eval(kinds: argparse._SubParsersAction) -> None:
+    """Add ``eval``."""
+    parser = add_command(
+        kinds,
+        "eval",
+        "judge a classifier on people that it has not learnt from",
+        handler=_eval,
+        description=(
+            f"{DATA_HELP}\n\n"
+            "Prints how often frames, and whole gestures, of each class were taken for each, and\n"
+            "how soon a gesture was recognised. Judged are the people that the training kept for\n"
+            "the test, or those that are named."
+        ),
+        examples=(
+            "  sd2 classify eval campaign.zarr --model gestures.safetensors\n"
+            "  sd2 classify eval own.sd2 --model g.safetensors --subjects all --plot matrix.png"
+        ),
+    )
+    add_data(parser)
+    parser.add_argument(
+        "--model", type=Path, required=True, metavar="FILE", help="by `sd2 classify train`"
+    )
+    parser.add_argument(
+        "--subjects",
+        metavar="NAMES",
+        help="who is judged, separated by commas, or `all` (default: whom the training kept for"
+        " the test)",
+    )
+    parser.add_argument(
+        "--all-placements",
+        action="store_true",
+        help="judge also what other places of the sensor saw, not each movement's own only",
+    )
+    parser.add_argument(
+        "--json", type=Path, metavar="FILE", help="write all numbers, or - to print them"
+    )
+    parser.add_argument(
+        "--plot", type=Path, metavar="FILE", help="draw both matrices, as .png, .svg or .pdf"
+    )
+
+
+def _eval(options: argparse.Namespace) -> None:
+    from sd2core.classify.files import load_classifier
+    from sd2core.classify.model_selection import judge
+    from sd2core.cli.reading import check_output
+    from sd2core.files.atomic import atomic_write_text
+    from sd2core.files.figure_files import SUFFIXES, save_figure
+
+    if options.plot is not None:
+        check_output(options.plot, *SUFFIXES)
+    if options.json not in (None, _STANDARD_OUTPUT):
+        check_output(options.json, ".json")
+    classifier = load_classifier(options.model)
+    maps = asked_maps(options)
+    known = clips_of(options.data, maps, denoiser_for(maps, options.denoiser))
+    clips = _judged(known, classifier.card, options)
+    found = judge(classifier, clips, known)
+    subjects = list(dict.fromkeys(clip.subject for clip in clips))
+    learnt = set(classifier.card.about.get("split", {}).get("training", ())) & set(subjects)
+    told = {
+        "model": str(options.model),
+        "maps": list(known.kinds),
+        "subjects": subjects,
+        "learnt_from": sorted(learnt),
+        **found.to_json(),
+        **found.summary(),
+    }
+    content = json.dumps(finite(told), indent=2, ensure_ascii=False)
+    if options.json == _STANDARD_OUTPUT:
+        print(content)
+    else:
+        _say(found, known, subjects, sorted(learnt))
+    if options.json not in (None, _STANDARD_OUTPUT):
+        atomic_write_text(options.json, content + "\n")
+    if options.plot is not None:
+        from sd2core.classify.comparison_plots import confusion_figure
+        from sd2core.classify.metrics import shares
+
+        figure = confusion_figure(
+            [shares(found.frames), shares(found.gestures)],
+            found.classes,
+            ["frames", "gestures"],
+            f"{options.model.stem} on {' and '.join(known.kinds)} maps",
+        )
+        save_figure(figure, options.plot)
+
+
+def _judged(known: ClipSet, card: ClassifierCard, options: argparse.Namespace) -> tuple[Clip, ...]:
+    kept = card.about.get("split", {}).get("test") or ()
+    if options.subjects == "all":
+        names = known.subjects
+    elif options.subjects is not None:
+        names = tuple(name for name in options.subjects.split(",") if name)
+    else:
+        # Data of other people than the training's are judged whole.
+        names = tuple(name for name in kept if name in known.subjects) or known.subjects
+    missing = [name for name in names if name not in known.subjects]
+    if missing:
+        raise Sd2Error(
+            f"There is nothing of {', '.join(missing)}", f"some of {', '.join(known.subjects)}"
+        )
+    clips = known.of(names)
+    return clips if options.all_placements else tuple(c for c in clips if c.placement == 0)
+
+
+def _say(found: Score, known: ClipSet, subjects: list[str], learnt: list[str]) -> None:
+    from sd2core.classify.metrics import shares
+
+    print(f"Judged on {' and '.join(known.kinds)} maps of {', '.join(subjects)}")
+    if learnt:
+        print(f"The classifier has learnt from {', '.join(learnt)}: not what it does for others.")
+    for what, matrix in (("frames", found.frames), ("gestures", found.gestures)):
+        rows = [(what, *(f"taken for {name}" for name in found.classes), "in all")]
+        for name, row, counts in zip(found.classes, shares(matrix), matrix, strict=True):
+            cells = ["–" if value != value else f"{100 * value:.1f} %" for value in row]
+            rows.append((name, *cells, f"{counts.sum():,}"))
+        print()
+        print_rows(rows, right=range(1, len(found.classes) + 2))
+    print(f"\nMean recall of frames {100 * found.mean_recall:.1f} %")
+    if found.latency_s == found.latency_s:
+        print(
+            f"A gesture is recognised after {found.latency_s:.2f} s (median), {found.missed} never"
+        )

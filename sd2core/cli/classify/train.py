@@ -1,0 +1,170 @@
+"""``sd2 classify train``: labelled maps to a classifier."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shlex
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from sd2core.cli.classify.data import (
+    DATA_HELP,
+    add_data,
+    asked_maps,
+    clips_of,
+    denoiser_for,
+    split_of,
+)
+from sd2core.cli.classify.network import add_network, network_of
+from sd2core.cli.options import (
+    add_command,
+    add_json,
+    add_people_kept_out,
+    positive_float,
+    positive_int,
+)
+from sd2core.cli.output import finite, print_facts, print_json
+
+if TYPE_CHECKING:
+    from sd2core.classify.training import TrainOptions, Watch
+
+_INTERRUPTED = 130
+
+
+def add_train(kinds: argparse._SubParsersAction) -> None:
+    """Add ``train``."""
+    parser = add_command(
+        kinds,
+        "train",
+        "train a classifier on labelled maps",
+        handler=_train,
+        description=(
+            f"{DATA_HELP}\n\n"
+            "Some people are kept out to choose the best moment by, some for `sd2 classify eval`.\n"
+            "Ctrl-C ends the training early; the best so far is kept. Beside FILE stands\n"
+            "FILE.json with all that is known of the training."
+        ),
+        examples=(
+            "  sd2 classify train campaign.zarr --out gestures.safetensors\n"
+            "  sd2 classify train set.zarr --maps radar,denoised --out both.safetensors\n"
+            "  sd2 classify train anna=a.sd2 anna=b.sd2 ben=c.sd2 --model s4 --out own.safetensors"
+        ),
+    )
+    add_data(parser)
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="FILE", help="to write (.safetensors)"
+    )
+    add_network(parser)
+    parser.add_argument(
+        "--placements",
+        choices=("all", "first"),
+        default="all",
+        help="range synthesis: learn from all places of the sensor, or the first only"
+        " (default: all)",
+    )
+    otherwise = "(default: as the data set says, or a sixth of all)"
+    add_people_kept_out(
+        parser,
+        f"kept out to choose the best step by, separated by commas, or none {otherwise}",
+        f"kept out for a test, or none {otherwise}",
+    )
+    parser.add_argument("--steps", type=positive_int, metavar="N", help="batches to learn from")
+    parser.add_argument(
+        "--patience",
+        type=positive_int,
+        metavar="N",
+        help="end after so many looks at the validation people without a better one",
+    )
+    parser.add_argument("--learning-rate", type=positive_float, metavar="R", help="at its highest")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="default: 0")
+    parser.add_argument(
+        "--progress-json",
+        action="store_true",
+        help="print what is done as JSON lines, for other programs (docs/formats.md)",
+    )
+    add_json(parser)
+
+
+def _train(options: argparse.Namespace) -> int:
+    from sd2core.cli.reading import check_output
+
+    check_output(options.out, ".safetensors")
+    maps = asked_maps(options)
+    from sd2core.classify.files import save_classifier
+    from sd2core.classify.splitting import split_clips
+    from sd2core.classify.training import train
+    from sd2core.files.atomic import atomic_write_text
+
+    known = clips_of(options.data, maps, denoiser_for(maps, options.denoiser))
+    parts = split_clips(
+        known,
+        _kept_out(options, "validation"),
+        _kept_out(options, "test"),
+        first_only=options.placements == "first",
+    )
+    about = {
+        "data": [str(one.path) for one in options.data],
+        "maps": list(maps),
+        "command": shlex.join(["sd2", *sys.argv[1:]]),
+        "split": parts.to_json(),
+    }
+    chosen = _options(options)
+    with _watching(options, chosen.steps) as watch:
+        made = train(parts.training, parts.validation, known, chosen, about=about, watch=watch)
+    card = save_classifier(options.out, made.classifier)
+    run = {"model": str(options.out), "card": card.to_json(), "events": made.events}
+    atomic_write_text(options.out.with_suffix(".json"), json.dumps(finite(run), indent=1) + "\n")
+    if options.progress_json:
+        print(json.dumps({"event": "written", "model": str(options.out)}), flush=True)
+    elif options.json:
+        print_json({"interrupted": made.interrupted, **run})
+    else:
+        from sd2core.cli.info.model import describe_classifier_card
+
+        description = describe_classifier_card(options.out, card)
+        print_facts(f"Wrote {options.out}", description.facts)
+    return _INTERRUPTED if made.interrupted else 0
+
+
+def _options(options: argparse.Namespace) -> TrainOptions:
+    from sd2core.classify.training import TrainOptions
+
+    given: dict[str, Any] = {
+        name: getattr(options, name)
+        for name in ("steps", "patience", "learning_rate")
+        if getattr(options, name) is not None
+    }
+    return network_of(options).of(TrainOptions(**given), options.seed)
+
+
+def _kept_out(
+    options: argparse.Namespace, part: Literal["validation", "test"]
+) -> Sequence[str] | None:
+    """Those who are named, which may be nobody; otherwise as the data sets have it."""
+    named: tuple[str, ...] | None = getattr(options, f"{part}_subjects")
+    return split_of(options.data, part) if named is None else named
+
+
+@contextmanager
+def _watching(options: argparse.Namespace, steps: int) -> Iterator[Watch]:
+    """A bar on standard error, or a JSON line for every event on standard output."""
+    from tqdm import tqdm
+
+    if options.progress_json:
+        yield lambda event: print(json.dumps(finite(event)), flush=True)
+        return
+    with tqdm(
+        total=steps, desc="Training", unit="step", file=sys.stderr, disable=None, leave=False
+    ) as bar:
+
+        def watch(event: dict[str, Any]) -> None:
+            if event["event"] == "step":
+                bar.update(event["step"] - bar.n)
+            elif event["event"] == "check":
+                bar.set_postfix_str(f"validation {event['validation_mean_recall']:.1%}")
+
+        yield watch

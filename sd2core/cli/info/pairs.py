@@ -1,0 +1,55 @@
+"""``sd2 info`` of pairs to learn from."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+
+from sd2core.cli.info import Description, bins_in_words
+from sd2core.pairs.store import PairSet
+
+
+def describe_pairs(path: Path, pairs: PairSet) -> Description:
+    """Describe pairs: who, how much, what is labelled, from where it was seen."""
+    minutes = {
+        subject: sum(len(take.times_s) for take in pairs.takes if take.subject == subject)
+        / pairs.frame_rate_hz
+        / 60
+        for subject in pairs.subjects
+    }
+    labelled: Counter[str] = Counter()
+    for take in pairs.takes:
+        counts = np.bincount(take.label, minlength=len(pairs.labels))
+        labelled.update(dict(zip(pairs.labels, counts.tolist(), strict=True)))
+    ranges_m = [float(np.linalg.norm(take.sensor_position_m)) for take in pairs.takes]
+    placements = len({take.placement for take in pairs.takes})
+    data = {
+        "kind": "pairs",
+        "path": str(path),
+        "pair_kind": pairs.kind,
+        "takes": len(pairs.takes),
+        "frames": pairs.frames,
+        "frames_per_s": pairs.frame_rate_hz,
+        "minutes_of_subject": minutes,
+        "frames_of_label": dict(labelled),
+        "placements": placements,
+        "bins": pairs.axis.bins,
+        "v_max_mps": pairs.axis.v_max_mps,
+        "null_bins": list(pairs.null_bins),
+        "provenance": pairs.provenance,
+    }
+    facts = {
+        "targets": "a simulated radar" if pairs.kind == "simulated" else "a real radar",
+        "takes": f"{len(pairs.takes)} of {pairs.frames} frames, {pairs.frame_rate_hz:g} frames/s",
+        "subjects": ", ".join(f"{name} {value:.1f} min" for name, value in minutes.items()),
+        "labels": ", ".join(
+            f"{name} {count / pairs.frames:.0%}" for name, count in labelled.items()
+        ),
+        "sensors": f"{placements} for each take, up to {max(ranges_m):.2f} m from the camera",
+        "velocity": f"{pairs.axis.bins} bins of {pairs.axis.bin_width_mps:g} m/s over"
+        f" ±{pairs.axis.v_max_mps:g} m/s, approaching is positive",
+        "nulled bins": bins_in_words(pairs.axis, pairs.null_bins),
+    }
+    return Description(f"Pairs {path}", data, facts)

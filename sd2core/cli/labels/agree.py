@@ -1,0 +1,158 @@
+"""``sd2 labels agree``: how far two people who labelled the same recording agree."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from statistics import median
+from typing import TYPE_CHECKING, Any
+
+from sd2core.cli.labels.reading import add_clock, clock_of, labels_at, needed, with_rate
+from sd2core.cli.options import add_command, add_json, share
+from sd2core.cli.output import counted, print_json, print_rows
+
+if TYPE_CHECKING:
+    from sd2core.labels.agreement import Agreement, Answer, Kappa
+    from sd2core.labels.spans import Span
+
+
+def add_agree(kinds: argparse._SubParsersAction) -> None:
+    """Add ``agree``."""
+    parser = add_command(
+        kinds,
+        "agree",
+        "compare the labels of two people",
+        handler=_agree,
+        description=(
+            "Frame by frame by Cohen's kappa (1 is agreement, 0 is chance), span by span by\n"
+            "one-to-one matches. Differences of edges are B's less A's: positive is later."
+        ),
+        examples=(
+            "  sd2 labels agree anna.json ben.json --video walk.mp4\n"
+            "  sd2 labels agree walk.sd2 ben.eaf --min-iou 0.3 --track Gestures"
+        ),
+    )
+    parser.add_argument("a", type=Path, metavar="A", help="labels of one person")
+    parser.add_argument("b", type=Path, metavar="B", help="labels of the other")
+    parser.add_argument(
+        "--min-iou",
+        type=share,
+        default=0.5,
+        metavar="X",
+        help="intersection over union that a match must reach (default: 0.5)",
+    )
+    parser.add_argument("--track", metavar="NAME", help="compare this track only")
+    add_clock(parser)
+    add_json(parser)
+
+
+def _agree(options: argparse.Namespace) -> None:
+    from sd2core.labels.agreement import agreement
+
+    clock = clock_of(options, options.a, options.b)
+    a, b = labels_at(options.a, clock), labels_at(options.b, clock)
+    clock = needed(with_rate(options, clock, a, b), "Comparing labels")
+    found = agreement(a, b, clock, min_iou=options.min_iou, track=options.track)
+    if options.json:
+        print_json(_data(found))
+    else:
+        _print(found)
+
+
+def _print(found: Agreement) -> None:
+    frames, spans = found.frames, found.spans
+    rows: list[tuple[str, ...]] = [("frames", "kappa", "same", "by chance")]
+    rows.append(("all labels", *_kappa(frames.overall)))
+    rows += [(label, *_kappa(kappa)) for label, kappa in frames.of_label.items()]
+    print_rows(rows, right=(1, 2, 3))
+    if frames.overall.value is None:
+        print("No kappa: both give one and the same answer in all frames.")
+    print()
+    rows = [("frames: A \\ B", *(_answer(answer) for answer in frames.answers))]
+    rows += [
+        (_answer(answer), *(str(count) for count in row))
+        for answer, row in zip(frames.answers, frames.confusion.tolist(), strict=True)
+    ]
+    print_rows(rows, right=tuple(range(1, len(rows[0]))))
+    print()
+    same = sum(match.same_label for match in spans.matches)
+    print(
+        f"{counted(len(spans.matches), 'span')} matched from an IoU of {spans.min_iou:g} on,"
+        f" {same} of them with the same label;"
+        f" {len(spans.only_a)} only in A, {len(spans.only_b)} only in B"
+        + ("" if spans.f1 is None else f"; F1 {spans.f1:.3f}")
+    )
+    if spans.matches:
+        start_s = median(abs(match.start_difference_s) for match in spans.matches)
+        end_s = median(abs(match.end_difference_s) for match in spans.matches)
+        print(f"Edges differ by {start_s:.3f} s (starts) and {end_s:.3f} s (ends), median")
+        rows = [("A", "B", "label", "IoU", "start s", "frames", "end s", "frames")]
+        for match in spans.matches:
+            words = match.a.label if match.same_label else f"{match.a.label} / {match.b.label}"
+            rows.append(
+                (
+                    str(match.a.id),
+                    str(match.b.id),
+                    words,
+                    f"{match.iou:.2f}",
+                    f"{match.start_difference_s:+.3f}",
+                    _frames(match.start_difference_frames),
+                    f"{match.end_difference_s:+.3f}",
+                    _frames(match.end_difference_frames),
+                )
+            )
+        print_rows(rows, right=(0, 1, 3, 4, 5, 6, 7))
+    for which, alone in (("A", spans.only_a), ("B", spans.only_b)):
+        for span in alone:
+            print(f"only in {which}: {span.id} {span.label} {span.start_s:.3f}–{span.end_s:.3f} s")
+
+
+def _data(found: Agreement) -> dict[str, Any]:
+    frames, spans = found.frames, found.spans
+    return {
+        "frames": frames.overall.frames,
+        "overall": _kappa_data(frames.overall),
+        "labels": {label: _kappa_data(kappa) for label, kappa in frames.of_label.items()},
+        "answers": [list(answer) for answer in frames.answers],
+        "confusion": frames.confusion.tolist(),
+        "min_iou": spans.min_iou,
+        "f1": spans.f1,
+        "mean_iou": spans.mean_iou,
+        "matches": [
+            {
+                "a": match.a.id,
+                "b": match.b.id,
+                "label_a": match.a.label,
+                "label_b": match.b.label,
+                "iou": match.iou,
+                "start_difference_s": match.start_difference_s,
+                "end_difference_s": match.end_difference_s,
+                "start_difference_frames": match.start_difference_frames,
+                "end_difference_frames": match.end_difference_frames,
+            }
+            for match in spans.matches
+        ],
+        "only_a": [_span_data(span) for span in spans.only_a],
+        "only_b": [_span_data(span) for span in spans.only_b],
+    }
+
+
+def _kappa(kappa: Kappa) -> tuple[str, str, str]:
+    value = "–" if kappa.value is None else f"{kappa.value:.3f}"
+    return value, f"{kappa.observed:.1%}", f"{kappa.expected:.1%}"
+
+
+def _kappa_data(kappa: Kappa) -> dict[str, Any]:
+    return {"kappa": kappa.value, "observed": kappa.observed, "expected": kappa.expected}
+
+
+def _span_data(span: Span) -> dict[str, Any]:
+    return {"id": span.id, "start_s": span.start_s, "end_s": span.end_s, "label": span.label}
+
+
+def _answer(answer: Answer) -> str:
+    return " + ".join(answer) or "(none)"
+
+
+def _frames(difference: int | None) -> str:
+    return "–" if difference is None else f"{difference:+d}"

@@ -1,0 +1,121 @@
+"""``sd2 labels set``: the label set of a file, written by itself or exchanged for another."""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sd2core.cli.labels.reading import (
+    add_clock,
+    add_reading,
+    add_replace,
+    check_label_output,
+    clock_of,
+    labels_at,
+    with_rate,
+    write,
+)
+from sd2core.cli.options import add_command, add_json
+from sd2core.cli.output import counted, print_json, print_rows
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    from sd2core.labels.label_set import LabelSet
+    from sd2core.labels.spans import Labels
+
+_USUAL = "usual"
+
+
+def add_set(kinds: argparse._SubParsersAction) -> None:
+    """Add ``set``."""
+    parser = add_command(
+        kinds,
+        "set",
+        "show, share or exchange a label set",
+        handler=_set,
+        description=(
+            "Prints the labels with key, colour, class for the classifier and how many spans have\n"
+            "them, and which two look alike. With --use spans keep their labels, also those that\n"
+            "the other set does not have."
+        ),
+        examples=(
+            "  sd2 labels set walk.sd2\n"
+            "  sd2 labels set walk.sd2 --export gestures.json\n"
+            "  sd2 labels set walk.sd2 --use gestures.json --out labels.json"
+        ),
+    )
+    parser.add_argument("file", type=Path, metavar="FILE", help="the file with labels")
+    parser.add_argument("--export", type=Path, metavar="SET.json", help="write the set by itself")
+    parser.add_argument(
+        "--use", metavar="SET.json", help=f"another set; {_USUAL!r} is the program's own"
+    )
+    parser.add_argument(
+        "--out", type=Path, metavar="OUT", help="where to write the labels with that other set"
+    )
+    add_replace(parser)
+    add_reading(parser, "FILE")
+    add_clock(parser)
+    add_json(parser)
+
+
+def _set(options: argparse.Namespace) -> None:
+    from sd2core.labels import files
+    from sd2core.labels.label_set_edits import set_label_set
+
+    if (options.use is None) != (options.out is None):
+        raise Sd2Error("One of --use and --out is given", "both of them, or none")
+    for path in (options.export, options.out):
+        if path is not None:
+            check_label_output(path, replace=options.replace)
+    clock = clock_of(options, options.file)
+    labels = labels_at(options.file, clock, options.format, options.observation)
+    written, lost = [], []
+    if options.use is not None:
+        labels = set_label_set(labels, _other(options.use)).labels
+        lost = write(options.out, labels, with_rate(options, clock, labels))
+        written.append(options.out)
+    if options.export is not None:
+        files.write_label_set(options.export, labels.label_set)
+        written.append(options.export)
+    if options.json:
+        print_json(_data(labels) | {"written": [str(path) for path in written], "not_kept": lost})
+        return
+    for path in written:
+        print(f"Wrote {path} with {counted(len(labels.label_set.labels), 'label')}")
+    for sentence in lost:
+        print(f"  not kept: {sentence}")
+    if not written:
+        _print(labels)
+
+
+def _other(name: str) -> LabelSet:
+    from sd2core.labels.files import read_label_set
+    from sd2core.labels.label_set import GESTURES
+
+    return GESTURES if name == _USUAL else read_label_set(Path(name))
+
+
+def _print(labels: Labels) -> None:
+    data = _data(labels)
+    print(data["name"])
+    rows = [("label", "key", "colour", "class", "spans")]
+    rows += [
+        (one["name"], one["key"], one["colour"], one["gesture_class"], str(one["spans"]))
+        for one in data["labels"]
+    ]
+    print_rows(rows, right=(4,))
+    for sentence in data["alike"]:
+        print(f"{sentence}.")
+
+
+def _data(labels: Labels) -> dict[str, Any]:
+    from sd2core.labels.colours import alike
+    from sd2core.labels.entries import label_set_entry
+
+    spans = Counter(span.label for span in labels.spans)
+    entry = label_set_entry(labels.label_set)
+    for one in entry["labels"]:
+        one["spans"] = spans[one["name"]]
+    return entry | {"alike": [pair.words() for pair in alike(labels.label_set.labels)]}

@@ -1,0 +1,180 @@
+"""Reading and writing labels that the command line names, and the clock that they need."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sd2core.cli.options import positive_float
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    from sd2core.labels.spans import Labels
+    from sd2core.recording.recording import Recording
+    from sd2core.timebase import Timebase
+
+_MOST_FRAMES = 100_000_000
+_FORMATS = "sd2, csv, audacity, elan, textgrid, boris or mne"
+
+
+def add_clock(parser: argparse.ArgumentParser) -> None:
+    """Add what says when frames are."""
+    group = parser.add_argument_group("frame times", "one of these; a recording brings its own")
+    choice = group.add_mutually_exclusive_group()
+    choice.add_argument("--recording", type=Path, metavar="REC.sd2", help="those of a recording")
+    choice.add_argument("--video", type=Path, metavar="FILE", help="those of a video")
+    choice.add_argument("--mesh", type=Path, metavar="FILE", help="those of a mesh")
+    choice.add_argument(
+        "--rate", type=positive_float, metavar="F", help="F frames per second from 0 s on"
+    )
+
+
+def add_reading(parser: argparse.ArgumentParser, name: str) -> None:
+    """Add what says how a file is to be read."""
+    parser.add_argument("--format", metavar="NAME", help=f"the format of {name}: {_FORMATS}")
+    parser.add_argument(
+        "--observation", metavar="NAME", help="which one of a BORIS project with several"
+    )
+
+
+def add_replace(parser: argparse.ArgumentParser) -> None:
+    """Add ``--replace``."""
+    parser.add_argument("--replace", action="store_true", help="replace the file where it exists")
+
+
+def labels_at(
+    path: Path,
+    timebase: Timebase | None = None,
+    file_format: str | None = None,
+    observation: str | None = None,
+) -> Labels:
+    """Labels of a ``labels.json``, a recording, a radar file or another program's file."""
+    from sd2core.io.radar import holds_map, load_recorded_map
+    from sd2core.labels import files
+    from sd2core.labels.formats import read_labels
+    from sd2core.recording.recording import is_recording, open_recording
+
+    if not path.exists():
+        raise Sd2Error(f"{path} does not exist", "a file with labels", "Check the path")
+    if file_format is not None:
+        return read_labels(path, timebase, file_format, observation=observation)
+    if is_recording(path):
+        return open_recording(path).effective_labels()
+    if holds_map(path):
+        return load_recorded_map(path).labels
+    if path.suffix.lower() == ".json":
+        return files.read_labels(path).labels
+    return read_labels(path, timebase, observation=observation)
+
+
+def clock_of(options: argparse.Namespace, *sources: Path) -> Timebase | None:
+    """Frame times as the options say, else those of the first source that has some.
+
+    A source is a file with labels: a recording, a radar file, or a ``labels.json`` that
+    names its recording or video. None where nothing says it.
+    """
+    from sd2core.io.radar import holds_map, load_recorded_map
+    from sd2core.labels import files
+    from sd2core.recording.recording import is_recording, open_recording
+
+    if options.recording is not None:
+        return recording_clock(open_recording(options.recording))
+    if options.video is not None:
+        return _video_clock(options.video)
+    if options.mesh is not None:
+        from sd2core.io.mesh import load_mesh
+
+        return load_mesh(options.mesh).timebase
+    for path in sources:
+        if is_recording(path):
+            return recording_clock(open_recording(path))
+        if holds_map(path):
+            return load_recorded_map(path).timebase
+        if path.suffix.lower() == ".json" and path.exists():
+            file = files.read_labels(path)
+            if file.recording is not None and file.recording.exists():
+                return recording_clock(open_recording(file.recording))
+            if file.video is not None and file.video.exists():
+                return _video_clock(file.video)
+    return None
+
+
+def with_rate(
+    options: argparse.Namespace, timebase: Timebase | None, *labels: Labels
+) -> Timebase | None:
+    """The same clock, or one of ``--rate`` that is as long as the labels."""
+    from sd2core.timebase import Timebase
+
+    if options.rate is None:
+        return timebase
+    end_s = max((span.end_s for one in labels for span in one.spans), default=0.0)
+    frames = max(math.ceil(end_s * options.rate - 1e-6), 1)
+    if frames > _MOST_FRAMES:
+        raise Sd2Error(
+            f"The labels end at {end_s:g} s; at {options.rate:g} frames/s these are"
+            f" {frames:,} frames",
+            f"up to {_MOST_FRAMES:,}",
+        )
+    return Timebase.regular(frames, options.rate)
+
+
+def needed(timebase: Timebase | None, why: str) -> Timebase:
+    """The clock, or the sentence that one is needed."""
+    if timebase is None:
+        raise Sd2Error(
+            f"{why} needs the times of frames",
+            "--recording, --video, --mesh or --rate",
+            "Name the recording that was labelled, or its frame rate",
+        )
+    return timebase
+
+
+def recording_clock(recording: Recording) -> Timebase:
+    """Frames of a recording's clock: the video's, else the mesh's, else the radar's."""
+    missing = recording.missing()
+    if recording.video is not None and "video" not in missing:
+        with recording.open_video() as video:
+            return video.timebase
+    if recording.mesh is not None and "mesh" not in missing:
+        return recording.load_mesh().timebase
+    if recording.radar is not None and "radar" not in missing:
+        radar = recording.load_radar_map() if recording.holds_radar_map else None
+        clock = recording.load_capture().timebase if radar is None else radar.timebase
+        return clock.shifted(recording.radar_offset_s)
+    raise Sd2Error(
+        f"{recording.folder} has no video, mesh or radar capture at hand",
+        "one of them, for the times of frames",
+        "Give the frame rate with --rate",
+    )
+
+
+def write(
+    path: Path, labels: Labels, timebase: Timebase | None, file_format: str | None = None
+) -> list[str]:
+    """Write labels by the file's suffix; what the file could not hold, as sentences."""
+    from sd2core.labels import files
+    from sd2core.labels.formats import write_labels
+
+    if file_format is None and path.suffix.lower() == ".json":
+        files.write_labels(path, labels, timebase=timebase)
+        return []
+    clock = needed(timebase, f"A file {path.suffix or path.name}")
+    return [str(loss) for loss in write_labels(path, labels, clock, file_format)]
+
+
+def check_label_output(path: Path, *, replace: bool) -> None:
+    """Refuse a file that cannot be written, or that is there and not to be replaced."""
+    from sd2core.cli.reading import check_output
+
+    if path.exists() and not replace:
+        raise Sd2Error(f"{path} exists", "a new file", "Choose another name, or say --replace")
+    check_output(path, path.suffix.lower())
+
+
+def _video_clock(path: Path) -> Timebase:
+    from sd2core.io.video import open_video
+
+    with open_video(path) as video:
+        return video.timebase

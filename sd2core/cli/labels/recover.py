@@ -1,0 +1,113 @@
+"""``sd2 labels recover``: labels that were not saved when a window ended."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sd2core.cli.labels.reading import add_replace, check_label_output
+from sd2core.cli.options import add_command, add_json
+from sd2core.cli.output import counted, print_json, print_rows
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    from sd2core.labels.recovery_offers import Offer
+
+
+def add_recover(kinds: argparse._SubParsersAction) -> None:
+    """Add ``recover``."""
+    parser = add_command(
+        kinds,
+        "recover",
+        "list labels that were not saved when a window ended, or write them to a file",
+        handler=_recover,
+        description=(
+            "Opening the recording in the window offers them as well. Nothing is deleted here,\n"
+            "and what a window edits now is not listed."
+        ),
+        examples=("  sd2 labels recover\n  sd2 labels recover walk.sd2 --out found.json"),
+    )
+    parser.add_argument(
+        "recording",
+        type=Path,
+        nargs="?",
+        metavar="REC",
+        help="what was labelled: a recording, or the video that was not saved as one yet",
+    )
+    parser.add_argument(
+        "--out", type=Path, metavar="FILE.json", help="write the newest of REC, for `convert`"
+    )
+    add_replace(parser)
+    add_json(parser)
+
+
+def _recover(options: argparse.Namespace) -> None:
+    from sd2core.labels.recovery import offers_in, recovery_folder
+
+    if options.out is not None and options.recording is None:
+        raise Sd2Error("--out was given without REC", "a recording whose labels are written")
+    found = offers_in(recovery_folder(), declined=True)
+    offers = found.offers
+    if options.recording is not None:
+        path = options.recording.resolve()
+        offers = tuple(one for one in offers if one.recording == path)
+    for note in found.notes:
+        print(note, file=sys.stderr)
+    if options.out is not None:
+        _write(options, offers)
+    elif options.json:
+        print_json({"recoveries": [_data(offer) for offer in offers]})
+    elif not offers:
+        print("There is nothing to recover.")
+    else:
+        _print(offers)
+
+
+def _write(options: argparse.Namespace, offers: tuple[Offer, ...]) -> None:
+    from sd2core.labels.files import write_labels
+
+    if not offers:
+        raise Sd2Error(
+            f"There is nothing to recover of {options.recording}",
+            "one of those that `sd2 labels recover` lists",
+        )
+    if options.out.suffix.lower() != ".json":
+        raise Sd2Error(
+            f"{options.out} is no .json", "a .json", "`sd2 labels convert` makes other files of it"
+        )
+    check_label_output(options.out, replace=options.replace)
+    write_labels(options.out, offers[0].labels, recording=offers[0].recording)
+    if options.json:
+        print_json({"path": str(options.out)} | _data(offers[0]))
+    else:
+        print(f"Wrote {options.out} with {counted(len(offers[0].labels.spans), 'span')}")
+
+
+def _print(offers: tuple[Offer, ...]) -> None:
+    rows = [("until", "edits", "last edit", "spans", "", "recording")]
+    rows += [
+        (
+            time.strftime("%Y-%m-%d %H:%M", time.localtime(one.time_unix_s)),
+            f"{one.edits:,}",
+            one.last,
+            f"{len(one.labels.spans):,}",
+            "discarded" if one.declined else "",
+            str(one.recording),
+        )
+        for one in offers
+    ]
+    print_rows(rows, right=(1, 3))
+
+
+def _data(offer: Offer) -> dict[str, Any]:
+    return {
+        "recording": str(offer.recording),
+        "edits": offer.edits,
+        "last": offer.last,
+        "time_unix_s": offer.time_unix_s,
+        "spans": len(offer.labels.spans),
+        "discarded": offer.declined,
+    }

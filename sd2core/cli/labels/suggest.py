@@ -1,0 +1,171 @@
+"""``sd2 labels suggest``: candidate spans where something moves."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sd2core.cli.labels.reading import add_replace, check_label_output, recording_clock, write
+from sd2core.cli.options import add_command, add_json, not_negative_float
+from sd2core.cli.output import counted, print_json, print_rows
+from sd2core.cli.recording_maps import MapName, maps_of
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    from sd2core.doppler_map import DopplerMap
+    from sd2core.recording.recording import Recording
+    from sd2core.sensor import VelocityAxis
+    from sd2core.timebase import Timebase
+
+_HELP = {
+    "high_db": ("DB", "energy over the quiet level that a span reaches somewhere (default: 8)"),
+    "low_db": ("DB", "energy that it does not fall below (default: 5)"),
+    "min_duration_s": ("S", "least duration, without margins (default: 0.2)"),
+    "merge_gap_s": ("S", "quiet stretches up to this do not end a span (default: 0.1)"),
+    "margin_s": ("S", "added on both sides (default: 0.3)"),
+}
+
+
+def add_suggest(kinds: argparse._SubParsersAction) -> None:
+    """Add ``suggest``."""
+    parser = add_command(
+        kinds,
+        "suggest",
+        "find spans in which something moves",
+        handler=_suggest,
+        description=(
+            "Measures the energy of every frame of a Doppler map over the map's own quiet level.\n"
+            "It finds motion, not gestures: raising an arm is suggested as well. The confidence\n"
+            "is how far the high threshold could be raised before the span was lost, 1 from\n"
+            "20 dB on; it is no probability. At least a quarter of the recording must be quiet."
+        ),
+        examples=(
+            "  sd2 labels suggest map.npz\n"
+            "  sd2 labels suggest walk.sd2 --out suggested.json\n"
+            "  sd2 labels suggest walk.sd2 --of radar --out suggested.eaf\n"
+            "  sd2 labels suggest swing.h5 --margin-s 0.1 --out suggested.csv"
+        ),
+    )
+    parser.add_argument(
+        "map", type=Path, metavar="MAP", help="a map, a recording, or the .h5 of a K60168A"
+    )
+    parser.add_argument("--out", type=Path, metavar="FILE", help="the file of labels to write")
+    add_replace(parser)
+    parser.add_argument(
+        "--of",
+        choices=("synthetic", "radar"),
+        help="which map of a recording (default: synthetic where there is a mesh)",
+    )
+    for name, (metavar, text) in _HELP.items():
+        parser.add_argument(
+            f"--{name.replace('_', '-')}", type=not_negative_float, metavar=metavar, help=text
+        )
+    parser.add_argument("--label", default="gesture", help="what to call them (default: gesture)")
+    add_json(parser)
+
+
+def _suggest(options: argparse.Namespace) -> None:
+    from sd2core.labels.spans import Labels, Track
+    from sd2core.labels.suggest import TRACK, SuggestOptions, motion_energy_db, suggest_spans
+
+    if options.out is not None:
+        check_label_output(options.out, replace=options.replace)
+    chosen = SuggestOptions(
+        **{
+            field.name: getattr(options, field.name)
+            for field in fields(SuggestOptions)
+            if getattr(options, field.name) is not None
+        }
+    )
+    doppler, clock = map_and_clock(options)
+    spans = suggest_spans(doppler, chosen, label=options.label)
+    energy_db = motion_energy_db(doppler)
+    loudest_db = float(max((value for value in energy_db.tolist() if value == value), default=0.0))
+    lost: list[str] = []
+    if options.out is not None:
+        lost = write(options.out, Labels((Track(TRACK),), spans), clock)
+    if options.json:
+        print_json(
+            {
+                "map_kind": doppler.kind,
+                "loudest_db": loudest_db,
+                "options": {field.name: getattr(chosen, field.name) for field in fields(chosen)},
+                "spans": [
+                    {
+                        "id": span.id,
+                        "start_s": span.start_s,
+                        "end_s": span.end_s,
+                        "confidence": span.confidence,
+                        "note": span.note,
+                    }
+                    for span in spans
+                ],
+                "path": None if options.out is None else str(options.out),
+                "not_kept": lost,
+            }
+        )
+        return
+    print(
+        f"{counted(len(spans), 'span')} in which something moves, in the {doppler.kind} map:"
+        f" {chosen.high_db:g} dB or more over the quiet level somewhere,"
+        f" {chosen.low_db:g} dB throughout"
+    )
+    if spans:
+        rows = [("id", "start s", "end s", "confidence", "why")]
+        rows += [
+            (
+                str(span.id),
+                f"{span.start_s:.3f}",
+                f"{span.end_s:.3f}",
+                f"{span.confidence:.2f}",
+                span.note,
+            )
+            for span in spans
+        ]
+        print_rows(rows, right=(0, 1, 2, 3))
+    else:
+        print(f"The loudest frame is {loudest_db:.1f} dB over the quiet level.")
+    if options.out is not None:
+        print(f"Wrote {options.out}")
+    for sentence in lost:
+        print(f"  not kept: {sentence}")
+
+
+def map_and_clock(
+    options: argparse.Namespace, axis: VelocityAxis | None = None
+) -> tuple[DopplerMap, Timebase]:
+    """The map that ``options.map`` and ``options.of`` name, and the clock of its labels.
+
+    A recording's capture becomes a map on the axis, or on one of its own.
+    """
+    from sd2core.doppler_map import DopplerMap
+    from sd2core.io.kinds import kind_of
+    from sd2core.io.radar import holds_map, load_recorded_map
+    from sd2core.recording.recording import open_recording
+
+    path: Path = options.map
+    kind = kind_of(path)
+    if kind == "recording":
+        recording = open_recording(path)
+        return _map_of(recording, options.of, axis), recording_clock(recording)
+    if options.of is not None:
+        raise Sd2Error(f"--of is given, and {path} is no recording", "--of for a recording only")
+    if kind == "map":
+        doppler = DopplerMap.load(path)
+    elif holds_map(path):
+        doppler = load_recorded_map(path).doppler
+    else:
+        raise Sd2Error(
+            f"{path} is a {kind}",
+            "a Doppler map, a recording, or the .h5 of a K60168A",
+            "Make a map of it first with `sd2 synth` or `sd2 radar`",
+        )
+    return doppler, doppler.timebase
+
+
+def _map_of(recording: Recording, which: MapName | None, axis: VelocityAxis | None) -> DopplerMap:
+    """The synthetic map where there is a mesh, else the radar's, or the one asked for."""
+    name = which or ("radar" if recording.mesh is None else "synthetic")
+    return maps_of(recording, (name,), axis=axis)[name]

@@ -1,0 +1,185 @@
+"""``sd2 simulate campaign`` and ``fit-errors``: simulated pairs to train a denoiser on."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from sd2core.cli.options import add_command, add_json, positive_float, positive_int
+from sd2core.cli.output import print_json, progress_bar
+
+
+def add_campaign(kinds: argparse._SubParsersAction) -> None:
+    """Add both commands to ``sd2 simulate``."""
+    parser = add_command(
+        kinds,
+        "campaign",
+        "make pairs of synthetic Doppler and simulated radar to train a denoiser on",
+        handler=_campaign,
+        description=(
+            "People of random shape swipe to the right, left, down and up in random order,\n"
+            "rest, and do other things. Of every take there is the Doppler map that a simulated\n"
+            "radar shows of the true motion, and the synthetic one of a body that errs as fits\n"
+            "of videos err. Stopped and started again it goes on where it was, and a longer\n"
+            "campaign goes on with a shorter one; the same seed makes the same takes."
+        ),
+        examples=(
+            "  sd2 simulate campaign campaign.zarr\n"
+            "  sd2 simulate campaign small.zarr --subjects 3 --minutes 5 --seed 1\n"
+            "  sd2 simulate campaign ranges.zarr --placements 3"
+        ),
+    )
+    parser.add_argument("out", type=Path, metavar="OUT", help="folder of the pairs")
+    parser.add_argument(
+        "--subjects", type=positive_int, default=6, metavar="N", help="people (default: 6)"
+    )
+    parser.add_argument(
+        "--minutes",
+        type=positive_float,
+        default=90.0,
+        metavar="M",
+        help="of all people together (default: 90)",
+    )
+    parser.add_argument(
+        "--seed", type=_seed, default=0, metavar="S", help="of all that is random (default: 0)"
+    )
+    parser.add_argument(
+        "--placements",
+        type=positive_int,
+        default=1,
+        metavar="N",
+        help="sensors that see each take: its own, beside the camera, and N - 1 at other ranges"
+        " and angles (default: 1)",
+    )
+    parser.add_argument(
+        "--take-seconds",
+        type=positive_float,
+        default=15.0,
+        metavar="T",
+        help="length of a take (default: 15)",
+    )
+    parser.add_argument(
+        "--processes",
+        type=positive_int,
+        default=2,
+        metavar="P",
+        help="that work side by side (default: 2)",
+    )
+    parser.add_argument(
+        "--fit-errors",
+        type=Path,
+        metavar="FILE",
+        help="how fits err, by `sd2 simulate fit-errors` (default: as measured, bundled)",
+    )
+    add_json(parser)
+    _add_fit_errors(kinds)
+
+
+def _add_fit_errors(kinds: argparse._SubParsersAction) -> None:
+    parser = add_command(
+        kinds,
+        "fit-errors",
+        "measure how fits of videos err, for simulated campaigns",
+        handler=_fit_errors,
+        description=(
+            "Compares fits of the clips of `sd2 simulate fit-truth` with what is known of them:\n"
+            "place, turns of the trunk, directions of the limbs, shape. With --check bodies that\n"
+            "are disturbed accordingly are scored as the fits are."
+        ),
+        examples=(
+            "  sd2 simulate fit-truth truth\n"
+            "  sd2 score-fit truth --keep fits\n"
+            "  sd2 simulate fit-errors truth fits --out fit_errors.json --check 4"
+        ),
+    )
+    parser.add_argument("truth", type=Path, metavar="TRUTH", help="folder of the clips")
+    parser.add_argument(
+        "fits", type=Path, metavar="FITS", help="folder that `sd2 score-fit --keep` filled"
+    )
+    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="to write (.json)")
+    parser.add_argument(
+        "--check",
+        type=positive_int,
+        metavar="N",
+        help="also score bodies that are disturbed N times, beside the fits",
+    )
+    add_json(parser)
+
+
+def _seed(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 0 on")
+    return int(text)
+
+
+def _campaign(options: argparse.Namespace) -> None:
+    from sd2core.pairs.store import read_pairs
+    from sd2core.simulate.campaign.making import make_campaign
+    from sd2core.simulate.campaign.takes import Campaign
+
+    campaign = Campaign(options.seed, options.take_seconds, options.placements)
+    with progress_bar("Simulating", unit="take") as progress:
+        made = make_campaign(
+            options.out,
+            campaign,
+            subjects=options.subjects,
+            minutes=options.minutes,
+            processes=options.processes,
+            errors=options.fit_errors,
+            progress=progress,
+        )
+    pairs = read_pairs(options.out)
+    first = pairs.placements(first_only=True)
+    if options.json:
+        print_json(
+            {
+                "path": str(options.out),
+                "simulated": True,
+                "subjects": list(pairs.subjects),
+                "takes": len(pairs.takes),
+                "made": made,
+                "frames": pairs.frames,
+                "minutes": first.frames / first.frame_rate_hz / 60.0,
+                "placements": options.placements,
+                "labels": list(pairs.labels),
+            }
+        )
+        return
+    print(
+        f"Made {made} takes: {options.out} holds {len(first.takes)} simulated takes of"
+        f" {len(pairs.subjects)} people, {first.frames / first.frame_rate_hz / 60.0:.1f} minutes"
+        + (f", each from {options.placements} places" if options.placements > 1 else "")
+    )
+
+
+def _fit_errors(options: argparse.Namespace) -> None:
+    from sd2core.cli.reading import check_output
+    from sd2core.compare.truth import read_truth, truth_folders
+    from sd2core.simulate.campaign.checking import compare_errors
+    from sd2core.simulate.campaign.measuring import measure_errors
+
+    check_output(options.out, ".json")
+    truths = [read_truth(folder) for folder in truth_folders(options.truth)]
+    with progress_bar("Measuring", unit="clip") as progress:
+        errors = measure_errors(truths, options.fits, progress)
+    errors.save(options.out)
+    likeness = []
+    if options.check:
+        with progress_bar("Checking", unit="clip") as progress:
+            likeness = compare_errors(truths, options.fits, errors, options.check, progress)
+    if options.json:
+        print_json(
+            {
+                "path": str(options.out),
+                **errors.provenance,
+                "likeness": [one._asdict() for one in likeness],
+            }
+        )
+        return
+    if likeness:
+        print(f"{'':66s}  fits  disturbed: mean, least to most")
+    for what, unit, measured, drawn in likeness:
+        name = f"{what} ({unit})" if unit else what
+        mean = sum(drawn) / len(drawn)
+        print(f"{name:66s}{measured:6.3f}  {mean:.3f}, {min(drawn):.3f} to {max(drawn):.3f}")
+    print(f"Wrote {options.out}: {len(truths)} clips, {errors.provenance['frames']} frames")

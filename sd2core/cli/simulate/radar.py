@@ -1,0 +1,241 @@
+"""``sd2 simulate radar``: raw FMCW samples of any mesh; shared with ``sd2 synth --model fmcw``."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from sd2core.cli.options import (
+    add_command,
+    add_json,
+    add_mesh_and_sensor,
+    add_mesh_reading,
+    finite_float,
+    position,
+    positive_float,
+    positive_int,
+)
+from sd2core.cli.output import progress_bar
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    from sd2core.fmcw import SignalOptions, WaveOptions
+    from sd2core.io.radar import RadarCapture
+    from sd2core.mesh.sequence import MeshSequence
+    from sd2core.sensor import RadarConfig, VirtualSensor
+
+
+def add_radar(kinds: argparse._SubParsersAction) -> None:
+    """Add ``simulate radar``."""
+    parser = add_command(
+        kinds,
+        "radar",
+        "compute the raw samples that a radar would record of a moving mesh",
+        handler=_radar,
+        description=(
+            "Sums the echo of every triangle, with its phase, to the beat signal of an FMCW\n"
+            "radar, and writes the samples in the format of a capture, marked as simulated.\n"
+            "The camera is at 0,0,0 and looks along z; x is to its right and y down, in\n"
+            "metres."
+        ),
+        examples=(
+            "  sd2 simulate radar walk.npz walk-radar\n"
+            "  sd2 radar walk-radar --out map.npz    (its Doppler map)\n"
+            "  sd2 simulate radar walk.npz left --sensor -1,0,0 --snr-db 20 --receivers 3\n"
+            "  sd2 simulate radar walk.npz floor --ground 1.1 --beam-width-deg 60\n"
+            "  sd2 simulate radar walk.npz like-mine --radar capture/config.json"
+        ),
+    )
+    add_mesh_and_sensor(parser)
+    parser.add_argument("out", type=Path, metavar="OUT", help="the capture's folder to write")
+    add_radar_choice(parser)
+    parser.add_argument(
+        "--model",
+        choices=("nufft", "direct"),
+        default="nufft",
+        help="sum by a non-uniform FFT, or triangle by triangle, some hundred times slower"
+        " (default: nufft)",
+    )
+    parser.add_argument(
+        "--blocks",
+        type=positive_int,
+        metavar="N",
+        default=1,
+        help="parts of a frame that follow the range as it changes (default: 1)",
+    )
+    parser.add_argument(
+        "--motion",
+        choices=("constant", "interpolated"),
+        default="constant",
+        help="within a frame: constant velocity, or the mesh interpolated at every chirp, which"
+        " takes as many sums as there are chirps (default: constant)",
+    )
+    parser.add_argument(
+        "--incoherent",
+        action="store_true",
+        help="a rough surface: every triangle has a random phase (default: a smooth one)",
+    )
+    parser.add_argument(
+        "--visibility",
+        choices=("facing", "exact"),
+        default="exact",
+        help="which triangles echo: those that face the radar, or those that nothing hides"
+        " (default: exact)",
+    )
+    parser.add_argument(
+        "--receivers",
+        type=receivers,
+        metavar="N",
+        help="how many, half a wavelength apart; or their places relative to the transmitter,"
+        " as X,Y,Z;X,Y,Z in metres to the right, down and ahead (default: the radar's own number)",
+    )
+    parser.add_argument(
+        "--beam-width-deg",
+        type=positive_float,
+        metavar="B",
+        help="full width of the beam at half power, along where the sensor looks (default: all"
+        " directions alike)",
+    )
+    plane = parser.add_mutually_exclusive_group()
+    plane.add_argument(
+        "--ground",
+        type=plane_at,
+        metavar="Y[,C]",
+        help="a floor Y metres below the camera reflects; C is its amplitude coefficient"
+        " (default: concrete, -0.39)",
+    )
+    plane.add_argument(
+        "--wall",
+        type=plane_at,
+        metavar="Z[,C]",
+        help="a wall Z metres in front of the camera reflects, likewise",
+    )
+    noise = parser.add_mutually_exclusive_group()
+    noise.add_argument(
+        "--snr-db",
+        type=finite_float,
+        metavar="S",
+        help="add thermal noise this many decibels below the moving mesh's echo (default: none)",
+    )
+    noise.add_argument(
+        "--link-budget",
+        action="store_true",
+        help="gain and noise of a 60 GHz radar on one chip, so that what is farther away is weaker"
+        " (default: a gain that suits the strongest echo)",
+    )
+    parser.add_argument(
+        "--seed", type=int, default=0, metavar="N", help="of noise and random phases (default: 0)"
+    )
+    add_mesh_reading(parser)
+    add_json(parser)
+
+
+def add_radar_choice(parser: argparse.ArgumentParser) -> None:
+    """Add ``--radar``."""
+    parser.add_argument(
+        "--radar",
+        default="paper",
+        metavar="paper|CONFIG.json",
+        help="the paper's 60 GHz radar, or that of a capture's config.json (default: paper)",
+    )
+
+
+def simulated(
+    mesh: MeshSequence,
+    sensor: VirtualSensor,
+    config: RadarConfig,
+    visibility: Literal["facing", "exact"],
+    *,
+    wave: WaveOptions | None = None,
+    options: SignalOptions | None = None,
+) -> RadarCapture:
+    """Raw samples of a mesh, with a bar; without noise unless the options say otherwise."""
+    from sd2core.fmcw import SignalOptions, simulate_radar
+
+    with progress_bar("Simulating") as progress:
+        return simulate_radar(
+            mesh,
+            config,
+            sensor=sensor,
+            visibility=visibility,
+            wave=wave,
+            options=options or SignalOptions(snr_db=math.inf),
+            progress=progress,
+        )
+
+
+def receivers(text: str) -> int | tuple[tuple[float, float, float], ...]:
+    """Parse a number of receivers, or ``X,Y,Z;X,Y,Z``."""
+    if "," not in text:
+        return positive_int(text)
+    return tuple(position(part) for part in text.split(";"))
+
+
+def plane_at(text: str) -> tuple[float, ...]:
+    """Parse a place in metres with or without a reflection coefficient."""
+    values = tuple(finite_float(part) for part in text.split(","))
+    if len(values) > 2:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a place, or a place and a coefficient")
+    return values
+
+
+def _radar(options: argparse.Namespace) -> None:
+    from sd2core.cli.info import describe_capture, show
+    from sd2core.cli.reading import mesh_and_sensor
+    from sd2core.fmcw import LinkBudget, Mirror, SignalOptions, WaveOptions
+    from sd2core.io.radar import check_replaceable, write_capture
+    from sd2core.io.radar.named import named_radar
+
+    check_replaceable(options.out)
+    if not options.out.absolute().parent.is_dir():
+        raise Sd2Error(
+            f"The folder {options.out.absolute().parent} does not exist", "an existing folder"
+        )
+    config = named_radar(options.radar)
+    offsets: tuple[tuple[float, float, float], ...] = ()
+    if options.receivers is not None:
+        placed = not isinstance(options.receivers, int)
+        offsets = options.receivers if placed else ()
+        config = replace(config, receivers=len(offsets) if placed else options.receivers)
+    mirror = None
+    if options.ground is not None:
+        mirror = Mirror.ground(*options.ground)
+    elif options.wall is not None:
+        mirror = Mirror.wall(*options.wall)
+    wave = WaveOptions(
+        model=options.model,
+        blocks=options.blocks,
+        coherent=not options.incoherent,
+        motion=options.motion,
+        receiver_offsets_m=offsets,
+        beam_width_deg=options.beam_width_deg,
+        mirror=mirror,
+    )
+    mesh, sensor = mesh_and_sensor(options)
+    capture = simulated(
+        mesh,
+        sensor,
+        config,
+        options.visibility,
+        wave=wave,
+        options=SignalOptions(
+            snr_db=math.inf if options.snr_db is None else options.snr_db,
+            seed=options.seed,
+            link=LinkBudget() if options.link_budget else None,
+        ),
+    )
+    folder = write_capture(
+        options.out,
+        capture.samples,
+        capture.config,
+        capture.timebase.times_s,
+        simulated=True,
+        meta=capture.meta,
+    )
+    description = describe_capture(folder, capture)
+    description.notes = mesh.notes + description.notes
+    description.data["notes"] = list(description.notes)
+    show(description, as_json=options.json)

@@ -1,0 +1,189 @@
+"""Whether a map is what a model was trained on, and what can be done where it is not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.doppler_map import DopplerMap
+from sd2core.errors import Sd2Error
+from sd2core.mesh.presence import Presence, runs
+from sd2core.sensor import VelocityAxis
+from sd2core.timebase import Timebase
+
+
+class Card(Protocol):
+    """What a model says of the maps that it knows; see :class:`~sd2core.denoise.card.ModelCard`."""
+
+    @property
+    def name(self) -> str:
+        """What to call it in a message."""
+
+    @property
+    def title(self) -> str:
+        """The same in words, or nothing."""
+
+    @property
+    def axis(self) -> VelocityAxis:
+        """Velocity axis."""
+
+    @property
+    def null_bins(self) -> tuple[int, ...]:
+        """Bins that are zero on purpose."""
+
+    @property
+    def frame_rate_hz(self) -> float:
+        """Frames per second."""
+
+
+Stretch = NDArray[np.float32]
+"""Energies without a gap, (frames, bins)."""
+
+SAME_RATE = 0.02
+"""Relative difference of frame rates that a model does not notice."""
+
+MOST_RESAMPLED = 4.0
+"""Up to this factor a map is brought to the frame rate of the model, and back."""
+
+_UNEVEN = 0.5
+"""Frames may come this share of a frame early or late."""
+
+_BREAK_FRAMES = 5.0
+"""Where frames are farther apart than this many, a new clip begins."""
+
+
+def check_map(doppler: DopplerMap, card: Card) -> None:
+    """Refuse a map that a denoiser cannot make sense of, in words.
+
+    Raises
+    ------
+    Sd2Error
+    """
+    model = f"the model {card.title or card.name}"
+    if doppler.kind != "synthetic":
+        raise Sd2Error(
+            f"The map is of kind {doppler.kind!r}",
+            f"a synthetic map, which {model} turns into what a radar would show",
+            "Make one with `sd2 synth`",
+        )
+    check_bins(doppler, card)
+
+
+def check_bins(doppler: DopplerMap, card: Card) -> None:
+    """Refuse a map of another axis, other emptied bins or too different a frame rate.
+
+    Raises
+    ------
+    Sd2Error
+    """
+    model = f"the model {card.title or card.name}"
+    if doppler.axis != card.axis:
+        raise Sd2Error(
+            f"The map has {doppler.axis.bins} bins up to ±{doppler.axis.v_max_mps:g} m/s",
+            f"{card.axis.bins} bins up to ±{card.axis.v_max_mps:g} m/s, for {model}",
+            f"Make it with `sd2 synth --bins {card.axis.bins} --v-max {card.axis.v_max_mps:g}`",
+        )
+    extra = sorted(set(doppler.null_bins) - set(card.null_bins))
+    if extra:
+        wanted = ",".join(map(str, card.null_bins)) or "none"
+        raise Sd2Error(
+            f"Bins {', '.join(map(str, extra))} of the map were emptied",
+            f"energy there, for {model}",
+            f"Make it with `sd2 synth --null-bins {wanted}`",
+        )
+    rate_hz = doppler.timebase.frames_per_s
+    factor = rate_hz / card.frame_rate_hz
+    if len(doppler.timebase) > 1 and not 1 / MOST_RESAMPLED <= factor <= MOST_RESAMPLED:
+        raise Sd2Error(
+            f"The map has {rate_hz:.4g} frames/s",
+            f"{card.frame_rate_hz:g} frames/s, for {model}, or up to {MOST_RESAMPLED:g} times"
+            " more or less",
+            "Use a model for such maps",
+        )
+
+
+def stretches(doppler: DopplerMap, frame_rate_hz: float) -> list[tuple[int, int]]:
+    """Half-open runs of frames that are clips of their own: without gaps, with a person.
+
+    Parameters
+    ----------
+    doppler : DopplerMap
+    frame_rate_hz : float
+        Of the model that is to be asked about them.
+    """
+    there = Presence.of(doppler.present, len(doppler.timebase)).there
+    return clips(doppler.times_s, there, frame_rate_hz)
+
+
+def clips(
+    times_s: NDArray[np.float64], there: NDArray[np.bool_], frame_rate_hz: float
+) -> list[tuple[int, int]]:
+    """Half-open runs of marked frames between which no time is missing.
+
+    Parameters
+    ----------
+    times_s : float64 array, shape (frames,)
+    there : bool array, shape (frames,)
+    frame_rate_hz : float
+        At which they are to be used.
+    """
+    longest_s = _BREAK_FRAMES * max(Timebase(times_s).frame_duration_s, 1 / frame_rate_hz)
+    breaks = np.flatnonzero(np.diff(times_s) > longest_s) + 1
+    found: list[tuple[int, int]] = []
+    for start, stop in runs(there):
+        edges = [start, *breaks[(breaks > start) & (breaks < stop)].tolist(), stop]
+        found += pairwise(edges)
+    return found
+
+
+def is_regular(times_s: NDArray[np.float64], frame_rate_hz: float) -> bool:
+    """Whether frames come at this rate, but for what a model does not notice."""
+    if len(times_s) < 2:
+        return True
+    steps = np.diff(times_s) * frame_rate_hz
+    even = bool((np.abs(steps - 1.0) <= _UNEVEN).all())
+    return even and abs(float(steps.mean()) - 1.0) <= SAME_RATE
+
+
+def at_rate(
+    work: Callable[[Stretch], Stretch],
+    values: Stretch,
+    times_s: NDArray[np.float64],
+    frame_rate_hz: float,
+) -> Stretch:
+    """Do ``work`` at an even frame rate: energies are interpolated linearly, there and back.
+
+    Parameters
+    ----------
+    work : callable
+        Takes and gives (frames, bins).
+    values : float32 array, shape (frames, bins)
+    times_s : float64 array, shape (frames,)
+    frame_rate_hz : float
+    """
+    even_s = even_times(times_s, frame_rate_hz)
+    return interpolated(work(interpolated(values, times_s, even_s)), even_s, times_s)
+
+
+def even_times(times_s: NDArray[np.float64], frame_rate_hz: float) -> NDArray[np.float64]:
+    """Times at an even rate, from the first frame to the first at or after the last one."""
+    duration_s = float(times_s[-1] - times_s[0])
+    count = int(np.ceil(duration_s * frame_rate_hz - 1e-6)) + 1
+    return np.asarray(times_s[0] + np.arange(count) / frame_rate_hz)
+
+
+def interpolated(
+    values: Stretch, times_s: NDArray[np.float64], wanted_s: NDArray[np.float64]
+) -> Stretch:
+    """Linearly between frames, held at both ends."""
+    if len(times_s) == 1:
+        return np.repeat(values, len(wanted_s), axis=0)
+    after = np.clip(np.searchsorted(times_s, wanted_s), 1, len(times_s) - 1)
+    span_s = times_s[after] - times_s[after - 1]
+    part = np.clip((wanted_s - times_s[after - 1]) / span_s, 0.0, 1.0)[:, None]
+    between = (1 - part) * values[after - 1] + part * values[after]
+    return between.astype(np.float32)

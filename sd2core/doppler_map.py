@@ -1,0 +1,298 @@
+"""DopplerMap: energy per velocity bin and frame, with all one needs to read it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_write
+from sd2core.mesh.presence import Presence, checked
+from sd2core.sensor import VelocityAxis
+from sd2core.timebase import Timebase
+
+MapKind = Literal["synthetic", "simulated", "real", "denoised"]
+"""synthetic: counted from a mesh; simulated: a computed radar signal; real: a capture."""
+
+FORMAT_VERSION = 1
+
+
+@dataclass(frozen=True, eq=False)
+class CellUncertainty:
+    """How well the values of a map are known.
+
+    Parameters
+    ----------
+    expected : float32 array, shape (bins, frames)
+        Mean of what the map may be: its values, smeared by how badly velocities are
+        known.
+    sd : float32 array, shape (bins, frames)
+        Standard deviation of every value.
+    """
+
+    expected: NDArray[np.float32]
+    sd: NDArray[np.float32]
+
+    def __post_init__(self) -> None:
+        for name in ("expected", "sd"):
+            object.__setattr__(self, name, np.ascontiguousarray(getattr(self, name), np.float32))
+        if self.expected.shape != self.sd.shape:
+            raise Sd2Error(
+                f"expected is of shape {self.expected.shape}, sd of {self.sd.shape}", "the same"
+            )
+
+    def deviation(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """How far from a map's values the truth may be: root mean square, (bins, frames).
+
+        sqrt(sd² + (expected − value)²). The standard deviation alone would call a value
+        well known that is almost certainly somewhere else.
+        """
+        deviation: NDArray[np.float32] = np.hypot(self.sd, self.expected - values)
+        return deviation
+
+    def between(self, start: int, stop: int) -> CellUncertainty:
+        """Of frames ``start`` to ``stop`` (exclusive)."""
+        return CellUncertainty(self.expected[:, start:stop], self.sd[:, start:stop])
+
+
+@dataclass(frozen=True, eq=False)
+class DopplerMap:
+    """Doppler energy on a velocity axis over time.
+
+    Parameters
+    ----------
+    values : float32 array, shape (bins, frames)
+        Not negative; velocity ascending, positive when approaching.
+    axis : VelocityAxis
+    timebase : Timebase
+        One time per frame.
+    kind : MapKind
+    unit : str
+        What a value of 1 means, e.g. ``"share of vertices"`` or ``"power"``.
+    null_bins : tuple of int
+        Bins that were set to zero on purpose.
+    unseen_bins : tuple of int
+        Bins that the radar cannot see because they lie beyond its v_max.
+    meta : dict
+        Provenance that fits into JSON: sensor, options, sources, version.
+    present : bool array, shape (frames,), optional
+        False in columns that say nothing because there was no person. None: all
+        columns say something.
+    uncertainty : CellUncertainty, optional
+        Where the mesh says how well its velocities are known, and one asked for it.
+    """
+
+    values: NDArray[np.float32]
+    axis: VelocityAxis
+    timebase: Timebase
+    kind: MapKind
+    unit: str = ""
+    null_bins: tuple[int, ...] = ()
+    unseen_bins: tuple[int, ...] = ()
+    meta: dict[str, Any] = field(default_factory=dict)
+    present: NDArray[np.bool_] | None = None
+    uncertainty: CellUncertainty | None = None
+
+    def __post_init__(self) -> None:
+        values = np.ascontiguousarray(self.values, dtype=np.float32)
+        if values.shape != (self.axis.bins, len(self.timebase)):
+            raise Sd2Error(
+                f"The Doppler map has shape {values.shape}",
+                f"({self.axis.bins} bins, {len(self.timebase)} frames)",
+            )
+        if self.kind not in get_args(MapKind):
+            raise Sd2Error(f"The map is of kind {self.kind!r}", f"one of {get_args(MapKind)}")
+        for name in ("null_bins", "unseen_bins"):
+            bins = tuple(sorted({int(index) for index in getattr(self, name)}))
+            if bins and not 0 <= bins[0] <= bins[-1] < self.axis.bins:
+                raise Sd2Error(f"{name} is {bins}", f"bins from 0 to {self.axis.bins - 1}")
+            object.__setattr__(self, name, bins)
+        object.__setattr__(self, "values", values)
+        if self.present is not None:
+            present = checked(self.present, values.shape[1])
+            object.__setattr__(self, "present", None if present.all() else present)
+        if self.uncertainty is not None and self.uncertainty.sd.shape != values.shape:
+            raise Sd2Error(
+                f"The map is of shape {values.shape}, its uncertainty of"
+                f" {self.uncertainty.sd.shape}",
+                "the same",
+            )
+
+    @property
+    def times_s(self) -> NDArray[np.float64]:
+        """Time of every frame, shape (frames,)."""
+        return self.timebase.times_s
+
+    def shifted(self, offset_s: float) -> DopplerMap:
+        """The same map ``offset_s`` later."""
+        return replace(self, timebase=self.timebase.shifted(offset_s))
+
+    def between(self, start: int, stop: int) -> DopplerMap:
+        """Frames ``start`` to ``stop`` (exclusive), at their times."""
+        known = self.uncertainty
+        return replace(
+            self,
+            values=self.values[:, start:stop],
+            timebase=Timebase(self.times_s[start:stop]),
+            present=None if self.present is None else self.present[start:stop],
+            uncertainty=None if known is None else known.between(start, stop),
+        )
+
+    def mean_velocity_mps(self) -> NDArray[np.float64]:
+        """Energy-weighted mean velocity per frame; NaN where a frame is empty."""
+        return mean_velocity_mps(self.values.T, self.axis)
+
+    def peak_velocity_mps(self) -> NDArray[np.float64]:
+        """Velocity of the strongest bin per frame; NaN where a frame is empty."""
+        return peak_velocity_mps(self.values.T, self.axis)
+
+    def save(self, path: Path) -> None:
+        """Write ``values``, ``velocity_mps``, ``times_s`` and ``meta`` to one ``.npz``.
+
+        Where there are columns without a person also ``present``; where it is known how
+        uncertain values are, ``expected`` and ``sd``.
+        """
+        meta = {
+            "format": "sd2-doppler-map",
+            "version": FORMAT_VERSION,
+            "kind": self.kind,
+            "unit": self.unit,
+            "v_max_mps": self.axis.v_max_mps,
+            "null_bins": self.null_bins,
+            "unseen_bins": self.unseen_bins,
+            "provenance": self.meta,
+        }
+        arrays: dict[str, Any] = {
+            "values": self.values,
+            "velocity_mps": self.axis.centres_mps,
+            "times_s": self.times_s,
+            "meta": json.dumps(meta),
+        }
+        if self.present is not None:
+            arrays["present"] = self.present
+        if self.uncertainty is not None:
+            arrays |= {"expected": self.uncertainty.expected, "sd": self.uncertainty.sd}
+        with atomic_write(Path(path)) as stream:
+            np.savez_compressed(stream, **arrays)
+
+    @classmethod
+    def load(cls, path: Path) -> DopplerMap:
+        """Read what :meth:`save` wrote.
+
+        Raises
+        ------
+        Sd2Error
+            When the file is not a Doppler map or is damaged.
+        """
+        path = Path(path)
+        try:
+            with np.load(path, allow_pickle=False) as data:
+                arrays = {name: data[name] for name in data.files}
+        except Exception as error:  # a damaged archive fails in many ways
+            raise Sd2Error(
+                f"{path} cannot be read as a Doppler map ({error})",
+                "an .npz written by `sd2 synth`",
+            ) from error
+        missing = {"values", "velocity_mps", "times_s", "meta"} - arrays.keys()
+        if missing:
+            raise Sd2Error(
+                f"{path} has no {', '.join(sorted(missing))}; it holds {', '.join(sorted(arrays))}",
+                "a Doppler map with values, velocity_mps, times_s and meta",
+            )
+        if arrays["values"].dtype.kind != "f" or not np.isfinite(arrays["values"]).all():
+            raise Sd2Error(f"{path}: values hold NaN, infinity or no numbers", "finite numbers")
+        try:
+            meta = json.loads(str(arrays["meta"]))
+            version = meta.get("version", 0)
+            if meta.get("format") != "sd2-doppler-map" or version > FORMAT_VERSION:
+                raise Sd2Error(
+                    f"{path} is of format {meta.get('format')!r} version {version}",
+                    f"'sd2-doppler-map' up to version {FORMAT_VERSION}",
+                    "Open it with the version of SD² Studio that wrote it",
+                )
+            axis = VelocityAxis(len(arrays["velocity_mps"]), float(meta["v_max_mps"]))
+            if not np.allclose(axis.centres_mps, arrays["velocity_mps"], atol=1e-6):
+                raise Sd2Error(f"{path}: velocity_mps does not match v_max_mps {axis.v_max_mps}")
+            return cls(
+                values=arrays["values"],
+                axis=axis,
+                timebase=Timebase(arrays["times_s"]),
+                kind=meta["kind"],
+                unit=meta["unit"],
+                null_bins=tuple(meta["null_bins"]),
+                unseen_bins=tuple(meta["unseen_bins"]),
+                meta=meta["provenance"],
+                present=arrays.get("present"),
+                uncertainty=CellUncertainty(arrays["expected"], arrays["sd"])
+                if {"expected", "sd"} <= arrays.keys()
+                else None,
+            )
+        except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
+            raise Sd2Error(
+                f"{path}: its description is damaged ({error!r})", "the meta written by `sd2 synth`"
+            ) from error
+
+
+def peak_velocity_mps(
+    energies: NDArray[np.floating], axis: VelocityAxis, floor: float = 0.0
+) -> NDArray[np.float64]:
+    """Centre of the strongest bin per frame, (frames,); NaN where a frame is empty.
+
+    Parameters
+    ----------
+    energies : float array, shape (frames, bins)
+    axis : VelocityAxis
+    floor : float
+        A frame that does not exceed it counts as empty.
+    """
+    _check(energies, axis)
+    peak = axis.centres_mps[energies.argmax(axis=1)]
+    return np.where(energies.max(axis=1) > floor, peak, np.nan)
+
+
+def joined(maps: Sequence[DopplerMap]) -> DopplerMap:
+    """Maps that follow one another in time as one; what it says of itself is the first's.
+
+    Parameters
+    ----------
+    maps : sequence of DopplerMap
+        On one axis.
+    """
+    if len(maps) == 1:
+        return maps[0]
+    present = [Presence.of(one.present, len(one.timebase)).there for one in maps]
+    return replace(
+        maps[0],
+        values=np.concatenate([one.values for one in maps], axis=1),
+        timebase=Timebase(np.concatenate([one.times_s for one in maps])),
+        present=np.concatenate(present),
+        uncertainty=None,
+    )
+
+
+def mean_velocity_mps(
+    energies: NDArray[np.floating], axis: VelocityAxis, floor: float = 0.0
+) -> NDArray[np.float64]:
+    """Energy-weighted mean velocity per frame, (frames,); NaN where a frame is empty.
+
+    Parameters
+    ----------
+    energies, axis, floor
+        As for :func:`peak_velocity_mps`.
+    """
+    _check(energies, axis)
+    values = energies.astype(np.float64)
+    total = values.sum(axis=1)
+    known = (values.max(axis=1) > floor) & (total > 0)
+    return np.divide(values @ axis.centres_mps, total, out=np.full_like(total, np.nan), where=known)
+
+
+def _check(energies: NDArray[np.floating], axis: VelocityAxis) -> None:
+    if energies.ndim != 2 or energies.shape[1] != axis.bins:
+        raise Sd2Error(f"The values are of shape {energies.shape}", f"(frames, {axis.bins})")

@@ -1,0 +1,1 @@
+"""Reading and writing safely: atomic writes, locks, digests, paths, bundled resources."""

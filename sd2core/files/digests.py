@@ -1,0 +1,126 @@
+"""Hashes of what files hold, taken once and kept until a file changes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from sd2core.files.atomic import atomic_write_text
+
+Signature = list[list[Any]]
+"""Per file or folder: path, size, time of the last change in ns, inode."""
+
+_WORTH_KEEPING_BYTES = 4 << 20
+"""What is smaller is hashed in less time than it takes to look its hash up safely."""
+
+
+def file_digest(path: Path) -> str:
+    """SHA-256 of a file's content; of a folder's, of the names and contents in it."""
+    if not path.is_dir():
+        with path.open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    digest = hashlib.sha256()
+    for file in sorted(one for one in path.rglob("*") if one.is_file()):
+        digest.update(f"{file.relative_to(path).as_posix()}\n{file_digest(file)}\n".encode())
+    return digest.hexdigest()
+
+
+def signature(paths: Iterable[Path | str]) -> Signature:
+    """By which it is told whether files have changed; what is not there has size -1."""
+    entries: Signature = []
+    for path in paths:
+        try:
+            facts = os.stat(path)
+        except OSError:
+            entries.append([str(path), -1, 0, 0])
+        else:
+            entries.append([str(path), facts.st_size, facts.st_mtime_ns, facts.st_ino])
+    return entries
+
+
+class Digests:
+    """Hashes of some files, of which those that have not changed are not read again.
+
+    Parameters
+    ----------
+    before : list
+        Their signature when they were last hashed.
+    known : mapping of str to str
+        What was found then, by path.
+
+    Attributes
+    ----------
+    files : list
+        Signature of all that was asked for.
+    digests : dict
+        Their hashes, by path.
+    """
+
+    def __init__(self, before: Signature, known: Mapping[str, str]) -> None:
+        self._before = {str(entry[0]): entry for entry in before}
+        self._known = known
+        self.files: Signature = []
+        self.digests: dict[str, str] = {}
+
+    def of(self, path: Path) -> str:
+        """Of a file, or of a folder with all that is in it."""
+        entries = self.look_at(path)
+        known = self._known.get(str(path))
+        if known is None or any(self._before.get(entry[0]) != entry for entry in entries):
+            known = file_digest(path)
+        self.digests[str(path)] = known
+        return known
+
+    def look_at(self, path: Path) -> Signature:
+        """Note the signature of a file or folder without hashing it."""
+        entries = signature(_tree(path))
+        self.files += entries
+        return entries
+
+
+def remembered_digest(path: Path) -> str:
+    """Hash of a file or folder, kept in the user's cache folder until it changes.
+
+    Empty where nothing is there. Where nothing can be written it is taken anew every time.
+    """
+    if not path.exists():
+        return ""
+    path = path.absolute()
+    if sum(entry[1] for entry in signature(_tree(path))) < _WORTH_KEEPING_BYTES:
+        return file_digest(path)
+    place = _place(path)
+    digests = Digests(*_kept(place))
+    found = digests.of(path)
+    content = {"files": digests.files, "digests": digests.digests}
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        atomic_write_text(place, json.dumps(content) + "\n")
+    except OSError:
+        pass
+    return found
+
+
+def _tree(path: Path) -> Iterable[Path]:
+    """A file; or a folder with all that is in it, whose own time tells when something goes."""
+    yield path
+    if path.is_dir():
+        yield from sorted(path.rglob("*"))
+
+
+def _place(path: Path) -> Path:
+    import platformdirs
+
+    folder = Path(platformdirs.user_cache_dir("sd2-studio", appauthor=False)) / "contents"
+    return folder / f"{hashlib.sha256(str(path).encode()).hexdigest()[:32]}.json"
+
+
+def _kept(place: Path) -> tuple[Signature, dict[str, str]]:
+    try:
+        content = json.loads(place.read_text(encoding="utf-8"))
+        return list(content["files"]), dict(content["digests"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return [], {}

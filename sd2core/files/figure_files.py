@@ -1,0 +1,74 @@
+"""Figures as files: what they may be called, and what is written into them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_write
+from sd2core.version import __version__
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SUFFIXES = (".png", ".svg", ".pdf")
+
+_RULES: Any = {"svg.fonttype": "none", "svg.hashsalt": "sd2", "pdf.fonttype": 42}
+"""Words are text, and the parts of an SVG are called the same whenever it is written."""
+
+
+def check_figure(path: Path) -> None:
+    """Refuse a name that no figure can have."""
+    if path.suffix.lower() not in SUFFIXES:
+        raise Sd2Error(f"The figure is to be {path}", f"a name that ends in {', '.join(SUFFIXES)}")
+    if not path.absolute().parent.is_dir():
+        raise Sd2Error(f"The folder {path.absolute().parent} does not exist", "an existing folder")
+
+
+def save_figure(
+    figure: Figure,
+    path: Path,
+    provenance: Mapping[str, Any] | None = None,
+    pixels_per_inch: float | None = None,
+) -> None:
+    """Write a figure as PNG, SVG or PDF, by the name's ending.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+    path : Path
+    provenance : mapping, optional
+        Fit for JSON. Goes into the file with the version of the program; words of SVG and
+        PDF are then text, and the same figure gives the same bytes.
+    pixels_per_inch : float, optional
+        The figure's own where none is given.
+
+    Raises
+    ------
+    Sd2Error
+        For another ending, or a folder that does not exist.
+    """
+    from matplotlib import rc_context
+
+    check_figure(path)
+    kind = path.suffix.lower()
+    told: dict[str, Any] = {"dpi": pixels_per_inch or "figure"}
+    if provenance is not None:
+        told["metadata"] = _metadata(kind, provenance)
+    with rc_context(None if provenance is None else _RULES), atomic_write(path) as stream:
+        figure.savefig(stream, format=kind[1:], **told)
+
+
+def _metadata(kind: str, provenance: Mapping[str, Any]) -> dict[str, Any]:
+    program = f"SD² Studio {__version__}"
+    about = {**provenance, "version": __version__}
+    description = json.dumps(about, ensure_ascii=False)
+    if kind == ".png":
+        return {"Software": program, "Description": description}
+    # Without a date the same figure gives the same bytes.
+    if kind == ".svg":
+        return {"Creator": program, "Description": description, "Date": None}
+    return {"Creator": program, "Subject": description, "CreationDate": None}

@@ -1,0 +1,40 @@
+"""Values as TOML writes them; Python reads TOML and does not write it."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from sd2core.files.paths import stored_path
+
+
+def toml_value(value: Any, folder: Path) -> str:
+    """A flag, number, text, path or list; paths relative to a folder."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(toml_value(one, folder) for one in value) + "]"
+    if isinstance(value, Path):
+        value = stored_path(value.absolute(), folder.absolute())
+    return _text(value) if isinstance(value, str) else json.dumps(value)
+
+
+def toml_lines(table: Mapping[str, Any], folder: Path) -> list[str]:
+    """One ``key = value`` per entry; entries that are None are left out."""
+    return [
+        f"{_bare(key)} = {toml_value(value, folder)}"
+        for key, value in table.items()
+        if value is not None
+    ]
+
+
+def _text(value: str) -> str:
+    """As a basic string of TOML: JSON's, but for one character."""
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _bare(key: str) -> str:
+    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else _text(key)

@@ -1,0 +1,144 @@
+"""Labels of a file taken into a recording: what fits, what is cut, and what is left out."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from sd2core.errors import Sd2Error
+from sd2core.labels.edits import Edit
+from sd2core.labels.free_time import Frames
+from sd2core.labels.label_set import GESTURES, LONGEST_NAME, LabelSet
+from sd2core.labels.spans import Labels, Span
+from sd2core.timebase import Timebase
+
+Way = Literal["replace", "add"]
+"""Instead of the labels that are there, or on tracks of their own below them."""
+
+
+@dataclass(frozen=True)
+class Incoming:
+    """What a file holds, as a recording can take it.
+
+    Parameters
+    ----------
+    labels : Labels
+        What is taken: inside the recording, each span with at least one frame.
+    cut : tuple of Span
+        As they are in the file: they reach beyond the recording and end with it.
+    outside : tuple of Span
+        As they are in the file: without a frame of the recording, and left out.
+    """
+
+    labels: Labels
+    cut: tuple[Span, ...] = ()
+    outside: tuple[Span, ...] = ()
+
+    @classmethod
+    def of(cls, labels: Labels, timebase: Timebase) -> Incoming:
+        """Labels of a file on the frames of a recording.
+
+        Edges inside the recording stay where the file has them, on a frame or not.
+        """
+        frames = Frames.of(timebase)
+        low_s, high_s = frames.whole
+        kept, cut, outside = [], [], []
+        for span in labels.spans:
+            start_s, end_s = max(span.start_s, low_s), min(span.end_s, high_s)
+            within = (start_s, end_s) == (span.start_s, span.end_s)
+            # One that lies between two frames is nothing to look at, but it is there.
+            if within or frames.held(start_s, end_s):
+                kept.append(span if within else replace(span, start_s=start_s, end_s=end_s))
+                if not within:
+                    cut.append(span)
+            else:
+                outside.append(span)
+        return cls(replace(labels, spans=tuple(kept)), tuple(cut), tuple(outside))
+
+    def unknown(self, label_set: LabelSet) -> dict[str, int]:
+        """Labels that a set does not have, with how many spans have them."""
+        counts = Counter(span.label for span in self.labels.spans)
+        return {name: count for name, count in counts.items() if label_set.find(name) is None}
+
+
+def take_in(labels: Labels, incoming: Incoming, way: Way, source: str) -> Edit:
+    """Put the labels of a file into a recording.
+
+    Replacing takes the tracks, spans and numbers of the file, and its label set where it
+    brings one of its own. Adding leaves all that is there: the file's tracks come below it,
+    those whose names are taken with the name of the file, and what the file says of labels
+    that the set does not have is added to the set.
+
+    Parameters
+    ----------
+    labels : Labels
+        Of the recording.
+    incoming : Incoming
+    way : {"replace", "add"}
+    source : str
+        Name of the file, for tracks whose names are taken.
+
+    Raises
+    ------
+    Sd2Error
+        When there is nothing to take.
+    """
+    brought = incoming.labels
+    if not brought.spans and not incoming.outside and way == "add":
+        raise Sd2Error(f"{source} holds no spans", "at least one, to add them")
+    name = f"Import {len(brought.spans)} span{'s' * (len(brought.spans) != 1)}"
+    label_set = set_after(labels.label_set, incoming, way)
+    if way == "replace":
+        after = replace(brought, label_set=label_set)
+        return Edit(name, labels if after == labels else after)
+    names = {track.name for track in labels.tracks}
+    called: dict[str, str] = {}
+    tracks = []
+    for track in brought.tracks:
+        if brought.of_track(track.name):
+            called[track.name] = free_name(track.name, source, names)
+            names.add(called[track.name])
+            tracks.append(replace(track, name=called[track.name]))
+    first = labels.next_id
+    spans = [
+        replace(span, id=first + number, track=called[span.track])
+        for number, span in enumerate(brought.spans)
+    ]
+    after = Labels((*labels.tracks, *tracks), (*labels.spans, *spans), label_set)
+    return Edit(name, after, tuple(span.id for span in spans))
+
+
+def free_name(name: str, source: str, taken: Collection[str]) -> str:
+    """A name of a track that is not taken: itself, with the source, or with a number besides."""
+    if name not in taken:
+        return name
+    shown = "".join(one if one.isprintable() else " " for one in source).strip() or "import"
+    number = 1
+    while True:
+        more = f" ({shown[: LONGEST_NAME // 2]}{'' if number == 1 else f', {number}'})"
+        free = name[: LONGEST_NAME - len(more)] + more
+        if free not in taken:
+            return free
+        number += 1
+
+
+def set_after(label_set: LabelSet, incoming: Incoming, way: Way) -> LabelSet:
+    """The label set of a recording after :func:`take_in`.
+
+    Added labels bring those of their labels that only the file has a colour for.
+    """
+    theirs = incoming.labels.label_set
+    if way == "replace":
+        # A file that says nothing of labels is read with the default set.
+        return theirs if theirs != GESTURES else label_set
+    keys = {one.key.casefold() for one in label_set.labels if one.key}
+    added = []
+    for name in incoming.unknown(label_set):
+        brought = theirs.find(name)
+        if brought is not None:
+            key = "" if brought.key.casefold() in keys else brought.key
+            keys.add(key.casefold())
+            added.append(replace(brought, key=key))
+    return replace(label_set, labels=(*label_set.labels, *added)) if added else label_set

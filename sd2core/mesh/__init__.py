@@ -1,0 +1,1 @@
+"""Moving meshes: positions and times, presence of a person, uncertainty, decimation."""

@@ -1,0 +1,199 @@
+"""A mesh (or point cloud) that moves: vertices, faces, times."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+from sd2core.mesh.presence import Presence, checked
+from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
+from sd2core.timebase import Timebase
+
+
+class VertexArray(Protocol):
+    """What vertices need: a NumPy array, or a chunked array that stays on disk."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(T, V, 3)."""
+
+    @property
+    def dtype(self) -> Any:
+        """A floating point type."""
+
+    def __getitem__(self, key: Any) -> Any: ...
+
+
+@dataclass(frozen=True, eq=False)
+class MeshSequence:
+    """Vertices through time with one topology.
+
+    Parameters
+    ----------
+    vertices : array, shape (T, V, 3)
+        Metres in the camera frame (x right, y down, z forward). May stay on
+        disk; read stretches with :meth:`read`.
+    faces : int32 array, shape (F, 3), or None
+        Counter-clockwise seen from outside. None makes it a point cloud, which
+        has no surface and takes visibility ``none`` only.
+    timebase : Timebase
+        One time per frame.
+    source : str
+        Where it came from, for provenance.
+    notes : tuple of str
+        What the reader found and repaired or wants the user to know.
+    vertex_counts : int64 array, shape (V,), optional
+        How many vertices each stands for, after decimation; None: for itself.
+    present : bool array, shape (T,), optional
+        False where there is no person. Vertices hold the last known pose there, which
+        nothing may be concluded from. None: there is one in every frame.
+    uncertainty : VelocityUncertainty, optional
+        How well velocities are known; None: nothing is said of it.
+    """
+
+    vertices: VertexArray
+    faces: NDArray[np.int32] | None
+    timebase: Timebase
+    source: str = ""
+    notes: tuple[str, ...] = ()
+    vertex_counts: NDArray[np.int64] | None = None
+    present: NDArray[np.bool_] | None = None
+    uncertainty: VelocityUncertainty | None = None
+
+    def __post_init__(self) -> None:
+        shape = tuple(self.vertices.shape)
+        if len(shape) != 3 or shape[2] != 3 or 0 in shape:
+            raise Sd2Error(
+                f"{self.source or 'The mesh'}: vertices have shape {shape}",
+                "(frames, vertices, 3), none of them zero",
+            )
+        if shape[0] != len(self.timebase):
+            raise Sd2Error(
+                f"{self.source or 'The mesh'}: {shape[0]} frames but {len(self.timebase)} times",
+                "one time per frame",
+            )
+        if self.vertex_counts is not None:
+            counts = np.ascontiguousarray(self.vertex_counts, np.int64)
+            if counts.shape != (shape[1],) or counts.min() < 1:
+                raise Sd2Error(
+                    f"{self.source or 'The mesh'}: vertex_counts of shape {counts.shape},"
+                    f" the least of them {counts.min(initial=1)}",
+                    f"{shape[1]} numbers from 1",
+                )
+            object.__setattr__(self, "vertex_counts", counts)
+        if self.present is not None:
+            present = checked(self.present, shape[0])
+            # Someone everywhere is said in one way only.
+            object.__setattr__(self, "present", None if present.all() else present)
+        if (known := self.uncertainty) is not None:
+            given = known.frame_count, len(known.vertex_limb)
+            if given != shape[:2]:
+                raise Sd2Error(
+                    f"{self.source or 'The mesh'}: its uncertainty is of {given[0]} frames and"
+                    f" {given[1]} vertices",
+                    f"those of the mesh, {shape[0]} and {shape[1]}",
+                )
+        if self.faces is not None and not np.size(self.faces):
+            object.__setattr__(self, "faces", None)
+        if self.faces is None:
+            return
+        faces = np.ascontiguousarray(self.faces, dtype=np.int32)
+        if faces.ndim != 2 or faces.shape[1] != 3:
+            raise Sd2Error(
+                f"{self.source or 'The mesh'}: faces have shape {faces.shape}",
+                "(faces, 3): three vertex numbers per triangle",
+            )
+        if faces.size and not (faces.min() >= 0 and faces.max() < shape[1]):
+            bad = faces.max() if faces.max() >= shape[1] else faces.min()
+            raise Sd2Error(
+                f"{self.source or 'The mesh'}: a face names vertex {bad}",
+                f"vertex numbers from 0 to {shape[1] - 1}",
+                "Give the faces that belong to this mesh (--faces)",
+            )
+        object.__setattr__(self, "faces", faces)
+
+    @property
+    def frame_count(self) -> int:
+        """Number of frames T."""
+        return int(self.vertices.shape[0])
+
+    @property
+    def vertex_count(self) -> int:
+        """Number of vertices V."""
+        return int(self.vertices.shape[1])
+
+    @property
+    def represented_count(self) -> int:
+        """Number of vertices that these stand for: V, or before decimation."""
+        if self.vertex_counts is None:
+            return self.vertex_count
+        return int(self.vertex_counts.sum())
+
+    @property
+    def times_s(self) -> NDArray[np.float64]:
+        """Time of every frame, shape (T,)."""
+        return self.timebase.times_s
+
+    @cached_property
+    def presence(self) -> Presence:
+        """In which frames there is a person."""
+        return Presence.of(self.present, self.frame_count)
+
+    def read(self, start: int, stop: int) -> NDArray[Any]:
+        """Vertices of frames ``start`` to ``stop`` (exclusive) in memory, (n, V, 3)."""
+        if not 0 <= start < stop <= self.frame_count:
+            raise IndexError(f"frames {start} to {stop} of {self.frame_count}")
+        return np.asarray(self.vertices[start:stop])
+
+    def between(self, start: int, stop: int) -> MeshSequence:
+        """Frames ``start`` to ``stop`` (exclusive) in memory, at their times."""
+        known = self.uncertainty
+        return replace(
+            self,
+            vertices=self.read(start, stop),
+            timebase=Timebase(self.times_s[start:stop]),
+            present=None if self.present is None else self.present[start:stop],
+            uncertainty=None if known is None else known.of_frames(slice(start, stop)),
+        )
+
+    def frame(self, index: int) -> NDArray[Any]:
+        """Vertices of one frame, (V, 3)."""
+        vertices: NDArray[Any] = self.read(index, index + 1)[0]
+        return vertices
+
+
+def refuse_missing(vertices: NDArray[Any], first_frame: int, source: str) -> None:
+    """Stop at a coordinate that is NaN or infinite.
+
+    Parameters
+    ----------
+    vertices : float array, shape (n, V, 3)
+    first_frame : int
+        Number of the first of these frames.
+    source : str
+
+    Raises
+    ------
+    Sd2Error
+        Names file, frame, vertex and the three numbers.
+    """
+    finite = np.isfinite(vertices)
+    if finite.all():
+        return
+    frame, vertex = np.argwhere(~finite)[0][:2]
+    raise Sd2Error(
+        f"{source or 'The mesh'}: vertex {vertex} of frame {first_frame + frame} is at"
+        f" {place_in_words(vertices[frame, vertex])}",
+        "finite coordinates in metres in every frame",
+        "Fill that vertex, or leave out the frame, where the file is written",
+    )
+
+
+def place_in_words(place_m: NDArray[Any]) -> str:
+    """Coordinates for a message: ``(0.1, nan, 2.5)``."""
+    return f"({', '.join(f'{value:g}' for value in place_m)})"

@@ -1,0 +1,236 @@
+"""Compiling numerical kernels so that nobody ever waits for it.
+
+Kernels are serial and release the GIL; callers split their frames over threads
+(see docs/decisions/0002). The machine code is kept on disk. While it is not
+there yet, callers use their plain NumPy form and ask for it in the background.
+"""
+
+from __future__ import annotations
+
+import atexit
+import functools
+import hashlib
+import importlib
+import importlib.metadata
+import os
+import platform
+import shutil
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any, TypeVar
+
+from sd2core.progress import Progress, silent
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+KERNEL_MODULES = (
+    "sd2core.scattering.amplitude",
+    "sd2core.scattering.visibility",
+    "sd2core.scattering.exact",
+    "sd2core.scattering.depth",
+    "sd2core.doppler.kernels",
+    "sd2core.doppler.limb_histograms",
+    "sd2core.fmcw.facet",
+    "sd2core.fmcw.kernels",
+    "sd2core.body.skinning",
+    "sd2core.numerics.raster",
+    "sd2core.simulate.people.crops",
+)
+"""Every module with kernels; each has ``compile_kernels()``, which calls them once."""
+
+_PACKAGE = Path(__file__).resolve().parent.parent
+_MARKER = "complete"
+_lock = threading.Lock()
+_ready = False
+_background: subprocess.Popen[bytes] | None = None
+
+
+def compiled(function: Function) -> Function:
+    """Compile a numerical kernel at its first call, without the GIL, cached on disk.
+
+    Floating-point contraction is allowed, because it only makes results more
+    accurate; NaN, infinities and the order of sums keep their meaning. Division
+    by zero gives infinity as in NumPy.
+    """
+    import numba
+
+    directory = cache_directory()
+    # The place is read when the function is decorated; whoever else uses numba
+    # in this process keeps the place they chose.
+    previous = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(directory) if directory else previous
+    try:
+        kernel: Function = numba.njit(
+            nogil=True,
+            cache=directory is not None,
+            error_model="numpy",
+            fastmath={"contract", "nsz"},
+        )(function)
+    finally:
+        numba.config.CACHE_DIR = previous
+    return kernel
+
+
+@functools.lru_cache(maxsize=1)
+def cache_directory() -> Path | None:
+    """Writable folder for the machine code of this version on this processor.
+
+    The installation itself, else the user's cache folder, else a private
+    temporary folder that lives as long as the process. None when nothing at all
+    can be written: kernels then live in memory only.
+    """
+    name = f"kernels-{_fingerprint()}"
+    for base in _candidate_folders():
+        if _writable(base / name):
+            return base / name
+    try:
+        temporary = Path(tempfile.mkdtemp(prefix="sd2-studio-"))
+    except OSError:
+        return None
+    atexit.register(shutil.rmtree, temporary, ignore_errors=True)
+    return temporary / name if _writable(temporary / name) else None
+
+
+def _candidate_folders() -> Iterator[Path]:
+    chosen = os.environ.get("NUMBA_CACHE_DIR")
+    if chosen:
+        yield Path(chosen)
+    yield _PACKAGE / "__pycache__"
+    import platformdirs
+
+    yield Path(platformdirs.user_cache_dir("sd2-studio", appauthor=False))
+
+
+def _writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return True
+    except OSError:
+        return False
+
+
+def _fingerprint() -> str:
+    """Changes with everything that machine code depends on.
+
+    Numba itself notices a change of a kernel's own file only, not of a function
+    that was inlined from another file.
+    """
+    import llvmlite.binding  # type: ignore[import-untyped]
+
+    digest = hashlib.sha256()
+    for module in (*KERNEL_MODULES, "sd2core.numerics.compiled"):
+        digest.update(_PACKAGE.parent.joinpath(*module.split(".")).with_suffix(".py").read_bytes())
+    for fact in (
+        # Numba keeps code by the place of its source: another installation that
+        # shares this cache cannot use it.
+        str(_PACKAGE),
+        platform.python_version(),
+        importlib.metadata.version("numba"),
+        llvmlite.binding.get_host_cpu_name(),
+        llvmlite.binding.get_host_cpu_features().flatten(),
+    ):
+        digest.update(fact.encode())
+    return digest.hexdigest()[:16]
+
+
+def kernels_ready() -> bool:
+    """Whether calling the kernels causes no pause: they are on disk or in memory."""
+    global _ready
+    if not _ready:
+        directory = cache_directory()
+        _ready = directory is not None and (directory / _MARKER).exists()
+    return _ready
+
+
+def warm_up(progress: Progress = silent) -> None:
+    """Compile every kernel that is not on disk yet (about half a minute the first time)."""
+    global _ready
+    for done, name in enumerate(KERNEL_MODULES):
+        progress(done, len(KERNEL_MODULES))
+        importlib.import_module(name).compile_kernels()
+    directory = cache_directory()
+    if directory is not None:
+        (directory / _MARKER).touch()
+    _ready = True
+    progress(len(KERNEL_MODULES), len(KERNEL_MODULES))
+
+
+def compile_in_background() -> subprocess.Popen[bytes] | None:
+    """Start compiling in another process, at low priority, unless it is done or under way.
+
+    A process, because the compiler holds the GIL: in a thread it would freeze
+    the window. Asked again after a failure it does not start again.
+
+    Returns
+    -------
+    subprocess.Popen or None
+        The process, or None when the kernels are ready, cannot be kept, or no
+        process can be started.
+    """
+    global _background
+    with _lock:
+        directory = cache_directory()
+        if kernels_ready() or directory is None:
+            return None
+        if _background is None:
+            paths = [str(_PACKAGE.parent), os.environ.get("PYTHONPATH", "")]
+            environment = {
+                **os.environ,
+                "NUMBA_CACHE_DIR": str(directory.parent),
+                "PYTHONPATH": os.pathsep.join(filter(None, paths)),
+            }
+            try:
+                _background = subprocess.Popen(
+                    [sys.executable, "-m", "sd2core.numerics.compiled", "--quiet"],
+                    env=environment,
+                    stdin=subprocess.DEVNULL,
+                    stdout=subprocess.DEVNULL,
+                    stderr=subprocess.DEVNULL,
+                )
+            except OSError:
+                return None
+            atexit.register(_stop_background)
+        return _background
+
+
+def _stop_background() -> None:
+    if _background is not None and _background.poll() is None:
+        _background.terminate()
+        _background.wait()
+
+
+def worker_count() -> int:
+    """Cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+@functools.lru_cache(maxsize=1)
+def workers() -> ThreadPoolExecutor:
+    """The threads over which kernels are spread; one pool for the whole process."""
+    return ThreadPoolExecutor(worker_count(), thread_name_prefix="sd2-kernel")
+
+
+def _main() -> None:
+    from sd2core.numerics import compiled as module
+
+    quiet = "--quiet" in sys.argv[1:]
+    if quiet and hasattr(os, "nice"):
+        os.nice(10)
+
+    def report(done: int, total: int) -> None:
+        if not quiet:
+            print(f"Compiling kernels: {done} of {total}", file=sys.stderr)
+
+    module.warm_up(report)
+
+
+if __name__ == "__main__":
+    _main()

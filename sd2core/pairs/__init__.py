@@ -1,0 +1,1 @@
+"""Pairs of synthetic and real maps to learn from, and their segments."""

@@ -1,0 +1,100 @@
+"""What a store of pairs holds, told from its description: no array is read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from sd2core.errors import Sd2Error
+from sd2core.pairs.segments import segment_starts
+from sd2core.pairs.store import PairKind, read_description
+
+
+@dataclass(frozen=True)
+class TakeFacts:
+    """One take: whose, from where, how long."""
+
+    subject: str
+    placement: int
+    frames: int
+
+
+@dataclass(frozen=True)
+class PairFacts:
+    """A store of pairs, but for its values.
+
+    Parameters
+    ----------
+    path : Path
+    kind : {"simulated", "real"}
+    bins : int
+    v_max_mps, frame_rate_hz : float
+    takes : tuple of TakeFacts
+    """
+
+    path: Path
+    kind: PairKind
+    bins: int
+    v_max_mps: float
+    frame_rate_hz: float
+    takes: tuple[TakeFacts, ...]
+
+    @property
+    def subjects(self) -> tuple[str, ...]:
+        """In the order of their first takes."""
+        return tuple(dict.fromkeys(take.subject for take in self.takes))
+
+    @property
+    def placements(self) -> int:
+        """From how many places the movements are seen."""
+        return len({take.placement for take in self.takes})
+
+    @property
+    def duration_s(self) -> float:
+        """Of the movements, each counted once however often it is seen."""
+        return sum(take.frames for take in self.takes if take.placement == 0) / self.frame_rate_hz
+
+    @property
+    def divisible(self) -> bool:
+        """Whether somebody has several takes."""
+        first = [take.subject for take in self.takes if take.placement == 0]
+        return len(set(first)) < len(first)
+
+    def segments(
+        self, subjects: Iterable[str], length: int, overlap: int, *, first_only: bool = False
+    ) -> int:
+        """How many windows the takes of these subjects give."""
+        wanted = set(subjects)
+        return sum(
+            len(segment_starts(take.frames, length, overlap))
+            for take in self.takes
+            if take.subject in wanted and not (first_only and take.placement)
+        )
+
+
+def pair_facts(path: Path) -> PairFacts:
+    """Read the description of a store of pairs.
+
+    Raises
+    ------
+    Sd2Error
+        When it is none, of another version or kind, empty, or its description is damaged.
+    """
+    path = Path(path)
+    header, index = read_description(path)
+    takes = tuple(
+        TakeFacts(entry["subject"], int(entry["placement"]), entry["stop"] - entry["start"])
+        for entry in index
+    )
+    try:
+        return PairFacts(
+            path=path,
+            kind=header["kind"],
+            bins=int(header["bins"]),
+            v_max_mps=float(header["v_max_mps"]),
+            frame_rate_hz=float(header["frame_rate_hz"]),
+            takes=takes,
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise Sd2Error(f"{path}: its description is damaged ({error!r})") from error

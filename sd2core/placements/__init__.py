@@ -1,0 +1,1 @@
+"""Planned sensor placements, their cost, and the space that a body takes up."""

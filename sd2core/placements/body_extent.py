@@ -1,0 +1,130 @@
+"""Where a body is during a clip and how it moves, and what that asks of sensors around it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.progress import Progress, silent
+from sd2core.sensor import RadarConfig, Vector, VirtualSensor
+
+_SAMPLED_FRAMES = 100
+_SAMPLED_VERTICES = 200
+_FASTEST_SHARE = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """What the body asks of each of N sensors.
+
+    Parameters
+    ----------
+    inside : bool array, shape (N,)
+        Whether the sensor stands in the box around the body at some time.
+    farthest_m : array, shape (N,)
+        To the farthest corner of that box, at any time.
+    fastest_mps : array, shape (N,)
+        Radial velocity, without its sign, that 1 % of the vertices exceed in some frame.
+    """
+
+    inside: NDArray[np.bool_]
+    farthest_m: NDArray[np.float64]
+    fastest_mps: NDArray[np.float64]
+
+    def out_of_range(self, radar: RadarConfig) -> NDArray[np.bool_]:
+        """Which of a radar's sensors would see part of the body folded in range."""
+        return self.farthest_m > radar.range_max_m
+
+    def aliasing(self, radar: RadarConfig) -> NDArray[np.bool_]:
+        """Which of a radar's sensors would see part of the body folded in velocity."""
+        return self.fastest_mps > radar.v_max_mps
+
+    def beyond(self, radar: RadarConfig) -> NDArray[np.bool_]:
+        """Which places are no good for a radar, for any of these reasons."""
+        return self.inside | self.out_of_range(radar) | self.aliasing(radar)
+
+
+@dataclass(frozen=True, eq=False)
+class Whereabouts:
+    """A body in up to 100 frames with a person, spread over the clip.
+
+    Parameters
+    ----------
+    target_m : tuple of 3 floats
+        What sensors look at: the mean over time of the median vertex, which is inside the
+        torso whatever the limbs do.
+    low_m, high_m : arrays, shape (n, 3)
+        Corners of the box around the body in each frame.
+    points_m, velocity_mps : float32 arrays, shape (n, k, 3)
+        Up to 200 vertices of each frame and their motion to the next one; zero where there
+        is no person in that.
+    """
+
+    target_m: Vector
+    low_m: NDArray[np.float64]
+    high_m: NDArray[np.float64]
+    points_m: NDArray[np.float32]
+    velocity_mps: NDArray[np.float32]
+
+    @classmethod
+    def of(cls, mesh: MeshSequence) -> Whereabouts:
+        """Of a clip, which is read frame by frame.
+
+        Raises
+        ------
+        Sd2Error
+            When there is a person in no frame.
+        """
+        there = np.flatnonzero(mesh.presence.there)
+        if not len(there):
+            raise Sd2Error(
+                f"{mesh.source or 'The mesh'} has a person in no frame",
+                "somebody to place sensors around",
+            )
+        picked = there[np.linspace(0, len(there) - 1, min(len(there), _SAMPLED_FRAMES)).astype(int)]
+        stride = -(-mesh.vertex_count // _SAMPLED_VERTICES)
+        middle, low, high = np.empty((3, len(picked), 3))
+        sampled = len(range(0, mesh.vertex_count, stride))
+        points = np.empty((len(picked), sampled, 3), np.float32)
+        velocity = np.zeros_like(points)
+        for row, frame in enumerate(picked.tolist()):
+            following = min(frame + 1, int(mesh.presence.last[frame]))
+            vertices = mesh.read(frame, following + 1)
+            middle[row] = np.median(vertices[0], axis=0)
+            low[row], high[row] = vertices[0].min(axis=0), vertices[0].max(axis=0)
+            points[row] = vertices[0, ::stride]
+            if following > frame:
+                passed_s = mesh.times_s[following] - mesh.times_s[frame]
+                velocity[row] = (vertices[1, ::stride] - points[row]) / passed_s
+        x, y, z = middle.mean(axis=0).tolist()
+        return cls((x, y, z), low, high, points, velocity)
+
+    def seen_by(self, sensors: Sequence[VirtualSensor], progress: Progress = silent) -> Sight:
+        """What the body asks of sensors; less than a millisecond for each."""
+        inside = np.zeros(len(sensors), dtype=bool)
+        farthest_m, fastest_mps = np.zeros((2, len(sensors)))
+        # Which of the vertices of a frame 1 % are faster than.
+        rank = int(np.ceil((1.0 - _FASTEST_SHARE) * self.points_m.shape[1])) - 1
+        for number, sensor in enumerate(sensors):
+            progress(number, len(sensors))
+            position = np.asarray(sensor.position_m)
+            inside[number] = self._holds(sensor)
+            corner = np.maximum(np.abs(self.low_m - position), np.abs(self.high_m - position))
+            farthest_m[number] = np.linalg.norm(corner, axis=1).max()
+            sight = self.points_m - position.astype(np.float32)
+            range_m = np.sqrt(np.einsum("nki,nki->nk", sight, sight))
+            radial_mps = np.abs(np.einsum("nki,nki->nk", self.velocity_mps, sight))
+            radial_mps /= np.maximum(range_m, 1e-9)
+            fastest_mps[number] = np.partition(radial_mps, rank, axis=1)[:, rank].max()
+        progress(len(sensors), len(sensors))
+        return Sight(inside, farthest_m, fastest_mps)
+
+    def _holds(self, sensor: VirtualSensor) -> bool:
+        position = np.asarray(sensor.position_m)
+        within = (self.low_m < position) & (position < self.high_m)  # (frames, 3)
+        return bool(within.all(axis=1).any())

@@ -1,0 +1,488 @@
+"""A recording on disk: video, mesh, radar capture and labels on one clock.
+
+A recording is a folder ``NAME.sd2/`` that holds ``recording.json``. The files it
+speaks of lie inside the folder or anywhere else; their paths are stored relative
+to the folder, so that a whole data set can move. See ``docs/formats.md``.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+import tempfile
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_write_text
+from sd2core.files.paths import (
+    free_path,
+    is_absolute,
+    located_path,
+    plain_path,
+    remove,
+    stored_path,
+)
+from sd2core.files.recording_json import (
+    FILE_NAME,
+    VERSION,
+    CameraEntry,
+    Document,
+    MeshReading,
+    Span,
+    read_document,
+)
+from sd2core.labels.files import FILE_NAME as LABELS_NAME
+from sd2core.labels.files import labels_of, read_labels, write_labels
+from sd2core.placements.placements import Placements, placements_from_dict
+from sd2core.progress import Progress, silent
+from sd2core.recording.relinking import ROLES, Relinked, Role, exists, find_again, is_many
+from sd2core.sensor import VirtualSensor
+
+if TYPE_CHECKING:
+    from sd2core.io.radar import RadarCapture, RecordedMap
+    from sd2core.io.video import VideoReader
+    from sd2core.labels.spans import Labels
+    from sd2core.mesh.sequence import MeshSequence
+    from sd2core.timebase import Timebase
+
+SUFFIX = ".sd2"
+
+_PLACED_BY_VIDEO = {".pkl", ".pickle", ".joblib"}
+"""Outputs of body models, which know their place only in the picture's pixels."""
+
+_AIDS: set[Role] = {"faces", "denoiser"}
+"""Files that are nothing to look at by themselves."""
+
+
+@dataclass(eq=False)
+class Recording:
+    """What belongs together; change the fields, then :meth:`save`.
+
+    Parameters
+    ----------
+    folder : Path
+        The ``NAME.sd2`` folder.
+    video, mesh, faces, radar : Path or None
+        Absolute paths, which need not exist (see :meth:`missing`).
+    mesh_reading : MeshReading
+        How to read a mesh that does not say its frame rate, unit or place.
+    radar_offset_s : float
+        Time on the recording's clock at which the first radar frame was taken.
+        The clock is the video's, or the mesh's where there is no video.
+    denoiser : Path or None
+        Model file that the synthetic map is denoised with.
+    bundled_denoiser : str or None
+        The same by the name of a model that comes with the program; empty where the map
+        is not to be denoised. Neither: nobody has chosen.
+    sensor : VirtualSensor
+    placements : PlacementGrid, PlacementCloud or None
+        Where else sensors are planned, around the body.
+    spans : tuple of Span
+        Labels as ``recording.json`` itself can hold them: those of a recording that nobody
+        has labelled here.
+    labels : Labels or None
+        Those in ``labels.json``, which then stand for ``spans``; see :attr:`labelled`.
+    labels_elsewhere : bool
+        Whether somebody else edits them now: ``labels.json`` is then left as it is.
+    title : str
+    simulated : bool
+        True when no camera and no radar was there.
+    camera : CameraEntry or None
+        What is known of the camera; see :meth:`focal_px`.
+    """
+
+    folder: Path
+    video: Path | None = None
+    mesh: Path | None = None
+    faces: Path | None = None
+    radar: Path | None = None
+    mesh_reading: MeshReading = field(default_factory=MeshReading)
+    radar_offset_s: float = 0.0
+    denoiser: Path | None = None
+    bundled_denoiser: str | None = None
+    sensor: VirtualSensor = field(default_factory=VirtualSensor)
+    placements: Placements | None = None
+    spans: tuple[Span, ...] = ()
+    labels: Labels | None = None
+    labels_elsewhere: bool = False
+    title: str = ""
+    simulated: bool = False
+    camera: CameraEntry | None = None
+    _read: Document = field(default_factory=Document, repr=False)
+
+    @classmethod
+    def create(
+        cls,
+        folder: Path,
+        *,
+        video: Path | None = None,
+        mesh: Path | None = None,
+        faces: Path | None = None,
+        radar: Path | None = None,
+        mesh_reading: MeshReading | None = None,
+        radar_offset_s: float = 0.0,
+        denoiser: Path | None = None,
+        sensor: VirtualSensor | None = None,
+        spans: tuple[Span, ...] = (),
+        title: str = "",
+        simulated: bool = False,
+        camera: CameraEntry | None = None,
+        copy: bool = False,
+        progress: Progress = silent,
+    ) -> Recording:
+        """Make ``folder`` a recording of files that exist; see :meth:`save_as`."""
+        recording = cls(
+            Path(folder),
+            video=video,
+            mesh=mesh,
+            faces=faces,
+            radar=radar,
+            mesh_reading=mesh_reading or MeshReading(),
+            radar_offset_s=radar_offset_s,
+            denoiser=denoiser,
+            sensor=sensor or VirtualSensor(),
+            spans=tuple(spans),
+            title=title,
+            simulated=simulated,
+            camera=camera,
+        )
+        return recording.save_as(Path(folder), copy=copy, progress=progress)
+
+    def save_as(
+        self,
+        folder: Path,
+        *,
+        copy: bool = False,
+        timebase: Timebase | None = None,
+        progress: Progress = silent,
+    ) -> Recording:
+        """Make ``folder`` a recording with the same content, and return it.
+
+        ``.sd2`` is appended to a name without it. Files are referred to where
+        they are; ``copy=True`` copies those outside the folder into it. A
+        folder that exists is taken when it is no recording yet, so that files
+        may be put into it first. Without a title it is called as its folder.
+        ``timebase`` is that of :meth:`save`.
+
+        Raises
+        ------
+        Sd2Error
+            When the folder is a recording already, a file does not exist, or
+            there is nothing to record.
+        """
+        folder = _new_folder(Path(folder))
+        files: dict[Role, Path] = {}
+        for role, path in self._files().items():
+            if not exists(role, Path(path)):
+                if role == "denoiser":  # everything else can be shown without it
+                    continue
+                raise Sd2Error(f"The {role} {path} does not exist", "a file or folder")
+            files[role] = plain_path(Path(path))
+        if not files.keys() - _AIDS:
+            raise Sd2Error(
+                f"{folder} would hold nothing", "a video, a mesh or a radar capture, or several"
+            )
+        created = not folder.exists()
+        folder.mkdir(exist_ok=True)
+        copied: list[Path] = []
+        try:
+            if copy:
+                files = _copied(files, folder, copied, progress)
+            made = replace(
+                self,
+                folder=folder,
+                **files,  # type: ignore[arg-type]
+                title=self.title or folder.stem,
+                labels_elsewhere=False,
+                _read=self._read.model_copy(deep=True),
+            )
+            made.save(timebase)
+        except BaseException:
+            for path in [*copied, *([folder] if created else [])]:
+                remove(path)
+            raise
+        return made
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a user should know about where the files are."""
+        return tuple(
+            f"The {role} {path} is on another drive than the recording: its path is stored in"
+            " full and does not move with the recording."
+            for role, path in self._files().items()
+            if is_absolute(stored_path(path, self.folder))
+        )
+
+    @property
+    def labelled(self) -> Labels:
+        """The labels, wherever they are kept."""
+        return labels_of(self.spans) if self.labels is None else self.labels
+
+    @property
+    def unlabelled(self) -> bool:
+        """Whether nobody has labelled it; a radar file's own labels may then stand for it."""
+        return self.labels is None and not self.spans
+
+    def effective_labels(self) -> Labels:
+        """The labels; where nobody has labelled it, those of its radar's file."""
+        if self.unlabelled and self.holds_radar_map:
+            return self.load_radar_map().labels.shifted(self.radar_offset_s)
+        return self.labelled
+
+    def missing(self) -> dict[Role, Path]:
+        """Files that are not where the recording says."""
+        return {role: path for role, path in self._files().items() if not exists(role, path)}
+
+    def relink(self, folder: Path, progress: Progress = silent) -> Relinked:
+        """Find all missing files by name under one folder, and save where it was saved before.
+
+        Parameters
+        ----------
+        folder : Path
+            Searched as :func:`~sd2core.recording.relinking.find_again` does.
+        progress : Progress
+            Called with (folders searched, 0), as the total is not known.
+        """
+        relinked = find_again(self.missing(), Path(folder), progress)
+        for role, path in relinked.found.items():
+            setattr(self, role, path)
+        if relinked.found and (self.folder / FILE_NAME).exists():
+            self.save()
+        return relinked
+
+    def save(self, timebase: Timebase | None = None) -> None:
+        """Write ``recording.json`` in one step, keeping fields this version does not know.
+
+        Labels are written before, to ``labels.json``, with their frames where a timebase
+        is given; but see :attr:`labels_elsewhere`.
+        """
+        document = self._read
+        if self.labels is not None and not self.labels_elsewhere:
+            write_labels(
+                self.folder / LABELS_NAME,
+                self.labels,
+                timebase=timebase,
+                recording=self.folder,
+                video=self.video,
+            )
+            self.spans = ()
+        document.version = VERSION
+        document.title = self.title
+        document.simulated = self.simulated
+        document.mesh_reading = self.mesh_reading
+        document.camera = self.camera
+        document.radar_offset_s = _finite(self.radar_offset_s, "radar offset in seconds")
+        document.bundled_denoiser = self.bundled_denoiser
+        document.placements = None if self.placements is None else self.placements.as_dict()
+        document.spans = tuple(self.spans)
+        for name in ("position_m", "azimuth_deg", "elevation_deg", "field_of_view_deg"):
+            setattr(document.sensor, name, getattr(self.sensor, name))
+        for role in ROLES:
+            path = getattr(self, role)
+            setattr(document, role, None if path is None else stored_path(path, self.folder))
+        text = json.dumps(document.model_dump(mode="json"), indent=2, ensure_ascii=False)
+        atomic_write_text(self.folder / FILE_NAME, text + "\n")
+
+    def read_labels_again(self) -> None:
+        """Take over what ``labels.json`` holds by now, where there is one.
+
+        Raises
+        ------
+        Sd2Error
+            When it is damaged; the labels are then as they were.
+        """
+        labels = self.folder / LABELS_NAME
+        if labels.exists():
+            self.labels = read_labels(labels).labels
+
+    def focal_px(self, width: int, height: int) -> float | None:
+        """Focal length in pixels of pictures of this size, None where nobody said.
+
+        What is known of the camera holds before what a mesh was placed with.
+        """
+        if self.camera is not None:
+            return self.camera.focal_for(width, height)
+        return self.mesh_reading.focal_px
+
+    def learn_camera(self) -> None:
+        """Take over the camera that the mesh was fitted with, where nothing is known of it."""
+        from sd2core.io.fitted import fitted_camera
+
+        if self.camera is None and self.mesh is not None and self.mesh_reading.focal_px is None:
+            self.camera = fitted_camera(self.mesh)
+
+    def open_video(self, progress: Progress = silent) -> VideoReader:
+        """Open the video."""
+        from sd2core.io.video import open_video
+
+        return open_video(self._present("video"), progress)
+
+    def load_mesh(self, progress: Progress = silent) -> MeshSequence:
+        """Load the mesh as :attr:`mesh_reading` says, placed by the video where that helps."""
+        from sd2core.io.mesh import load_mesh
+
+        return load_mesh(self._present("mesh"), **self.mesh_options(), progress=progress)
+
+    def mesh_options(self) -> dict[str, Any]:
+        """Arguments with which ``load_mesh`` reads the mesh."""
+        path = self._present("mesh")
+        options = self.mesh_reading.options()
+        if self.faces is not None:
+            options["faces"] = self._present("faces")
+        by_video = path.suffix.lower() in _PLACED_BY_VIDEO and self.video and self.video.exists()
+        if by_video and "image_size" not in options:
+            with self.open_video() as video:
+                options["image_size"] = (video.width, video.height)
+        return options
+
+    def load_capture(self) -> RadarCapture:
+        """Load the radar capture on its own clock; the recording's is ``radar_offset_s`` later."""
+        from sd2core.io.radar import load_capture
+
+        return load_capture(self._present("radar"))
+
+    @property
+    def holds_radar_map(self) -> bool:
+        """Whether its radar file holds a map: :meth:`load_radar_map`, not a capture."""
+        from sd2core.io.radar import holds_map
+
+        return self.radar is not None and holds_map(self.radar)
+
+    def load_radar_map(self) -> RecordedMap:
+        """Load the radar's own map and labels on their own clock, as the capture's is."""
+        from sd2core.io.radar import load_recorded_map
+
+        return load_recorded_map(self._present("radar"))
+
+    def _files(self) -> dict[Role, Path]:
+        paths = {role: getattr(self, role) for role in ROLES}
+        return {role: path for role, path in paths.items() if path is not None}
+
+    def _present(self, role: Role) -> Path:
+        path: Path | None = getattr(self, role)
+        if path is None:
+            has = ", ".join(self._files()) or "nothing"
+            raise Sd2Error(f"{self.folder} holds no {role}", f"a {role}; it has {has}")
+        if not exists(role, path):
+            raise Sd2Error(
+                f"The {role} of {self.folder} is not at {path}",
+                "the file where the recording says",
+                "Move it back, or find it again with `sd2 relink RECORDING FOLDER`",
+            )
+        return path
+
+
+def is_recording(path: Path) -> bool:
+    """Whether ``path`` is a recording's folder or its ``recording.json``."""
+    path = Path(path)
+    return path.name == FILE_NAME or path.suffix == SUFFIX or (path / FILE_NAME).is_file()
+
+
+def open_recording(path: Path) -> Recording:
+    """Open a recording by its folder or its ``recording.json``.
+
+    Files that it names may be missing: see :meth:`Recording.missing`.
+
+    Raises
+    ------
+    Sd2Error
+        When it is not a recording, is damaged, or was written by a newer version.
+    """
+    path = Path(path)
+    folder = plain_path(path.parent if path.name == FILE_NAME else path)
+    document = read_document(folder / FILE_NAME)
+    recording = Recording(
+        folder,
+        video=located_path(document.video, folder),
+        mesh=located_path(document.mesh, folder),
+        faces=located_path(document.faces, folder),
+        radar=located_path(document.radar, folder),
+        denoiser=located_path(document.denoiser, folder),
+        bundled_denoiser=document.bundled_denoiser,
+        mesh_reading=document.mesh_reading,
+        radar_offset_s=document.radar_offset_s,
+        sensor=_sensor(document, folder / FILE_NAME),
+        placements=_placements(document, folder / FILE_NAME),
+        spans=document.spans,
+        title=document.title or folder.stem,
+        simulated=document.simulated,
+        camera=document.camera,
+        _read=document,
+    )
+    recording.read_labels_again()
+    return recording
+
+
+def _sensor(document: Document, file: Path) -> VirtualSensor:
+    entry = document.sensor
+    try:
+        return VirtualSensor(
+            position_m=entry.position_m,
+            azimuth_deg=entry.azimuth_deg,
+            elevation_deg=entry.elevation_deg,
+            field_of_view_deg=entry.field_of_view_deg,
+        )
+    except Sd2Error as error:
+        raise Sd2Error(f"{file}: {error.found}", error.expected, error.remedy) from error
+
+
+def _placements(document: Document, file: Path) -> Placements | None:
+    if document.placements is None:
+        return None
+    try:
+        return placements_from_dict(document.placements)
+    except Sd2Error as error:
+        raise Sd2Error(f"{file}: {error.found}", error.expected, error.remedy) from error
+
+
+def _new_folder(folder: Path) -> Path:
+    folder = plain_path(folder)
+    if folder.suffix != SUFFIX:
+        folder = folder.with_name(folder.name + SUFFIX)
+    if (folder / FILE_NAME).exists():
+        raise Sd2Error(
+            f"{folder} is a recording already",
+            "a new folder",
+            "Choose another name, or delete that folder first",
+        )
+    if not folder.parent.is_dir():
+        raise Sd2Error(f"The folder {folder.parent} does not exist", "an existing folder")
+    return folder
+
+
+def _finite(value: float, name: str) -> float:
+    if not math.isfinite(value):
+        raise Sd2Error(f"The {name} is {value}", "a finite number")
+    return float(value)
+
+
+def _copied(
+    files: dict[Role, Path], folder: Path, made: list[Path], progress: Progress
+) -> dict[Role, Path]:
+    """Copy what lies outside ``folder`` into it; ``made`` lists the copies, for undoing."""
+    inside: dict[Role, Path] = {}
+    for done, (role, source) in enumerate(files.items()):
+        progress(done, len(files))
+        if is_many(role, source):
+            raise Sd2Error(
+                f"{source} stands for several files", "a folder, for copying", "Give their folder"
+            )
+        if source.is_relative_to(folder):
+            inside[role] = source
+            continue
+        target = free_path(folder, source.name, role, reserved=FILE_NAME)
+        temporary = Path(tempfile.mkdtemp(prefix=".copy-", dir=folder))
+        made.append(temporary)
+        if source.is_dir():
+            shutil.copytree(source, temporary / target.name)
+        else:
+            shutil.copy2(source, temporary / target.name)
+        (temporary / target.name).rename(target)
+        made.append(target)
+        temporary.rmdir()
+        inside[role] = target
+    progress(len(files), len(files))
+    return inside

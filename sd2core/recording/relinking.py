@@ -1,0 +1,93 @@
+"""Files of a recording that are no longer where it says, found again by their names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, get_args
+
+from sd2core.errors import Sd2Error
+from sd2core.files.paths import common_suffix_length, is_pattern, is_there, paths_named
+from sd2core.progress import Progress
+
+Role = Literal["video", "mesh", "faces", "radar", "denoiser"]
+"""What a file is to a recording."""
+
+ROLES: tuple[Role, ...] = get_args(Role)
+
+
+@dataclass(frozen=True)
+class Relinked:
+    """Which files were found, by role.
+
+    Parameters
+    ----------
+    found : dict
+        New path of every file that was found.
+    ambiguous : dict
+        Candidates that fit equally well; nothing was changed for these.
+    missing : tuple of Role
+        Files that no name under the folder fits.
+    """
+
+    found: dict[Role, Path]
+    ambiguous: dict[Role, tuple[Path, ...]]
+    missing: tuple[Role, ...]
+
+
+def find_again(missing: Mapping[Role, Path], folder: Path, progress: Progress) -> Relinked:
+    """Look for files by their names under a folder.
+
+    Of several files with the right name, the one whose path agrees with the stored one
+    over the most trailing parts is taken, when it is the only one.
+
+    Parameters
+    ----------
+    missing : mapping
+        Where each was.
+    folder : Path
+        Searched with everything below it.
+    progress : Progress
+        Called with (folders searched, 0), as the total is not known.
+
+    Raises
+    ------
+    Sd2Error
+        When it is no folder.
+    """
+    if not folder.is_dir():
+        raise Sd2Error(f"{folder} is not a folder", "the folder to search for missing files")
+    folders = {path.parent.name for role, path in missing.items() if is_many(role, path)}
+    names = {path.name for path in missing.values()}
+    candidates = paths_named(names | folders, folder, progress)
+    found: dict[Role, Path] = {}
+    ambiguous: dict[Role, tuple[Path, ...]] = {}
+    for role, path in missing.items():
+        # Files of a pattern are found by their folder, unless it is one file's own name.
+        by_folder = is_many(role, path) and path.name not in candidates
+        old = path.parent if by_folder else path
+        rest = path.relative_to(old)
+        same_name = [p for p in candidates.get(old.name, []) if exists(role, p / rest)]
+        agreement = [common_suffix_length(path, old) for path in same_name]
+        best = [
+            path
+            for path, parts in zip(same_name, agreement, strict=True)
+            if parts == max(agreement)
+        ]
+        if len(best) == 1:
+            found[role] = best[0] / rest
+        elif best:
+            ambiguous[role] = tuple(sorted(best))
+    left = tuple(role for role in missing if role not in found and role not in ambiguous)
+    return Relinked(found, ambiguous, left)
+
+
+def is_many(role: Role, path: Path) -> bool:
+    """Whether a path stands for many files; only a mesh is made of them."""
+    return role == "mesh" and is_pattern(path)
+
+
+def exists(role: Role, path: Path) -> bool:
+    """Whether what a path stands for is there."""
+    return is_there(path) if role == "mesh" else path.exists()

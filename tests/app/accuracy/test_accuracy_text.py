@@ -1,0 +1,51 @@
+from __future__ import annotations
+
+import pytest
+
+from sd2app.accuracy.text import InUse, deviation, milliseconds, percent, seconds, short
+from sd2core.accuracy.plans import Plan
+
+
+@pytest.mark.parametrize(
+    ("share", "text"),
+    [
+        (0.0, "0 %"),
+        (1e-6, "<0.01 %"),
+        (0.0004, "0.04 %"),
+        (0.0078, "0.78 %"),
+        (0.05, "5 %"),
+        (0.0996, "10 %"),
+        (0.134, "13 %"),
+        (2.5, "250 %"),
+    ],
+)
+def test_shares_have_two_digits_and_no_exponent(share, text):
+    assert percent(share) == text
+
+
+def test_a_map_is_off_either_way_unless_hardly_at_all():
+    assert deviation(0.008) == "±0.8 %"
+    assert deviation(1e-6) == "<0.01 %"
+
+
+@pytest.mark.parametrize(
+    ("value_ms", "text"),
+    [(0.0, "0 ms"), (2e-4, "<0.001 ms"), (0.0123, "0.012 ms"), (1.26, "1.3 ms"), (458.2, "458 ms")],
+)
+def test_costs_have_two_digits_and_no_exponent(value_ms, text):
+    assert milliseconds(value_ms) == text
+
+
+def test_a_clip_takes_seconds_or_less():
+    assert seconds(0.27) == "270 ms"
+    assert seconds(1.26) == "1.3 s"
+
+
+def test_a_plan_is_said_shortly_and_with_its_figures():
+    plan = Plan(mask_stride=5, vertices_kept=0.25, frame_rate_factor=2)
+    assert short(plan) == (
+        "visibility exact · mask every 5 frames · 25 % of the vertices · frame rate × 2"
+    )
+    assert short(Plan(visibility="depth", depth_resolution=128)) == "depth 128"
+    text = str(InUse(plan, 0.008, 0.6))
+    assert text == f"{plan} · ±0.8 % · 0.6 ms/frame"

@@ -1,0 +1,246 @@
+"""What is to be exported: counted while it is chosen, written in a process of its own."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QObject
+from swinging_recordings import recording
+
+from sd2app.background.run_folder import folders_in
+from sd2app.dataset_export.messages import Exported, message_of
+from sd2app.dataset_export.model import ExportModel
+from sd2app.dataset_export.text import bytes_words, label_words, size_words, split_words
+from sd2app.session.tasks import JobsModel
+from sd2core.placements.placements import PlacementGrid
+
+FAKE = Path(__file__).resolve().parents[2] / "fake_export.py"
+
+
+@pytest.fixture
+def made(qtbot, tmp_path: Path):
+    parent = QObject()
+    models = []
+
+    def make(how: str = "done") -> ExportModel:
+        command = [sys.executable, str(FAKE), how]
+        models.append(ExportModel(JobsModel(parent), parent, command, tmp_path / "exports"))
+        return models[-1]
+
+    yield make
+    for model in models:
+        model.close()
+    for folder in folders_in(tmp_path / "exports"):
+        folder.stop()
+        qtbot.waitUntil(lambda folder=folder: not folder.live, timeout=20_000)
+    parent.deleteLater()
+
+
+@pytest.fixture
+def people(tmp_path: Path) -> Path:
+    (tmp_path / "people").mkdir()
+    for name in ("anna", "ben"):
+        recording(tmp_path / "people" / f"{name}.sd2")
+    return tmp_path / "people"
+
+
+def counted(model: ExportModel, qtbot) -> None:
+    qtbot.waitUntil(lambda: not model.counting, timeout=20_000)
+
+
+def test_choices_are_counted_at_once(made, people, qtbot) -> None:
+    model = made()
+    model.begin(people / "anna.sd2")
+    assert model.counting
+    assert model.forecast is None
+    counted(model, qtbot)
+    assert model.forecast is not None
+    # 120 frames in steps of 62: at 0 and, to their end, at 48.
+    assert (model.forecast.segments, model.forecast.sources) == (2, 1)
+    model.choose(length=30, overlap=0)
+    counted(model, qtbot)
+    assert model.forecast.segments == 4
+    assert size_words(model.forecast, 30).startswith("4 segments of 1.0 s from 1 view · ")
+    # It swings from 1 s to 2 s.
+    assert label_words(model.forecast) == "Labels: background 3 · swing 1"
+    assert split_words(model.forecast) == (
+        "Split: all 4 to train (anna); nobody is left to judge on"
+    )
+    model.choose(maps=frozenset({"radar"}))
+    counted(model, qtbot)
+    assert model.forecast.of_kind == {"simulated": 4}
+
+
+def test_a_folder_has_people_and_planned_places(made, people, qtbot) -> None:
+    planning = recording(people / "carla.sd2", radar=False)
+    planning.placements = PlacementGrid((1.0, 2.0, 3.0))
+    planning.save()
+    model = made()
+    model.begin(people)
+    assert model.places == 3
+    counted(model, qtbot)
+    assert model.forecast.sources == 3
+    model.choose(planned=True)
+    counted(model, qtbot)
+    assert model.forecast.sources == 6
+    model.choose(subjects=("ann", "ann", "ben"))
+    counted(model, qtbot)
+    assert model.forecast.split.validation == ("ann",)
+    model.choose(subjects=("ann",))
+    counted(model, qtbot)
+    assert "1 people are named for 3 recordings" in model.problem
+    assert not model.ready
+    model.begin(people / "anna.sd2")
+    assert (model.choice.subjects, model.choice.planned, model.places) == ((), False, 0)
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        ({"maps": frozenset()}, "No map is chosen."),
+        ({"length": 200}, "No recording has 200 frames on end with a person."),
+    ],
+)
+def test_what_cannot_be_exported_is_said(made, people, qtbot, change, problem) -> None:
+    model = made()
+    model.begin(people / "anna.sd2")
+    model.choose(**change)
+    counted(model, qtbot)
+    assert model.problem == problem
+    assert not model.ready
+    model.start(people / "set.zarr")
+    assert not model.exporting
+
+
+def test_it_is_written_by_another_process(made, people, qtbot) -> None:
+    model = made()
+    model.begin(people)
+    model.choose(length=30, overlap=5, maps=frozenset({"synthetic"}), subjects=("a", "b"))
+    counted(model, qtbot)
+    out = people / "set.h5"
+    said: list[str] = []
+    model.noted.connect(said.append)
+    model.failed.connect(said.append)
+    model.start(out)
+    assert model.exporting
+    assert not model.ready
+    qtbot.waitUntil(lambda: not model.exporting, timeout=20_000)
+    assert model.result == Exported(
+        out, people / "set.card.md", people / "set.png", 7, 2, ("b: it is damaged",)
+    )
+    assert said == [f"7 segments from 2 views are in {out}.", "Left out: b: it is damaged"]
+    assert json.loads((people / "set.h5.asked").read_text()) == [
+        "export", str(people), "--out", str(out), "--kinds", "synthetic", "--length", "30",
+        "--overlap", "5", "--progress-json", "--subjects", "a,b",
+    ]  # fmt: skip
+    model.choose(overlap=6)
+    assert model.result is None
+
+
+@pytest.mark.parametrize(
+    ("how", "why"), [("refused", "It cannot be."), ("silent", "the disk is full")]
+)
+def test_what_goes_wrong_is_said(made, people, qtbot, how: str, why: str) -> None:
+    model = made(how)
+    model.begin(people)
+    counted(model, qtbot)
+    with qtbot.waitSignal(model.failed, timeout=20_000) as failed:
+        model.start(people / "set.zarr")
+    assert failed.args == [why]
+    assert model.result is None
+
+
+def test_it_can_be_stopped(made, people, qtbot) -> None:
+    model = made("slow")
+    model.begin(people)
+    counted(model, qtbot)
+    said: list[str] = []
+    model.failed.connect(said.append)
+    model.start(people / "set.zarr")
+    qtbot.waitUntil(lambda: model.progress == (500, 2000), timeout=20_000)
+    model.stop()
+    qtbot.waitUntil(lambda: not model.exporting, timeout=20_000)
+    assert not said
+    assert model.ready
+
+
+def begun(model: ExportModel, people: Path, qtbot) -> None:
+    model.begin(people)
+    model.choose(length=30, overlap=5, maps=frozenset({"synthetic"}), subjects=("a", "b"))
+    counted(model, qtbot)
+    model.start(people / "set.h5")
+    qtbot.waitUntil(lambda: model.progress == (500, 2000), timeout=20_000)
+
+
+def test_it_outlives_the_window_and_is_found_by_the_next(made, people, qtbot) -> None:
+    first, second = made("slow"), made()
+    begun(first, people, qtbot)
+    choice = first.choice
+    first.close()
+    with qtbot.waitSignal(second.noted, timeout=20_000) as noted:
+        second.look_for_export()
+    assert noted.args[0].startswith("set.h5 is being written.")
+    assert second.exporting
+    assert second.choice == choice
+    qtbot.waitUntil(lambda: second.progress == (500, 2000), timeout=20_000)
+    counted(second, qtbot)
+    assert second.forecast is not None
+    assert not second.ready
+    (people / "set.h5.go").touch()
+    qtbot.waitUntil(lambda: not second.exporting, timeout=20_000)
+    assert second.result.segments == 7
+    third = made()
+    third.look_for_export()
+    assert not third.exporting
+
+
+def test_what_was_written_meanwhile_is_said(made, people, qtbot, tmp_path) -> None:
+    first, second = made("slow"), made()
+    begun(first, people, qtbot)
+    first.close()
+    (people / "set.h5.go").touch()
+    (folder,) = folders_in(tmp_path / "exports")
+    qtbot.waitUntil(lambda: folder.code is not None, timeout=20_000)
+    said: list[str] = []
+    second.noted.connect(said.append)
+    second.look_for_export()
+    qtbot.waitUntil(lambda: not second.exporting, timeout=20_000)
+    assert said == [f"7 segments from 2 views are in {people / 'set.h5'}."]
+
+
+def test_one_that_was_killed_is_said(made, people, qtbot) -> None:
+    model = made("slow")
+    begun(model, people, qtbot)
+    os.kill(model._run._pid, signal.SIGKILL)
+    with qtbot.waitSignal(model.failed, timeout=20_000) as failed:
+        pass
+    assert failed.args[0].startswith("set.h5 was not written to its end")
+    assert model.ready
+
+
+def test_one_that_cannot_be_started_is_said(made, people, qtbot) -> None:
+    model = made()
+    model._command = ("/no/such/program",)
+    model.begin(people)
+    counted(model, qtbot)
+    with qtbot.waitSignal(model.failed, timeout=20_000) as failed:
+        model.start(people / "set.h5")
+    assert "cannot be started" in failed.args[0]
+    assert not model.exporting
+    model.look_for_export()
+    assert not model.exporting
+
+
+def test_lines_that_say_nothing_are_left_alone() -> None:
+    for told in ({}, {"event": "else"}, {"event": "done"}, {"event": []}):
+        assert message_of(told) is None
+
+
+def test_bytes_in_words() -> None:
+    assert bytes_words(1_234_567) == "1.2 MB"
+    assert bytes_words(2_500_000_000) == "2.5 GB"

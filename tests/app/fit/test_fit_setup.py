@@ -1,0 +1,117 @@
+"""What is asked before a fit: camera, person, height, and where it is saved."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+
+from sd2app.fit.request import FitRequest, Person
+from sd2app.fit.setup import FitSetupModel, folder_for
+from sd2core.recording.recording import Recording
+
+
+@pytest.fixture
+def video(tmp_path: Path) -> Path:
+    """Ten pictures of 160 × 120, frame k of brightness 20 k."""
+    path = tmp_path / "walk.mp4"
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("mpeg4", rate=30)
+        stream.width, stream.height, stream.pix_fmt = 160, 120, "yuv420p"
+        for number in range(10):
+            picture = np.full((120, 160, 3), 20 * number, np.uint8)
+            for packet in stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")):
+                container.mux(packet)
+        for packet in stream.encode():
+            container.mux(packet)
+    return path
+
+
+@pytest.fixture
+def setup(qtbot, video):
+    setup = FitSetupModel()
+    setup.choose_video(video)
+    qtbot.waitUntil(lambda: setup.picture is not None, timeout=10_000)
+    yield setup
+    setup.close()
+
+
+def test_the_video_is_shown_from_its_middle(setup, video, qtbot) -> None:
+    assert setup.ready
+    assert (setup.frames, setup.size, setup.frame) == (10, (160, 120), 5)
+    assert setup.picture.mean() == pytest.approx(100, abs=4)
+    setup.show_frame(2)
+    qtbot.waitUntil(lambda: abs(float(setup.picture.mean()) - 40) < 4)
+
+
+def test_nothing_said_leaves_all_to_the_fit(setup, video) -> None:
+    assert setup.request() == FitRequest(video, video.with_name("walk.sd2"))
+
+
+def test_field_of_view_and_focal_length_are_one_thing(setup) -> None:
+    setup.set_camera("angle")
+    setup.set_angle(90.0)
+    assert setup.request().focal_px == pytest.approx(80.0)
+    setup.set_focal(160.0)
+    assert setup.angle_deg == pytest.approx(2 * math.degrees(math.atan(0.5)))
+    setup.set_camera("file")
+    assert setup.request().focal_px is None
+
+
+def test_a_rectangle_may_be_drawn_from_any_corner_and_beyond_the_edge(setup) -> None:
+    setup.show_frame(3)
+    setup.set_person(100.4, 80.2, -20, 10.6)
+    assert setup.person == Person(frame=3, x=0, y=11, width=100, height=69)
+    setup.show_frame(7)
+    assert setup.person.frame == 3
+    setup.set_person(10, 10, 11, 90)  # a slip of the hand
+    assert setup.person.width == 100
+    setup.clear_person()
+    assert setup.request().person is None
+
+
+def test_heights_stay_human(setup) -> None:
+    setup.set_stature(17.0)
+    assert setup.stature_m == 2.3
+    setup.set_stature(None)
+    assert setup.request().stature_m is None
+
+
+def test_a_file_that_is_no_video_is_explained(qtbot, tmp_path) -> None:
+    (tmp_path / "text.mp4").write_text("no video")
+    setup = FitSetupModel()
+    setup.choose_video(tmp_path / "text.mp4")
+    qtbot.waitUntil(lambda: bool(setup.problem), timeout=10_000)
+    assert "text.mp4" in setup.problem
+    assert not setup.ready
+    setup.close()
+
+
+def test_a_stopped_fit_is_continued_with_its_choices_and_not_with_others(qtbot, video) -> None:
+    kept = FitRequest(video, video.with_name("walk.sd2"), 1.66, 123.0, Person(4, 10, 10, 60, 90))
+    kept.save()
+    setup = FitSetupModel()
+    setup.choose_video(video)
+    qtbot.waitUntil(lambda: setup.picture is not None, timeout=10_000)
+    assert setup.continues
+    assert setup.frame == 4
+    assert setup.request().asks_the_same(kept)
+    setup.set_stature(1.8)
+    assert setup.kept is not None
+    assert not setup.continues
+    setup.close()
+
+
+def test_where_it_is_saved_by_default(video, tmp_path) -> None:
+    assert folder_for(video) == tmp_path / "walk.sd2"
+    (tmp_path / "walk.sd2").mkdir()
+    assert folder_for(video) == tmp_path / "walk-2.sd2"
+    saved = Recording.create(tmp_path / "mine.sd2", video=video)
+    assert folder_for(video, saved) == tmp_path / "mine.sd2"
+    (tmp_path / "m.npz").write_bytes(b"")
+    saved.mesh = tmp_path / "m.npz"
+    assert folder_for(video, saved) == tmp_path / "walk-2.sd2"
+    assert folder_for(video, Recording(Path(), video=video)) == tmp_path / "walk-2.sd2"

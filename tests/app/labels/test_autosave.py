@@ -1,0 +1,483 @@
+"""Labels from opening to closing, without a window: kept, offered again, edited in one place."""
+
+from __future__ import annotations
+
+import errno
+import os
+import random
+from pathlib import Path
+
+import numpy as np
+import pytest
+from labelled import even, imported, random_edit
+
+from sd2app.labels.autosave import LabelSession
+from sd2app.labels.dragging import LabelDragging
+from sd2app.labels.edits import LabelEdits
+from sd2app.labels.marking import LabelMarking
+from sd2app.labels.model import LabelsModel
+from sd2app.labels.reaction import ReactionModel
+from sd2app.session.document import DocumentModel
+from sd2app.session.playback import PlaybackModel
+from sd2app.session.tasks import JobsModel
+from sd2app.settings import Settings
+from sd2core.labels import edits as core_edits
+from sd2core.labels.files import read_labels, write_labels
+from sd2core.labels.recovery import RecoveryPlace, offers_in
+from sd2core.labels.recovery_offers import Found, Offer
+from sd2core.recording.recording import Recording
+
+
+class Desk:
+    """What a window has for labels, without the window."""
+
+    def __init__(self, qtbot, root: Path) -> None:
+        self.qtbot, self.root = qtbot, root
+        self.document = DocumentModel(JobsModel())
+        self.labels, self.playback = LabelsModel(), PlaybackModel()
+        self.session = LabelSession(self.document, self.labels, root)
+        self.edits = LabelEdits(self.document, self.labels, self.playback, self.session)
+        self.marking = LabelMarking(
+            self.labels, self.playback, ReactionModel(Settings.forgetful()), self.edits
+        )
+        self.hand = LabelDragging(self.labels, self.playback, self.edits)
+        self.said: list[str] = []
+        for signal in (self.session.failed, self.session.noted, self.edits.failed):
+            signal.connect(self.said.append)
+        self.document.opened.connect(self._take_over)
+
+    def _take_over(self) -> None:
+        self.playback.set_timebase(self.document.content.timebase)
+        self.session.take_over()
+
+    def open(self, path: Path) -> Desk:
+        with self.qtbot.waitSignal(self.document.opened, timeout=10_000):
+            self.document.open([path])
+        return self
+
+    def mark(self, first: int, stop: int, label: str = "left-to-right") -> None:
+        """Mark frames from the first to the one before ``stop`` by key."""
+        for frame in (first, stop):
+            self.playback.seek_frame(frame)
+            self.marking.mark(label)
+
+    def edit(self, rng: random.Random) -> bool:
+        return self.edits.apply(lambda labels, base: random_edit(labels, base, rng))
+
+    def crash(self) -> None:
+        """What the end of a process does."""
+        if self.session._journal is not None:
+            self.session._journal._close_stream()
+        self.session._place.release()
+        self.session._journal = self.session._place = None
+
+    @property
+    def spans(self) -> list[tuple[str, int, int]]:
+        base = self.playback.timebase
+        return [
+            (span.label, *base.frames_between(span.start_s, span.end_s))
+            for span in self.labels.labels.spans
+        ]
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    return tmp_path / "recovery"
+
+
+@pytest.fixture
+def desk(qtbot, root: Path):
+    """Makes desks, and clears them in the end."""
+    made = []
+
+    def make() -> Desk:
+        made.append(Desk(qtbot, root))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.session.close()
+        one.document.close()
+
+
+@pytest.fixture
+def mesh(tmp_path: Path) -> Path:
+    vertices = np.random.default_rng(0).normal(size=(90, 5, 3))
+    vertices[..., 2] += 3.0
+    np.savez(tmp_path / "walk.npz", vertices=vertices)
+    return tmp_path / "walk.npz"
+
+
+@pytest.fixture
+def recording(mesh: Path) -> Path:
+    return Recording.create(mesh.with_name("walk.sd2"), mesh=mesh).folder
+
+
+def left(root: Path) -> list[Offer]:
+    """What a process that ended now would leave behind."""
+    offers = []
+    for folder in root.iterdir():
+        if next(folder.glob("*.journal"), None) is not None:
+            place = RecoveryPlace(root, folder)
+            place._folder = folder
+            offers += place.offers().offers
+    return offers
+
+
+class TestEveryEdit:
+    @pytest.mark.parametrize("seed", range(4))
+    def test_is_on_disk_when_it_returns_and_so_are_steps_back_and_forth(
+        self, desk, root, recording, seed
+    ) -> None:
+        write_labels(recording / "labels.json", imported(even(90), 7))
+        at, rng = desk().open(recording), random.Random(seed)
+        stack, changes = at.document.undo_stack, 0
+        for _ in range(40):
+            before = at.labels.labels
+            rng.choice([lambda: at.edit(rng), lambda: at.edit(rng), stack.undo, stack.redo])()
+            if at.labels.labels is not before:
+                (offer,) = left(root)
+                assert offer.labels == at.labels.labels
+                changes += 1
+            assert at.document.recording.labels in (None, at.labels.labels)
+        assert changes > 10
+
+    def test_a_drag_is_one_record(self, desk, root, recording) -> None:
+        at = desk().open(recording)
+        at.mark(10, 20)
+        size = [path.stat().st_size for path in root.rglob("*.journal")]
+        assert at.hand.begin_drag()
+        span = at.labels.labels.spans[0]
+        for to_s in (0.8, 0.9, 1.0):
+            at.hand.drag_edge(span.id, "end", to_s, 0.0)
+            assert [path.stat().st_size for path in root.rglob("*.journal")] == size
+        at.hand.end_drag()
+        (offer,) = left(root)
+        assert (offer.edits, offer.last) == (2, "Move end of span")
+        assert offer.labels == at.labels.labels
+
+    def test_names_say_what_was_done_last(self, desk, root, recording) -> None:
+        at = desk().open(recording)
+        at.mark(10, 20)
+        assert left(root)[0].last == "Create span"
+        at.document.undo_stack.undo()
+        assert left(root)[0].last == "Undo create span"
+
+    def test_nothing_is_written_where_nothing_changes(self, desk, root, recording) -> None:
+        at = desk().open(recording)
+        at.edits.apply(lambda labels, base: core_edits.Edit("Nothing", labels))
+        at.edits.delete()
+        assert not list(root.rglob("*.journal"))
+        assert not at.document.modified
+
+    def test_that_cannot_be_written_is_made_and_told_once(
+        self, desk, root, recording, monkeypatch
+    ) -> None:
+        at = desk().open(recording)
+        at.mark(10, 20)
+
+        def full(_: int) -> None:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+        with monkeypatch.context() as patch:
+            patch.setattr(os, "fsync", full)
+            at.mark(30, 40)
+            at.mark(50, 60)
+        assert len(at.spans) == 3
+        (said,) = at.said
+        assert said.startswith("The edit is made, but could not be kept")
+        assert "No space left" in said
+        at.mark(70, 80)
+        assert at.said[1:] == ["Edits of labels are kept again."]
+        assert left(root)[0].labels == at.labels.labels
+        assert left(root)[0].edits == 4
+
+    def test_a_place_that_cannot_be_made_keeps_nobody_from_editing(
+        self, desk, root, recording
+    ) -> None:
+        root.write_text("a file where the folder should be")
+        at = desk().open(recording)
+        assert not at.session.refusal
+        assert "not kept until they are saved" in at.session.notes[0]
+        at.mark(10, 20)
+        assert at.spans == [("left-to-right", 10, 20)]
+        assert "could not be kept" in at.said[0]
+
+
+class TestOpeningAndClosing:
+    def test_what_was_saved_or_given_up_is_not_offered(self, desk, root, recording) -> None:
+        at = desk().open(recording)
+        at.mark(10, 20)
+        at.document.save()
+        assert offers_in(root) == Found()
+        at.mark(30, 40)
+        at.session.close()
+        at = desk().open(recording)
+        assert at.session.offer is None
+        assert at.spans == [("left-to-right", 10, 20)]
+
+    def test_what_was_saved_and_then_lost_is_no_more_than_the_rest(
+        self, desk, root, recording
+    ) -> None:
+        at = desk().open(recording)
+        at.mark(10, 20)
+        at.document.save()
+        at.mark(30, 40)
+        at.crash()
+        again = desk().open(recording)
+        assert again.session.offer.edits == 1
+        assert len(again.session.offer.labels.spans) == 2
+
+    def test_saved_as_something_else_it_goes_on_there(self, desk, root, mesh, tmp_path) -> None:
+        at = desk().open(mesh)
+        at.mark(10, 20)
+        at.document.save_as(tmp_path / "other.sd2")
+        assert not list(root.rglob("*.journal"))
+        at.mark(30, 40)
+        (offer,) = left(root)
+        assert offer.recording == tmp_path / "other.sd2"
+        # The mesh is free for another window again.
+        other = desk().open(mesh)
+        assert not other.session.refusal
+        assert other.spans == []
+
+    def test_a_file_that_is_no_recording_yet(self, desk, root, mesh) -> None:
+        at = desk().open(mesh)
+        at.mark(10, 20)
+        at.crash()
+        again = desk().open(mesh)
+        assert again.session.offer.recording == mesh
+        again.edits.restore()
+        assert again.spans == [("left-to-right", 10, 20)]
+
+    def test_files_that_are_added_change_nothing(self, qtbot, desk, root, mesh, tmp_path) -> None:
+        at = desk().open(mesh)
+        at.mark(10, 20)
+        write_capture_of_nothing(tmp_path / "radar")
+        with qtbot.waitSignal(at.document.opened, timeout=10_000):
+            at.document.add([tmp_path / "radar"])
+            at.mark(30, 40)  # while it is read
+        assert at.spans == [("left-to-right", 10, 20), ("left-to-right", 30, 40)]
+        assert at.document.modified
+        at.mark(50, 60)
+        (offer,) = left(root)
+        assert (offer.edits, offer.recording) == (3, mesh)
+
+    def test_a_recording_is_not_added_to_another(self, qtbot, desk, mesh, recording) -> None:
+        at = desk().open(mesh)
+        at.mark(10, 20)
+        with qtbot.waitSignal(at.document.failed, timeout=10_000) as caught:
+            at.document.add([recording])
+        assert "cannot be added to another" in caught.args[0]
+        assert at.spans == [("left-to-right", 10, 20)]
+
+
+class TestOffers:
+    @pytest.fixture
+    def crashed(self, desk, recording) -> list[tuple[str, int, int]]:
+        """Two edits beyond the file, which has one span."""
+        at = desk().open(recording)
+        at.mark(10, 20)
+        at.document.save()
+        at.mark(30, 40, "up-to-down")
+        at.edits.relabel("down-to-up")
+        spans = at.spans
+        at.crash()
+        return spans
+
+    def test_restoring_is_one_step(self, desk, root, recording, crashed) -> None:
+        at = desk().open(recording)
+        assert at.spans == crashed[:1]
+        at.edits.restore()
+        assert at.spans == crashed
+        assert at.session.offer is None
+        assert at.document.modified
+        stack = at.document.undo_stack
+        assert stack.undoText() == "Restore labels"
+        stack.undo()
+        assert at.spans == crashed[:1]
+        stack.redo()
+        assert at.spans == crashed
+        at.crash()
+        again = desk().open(recording)
+        again.edits.restore()
+        assert again.spans == crashed
+
+    def test_restored_and_lost_again_it_counts_as_before(
+        self, desk, root, recording, crashed
+    ) -> None:
+        at = desk().open(recording)
+        at.edits.restore()
+        at.crash()
+        assert desk().open(recording).session.offer.edits == 2
+
+    def test_restoring_goes_before_edits_that_were_made_meanwhile(
+        self, desk, root, recording, crashed
+    ) -> None:
+        at = desk().open(recording)
+        at.mark(50, 60)
+        at.edits.restore()
+        assert at.spans == crashed
+        at.document.undo_stack.undo()
+        assert at.spans == [crashed[0], ("left-to-right", 50, 60)]
+        (offer,) = left(root)
+        assert offer.labels == at.labels.labels
+
+    def test_declined_is_kept_and_asked_for_comes_back(
+        self, desk, root, recording, crashed
+    ) -> None:
+        at = desk().open(recording)
+        at.session.decline()
+        at.session.close()
+        at = desk().open(recording)
+        assert at.session.offer is None
+        (offer,) = at.session.recoveries().offers
+        assert offer.declined
+        at.session.ask_for(offer)
+        assert at.session.offer == offer
+        at.edits.restore()
+        assert at.spans == crashed
+        assert not list(root.rglob("*.declined"))
+
+    def test_not_now_is_asked_again(self, desk, root, recording, crashed) -> None:
+        at = desk().open(recording)
+        at.session.postpone()
+        assert at.session.offer is None
+        at.mark(50, 60)  # begins a journal of its own
+        at.session.close()
+        assert desk().open(recording).session.offer.edits == 2
+
+    def test_what_is_in_the_file_already_is_dropped(self, desk, root, recording) -> None:
+        at = desk().open(recording)
+        at.mark(10, 20)
+        at.document.undo_stack.undo()
+        at.crash()
+        assert len(offers_in(root).offers) == 1
+        assert desk().open(recording).session.offer is None
+        assert not list(root.rglob("*.journal"))
+
+    def test_of_another_recording_asked_for_when_it_is_opened(
+        self, desk, root, recording, mesh, crashed
+    ) -> None:
+        at = desk()
+        at.session.look_around()
+        assert [one.recording for one in at.session.waiting.offers] == [recording]
+        at.open(mesh)
+        assert at.session.waiting == Found()
+        assert at.session.offer is None
+        (offer,) = at.session.recoveries().offers
+        assert not at.session.is_of_open(offer)
+        at.session.give_up(offer)
+        (offer,) = at.session.recoveries().offers
+        assert offer.declined
+        at.session.ask_for(offer)
+        assert at.session.offer is None
+        at.open(recording)
+        assert at.session.offer == offer
+        at.session.give_up(offer)
+        assert at.session.recoveries() == Found()
+        assert at.session.offer is None
+
+    def test_what_cannot_be_read_is_said(self, desk, root, recording, crashed) -> None:
+        (path,) = root.rglob("*.journal")
+        path.write_bytes(b"not a journal")
+        at = desk().open(recording)
+        assert at.session.offer is None
+        assert "is kept" in at.session.notes[0]
+        at.mark(50, 60)
+        assert path.with_suffix(".damaged").read_bytes() == b"not a journal"
+
+
+class TestTwoWindows:
+    def test_the_second_looks_on(self, desk, root, recording) -> None:
+        first, second = desk().open(recording), desk().open(recording)
+        first.mark(10, 20)
+        assert second.session.read_only
+        assert f"(process {os.getpid()})" in second.session.refusal
+        second.playback.seek_frame(5)
+        for refused in (
+            lambda: second.marking.mark("left-to-right"),
+            lambda: second.edits.apply(lambda labels, base: random_edit(labels, base, None)),
+            second.hand.begin_drag,
+        ):
+            second.said.clear()
+            assert not refused()
+            assert second.said == [second.session.refusal]
+        assert second.spans == []
+        assert not second.labels.marks
+        assert not second.hand.dragging
+        first.document.save()
+        # The sensor, say, can be saved; the labels of the first stay.
+        second.document.save()
+        assert len(read_labels(recording / "labels.json").labels.spans) == 1
+
+    def test_it_edits_once_the_first_has_let_go(self, desk, root, recording) -> None:
+        first, second = desk().open(recording), desk().open(recording)
+        second.session.try_again()
+        assert second.session.read_only
+        assert second.said == [second.session.refusal]
+        first.mark(10, 20)
+        first.document.save()
+        first.mark(30, 40)
+        first.crash()
+        second.session.try_again()
+        assert not second.session.refusal
+        # What was saved meanwhile, and what was not.
+        assert second.spans == [("left-to-right", 10, 20)]
+        assert second.session.offer.edits == 1
+        second.mark(50, 60)
+        second.document.save()
+        assert len(read_labels(recording / "labels.json").labels.spans) == 2
+
+    def test_a_recording_of_ones_own_is_edited(self, desk, root, recording, tmp_path) -> None:
+        first, second = desk().open(recording), desk().open(recording)
+        second.document.save_as(tmp_path / "mine.sd2")
+        assert not second.session.refusal
+        second.mark(10, 20)
+        second.document.save()
+        first.mark(30, 40)
+        first.document.save()
+        for folder, spans in ((tmp_path / "mine.sd2", second.spans), (recording, first.spans)):
+            (span,) = read_labels(folder / "labels.json").labels.spans
+            assert (span.label, *even(90).frames_between(span.start_s, span.end_s)) == spans[0]
+
+    def test_it_looks_on_with_files_that_were_added(
+        self, qtbot, desk, root, recording, tmp_path
+    ) -> None:
+        first, second = desk().open(recording), desk().open(recording)
+        write_capture_of_nothing(tmp_path / "radar")
+        with qtbot.waitSignal(second.document.opened, timeout=10_000):
+            second.document.add([tmp_path / "radar"])
+        assert not second.hand.begin_drag()
+        first.mark(10, 20)
+        first.document.save()
+        second.document.save()
+        assert len(read_labels(recording / "labels.json").labels.spans) == 1
+
+    def test_labels_that_were_damaged_meanwhile_are_not_overwritten(
+        self, desk, root, recording
+    ) -> None:
+        first, second = desk().open(recording), desk().open(recording)
+        (recording / "labels.json").write_text("{")
+        first.session.close()
+        second.session.try_again()
+        assert "labels.json" in second.session.refusal
+        assert not second.hand.begin_drag()
+        second.document.save()
+        assert (recording / "labels.json").read_text() == "{"
+
+    def test_nothing_is_edited_where_nothing_is_open(self, desk) -> None:
+        at = desk()
+        at.marking.mark("left-to-right")
+        assert not at.hand.begin_drag()
+        assert not at.session.read_only
+        assert set(at.said) == {at.session.refusal}
+
+
+def write_capture_of_nothing(folder: Path) -> None:
+    from sd2core.io.radar.infineon import write_capture
+    from sd2core.sensor import PAPER_RADAR
+
+    shape = (30, 1, PAPER_RADAR.chirps_per_frame, PAPER_RADAR.samples_per_chirp)
+    samples = np.full(shape, 2048, np.uint16)
+    write_capture(folder, samples, PAPER_RADAR, np.arange(30) / 30, simulated=True)

@@ -1,0 +1,123 @@
+"""What an import and an export say before anything is done; no window."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from sd2app.labels.export_model import LabelExportModel, Written
+from sd2app.labels.import_model import LabelImportModel, is_label_file
+from sd2core.labels.formats import read_labels, write_labels
+from sd2core.labels.spans import Labels, Span, Track
+from sd2core.timebase import Timebase
+
+FRAMES = Timebase.regular(100, 10.0)
+HERE = Labels((Track("Gestures"),), (Span(7, "Gestures", 1.0, 2.0, "up-to-down", note="n"),))
+
+
+def of(*spans: tuple[float, float, str]) -> Labels:
+    made = [Span(k, "Ben", *span) for k, span in enumerate(spans, start=1)]
+    return Labels((Track("Ben"),), tuple(made))
+
+
+@pytest.fixture
+def importing(qtbot):
+    models = []
+
+    def read(path: Path, here: Labels = HERE) -> LabelImportModel:
+        model = LabelImportModel(path, here, FRAMES)
+        models.append(model)
+        qtbot.waitUntil(lambda: bool(model.incoming or model.problem), timeout=10_000)
+        return model
+
+    yield read
+    for model in models:
+        model.close()
+
+
+def test_the_preview_says_what_becomes_of_everything(importing, tmp_path) -> None:
+    path = tmp_path / "ben.eaf"
+    spans = of((1.0, 2.0, "wave"), (3.0, 4.0, "wave"), (9.0, 11.0, "up-to-down"), (12.0, 13.0, "b"))
+    write_labels(path, spans, Timebase.regular(200, 10.0))
+    model = importing(path)
+    assert dict(model.facts()) == {
+        "Spans": "3, from 1.000 to 10.000 s",
+        "Tracks": "1: Ben",
+        "Labels": "wave (2), up-to-down (1)",
+        "Not in the label set": "wave. It is kept and shown in grey.",
+        "Cut": "1 span beyond the recording, cut where it ends or begins",
+        "Left out": "1 span outside the recording (0.000 to 10.000 s)",
+    }
+    assert model.way == "add"
+    assert "Nothing that is there changes" in model.consequence()
+    model.set_way("replace")
+    assert model.consequence().startswith("The 1 span of this recording go")
+
+
+def test_a_bad_file_is_refused_in_the_cores_words(importing, tmp_path) -> None:
+    path = tmp_path / "ben.TextGrid"
+    path.write_text("nothing of the kind")
+    model = importing(path)
+    assert model.incoming is None
+    assert str(path) in model.problem
+    assert "Expected" in model.problem
+    # It is a table after all.
+    path.write_text("start_s,end_s,label\n1,2,wave\n")
+    model.read_as("csv")
+    assert model.problem == ""
+
+
+def test_a_file_without_spans_is_shown_as_that(importing, tmp_path) -> None:
+    path = tmp_path / "empty.json"
+    write_labels(path, Labels(), FRAMES)
+    model = importing(path)
+    assert dict(model.facts()) == {"Spans": "none", "Tracks": "1: Gestures", "Labels": "none"}
+
+
+def test_of_several_videos_in_a_file_one_is_chosen(importing, tmp_path, qtbot) -> None:
+    path = tmp_path / "project.boris"
+    write_labels(path, of((1.0, 2.0, "wave")), FRAMES)
+    project = json.loads(path.read_text("utf-8"))
+    ((name, first),) = project["observations"].items()
+    second = json.loads(json.dumps(first))
+    for event in second["events"]:
+        event[0] += 1.0
+    project["observations"] = {name: first, "later": second}
+    path.write_text(json.dumps(project), "utf-8")
+    model = importing(path)
+    assert model.observations == (name, "later")
+    assert model.incoming.labels.spans[0].start_s == 1.0
+    model.set_observation("later")
+    qtbot.waitUntil(lambda: model.incoming is not None, timeout=10_000)
+    assert model.incoming.labels.spans[0].start_s == 2.0
+
+
+def test_what_is_a_label_file() -> None:
+    names = ("a.eaf", "b.TextGrid", "labels.json", "recording.json", "video.mp4", "c.txt")
+    assert [is_label_file(Path(name)) for name in names] == [True, True, True, False, False, True]
+
+
+def test_an_export_says_its_losses_before_and_after(qtbot, tmp_path) -> None:
+    model = LabelExportModel(HERE, FRAMES, None)
+    qtbot.waitUntil(lambda: model.losses is not None, timeout=10_000)
+    assert model.losses == ()
+    model.choose("audacity")
+    qtbot.waitUntil(lambda: model.losses is not None, timeout=10_000)
+    assert "notes" in {loss.what for loss in model.losses}
+    with qtbot.waitSignal(model.written, timeout=10_000) as said:
+        model.export(tmp_path / "mine")
+    written: Written = said.args[0]
+    assert written.path == tmp_path / "mine.txt"
+    assert "keeps no notes: 1 note left out" in str(written)
+    assert len(read_labels(written.path).spans) == 1
+    before = written.path.read_bytes()
+    model.export(tmp_path / "mine")
+    assert f"{written.path} exists" in model.problem
+    assert written.path.read_bytes() == before
+    model.export(tmp_path / "no such folder" / "mine.txt")
+    assert not model.problem
+    qtbot.waitUntil(lambda: bool(model.problem), timeout=10_000)
+    assert not model.exporting
+    model.close()

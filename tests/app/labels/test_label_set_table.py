@@ -1,0 +1,146 @@
+"""The label set as a table without a window."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtTest import QAbstractItemModelTester
+
+from sd2app.labels.columns import Change
+from sd2app.labels.label_set_model import (
+    CLASS,
+    COLOUR,
+    KEY,
+    NAME,
+    SPANS,
+    LabelSetModel,
+)
+from sd2app.labels.model import LabelsModel
+from sd2app.settings import Settings
+from sd2app.shell.keys.bindings import KeyBindings
+from sd2core.errors import Sd2Error
+from sd2core.labels.label_set import GESTURES
+from sd2core.labels.spans import Labels, Span, Track
+from sd2core.timebase import Timebase
+
+
+class Named:
+    id, menu, text, tip, keys = "next", "Labels", "Next span", "", ("N", "6")
+
+
+class Edited:
+    """A label set with two spans of "up-to-down"."""
+
+    def __init__(self) -> None:
+        self.labels, self.refused = LabelsModel(), []
+        keys = KeyBindings([Named()], self.labels, Settings.forgetful())
+        self.model = LabelSetModel(self.labels, keys, self.apply)
+        self.labels.open(
+            Labels(
+                (Track("Gestures"),),
+                (
+                    Span(1, "Gestures", 1.0, 2.0, "up-to-down"),
+                    Span(2, "Gestures", 3.0, 4.0, "up-to-down"),
+                ),
+            )
+        )
+        self.model.set_watched(True)
+
+    def apply(self, change: Change) -> bool:
+        try:
+            done = change(self.labels.labels, Timebase.regular(100, 10.0))
+        except Sd2Error as error:
+            self.refused.append(str(error))
+            return False
+        self.labels.set_labels(done.labels)
+        return True
+
+    def cell(self, row: int, column: int) -> str:
+        return self.model.data(self.model.index(row, column))
+
+    def type(self, row: int, column: int, text: str) -> bool:
+        return self.model.setData(self.model.index(row, column), text)
+
+
+@pytest.fixture
+def edited() -> Edited:
+    return Edited()
+
+
+def test_what_the_rows_show(edited) -> None:
+    row = [edited.cell(2, column) for column in (NAME, KEY, COLOUR, CLASS, SPANS)]
+    assert row == ["up-to-down", "3", "vermilion", "vertical", "2"]
+    assert edited.model.warnings == ""
+
+
+def test_a_name_changes_with_the_spans_that_have_it(edited) -> None:
+    assert edited.type(2, NAME, "  fall ")
+    assert [span.label for span in edited.labels.labels.spans] == ["fall", "fall"]
+    assert edited.cell(2, SPANS) == "2"
+    assert not edited.type(2, NAME, "background")
+    assert "share the name background" in edited.refused[0]
+    assert edited.cell(2, NAME) == "fall"
+
+
+@pytest.mark.parametrize(
+    ("key", "words"),
+    [
+        ("n", "N belongs to “Next span” in the menu Labels"),
+        ("1", "1 belongs to the label “left-to-right”"),
+    ],
+)
+def test_a_key_that_somebody_has_is_refused_by_name(edited, key: str, words: str) -> None:
+    assert not edited.type(2, KEY, key)
+    assert words in edited.refused[0]
+    assert edited.cell(2, KEY) == "3"
+
+
+def test_keys_colours_and_classes_change(edited) -> None:
+    assert edited.type(2, KEY, "Q")
+    assert edited.type(2, COLOUR, "#332288")
+    assert edited.type(2, CLASS, "")
+    assert [edited.cell(2, column) for column in (KEY, COLOUR, CLASS)] == ["Q", "indigo", "–"]
+    label = edited.labels.labels.label_set.find("up-to-down")
+    assert (label.key, label.colour, label.gesture_class) == ("q", "#332288", "")
+    assert edited.type(2, KEY, "")
+    assert edited.cell(2, KEY) == ""
+
+
+def test_colours_that_look_alike_are_said(edited) -> None:
+    assert edited.type(1, COLOUR, "#0080c0")
+    assert edited.cell(0, COLOUR) == "blue (alike)"
+    assert edited.cell(1, COLOUR) == "#0080c0 (alike)"
+    assert edited.model.warnings == "left-to-right and right-to-left look alike."
+    assert ("#0080c0", "#0080c0") in edited.model.colours()
+
+
+def test_a_new_label_takes_no_key_of_an_action(edited) -> None:
+    assert edited.model.add()
+    assert (edited.cell(5, NAME), edited.cell(5, KEY)) == ("label 1", "")  # 6 is an action's
+    assert edited.model.warnings == ""
+
+
+def test_labels_are_put_in_another_order_and_removed(edited) -> None:
+    assert edited.model.move(2, -1)
+    assert edited.cell(1, NAME) == "up-to-down"
+    assert edited.model.remove(1)
+    assert edited.labels.labels.spans[0].label == "up-to-down"
+    edited.labels.open(edited.labels.labels.with_spans([Span(3, "Gestures", 5, 6, "background")]))
+    assert edited.model.remove(3, "down-to-up")
+    assert edited.labels.labels.span(3).label == "down-to-up"
+
+
+def test_the_set_has_a_name(edited) -> None:
+    assert edited.model.rename_set(" Mine ")
+    assert edited.labels.labels.label_set.name == "Mine"
+    assert edited.labels.labels.label_set.labels == GESTURES.labels
+
+
+def test_under_qts_own_test_of_models(edited) -> None:
+    mode = QAbstractItemModelTester.FailureReportingMode.Fatal
+    tester = QAbstractItemModelTester(edited.model, mode)
+    edited.model.add()
+    edited.type(5, NAME, "wave")
+    edited.model.move(5, -1)
+    edited.model.remove(0)
+    assert edited.model.rowCount() == 5
+    tester.deleteLater()

@@ -1,0 +1,373 @@
+"""The synthetic map without a window: order of work, quality, interruption."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import trimesh
+from fake_denoisers import FakeDenoisers
+from fake_ladder import COUNTING, EXACT, FACING, FakeLadder
+
+from sd2app.maps import compiling
+from sd2app.maps.partial_map import FINAL, ROUGH
+from sd2app.settings import Settings
+from sd2app.shell.wiring import build_context
+from sd2core.accuracy.plans import Plan
+from sd2core.accuracy.synthesizers import synthesizer_for
+from sd2core.doppler.synthesizer import Synthesizer
+from sd2core.doppler_map import DopplerMap
+from sd2core.io.mesh import load_mesh
+from sd2core.numerics.compiled import warm_up
+from sd2core.sensor import VirtualSensor
+
+
+@pytest.fixture(scope="module")
+def ball(tmp_path_factory):
+    path = tmp_path_factory.mktemp("ball") / "ball.npz"
+    shape = trimesh.creation.icosphere(subdivisions=2, radius=0.3)
+    times_s = np.arange(90) / 30
+    vertices = np.repeat(shape.vertices[None], 90, axis=0)
+    vertices[:, :, 2] += 2 + 0.2 * np.sin(2 * np.pi * times_s)[:, None]
+    np.savez(path, vertices=vertices, faces=shape.faces, times_s=times_s)
+    return path
+
+
+@pytest.fixture
+def fake():
+    return FakeLadder()
+
+
+@pytest.fixture
+def context(qapp, fake):
+    from PySide6.QtCore import QObject
+
+    warm_up()
+    parent = QObject()
+    context = build_context(
+        parent, Settings.forgetful(), fake.ladder, None, FakeDenoisers().library
+    )
+    yield context
+    fake.gate.set()
+    context.close()
+    parent.deleteLater()
+
+
+def open_ball(context, qtbot, ball):
+    with qtbot.waitSignal(context.document.opened, timeout=10_000):
+        context.document.open([ball])
+
+
+def test_rough_comes_before_exact(context, qtbot, ball):
+    ranks = []
+    context.synthetic.changed.connect(
+        lambda: (
+            ranks.append(context.synthesis._painted.canvas.rank.copy())
+            if context.synthetic.map
+            else 0
+        )
+    )
+    open_ball(context, qtbot, ball)
+    qtbot.waitUntil(lambda: context.synthesis.complete, timeout=10_000)
+    assert (ranks[0] == ROUGH).all()
+    assert (ranks[-1] == FINAL).all()
+    lowest = [rank.min() for rank in ranks]
+    assert lowest == sorted(lowest)
+
+
+def test_the_map_is_that_of_the_library(context, qtbot, ball):
+    open_ball(context, qtbot, ball)
+    qtbot.waitUntil(lambda: context.synthesis.complete, timeout=10_000)
+    expected = Synthesizer(load_mesh(ball), "paper").map(context.sensor.sensor)
+    np.testing.assert_allclose(context.synthetic.map.values, expected.values, atol=1e-7)
+    assert context.synthetic.map.unit == expected.unit
+
+
+def test_every_sweep_of_a_fast_hand_is_for_one_placement(context, qtbot, ball):
+    open_ball(context, qtbot, ball)
+    qtbot.waitUntil(lambda: context.synthesis.complete, timeout=10_000)
+    shown = []
+    context.synthetic.changed.connect(
+        lambda: shown.append(context.synthesis._painted.canvas.sensor)
+    )
+    context.edits.begin_sensor_drag()
+    for step in range(200):
+        context.edits.drag_sensor((step * 0.005, 0.0, 0.0))
+        qtbot.wait(1)
+    qtbot.waitUntil(lambda: not context.synthesis.busy, timeout=5_000)
+    places = [sensor.position_m[0] for sensor in shown]
+    assert len(places) > 10
+    assert places == sorted(places)
+    assert places[-1] == pytest.approx(199 * 0.005)
+    context.edits.end_sensor_drag()
+    qtbot.waitUntil(lambda: context.synthesis.complete, timeout=10_000)
+    assert context.document.undo_stack.count() == 1
+
+
+def test_a_hand_that_holds_still_gets_the_exact_map(context, qtbot, ball):
+    open_ball(context, qtbot, ball)
+    qtbot.waitUntil(lambda: context.synthesis.complete, timeout=10_000)
+    context.edits.begin_sensor_drag()
+    context.edits.drag_sensor((0.2, 0.0, 0.0))
+    qtbot.waitUntil(lambda: not context.synthesis.complete, timeout=5_000)
+    qtbot.waitUntil(lambda: context.synthesis.complete, timeout=10_000)
+    assert context.sensor.dragging
+    context.edits.drag_sensor((0.3, 0.0, 0.0))
+    qtbot.waitUntil(lambda: not context.synthesis.complete, timeout=5_000)
+    context.edits.end_sensor_drag()
+
+
+def test_another_recording_replaces_work_under_way(context, qtbot, ball, tmp_path):
+    still = tmp_path / "still.npz"
+    with np.load(ball) as data:
+        np.savez(still, vertices=np.repeat(data["vertices"][:1], 5, axis=0), faces=data["faces"])
+    open_ball(context, qtbot, ball)
+    with qtbot.waitSignal(context.document.opened, timeout=10_000):
+        context.document.open([still])
+    qtbot.waitUntil(lambda: context.synthesis.complete, timeout=10_000)
+    assert context.synthetic.map.values.shape == (32, 5)
+    assert context.synthetic.map.values.max() == 0
+
+
+def test_without_machine_code_exact_waits_for_the_compiler(context, qtbot, ball, monkeypatch):
+    state = {"ready": False, "exit": None}
+    compiler = SimpleNamespace(poll=lambda: state["exit"])
+    monkeypatch.setattr(compiling, "kernels_ready", lambda: state["ready"])
+    monkeypatch.setattr(compiling, "compile_in_background", lambda: compiler)
+    open_ball(context, qtbot, ball)
+    qtbot.waitUntil(lambda: "compiling" in context.synthetic.status, timeout=10_000)
+    assert not context.synthesis.complete
+    state.update(ready=True, exit=0)
+    qtbot.waitUntil(lambda: context.synthesis.complete, timeout=10_000)
+    qtbot.waitUntil(lambda: context.synthetic.status == "visibility exact, ±0 %", timeout=10_000)
+
+
+def test_a_compiler_that_fails_does_not_keep_exact_away(context, qtbot, ball, monkeypatch):
+    compiler = SimpleNamespace(poll=lambda: 1)
+    monkeypatch.setattr(compiling, "kernels_ready", lambda: False)
+    monkeypatch.setattr(compiling, "compile_in_background", lambda: compiler)
+    open_ball(context, qtbot, ball)
+    qtbot.waitUntil(lambda: context.synthesis.complete, timeout=30_000)
+
+
+def test_levels_keep_their_reference_until_asked(context, qtbot, ball):
+    open_ball(context, qtbot, ball)
+    qtbot.waitUntil(lambda: context.synthesis.complete, timeout=10_000)
+    reference = context.synthetic.reference
+    assert reference > 0
+    context.edits.begin_sensor_drag()
+    context.edits.drag_sensor((0.0, 0.0, -5.0))
+    context.edits.end_sensor_drag()
+    qtbot.waitUntil(lambda: context.synthesis.complete, timeout=10_000)
+    assert context.synthetic.reference == reference
+    context.reset_references()
+    assert context.synthetic.reference < reference
+
+
+# --- plans --------------------------------------------------------------------------------
+
+
+def of_plan(ball, plan, sensor=None):
+    mesh = load_mesh(ball)
+    return (
+        synthesizer_for(plan, mesh, Synthesizer(mesh).options).map(sensor or VirtualSensor()).values
+    )
+
+
+def wait_until_done(context, qtbot):
+    qtbot.waitUntil(
+        lambda: context.synthesis.complete and not context.synthesis.busy and not context.jobs.jobs,
+        timeout=10_000,
+    )
+
+
+@pytest.mark.parametrize(
+    "plan", [FACING, Plan(mask_stride=5), Plan(vertices_kept=0.5), Plan(frame_rate_factor=2)]
+)
+def test_the_plan_in_use_is_carried_out(context, fake, qtbot, ball, plan):
+    fake.plan, fake.error = plan, 0.008
+    open_ball(context, qtbot, ball)
+    wait_until_done(context, qtbot)
+    np.testing.assert_allclose(context.synthetic.map.values, of_plan(ball, plan), atol=1e-7)
+    assert context.synthetic.status.endswith(", ±0.8 %")
+
+
+def test_a_recording_opens_with_a_rough_map_while_the_plan_is_chosen(context, fake, qtbot, ball):
+    fake.gate.clear()
+    open_ball(context, qtbot, ball)
+    qtbot.waitUntil(lambda: context.trade.choosing, timeout=10_000)
+    assert context.synthetic.map is not None
+    assert context.synthetic.covered is None
+    assert context.synthetic.status == "preview: vertices facing the sensor"
+    assert not context.synthesis.complete
+    fake.gate.set()
+    wait_until_done(context, qtbot)
+
+
+def test_another_plan_replaces_the_map_without_a_gap(context, fake, qtbot, ball):
+    fake.plans[0.1] = FACING
+    open_ball(context, qtbot, ball)
+    wait_until_done(context, qtbot)
+    before, shown = context.synthetic.map.values.copy(), []
+    context.synthetic.changed.connect(
+        lambda: shown.append((context.synthetic.covered, context.synthetic.map.values.copy()))
+    )
+    context.trade.set_tolerance(0.1)
+    qtbot.waitUntil(lambda: context.trade.in_use.plan == FACING, timeout=10_000)
+    wait_until_done(context, qtbot)
+    after = of_plan(ball, FACING)
+    assert shown
+    for covered, values in shown:
+        assert covered is None
+        # Every column is the old plan's or the new one's.
+        old = np.isclose(values, before, atol=1e-7).all(axis=0)
+        new = np.isclose(values, after, atol=1e-7).all(axis=0)
+        assert (old | new).all()
+    np.testing.assert_allclose(context.synthetic.map.values, after, atol=1e-7)
+
+
+def test_a_clicked_plan_is_carried_out_and_the_tolerance_brings_the_other_back(
+    context, fake, qtbot, ball
+):
+    open_ball(context, qtbot, ball)
+    wait_until_done(context, qtbot)
+    context.trade.use(COUNTING[0])
+    wait_until_done(context, qtbot)
+    np.testing.assert_allclose(context.synthetic.map.values, of_plan(ball, FACING), atol=1e-7)
+    context.trade.choose_by_tolerance()
+    wait_until_done(context, qtbot)
+    np.testing.assert_allclose(context.synthetic.map.values, of_plan(ball, EXACT), atol=1e-7)
+
+
+def test_a_new_place_first_gets_the_plan_in_use_and_then_a_choice_of_its_own(
+    context, fake, qtbot, ball
+):
+    open_ball(context, qtbot, ball)
+    wait_until_done(context, qtbot)
+    there = VirtualSensor(position_m=(0.4, 0.0, 0.0))
+    fake.plan = FACING
+    plans = []
+    context.synthesis.completed.connect(lambda: plans.append(context.trade.in_use.plan))
+    context.edits.place_sensor(there)
+    qtbot.waitUntil(lambda: len(plans) == 2, timeout=10_000)
+    assert plans == [EXACT, FACING]
+    np.testing.assert_allclose(
+        context.synthetic.map.values, of_plan(ball, FACING, there), atol=1e-7
+    )
+
+
+def test_a_hand_gets_the_plan_for_dragging(context, fake, qtbot, ball):
+    fake.dragging = Plan(visibility="depth", depth_resolution=128, mask_stride=5)
+    open_ball(context, qtbot, ball)
+    wait_until_done(context, qtbot)
+    qtbot.waitUntil(lambda: context.synthesis._readier.ready_at is not None, timeout=10_000)
+    context.edits.begin_sensor_drag()
+    assert not context.synthesis.moving  # the hand has hold of it; nothing moves yet
+    context.edits.drag_sensor((0.2, 0.0, 0.0))
+    assert context.synthesis.moving
+    qtbot.waitUntil(lambda: "while dragging" in context.synthetic.status, timeout=5_000)
+    assert context.synthetic.status == ("while dragging: depth 128 · mask every 5 frames, ±13 %")
+    moved = VirtualSensor(position_m=(0.2, 0.0, 0.0))
+    np.testing.assert_allclose(
+        context.synthetic.map.values, of_plan(ball, fake.dragging, moved), atol=1e-7
+    )
+    context.edits.end_sensor_drag()
+    wait_until_done(context, qtbot)
+    assert not context.synthesis.moving
+
+
+def test_masks_are_kept_within_their_reach_and_not_beyond(context, fake, qtbot, ball):
+    fake.dragging = Plan(mask_reuse_m=0.1)
+    open_ball(context, qtbot, ball)
+    wait_until_done(context, qtbot)
+    qtbot.waitUntil(lambda: context.synthesis._readier.ready_at is not None, timeout=10_000)
+    context.edits.begin_sensor_drag()
+    for x_m, words in ((0.05, "while dragging: visibility exact"), (0.15, "facing the sensor")):
+        context.edits.drag_sensor((x_m, 0.0, 0.0))
+        qtbot.waitUntil(lambda words=words: words in context.synthetic.status, timeout=5_000)
+    context.edits.end_sensor_drag()
+
+
+def test_a_hand_interrupts_the_choosing(context, fake, qtbot, ball):
+    open_ball(context, qtbot, ball)
+    wait_until_done(context, qtbot)
+    fake.gate.clear()
+    context.edits.place_sensor(VirtualSensor(position_m=(0.3, 0.0, 0.0)))
+    qtbot.waitUntil(lambda: context.trade.choosing, timeout=10_000)
+    context.edits.begin_sensor_drag()
+    assert not context.trade.choosing
+    context.edits.drag_sensor((0.35, 0.0, 0.0))
+    qtbot.waitUntil(lambda: bool(fake.cancelled), timeout=5_000)
+    fake.gate.set()
+    context.edits.end_sensor_drag()
+    wait_until_done(context, qtbot)
+    assert fake.asked[-1][2] == context.sensor.sensor
+
+
+def test_a_choice_that_fails_leaves_exact_visibility(context, fake, qtbot, ball):
+    from sd2core.errors import Sd2Error
+
+    fake.failure = Sd2Error("There is no choice")
+    failures = []
+    context.trade.failed.connect(failures.append)
+    open_ball(context, qtbot, ball)
+    wait_until_done(context, qtbot)
+    assert context.synthetic.status == "exact visibility"
+    assert failures == ["There is no choice."]
+
+
+def test_the_exported_map_names_its_plan(context, fake, qtbot, ball, tmp_path):
+    fake.plan, fake.error = Plan(mask_stride=5), 0.008
+    open_ball(context, qtbot, ball)
+    wait_until_done(context, qtbot)
+    context.synthesis.export(tmp_path / "map.npz")
+    saved = DopplerMap.load(tmp_path / "map.npz")
+    np.testing.assert_array_equal(saved.values, context.synthetic.map.values)
+    plan = saved.meta["plan"]
+    assert plan.pop("text") == str(fake.plan)
+    assert Plan.from_json(plan) == fake.plan
+    assert saved.meta["plan_error_l1"] == 0.008
+
+
+def test_the_library_chooses_for_a_small_scene(qapp, qtbot, ball):
+    """The real ladder: it finds a plan within the tolerance, and the map is that plan's."""
+    from PySide6.QtCore import QObject
+
+    warm_up()
+    parent = QObject()
+    context = build_context(parent, Settings.forgetful(), denoisers=FakeDenoisers().library)
+    try:
+        open_ball(context, qtbot, ball)
+        qtbot.waitUntil(lambda: context.trade.in_use is not None, timeout=60_000)
+        wait_until_done(context, qtbot)
+        choice = context.trade.choice
+        assert choice.holds
+        assert choice.errors.l1 <= context.trade.tolerance
+        np.testing.assert_allclose(
+            context.synthetic.map.values, of_plan(ball, choice.plan), atol=1e-6
+        )
+    finally:
+        context.close()
+        parent.deleteLater()
+
+
+def test_a_long_clip_waits_with_what_is_out_of_view_until_the_plan_is_known(
+    context, fake, qtbot, ball, monkeypatch
+):
+    monkeypatch.setattr("sd2app.maps.refine.AT_ONCE", 1000)
+    fake.gate.clear()
+    open_ball(context, qtbot, ball)
+    context.span.set_span(1.0, 2.0)
+    qtbot.waitUntil(lambda: context.trade.choosing, timeout=10_000)
+    # All was in view at first; nothing is done again.
+    wanted = VirtualSensor(position_m=(0.2, 0.0, 0.0))
+    context.edits.place_sensor(wanted)
+    qtbot.waitUntil(lambda: context.trade.choosing, timeout=10_000)
+    covered = context.synthetic.covered
+    assert covered[30:60].all()
+    assert not covered[:30].any()
+    assert not covered[60:].any()
+    fake.gate.set()
+    wait_until_done(context, qtbot)
+    assert context.synthetic.covered is None

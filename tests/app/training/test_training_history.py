@@ -1,0 +1,151 @@
+"""Lines of progress put together; truths of what they say."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sd2app.training.curves import error_ticks
+from sd2app.training.history import TrainingHistory
+from sd2app.training.phase import Look, phase_of
+from sd2app.training.text import duration_text, metric_rows
+from sd2app.widgets.log_axis import LogAxis
+
+START = {"event": "start", "model": "s4", "parameters": 7, "device": "cpu", "epochs": 4,
+         "steps_per_epoch": 5, "train_segments": 300}  # fmt: skip
+
+
+def step(number: int, **more: object) -> dict[str, object]:
+    return {"event": "step", "epoch": (number - 1) // 5 + 1, "step": number, "steps": 20,
+            "train_rmse": 1.0 / number, "elapsed_s": 0.5 * number,
+            "left_s": 0.5 * (20 - number), **more}  # fmt: skip
+
+
+def epoch(number: int, best: bool = True, **more: object) -> dict[str, object]:
+    return {"event": "epoch", "epoch": number, "step": 5 * number, "train_rmse": 0.5,
+            "validation_rmse": 1.0 / number, "validation_mae_mps": 0.2, "best": best,
+            "elapsed_s": 2.5 * number, "left_s": 1.0, **more}  # fmt: skip
+
+
+def told(*events: dict[str, object]) -> TrainingHistory:
+    history = TrainingHistory()
+    history.take(events)
+    return history
+
+
+def test_what_is_told_stands_in_it() -> None:
+    history = told(START, step(1), step(5), epoch(1), step(6), epoch(2, best=False))
+    assert (history.model, history.parameters, history.segments) == ("s4", 7, 300)
+    assert (history.epoch, history.steps_done, history.share) == (2, 10, 0.5)
+    assert history.best.epoch == 1
+    assert history.step_s == pytest.approx(0.5)
+    assert [point.at for point in history.step_points] == [0.2, 1.0, 1.2]
+    assert metric_rows(history)[0] == ("Best epoch", "1")
+
+
+def test_a_run_limited_by_time_knows_its_share_by_the_clock() -> None:
+    history = told({**START, "epochs": None, "minutes": 1.0}, step(3, steps=None, elapsed_s=15.0))
+    assert history.share == pytest.approx(0.25)
+
+
+def test_what_is_done_again_after_a_kill_counts_once() -> None:
+    again = {**START, "resumed": True, "steps_done": 5}
+    history = told(START, step(1), epoch(1), step(6), epoch(2), step(11), again)
+    assert history.steps_done == 5
+    assert [point.epoch for point in history.epoch_points] == [1]
+    assert history.step_s is None
+    history.take([step(6), epoch(2), epoch(2)])
+    assert [point.epoch for point in history.epoch_points] == [1, 2]
+
+
+def test_an_end_is_an_end_until_it_goes_on() -> None:
+    error = {"found": "No space", "expected": "some", "remedy": "Make room"}
+    history = told(START, {"event": "end", "outcome": "failed", "error": error})
+    assert history.error == "No space. Expected: some. Make room."
+    gone = Look(exists=True, live=False, state="failed")
+    assert phase_of(gone, history, launching=False) == "failed"
+    history.take([{**START, "resumed": True, "steps_done": 0}])
+    assert history.outcome is None
+    assert phase_of(Look(True, True), history, launching=False) == "running"
+    assert phase_of(Look(True, False, "died"), history, launching=False) == "died"
+
+
+@pytest.mark.parametrize(
+    ("word", "paused", "phase"),
+    [
+        ("run", False, "running"),
+        ("pause", False, "pausing"),
+        ("pause", True, "paused"),
+        ("run", True, "resuming"),
+        ("stop", True, "stopping"),
+        ("cancel", False, "cancelling"),
+    ],
+)
+def test_what_a_process_was_told_and_does_makes_its_phase(word, paused, phase) -> None:
+    history = told(START, *([{"event": "paused"}] if paused else []))
+    assert phase_of(Look(True, True, word=word), history, launching=False) == phase
+
+
+json_values = st.sampled_from(
+    [None, True, False, -1, 0, 3, 2.5, -0.1, 1e300, 10**40, float("nan"), float("inf"), "many", "",
+     [1], {"found": 1}, {"found": None, "remedy": [2]}, "finished", "cancelled"]
+)  # fmt: skip
+keys = st.sampled_from(
+    ["epoch", "step", "steps", "train_rmse", "elapsed_s", "left_s", "model", "steps_per_epoch",
+     "epochs", "minutes", "outcome", "error", "resumed", "steps_done", "best"]
+)  # fmt: skip
+kinds = st.sampled_from(["start", "step", "epoch", "paused", "resumed", "end", "unheard of"])
+
+
+@settings(max_examples=60)
+@given(st.lists(st.tuples(kinds, st.dictionaries(keys, json_values)), max_size=8))
+def test_nothing_that_is_told_breaks_it(events) -> None:
+    history = TrainingHistory()
+    history.take([START])
+    history.take([{**content, "event": kind} for kind, content in events])
+    for point in history.epoch_points:
+        assert isinstance(point.epoch, int)
+    assert history.share is None or 0 <= history.share <= 1
+    assert isinstance(metric_rows(history), list)
+
+
+def test_points_are_kept_few() -> None:
+    history = TrainingHistory()
+    history.take([{**START, "epochs": 20_000}])
+    history.take(step(number, steps=100_000) for number in range(1, 20_001))
+    assert 500 < len(history.step_points) <= 2000
+    gaps = {
+        round(5 * (b.at - a.at))
+        for a, b in zip(history.step_points, history.step_points[1:], strict=False)
+    }
+    assert max(gaps) <= 2 * min(gaps)
+
+
+@given(st.floats(1e-4, 1e3), st.floats(1.6, 1e4), st.integers(3, 9))
+def test_an_axis_of_errors_has_values_on_it(low, ratio, most) -> None:
+    axis = LogAxis(low, low * ratio, 100.0, 0.0)
+    values = error_ticks(axis, most)
+    assert 1 <= len(values) <= most
+    assert values == sorted(set(values))
+    assert all(0.999 * axis.low <= value <= 1.001 * axis.high for value in values)
+
+
+def test_half_a_decade_has_three_values() -> None:
+    assert error_ticks(LogAxis(0.2, 0.8, 100.0, 0.0), 5) == pytest.approx([0.2, 0.3, 0.5, 0.7])
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [
+        (3, "a few seconds"),
+        (33, "35 s"),
+        (59, "1 min"),
+        (3590, "1 h"),
+        (7800, "2 h 10 min"),
+        (100_000, "28 h"),
+        (400_000, "4.6 days"),
+    ],
+)
+def test_durations_are_rounded_as_estimates_deserve(seconds, text) -> None:
+    assert duration_text(seconds) == text

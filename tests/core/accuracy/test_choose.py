@@ -1,0 +1,219 @@
+"""Choosing: what holds, what is refused, and what is asked wrongly."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+from accuracy_scenes import ball, moving, plate, steady, swinging, together
+
+from sd2core.accuracy.choosing import choose
+from sd2core.accuracy.deviation import relative_l1
+from sd2core.accuracy.plans import FRAME_RATE_FACTORS
+from sd2core.accuracy.sample import take_sample
+from sd2core.accuracy.survey import survey_scene
+from sd2core.accuracy.synthesizers import synthesizer_for
+from sd2core.doppler import PRESETS, Synthesizer
+from sd2core.errors import Sd2Error
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.progress import Cancelled
+from sd2core.sensor import VirtualSensor
+from sd2core.timebase import Timebase
+
+CAMERA = VirtualSensor()
+PAPER = PRESETS["paper"]
+
+
+@pytest.fixture(scope="module")
+def scene() -> MeshSequence:
+    return together(ball(swinging((0, 0, 3), 1.5, 0.8)), plate((0.25, 0, 1), 0.5, 0.5))
+
+
+@pytest.mark.parametrize("tolerance", [0.3, 0.05, 0.01])
+def test_the_plan_holds_its_tolerance_on_the_whole_clip(
+    scene: MeshSequence, tolerance: float
+) -> None:
+    """Not only on the frames that were looked at: those stand for the others."""
+    choice = choose(scene, CAMERA, tolerance=tolerance)
+    assert choice.holds
+    found = synthesizer_for(choice.plan, scene, PAPER).map(CAMERA).values
+    best = replace(PAPER, oversampling=8, beyond="wrap")
+    truth = Synthesizer(scene, best).map(CAMERA).values
+    assert relative_l1(found.astype(float), truth.astype(float)) <= 1.25 * tolerance
+
+
+def test_less_accuracy_never_costs_more(scene: MeshSequence) -> None:
+    survey = survey_scene(scene, CAMERA, PAPER)
+    costs = [
+        choose(scene, CAMERA, tolerance=tolerance, survey=survey).cost_ms
+        for tolerance in (0.5, 0.1, 0.02)
+    ]
+    assert costs == sorted(costs)
+
+
+def test_a_larger_budget_never_costs_accuracy(scene: MeshSequence) -> None:
+    survey = survey_scene(scene, CAMERA, PAPER)
+    changes = [
+        survey.forecast_error(choose(scene, CAMERA, budget_ms=budget, survey=survey).plan)
+        for budget in (0.01, 0.1, 1.0, 100.0)
+    ]
+    assert changes == sorted(changes, reverse=True)
+
+
+def test_what_cannot_be_had_is_refused_with_the_best_there_is(scene: MeshSequence) -> None:
+    choice = choose(scene, CAMERA, tolerance=1e-9)
+    assert not choice.holds
+    assert choice.plan.visibility == "exact"
+    assert choice.plan.vertices_kept == 1
+    assert choice.summary.startswith("No plan holds 1e-07 %; the best is counted")
+    soon = choose(scene, CAMERA, budget_ms=1e-9)
+    assert not soon.holds
+    assert "No plan keeps within 1e-09 ms" in soon.summary
+
+
+def test_a_point_cloud_has_a_plan() -> None:
+    full = ball(swinging((0, 0, 3), 1.5, 0.8))
+    cloud = MeshSequence(full.vertices, None, full.timebase, "cloud")
+    choice = choose(cloud, CAMERA, tolerance=0.05)
+    assert choice.holds
+    assert choice.plan.visibility == "none"
+    assert {reason.rung for reason in choice.reasons}.isdisjoint({"occlusion", "geometry"})
+
+
+def test_a_body_at_rest_needs_nothing() -> None:
+    choice = choose(ball(steady((0, 0, 3), (0, 0, 0))), CAMERA, tolerance=0.01)
+    assert choice.holds
+    assert choice.errors.l1 == 0
+    (still,) = (reason for reason in choice.reasons if reason.rung == "static")
+    assert still.value == 1
+
+
+@pytest.mark.parametrize("frames", [1, 2, 7, 39])
+def test_short_clips(frames: int) -> None:
+    choice = choose(ball(swinging((0, 0, 3), 1.5, 0.8), frames=frames), CAMERA, tolerance=0.1)
+    assert choice.errors.frames >= 1
+
+
+def test_a_choice_can_be_written_down(scene: MeshSequence) -> None:
+    choice = choose(scene, CAMERA, tolerance=0.1)
+    content = json.loads(json.dumps(choice.to_json()))
+    assert content["text"] == str(choice.plan)
+    assert content["plan"]["visibility"] == choice.plan.visibility
+
+
+@pytest.mark.parametrize(
+    "wanted",
+    [
+        {},
+        {"tolerance": 0.1, "budget_ms": 1.0},
+        {"tolerance": 0.0},
+        {"tolerance": -1.0},
+        {"tolerance": float("nan")},
+        {"budget_ms": 0.0},
+        {"budget_ms": float("inf")},
+    ],
+)
+def test_one_positive_wish(scene: MeshSequence, wanted: dict[str, float]) -> None:
+    with pytest.raises(Sd2Error):
+        choose(scene, CAMERA, **wanted)  # type: ignore[arg-type]
+
+
+def test_the_other_tool_has_no_rungs(scene: MeshSequence) -> None:
+    with pytest.raises(Sd2Error, match="vid2doppler"):
+        choose(scene, CAMERA, tolerance=0.1, options=PRESETS["vid2doppler"])
+
+
+def test_choosing_can_be_stopped(scene: MeshSequence) -> None:
+    def stop(done: int, total: int) -> None:
+        raise Cancelled
+
+    with pytest.raises(Cancelled):
+        choose(scene, CAMERA, tolerance=0.1, progress=stop)
+
+
+def test_a_missing_number_is_named_by_its_frame_in_the_clip() -> None:
+    mesh = ball(swinging((0, 0, 3), 1.5, 0.8), frames=400)
+    frame = take_sample(mesh, PAPER).checked_on[0].first + 3
+    vertices = mesh.read(0, mesh.frame_count).copy()
+    vertices[frame, 7, 1] = np.nan
+    broken = replace(mesh, vertices=vertices)
+    with pytest.raises(Sd2Error, match=f"scene: vertex 7 of frame {frame} is at"):
+        choose(broken, CAMERA, tolerance=0.1)
+
+
+def test_a_survey_that_builds_on_another_finds_the_same(scene: MeshSequence) -> None:
+    aside = VirtualSensor(position_m=(0.4, 0.0, 0.0))
+    anew = survey_scene(scene, aside, PAPER)
+    built_on = survey_scene(scene, aside, PAPER, like=survey_scene(scene, CAMERA, PAPER))
+    assert built_on.change == anew.change
+    assert built_on.facts == anew.facts
+
+
+def test_an_empty_map_is_called_so() -> None:
+    """Nothing is off by infinity without a word on why."""
+    hidden = together(ball(swinging((0, 0, 3), 1.5, 0.8), fineness=2), plate((0, 0, 1), 3, 3))
+    choice = choose(hidden, CAMERA, tolerance=0.02)
+    assert choice.holds
+    assert choice.errors.l1 == 0
+    assert "empty" in choice.reasons[0].text
+    assert not any("inf" in reason.text for reason in choice.reasons)
+
+
+def test_what_cannot_be_decimated_is_not_planned_so() -> None:
+    triangle = moving(
+        trimesh.Trimesh([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0]], [[0, 1, 2]], process=False),
+        swinging((0, 0, 2), 1.0, 0.7),
+    )
+    survey = survey_scene(triangle, CAMERA, PAPER)
+    assert survey.trial.vertices_kept == (1.0,)
+    choice = choose(triangle, CAMERA, tolerance=0.5, survey=survey)
+    assert choice.plan.vertices_kept == 1
+    assert not any(reason.rung == "geometry" for reason in choice.reasons)
+
+
+def test_inside_a_body_nothing_needs_to_stand_in_between() -> None:
+    """There the facing test hides all of it; that is not what occlusion is for."""
+    around = ball(swinging((0, 0, 0.02), 0.8, 0.7), radius_m=1.0, fineness=3)
+    choice = choose(around, CAMERA, tolerance=0.02)
+    found = next(reason for reason in choice.reasons if reason.rung == "occlusion")
+    assert choice.plan.visibility == "none"
+    assert not found.modelled
+    assert found.value < 0.001
+    # Nor is anything said of masks where none is used.
+    assert not any(reason.rung in ("mask_reuse", "mask_age") for reason in choice.reasons)
+
+
+def test_a_single_map_keeps_no_mask(scene: MeshSequence) -> None:
+    """Such a plan is for a sensor that moves: alone it would be worked out whole."""
+    survey = survey_scene(scene, CAMERA, PAPER)
+    # As if working out any mask were dear, and counting free.
+    survey.mask_ms.update(dict.fromkeys(survey.mask_ms, 1e3))
+    survey.count_ms.update(dict.fromkeys(survey.count_ms, 1e-3))
+    while_moving = choose(scene, CAMERA, budget_ms=1.0, survey=survey)
+    assert while_moving.holds
+    assert while_moving.plan.mask_reuse_m > 0
+    at_rest = choose(scene, CAMERA, budget_ms=1.0, dragging=False, survey=survey)
+    assert at_rest.plan.mask_reuse_m == 0
+    assert not at_rest.holds
+
+
+def test_a_clip_too_short_to_check_apart_says_so(scene: MeshSequence) -> None:
+    few = replace(
+        scene, vertices=scene.read(0, 6), timebase=Timebase(scene.times_s[:6]), source="few"
+    )
+    assert not choose(few, CAMERA, tolerance=0.1).unseen
+    assert choose(scene, CAMERA, tolerance=0.1).unseen
+
+
+def test_more_moments_never_have_a_lower_forecast(scene: MeshSequence) -> None:
+    survey = survey_scene(scene, CAMERA, PAPER)
+    costs = [
+        survey.forecast_ms(replace(survey.base, frame_rate_factor=factor))
+        for factor in FRAME_RATE_FACTORS
+    ]
+    assert costs == sorted(costs)
+    for kept in survey.trial.vertices_kept:
+        assert kept <= survey.cost_share[kept] <= 1

@@ -1,0 +1,128 @@
+"""The table: every plan with errors that its rungs explain, and costs that are measured."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from accuracy_scenes import ball, plate, steady, swinging, together
+
+from sd2core.accuracy.measuring import measure
+from sd2core.accuracy.plans import Plan, compared_plans, wave_plans
+from sd2core.accuracy.results import Measurement
+from sd2core.doppler import PRESETS
+from sd2core.errors import Sd2Error
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.progress import Cancelled
+from sd2core.sensor import VirtualSensor
+
+CAMERA = VirtualSensor()
+
+
+@pytest.fixture(scope="module")
+def scene() -> MeshSequence:
+    return together(ball(swinging((0, 0, 3), 1.5, 0.8), fineness=3), plate((0.25, 0, 1), 0.5, 0.5))
+
+
+@pytest.fixture(scope="module")
+def table(scene: MeshSequence) -> Measurement:
+    return measure(scene, CAMERA, repeats=2)
+
+
+def error(table: Measurement, plan: Plan) -> float:
+    result = table.of(plan)
+    assert result is not None, plan
+    return result.errors.l1
+
+
+def test_every_plan_is_there_once(table: Measurement) -> None:
+    plans = [result.plan for result in table.results]
+    assert len(set(plans)) == len(plans)
+    assert set(plans) == set(compared_plans())
+
+
+def test_the_reference_plan_itself_is_right(table: Measurement) -> None:
+    """In single precision only vertices at the very edge of a bin can differ."""
+    assert error(table, Plan(frame_rate_factor=8)) < 1e-3
+
+
+def test_each_rung_brings_the_map_nearer(table: Measurement) -> None:
+    raised = replace(Plan(), frame_rate_factor=4)
+    kinds = [replace(raised, visibility=kind) for kind in ("none", "facing", "exact")]
+    found = [error(table, plan) for plan in kinds]
+    assert found == sorted(found, reverse=True)
+    rates = [error(table, Plan(frame_rate_factor=factor)) for factor in (1, 2, 4, 8)]
+    assert rates == sorted(rates, reverse=True)
+
+
+def test_costs_are_there_and_finer_work_costs_more(table: Measurement) -> None:
+    for result in table.results:
+        assert result.cost.one_thread_ms.median > 0
+        assert result.cost.all_cores_ms.median > 0
+        assert result.cost.peak_bytes > 0
+    cheap, dear = table.of(Plan(visibility="facing")), table.of(Plan(frame_rate_factor=8))
+    assert cheap is not None
+    assert dear is not None
+    assert dear.cost.one_thread_ms.median > cheap.cost.one_thread_ms.median
+    assert dear.cost.peak_bytes > cheap.cost.peak_bytes
+
+
+def test_the_front_is_a_staircase(table: Measurement) -> None:
+    costs = [result.cost.all_cores_ms.median for result in table.front]
+    errors = [result.errors.l1 for result in table.front]
+    assert costs == sorted(costs)
+    assert errors == sorted(errors, reverse=True)
+    assert len(set(errors)) == len(errors)
+
+
+def test_the_table_says_what_it_is_of(table: Measurement) -> None:
+    assert table.source == "scene"
+    assert table.machine.cores >= 1
+    best = table.of(Plan(frame_rate_factor=8))
+    assert best is not None
+    assert len(table.frames) == len(set(table.frames)) == best.errors.frames
+
+
+def test_a_point_cloud_has_a_table(scene: MeshSequence) -> None:
+    cloud = MeshSequence(scene.vertices, None, scene.timebase, "cloud")
+    table = measure(cloud, CAMERA, repeats=1)
+    assert {result.plan.visibility for result in table.results} == {"none"}
+    with pytest.raises(Sd2Error, match="cloud has no faces"):
+        measure(cloud, CAMERA, repeats=1, family="fmcw")
+
+
+def test_measuring_can_be_stopped(scene: MeshSequence) -> None:
+    calls = []
+
+    def stop(done: int, total: int) -> None:
+        calls.append(done)
+        if len(calls) == 3:
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        measure(scene, CAMERA, repeats=1, progress=stop)
+    assert len(calls) == 3
+
+
+def test_the_weight_is_measured_against_its_own_reference(scene: MeshSequence) -> None:
+    options = replace(PRESETS["paper"], weight="projected")
+    table = measure(scene, CAMERA, options=options, repeats=1)
+    assert error(table, Plan(weight="projected", frame_rate_factor=8)) < 1e-3
+
+
+def test_waves_converge_and_blocks_and_motion_bring_them_nearer() -> None:
+    body = ball(steady((0, 0, 2), (0.1, 0, -0.8)), fineness=3, radius_m=0.1)
+    table = measure(body, CAMERA, family="fmcw", repeats=1)
+    assert {result.plan for result in table.results} == set(wave_plans())
+    changes = [change for _, change in table.convergence]
+    assert changes
+    assert changes[-1] < 0.02
+    fine = error(table, Plan(signal="fmcw", motion="interpolated"))
+    # A ball of flat facets has speckle of its own: fewer facets are another surface.
+    coarse = error(table, Plan(signal="fmcw", vertices_kept=0.25))
+    assert fine < 0.02
+    assert fine < coarse
+    direct = error(table, Plan(signal="direct"))
+    assert direct == pytest.approx(error(table, Plan(signal="fmcw", blocks=4)), abs=1e-3)
+    assert np.isfinite([result.errors.l1 for result in table.results]).all()

@@ -1,0 +1,121 @@
+"""One plan for all places around a mesh: held to everywhere, and chosen only where that pays."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from moving_spheres import swinging_sphere
+
+from sd2core.accuracy import Choice, places
+from sd2core.accuracy.places import MOST_PLACES, choose_for_places, spread
+from sd2core.accuracy.plans import Plan, reference_plan
+from sd2core.accuracy.synthesizers import synthesizer_for
+from sd2core.doppler import PRESETS
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.progress import silent
+from sd2core.sensor import VirtualSensor
+
+PAPER = PRESETS["paper"]
+TOP = reference_plan("histogram")
+AROUND = [VirtualSensor(place) for place in ((0.0, 0.0, 0.0), (2.0, 0.0, 2.0), (0.0, -1.5, 1.0))]
+
+
+@pytest.fixture
+def free(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Choosing costs nothing, and every plan but the most accurate as little."""
+    monkeypatch.setattr(places._Search, "reference_s", lambda _: 0.0)
+    costs = {TOP: 1.0, Plan(): 0.5}
+    monkeypatch.setattr(places._Search, "frame_s", lambda _, plan: costs.get(plan, 0.1))
+
+
+@given(st.integers(1, 500))
+def test_places_to_check_on_are_the_ends_and_the_middle(count: int) -> None:
+    sensors = [VirtualSensor((float(number), 0.0, 0.0)) for number in range(count)]
+    chosen = [int(one.position_m[0]) for one in spread(sensors)]
+    assert chosen == sorted({*chosen})
+    assert len(chosen) == min(count, MOST_PLACES)
+    assert {chosen[0], chosen[-1]} == {0, count - 1}
+
+
+@pytest.mark.usefixtures("free")
+def test_the_plan_holds_at_every_place() -> None:
+    mesh = swinging_sphere(90)
+    found = choose_for_places(mesh, AROUND, 10**6, 0.1, PAPER)
+    assert found.plan != TOP
+    assert 0 < found.error_l1 <= 0.1
+    made = found.provenance()
+    assert made["plan"]["text"] == str(found.plan)
+    assert made["plan_reasons"] == list(found.reasons)
+    for sensor in AROUND:
+        best = synthesizer_for(TOP, mesh, PAPER).map(sensor).values
+        values = synthesizer_for(found.plan, mesh, PAPER).map(sensor).values
+        assert np.abs(values - best).sum() <= 0.15 * best.sum()
+
+
+@pytest.mark.usefixtures("free")
+def test_where_nothing_else_holds_the_most_accurate_is_taken() -> None:
+    found = choose_for_places(swinging_sphere(90), AROUND, 10**6, 1e-9, PAPER)
+    assert (found.plan, found.error_l1) == (TOP, 0.0)
+    assert "holds 0.0% from every place" in found.reasons[0]
+
+
+@pytest.mark.usefixtures("free")
+def test_a_plan_that_fails_elsewhere_is_chosen_anew_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[VirtualSensor] = []
+    bad, good, really = Plan(visibility="none"), Plan(mask_stride=5), places.choose
+
+    def chosen(mesh: MeshSequence, place: VirtualSensor, **told: Any) -> Choice:
+        asked.append(place)
+        return replace(really(mesh, place, **told), plan=bad if len(asked) == 1 else good)
+
+    monkeypatch.setattr(places, "choose", chosen)
+    found = choose_for_places(swinging_sphere(90), AROUND, 10**6, 0.3, PAPER)
+    assert asked == AROUND[:2]
+    assert found.plan == good
+
+
+@pytest.mark.usefixtures("free")
+def test_what_is_chosen_and_is_not_cheaper_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    costs = {TOP: 1.0, Plan(): 0.1}
+    monkeypatch.setattr(places._Search, "frame_s", lambda _, plan: costs.get(plan, 0.2))
+    found = choose_for_places(swinging_sphere(90), AROUND, 10**6, 0.3, PAPER)
+    assert found.plan == Plan()
+    assert 0 < found.error_l1 <= 0.3
+
+
+def test_few_frames_are_not_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(places._Search, "reference_s", None)
+    found = choose_for_places(swinging_sphere(30), AROUND, 90, 0.02, PAPER)
+    assert (found.plan, found.error_l1) == (TOP, 0.0)
+    assert "too few" in found.reasons[0]
+
+
+def test_where_choosing_takes_longer_than_it_saves_nothing_is_chosen(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(places, "survey_scene", None)
+    monkeypatch.setattr(places._Search, "frame_s", lambda _, plan: 1e-3 if plan == TOP else 5e-4)
+    monkeypatch.setattr(places._Search, "reference_s", lambda _: 10.0)
+    dear = choose_for_places(swinging_sphere(30), AROUND, 10_000, 0.3, PAPER)
+    assert dear.plan == TOP
+    assert "longer than it saves" in dear.reasons[0]
+    # A check takes a fraction of choosing: it pays earlier.
+    monkeypatch.setattr(places._Search, "reference_s", lambda _: 0.02)
+    checked = choose_for_places(swinging_sphere(30), AROUND, 10_000, 0.3, PAPER)
+    assert checked.plan == Plan()
+    assert 0 < checked.error_l1 <= 0.3
+    with pytest.raises(TypeError):  # the survey is called
+        choose_for_places(swinging_sphere(30), AROUND, 200_000, 0.3, PAPER)
+
+
+@pytest.mark.parametrize("frames", [1, 3, 30])
+def test_costs_are_of_this_mesh(frames: int) -> None:
+    search = places._Search(swinging_sphere(frames), AROUND, 0.1, PAPER, silent)
+    assert search.reference_s() > 0
+    assert search.frame_s(TOP) > 0
+    assert search.frame_s(search.plain) > 0

@@ -1,0 +1,90 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sd2core.doppler_map import DopplerMap
+from sd2core.errors import Sd2Error
+from sd2core.io.kinds import kind_of
+from sd2core.io.mesh import load_mesh
+from sd2core.sensor import VelocityAxis
+from sd2core.timebase import Timebase
+
+
+def test_files_are_told_apart(tmp_path):
+    for name, kind in (
+        ("a.MP4", "video"),
+        ("b.obj", "mesh"),
+        ("c.pkl", "mesh"),
+        ("d.zarr.zip", "mesh"),
+        ("radar.npy", "radar"),
+        ("recording.json", "recording"),
+    ):
+        (tmp_path / name).touch()
+        assert kind_of(tmp_path / name) == kind, name
+    np.savez(tmp_path / "mesh.npz", vertices=np.zeros((1, 1, 3)))
+    assert kind_of(tmp_path / "mesh.npz") == "mesh"
+    values = np.ones((4, 2), np.float32)
+    DopplerMap(values, VelocityAxis(4), Timebase([0, 1]), "real").save(tmp_path / "map.npz")
+    assert kind_of(tmp_path / "map.npz") == "map"
+
+
+def test_folders_are_told_apart(tmp_path):
+    for name, inside, kind in (
+        ("x.sd2", "recording.json", "recording"),
+        ("mesh.zarr", "zarr.json", "mesh"),
+        ("frames", "frame_001.ply", "mesh"),
+        ("capture", "radar.npy", "radar"),
+    ):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / inside).touch()
+        assert kind_of(tmp_path / name) == kind
+    (tmp_path / "outer" / "RadarIfxAvian_00").mkdir(parents=True)
+    (tmp_path / "outer" / "RadarIfxAvian_00" / "radar.npy").touch()
+    assert kind_of(tmp_path / "outer") == "radar"
+    assert kind_of(tmp_path / "frames" / "*.ply") == "mesh"
+
+
+def test_what_is_nothing_known_is_explained(tmp_path):
+    (tmp_path / "notes.txt").touch()
+    (tmp_path / "bad.npz").write_text("no zip")
+    (tmp_path / "empty").mkdir()
+    for name, words in (
+        ("notes.txt", "is of no kind that is known"),
+        ("missing.mp4", "does not exist"),
+        ("bad.npz", "is not a readable .npz"),
+        ("empty", "holds nothing that is known"),
+    ):
+        with pytest.raises(Sd2Error) as caught:
+            kind_of(tmp_path / name)
+        assert words in str(caught.value)
+        assert name in str(caught.value)
+
+
+@pytest.mark.parametrize("folder", ["data", "data [1]"])
+def test_a_name_with_brackets_is_a_file_and_not_a_pattern(tmp_path, folder):
+    path = tmp_path / folder / "walk [1].mkv"
+    path.parent.mkdir()
+    for name, kind in (("walk [1].mkv", "video"), ("a?b*.npy", "radar"), ("[a].sd2", "recording")):
+        if kind == "recording":
+            (path.parent / name).mkdir()
+            (path.parent / name / "recording.json").touch()
+        else:
+            (path.parent / name).touch()
+        assert kind_of(path.parent / name) == kind
+    (path.parent / "1.obj").touch()
+    assert kind_of(path.parent / "*.obj") == "mesh"
+    with pytest.raises(Sd2Error, match="does not exist"):
+        kind_of(path.parent / "walk.mkv")
+
+
+def test_a_pattern_below_a_folder_with_brackets_finds_its_frames(tmp_path):
+    folder = tmp_path / "data [1]"
+    folder.mkdir()
+    for number in range(3):
+        (folder / f"{number}.obj").write_text(
+            f"v 0 0 {number + 1}\nv 1 0 2\nv 0 1 2\nf 1 2 3\n", encoding="utf-8"
+        )
+    assert load_mesh(folder / "*.obj", frames_per_s=30, scale=1).frame_count == 3
+    with pytest.raises(Sd2Error, match="does not exist"):
+        load_mesh(folder / "walk.npz")

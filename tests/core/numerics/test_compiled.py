@@ -1,0 +1,192 @@
+"""Compiled kernels: kept on disk, never in the way, whatever can be written."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import sd2core
+from sd2core.numerics import compiled
+
+PACKAGE = Path(sd2core.__file__).parent
+
+ONE_KERNEL = """
+import numpy as np
+from sd2core.numerics import compiled
+from sd2core.scattering.visibility import compile_kernels, vertex_normals_kernel
+print(compiled.cache_directory())
+print(compiled.kernels_ready())
+compile_kernels()
+print(sum(vertex_normals_kernel.stats.cache_hits.values()))
+"""
+
+
+def run(code: str, package_parent: Path, **environment: str) -> list[str]:
+    inherited = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"}
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**inherited, "PYTHONPATH": str(package_parent), **environment},
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=package_parent,
+    )
+    return done.stdout.split()
+
+
+@pytest.fixture
+def sealed(tmp_path: Path) -> Path:
+    """An installation without a place for caches.
+
+    A plain file stands where each folder would be: unlike missing permissions,
+    that stops even the administrator.
+    """
+    copy = tmp_path / "site" / "sd2core"
+    shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__", "resources"))
+    (copy / "__pycache__").touch()
+    (tmp_path / "file").touch()
+    return copy.parent
+
+
+def test_the_installation_keeps_its_machine_code(tmp_path: Path) -> None:
+    copy = tmp_path / "sd2core"
+    shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__", "resources"))
+    folder, ready, hits = run(ONE_KERNEL, tmp_path)
+    assert Path(folder).parent == copy / "__pycache__"
+    assert (ready, hits) == ("False", "0")
+    assert run(ONE_KERNEL, tmp_path) == [folder, "False", "1"]
+
+
+def test_a_read_only_installation_uses_the_users_cache(sealed: Path, tmp_path: Path) -> None:
+    cache = tmp_path / "cache"
+    code = "from sd2core import compiled; print(compiled.cache_directory())"
+    variables = {"XDG_CACHE_HOME": str(cache), "LOCALAPPDATA": str(cache), "HOME": str(cache)}
+    (folder,) = run(code, sealed, **variables)
+    assert cache in Path(folder).parents
+
+
+def test_nothing_writable_but_the_temporary_folder(sealed: Path, tmp_path: Path) -> None:
+    blocked, temporary = str(tmp_path / "file"), tmp_path / "temporary"
+    temporary.mkdir()
+    variables = {"XDG_CACHE_HOME": blocked, "LOCALAPPDATA": blocked, "HOME": blocked}
+    variables |= {"TMPDIR": str(temporary), "NUMBA_CACHE_DIR": blocked}
+    folder, ready, hits = run(ONE_KERNEL, sealed, **variables)
+    assert temporary in Path(folder).parents
+    assert (ready, hits) == ("False", "0")
+    assert not list(temporary.iterdir()), "the private folder goes with the process"
+
+
+def test_a_chosen_cache_folder_is_used(sealed: Path, tmp_path: Path) -> None:
+    chosen = tmp_path / "chosen"
+    code = "from sd2core import compiled; print(compiled.cache_directory())"
+    (folder,) = run(code, sealed, NUMBA_CACHE_DIR=str(chosen))
+    assert Path(folder).parent == chosen
+
+
+def test_nothing_writable_at_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(prefix: str) -> str:
+        raise PermissionError(prefix)
+
+    monkeypatch.setattr(compiled, "_writable", lambda folder: False)
+    monkeypatch.setattr(compiled.tempfile, "mkdtemp", refuse)
+    monkeypatch.setattr(compiled, "cache_directory", compiled.cache_directory.__wrapped__)
+    monkeypatch.setattr(compiled, "_ready", False)
+    assert compiled.cache_directory() is None
+    assert not compiled.kernels_ready()
+    assert compiled.compile_in_background() is None
+    kernel = compiled.compiled(lambda x: x + 1)
+    assert kernel(2) == 3
+
+
+def test_every_kernel_module_compiles_its_own() -> None:
+    for name in compiled.KERNEL_MODULES:
+        assert callable(importlib.import_module(name).compile_kernels), name
+    with_kernels = {
+        ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts)
+        for path in PACKAGE.rglob("*.py")
+        if "\n@compiled\n" in path.read_text(encoding="utf-8")
+    }
+    assert with_kernels == set(compiled.KERNEL_MODULES)
+
+
+def test_warm_up_makes_ready_and_reports(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compiled, "_ready", False)
+    reports: list[tuple[int, int]] = []
+    compiled.warm_up(lambda done, total: reports.append((done, total)))
+    assert compiled.kernels_ready()
+    count = len(compiled.KERNEL_MODULES)
+    assert reports == [(done, count) for done in range(count + 1)]
+    assert compiled.compile_in_background() is None
+
+
+def test_warm_up_leaves_nothing_to_compile() -> None:
+    """A process that finds the kernels ready compiles nothing when it uses them."""
+    compiled.warm_up()
+    code = """
+import numpy as np
+from sd2core.numerics import compiled
+assert compiled.kernels_ready()
+from sd2core.doppler import Synthesizer, SynthesisOptions, kernels
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.sensor import VirtualSensor
+from sd2core.timebase import Timebase
+from sd2core.scattering import amplitude, depth, exact, visibility
+faces = np.array([[0, 1, 2]], np.int32)
+faces.flags.writeable = False
+vertices = np.random.default_rng(0).normal(size=(40, 3, 3))
+for dtype in ("f4", "f8"):
+    for weight in ("count", "area", "projected"):
+        mesh = MeshSequence(vertices.astype(dtype), faces, Timebase.regular(40, 30), "x")
+        maker = Synthesizer(mesh, SynthesisOptions(weight=weight))
+        for seen in ("none", "facing", "depth", "exact", "frozen"):
+            maker.map(VirtualSensor(), visibility=seen)
+        maker.frame(VirtualSensor(), 3)
+    Synthesizer(mesh, "vid2doppler").map(VirtualSensor())
+misses = [
+    (kernel.__name__, sum(kernel.stats.cache_misses.values()))
+    for module in (amplitude, depth, exact, visibility, kernels)
+    for kernel in vars(module).values()
+    if hasattr(kernel, "stats")
+]
+assert len(misses) > 4
+print(sum(count for _, count in misses))
+"""
+    assert run(code, PACKAGE.parent) == ["0"]
+
+
+def test_compiling_in_the_background_runs_once(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    started: list[list[str]] = []
+
+    class Process:
+        def __init__(self, command: list[str], **_: object) -> None:
+            started.append(command)
+
+    monkeypatch.setattr(compiled, "_ready", False)
+    monkeypatch.setattr(compiled, "_background", None)
+    monkeypatch.setattr(compiled, "cache_directory", lambda: tmp_path)
+    monkeypatch.setattr(compiled.subprocess, "Popen", Process)
+    monkeypatch.setattr(compiled.atexit, "register", lambda *_: None)
+    first = compiled.compile_in_background()
+    assert first is not None
+    assert compiled.compile_in_background() is first
+    assert started == [[sys.executable, "-m", "sd2core.numerics.compiled", "--quiet"]]
+    # Once the marker is there, everyone knows.
+    (tmp_path / "complete").touch()
+    assert compiled.kernels_ready()
+    assert compiled.compile_in_background() is None
+
+
+def test_numba_users_beside_us_keep_their_folder() -> None:
+    import numba
+
+    before = numba.config.CACHE_DIR
+    compiled.compiled(lambda x: x)
+    assert before == numba.config.CACHE_DIR

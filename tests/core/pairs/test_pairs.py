@@ -1,0 +1,177 @@
+"""Takes survive the way to disk and back, whole or not at all."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sd2core.errors import Sd2Error
+from sd2core.pairs.segments import cut, join, segment_starts
+from sd2core.pairs.store import INDEX_NAME, PairWriter, Take, TakeKey, is_pair_store, read_pairs
+from sd2core.sensor import VelocityAxis
+
+HEADER: dict[str, Any] = {
+    "kind": "simulated",
+    "axis": VelocityAxis(8, 2.0),
+    "null_bins": (3, 4),
+    "frame_rate_hz": 30.0,
+    "labels": ("background", "swipe"),
+    "provenance": {"seed": 3},
+}
+
+
+def take(name: str, frames: int = 20, subject: str = "s1", placement: int = 0) -> Take:
+    rng = np.random.default_rng(len(name) + frames + placement)
+    return Take(
+        subject=subject,
+        name=name,
+        synthetic=rng.random((frames, 8), np.float32),
+        radar=rng.random((frames, 8), np.float32),
+        times_s=np.arange(frames) / 30.0,
+        label=rng.integers(0, 2, frames).astype(np.int8),
+        sensor_position_m=rng.normal(size=3),
+        placement=placement,
+    )
+
+
+def same(one: Take, other: Take) -> bool:
+    return one.key == other.key and all(
+        np.array_equal(getattr(one, name), getattr(other, name))
+        for name in ("synthetic", "radar", "times_s", "label", "sensor_position_m")
+    )
+
+
+def test_what_is_written_is_read(tmp_path: Path) -> None:
+    takes = [take("a", 20), take("b", 7), take("b", 9, "s2"), take("b", 9, "s2", placement=1)]
+    writer = PairWriter(tmp_path / "pairs.zarr", **HEADER)
+    for each in takes:
+        writer.append(each)
+    pairs = read_pairs(tmp_path / "pairs.zarr")
+    assert all(same(*two) for two in zip(pairs.takes, takes, strict=True))
+    assert pairs.subjects == ("s1", "s2")
+    assert pairs.frames == 45
+    assert (pairs.kind, pairs.axis, pairs.null_bins) == ("simulated", HEADER["axis"], (3, 4))
+    assert pairs.provenance == {"seed": 3}
+    assert [each.title for each in pairs.of(["s2"]).takes] == ["s2/b", "s2/b@1"]
+    assert len(pairs.placements(first_only=True).takes) == 3
+
+
+def test_a_killed_writer_loses_only_the_take_it_was_at(tmp_path: Path) -> None:
+    path = tmp_path / "pairs.zarr"
+    PairWriter(path, **HEADER).append(take("a"))
+    writer = PairWriter(path, **HEADER)
+    writer.append(take("torn", 30))
+    index = path / INDEX_NAME
+    index.write_bytes(index.read_bytes()[:-9])
+
+    assert [each.name for each in read_pairs(path).takes] == ["a"]
+    again = PairWriter(path, **HEADER)
+    assert again.done == {TakeKey("s1", "a", 0)}
+    again.append(take("b", 11))
+    assert [each.name for each in read_pairs(path).takes] == ["a", "b"]
+    assert same(read_pairs(path).takes[1], take("b", 11))
+
+
+def test_a_begun_store_goes_on_only_with_the_same_settings(tmp_path: Path) -> None:
+    PairWriter(tmp_path / "p", **HEADER).append(take("a"))
+    with pytest.raises(Sd2Error, match=r"begun with frame_rate_hz 30.0.*10.0"):
+        PairWriter(tmp_path / "p", **{**HEADER, "frame_rate_hz": 10.0})
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"synthetic": np.ones((20, 9), np.float32)}, "shape"),
+        ({"radar": np.full((20, 8), -1, np.float32)}, "radar holds values that are negative"),
+        ({"synthetic": np.full((20, 8), np.nan, np.float32)}, "not finite"),
+        ({"label": np.zeros(19, np.int8)}, "19 labels"),
+    ],
+)
+def test_a_take_that_does_not_fit_together_is_refused(change: Any, message: str) -> None:
+    with pytest.raises(Sd2Error, match=message):
+        replace(take("a"), **change)
+
+
+def test_a_take_of_another_set_is_refused(tmp_path: Path) -> None:
+    writer = PairWriter(tmp_path / "p", **HEADER)
+    writer.append(take("a"))
+    with pytest.raises(Sd2Error, match="already holds the take s1/a"):
+        writer.append(take("a"))
+    with pytest.raises(Sd2Error, match="labels from"):
+        writer.append(replace(take("b"), label=np.full(20, 2, np.int8)))
+    wide = np.zeros((20, 9), np.float32)
+    with pytest.raises(Sd2Error, match="9 bins"):
+        writer.append(replace(take("b"), synthetic=wide, radar=wide))
+
+
+def test_what_is_no_set_of_pairs_is_named(tmp_path: Path) -> None:
+    with pytest.raises(Sd2Error, match="holds no pairs"):
+        read_pairs(tmp_path)
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(Sd2Error, match="new or empty folder"):
+        PairWriter(tmp_path, **HEADER)
+    path = tmp_path / "p"
+    PairWriter(path, **HEADER)
+    assert is_pair_store(path)
+    with pytest.raises(Sd2Error, match="no take yet"):
+        read_pairs(path)
+
+
+def test_a_newer_version_and_a_damaged_index_are_named(tmp_path: Path) -> None:
+    path = tmp_path / "p"
+    PairWriter(path, **HEADER).append(take("a"))
+    index = path / INDEX_NAME
+    whole = index.read_text()
+    index.write_text("{}\n" + whole)
+    with pytest.raises(Sd2Error, match="line 1 cannot be read"):
+        read_pairs(path)
+    index.write_text(whole.replace('"stop": 20', '"stop": 2000'))
+    with pytest.raises(Sd2Error, match="shorter than"):
+        read_pairs(path)
+    index.write_text(whole)
+    header = json.loads((path / "zarr.json").read_text())
+    header["attributes"]["version"] = 2
+    (path / "zarr.json").write_text(json.dumps(header))
+    with pytest.raises(Sd2Error, match="version 2"):
+        read_pairs(path)
+
+
+@given(st.integers(1, 400), st.integers(1, 80), st.data())
+def test_windows_cover_every_frame_and_join_to_what_they_were(
+    frames: int, length: int, data: st.DataObject
+) -> None:
+    overlap = data.draw(st.integers(0, length - 1))
+    starts = segment_starts(frames, length, overlap)
+    if frames < length:
+        assert len(starts) == 0
+        return
+    assert starts[0] == 0
+    assert starts[-1] + length == frames
+    steps = np.diff(starts)
+    assert (steps > 0).all()
+    assert (steps[:-1] == length - overlap).all()
+    assert (steps <= length - overlap).all()
+    values = np.random.default_rng(frames).random((frames, 3), np.float32)
+    windows = cut(values, starts, length)
+    assert np.array_equal(windows[0], values[:length])
+    np.testing.assert_allclose(join(windows, starts, frames), values, rtol=1e-6)
+
+
+def test_where_windows_overlap_the_one_farther_from_its_end_counts_more() -> None:
+    windows = np.stack([np.zeros((10, 1)), np.ones((10, 1))]).astype(np.float32)
+    joined = join(windows, np.array([0, 6]), 16)[:, 0]
+    assert (joined[:6] == 0).all()
+    assert (joined[10:] == 1).all()
+    np.testing.assert_allclose(joined[6:10], [0.2, 0.4, 0.6, 0.8], rtol=1e-6)
+
+
+def test_an_overlap_as_long_as_the_window_is_refused() -> None:
+    with pytest.raises(Sd2Error, match="72 frames overlap by 72"):
+        segment_starts(100, 72, 72)

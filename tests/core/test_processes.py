@@ -1,0 +1,62 @@
+"""Workers do not outlive the process that started them."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+PARENT = """
+import multiprocessing, os, sys, time
+from sd2core.processes import end_with_parent
+
+def work(ready):
+    end_with_parent()
+    ready.put(os.getpid())
+    time.sleep(600)
+
+if __name__ == "__main__":
+    context = multiprocessing.get_context("spawn")
+    ready = context.Queue()
+    context.Process(target=work, args=(ready,)).start()
+    print(ready.get(), flush=True)
+    time.sleep(600)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="looks for the process as POSIX does")
+def test_a_worker_ends_when_its_parent_is_killed(tmp_path) -> None:
+    script = tmp_path / "parent.py"
+    script.write_text(PARENT)
+    parent = subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True)
+    assert parent.stdout is not None
+    worker = int(parent.stdout.readline())
+    assert _lives(worker)
+    parent.send_signal(signal.SIGKILL)
+    parent.wait()
+    parent.stdout.close()
+    deadline_s = time.monotonic() + 30.0
+    while _lives(worker) and time.monotonic() < deadline_s:
+        time.sleep(0.05)
+    try:
+        assert not _lives(worker)
+    finally:
+        if _lives(worker):
+            os.kill(worker, signal.SIGKILL)
+
+
+def _lives(process: int) -> bool:
+    """Whether it runs; one that ended but that nobody has asked for does not."""
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    try:
+        with open(f"/proc/{process}/stat") as stream:
+            return stream.read().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return True

@@ -1,0 +1,71 @@
+"""Another person's labels beside one's own, by real keys and clicks in the whole window."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtWidgets import QFileDialog, QToolButton
+
+from sd2app.agreement.panel import AgreementPanel
+from sd2app.agreement.timeline import OtherTimeline
+from sd2core.labels.formats import write_labels
+from sd2core.labels.spans import Labels, Span, Track
+
+CONTROL, SHIFT = Qt.KeyboardModifier.ControlModifier, Qt.KeyboardModifier.ShiftModifier
+LEFT = Qt.MouseButton.LeftButton
+
+
+@pytest.fixture
+def compared(window, qtbot, monkeypatch, tmp_path):
+    """Mine: "there" 0.2 to 0.8 s, "back" 1 to 2 s. Ben's: "there" the same, "back" from 1.5 s."""
+    spans = (Span(1, "Ben", 0.2, 0.8, "there"), Span(2, "Ben", 1.5, 2.0, "back"))
+    path = tmp_path / "ben.eaf"
+    write_labels(path, Labels((Track("Ben"),), spans), window.context.playback.timebase)
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(path), ""))
+    qtbot.keyClick(window, Qt.Key.Key_K, CONTROL)
+    model = window.context.agreement
+    qtbot.waitUntil(lambda: model.found is not None, timeout=10_000)
+    return window
+
+
+def test_side_by_side_and_from_one_difference_to_the_next(compared, qtbot) -> None:
+    c = compared.context
+    below, panel = compared.findChild(OtherTimeline), compared.findChild(AgreementPanel)
+    assert below.isVisible()
+    assert compared.side.shown == "Agree"
+    assert panel.isVisible()
+    assert below.accessibleName() == "Labels of ben, read-only"
+    assert [one.frames for one in c.agreement.disagreements] == [15]
+    qtbot.keyClick(compared, Qt.Key.Key_N, SHIFT)
+    assert c.playback.frame == 30
+    assert "You: back." in panel._where.text()
+    c.playback.seek_frame(59)
+    qtbot.keyClick(compared, Qt.Key.Key_P, SHIFT)
+    assert c.playback.frame == 30
+
+
+def test_editing_is_followed_and_nothing_of_theirs_is_changed(compared, qtbot) -> None:
+    c, below = compared.context, compared.findChild(OtherTimeline)
+    qtbot.mouseClick(below, LEFT, pos=QPoint(round(below.scale.x_of(1.5)), below.height() - 8))
+    assert c.playback.frame == 45
+    assert not c.labels.selected
+    qtbot.keyClick(compared, Qt.Key.Key_P)
+    c.playback.seek_frame(45)
+    qtbot.keyClick(compared, Qt.Key.Key_BracketLeft)
+    qtbot.waitUntil(lambda: not c.agreement.busy, timeout=10_000)
+    assert c.agreement.disagreements == ()
+    assert len(c.agreement.other.labels.spans) == 2
+
+
+def test_the_end_takes_them_away(compared, qtbot) -> None:
+    panel = compared.findChild(AgreementPanel)
+    end = next(one for one in panel.findChildren(QToolButton) if one.text() == "End")
+    qtbot.mouseClick(end, LEFT)
+    assert not compared.findChild(OtherTimeline).isVisible()
+    assert not compared.context.agreement.active
+
+
+def test_another_recording_is_not_compared(compared, qtbot, recording_copy) -> None:
+    compared.open_paths([recording_copy])
+    qtbot.waitUntil(lambda: compared.settled, timeout=20_000)
+    assert not compared.context.agreement.active

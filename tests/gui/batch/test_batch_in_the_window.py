@@ -1,0 +1,230 @@
+"""The window of batches, by real mouse and key events; the work itself is pretended."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import sys
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QCoreApplication, QEvent, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QCheckBox, QFileDialog, QLabel, QListWidget, QTableView, QToolButton
+
+from sd2app.batch import dialog as batch_dialogs
+from sd2app.batch import run as batch_follower
+from sd2app.batch.dialog import BatchWindow
+from sd2app.batch.model import BatchModel
+from sd2app.settings import Settings
+from sd2app.shell.window import MainWindow
+from sd2core.batch.plan_file import read_plan
+from sd2core.placements.placements import PlacementGrid, write_placements
+from sd2core.recording.recording import open_recording
+
+FAKE = Path(__file__).resolve().parents[2] / "fake_batch.py"
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch) -> None:
+    """Look more often than a person would."""
+    monkeypatch.setattr(batch_follower, "POLL_MS", 40)
+    monkeypatch.setattr(batch_follower, "SLOW_POLL_MS", 40)
+    monkeypatch.setattr(batch_dialogs, "_ESTIMATE_MS", 20)
+
+
+@pytest.fixture
+def opened(qtbot, compiled_kernels, fake, fake_models, recording_copy):
+    """A window on a copy of the small recording, whose batches are pretended."""
+    windows: list[MainWindow] = []
+
+    def make(*options: object) -> MainWindow:
+        command = [sys.executable, "-u", str(FAKE), *map(str, options)]
+        window = MainWindow(
+            Settings.forgetful(), fake.ladder, None, fake_models.library, batch_command=command
+        )
+        windows.append(window)
+        window.show()
+        window.populate()
+        qtbot.waitUntil(lambda: window.settled, timeout=20_000)
+        window.open_paths([recording_copy])
+        qtbot.waitUntil(
+            lambda: window.settled and window.context.synthesis.complete, timeout=20_000
+        )
+        return window
+
+    yield make
+    for window in windows:
+        run = window.context.batch.batch
+        if run is not None and run.folder.live:
+            os.kill(run.folder.status().pid, signal.SIGKILL)
+        window.context.document.undo_stack.clear()
+        window.close()
+        window.deleteLater()
+    QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+
+
+def begin(window: MainWindow) -> BatchWindow:
+    window._actions["batch"].trigger()
+    return window.findChild(BatchWindow)
+
+
+def button(dialog: BatchWindow, text: str) -> QToolButton:
+    return next(b for b in dialog.findChildren(QToolButton) if b.text() == text and b.isVisible())
+
+
+def click(dialog: BatchWindow, text: str) -> None:
+    QTest.mouseClick(button(dialog, text), Qt.MouseButton.LeftButton)
+
+
+def words(dialog: BatchWindow) -> str:
+    return "\n".join(one.text() for one in dialog.findChildren(QLabel) if one.isVisible())
+
+
+def ready(qtbot, batch: BatchModel) -> None:
+    qtbot.waitUntil(lambda: not batch.why_not_start, timeout=20_000)
+
+
+def until(qtbot, batch: BatchModel, phase: str) -> None:
+    qtbot.waitUntil(
+        lambda: batch.batch is not None and batch.batch.known and batch.batch.phase == phase,
+        timeout=20_000,
+    )
+
+
+def test_a_batch_is_set_up_started_and_its_results_opened(
+    opened, qtbot, recording_copy, tmp_path, monkeypatch
+):
+    window = opened("--fail", 0)
+    batch = window.context.batch
+    dialog = begin(window)
+    # What is open is taken along.
+    assert batch.setup.entries[0].path == recording_copy
+    another = shutil.copytree(recording_copy, tmp_path / "more" / "other.sd2")
+    monkeypatch.setattr(
+        QFileDialog,
+        "getOpenFileNames",
+        lambda *_: ([str(another / "recording.json")], ""),
+    )
+    click(dialog, "Add files…")
+    paths = dialog.findChild(QListWidget)
+    assert paths.count() == 2
+    export = next(b for b in dialog.findChildren(QCheckBox) if b.text() == "Export as")
+    QTest.mouseClick(export, Qt.MouseButton.LeftButton, pos=export.rect().center() / 4)
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(tmp_path / "made"), ""))
+    click(dialog, "Choose…")
+    ready(qtbot, batch)
+    click(dialog, "Start")
+    until(qtbot, batch, "finished")
+    plan = read_plan(tmp_path / "made" / "plan.toml")
+    assert plan.recordings.files == (str(recording_copy), str(another))
+    assert (plan.export is None) == (not export.isChecked())
+    assert "Finished" in words(dialog)
+    assert "2 of 2" in words(dialog)
+    qtbot.waitUntil(lambda: bool(batch.results.rows), timeout=20_000)
+    shown: list[Path] = []
+    monkeypatch.setattr(batch_dialogs, "_show_in_files", shown.append)
+    click(dialog, "Open folder")
+    assert shown == [tmp_path / "made"]
+    click(dialog, "Data set")
+    assert "A data set" in dialog._run._card.toPlainText()
+    click(dialog, "Results")
+    table = dialog.findChild(QTableView)
+    table.selectRow(3)
+    with qtbot.waitSignal(window.context.document.opened, timeout=20_000):
+        click(dialog, "Open in the window")
+    qtbot.waitUntil(lambda: window.settled, timeout=20_000)
+    assert window.context.document.recording.folder == another
+    assert window.context.sensor.sensor.position_m == (1.0, 0.0, 0.25)
+    assert open_recording(another).sensor.position_m != (1.0, 0.0, 0.25)
+    click(dialog, "New batch")
+    assert button(dialog, "Start")
+
+
+def test_delete_takes_a_recording_from_the_list_and_says_what_is_missing(opened, qtbot):
+    window = opened()
+    dialog = begin(window)
+    ready(qtbot, window.context.batch)
+    paths = dialog.findChild(QListWidget)
+    paths.setCurrentRow(0)
+    paths.item(0).setSelected(True)
+    QTest.keyClick(paths, Qt.Key.Key_Delete)
+    assert paths.count() == 0
+    assert "Add recordings to work on." in words(dialog)
+    assert not button(dialog, "Start").isEnabled()
+
+
+def test_failures_and_their_reasons_are_shown_and_a_batch_is_stopped(opened, qtbot, recording_copy):
+    window = opened("--fail", 1, "--step-s", 30)
+    batch = window.context.batch
+    dialog = begin(window)
+    ready(qtbot, batch)
+    assert "1 recording: about 30 min on" in words(dialog)
+    click(dialog, "Start")
+    qtbot.waitUntil(lambda: batch.batch is not None and bool(batch.batch.failures), timeout=20_000)
+    assert "At work" in words(dialog)
+    assert "1:00 so far" in words(dialog)
+    failures = dialog._run._failures.toPlainText()
+    assert "synthesise from place 2: It is damaged" in failures
+    click(dialog, "Failures (1)")
+    click(dialog, "Log")
+    qtbot.waitUntil(lambda: "looked at" in dialog._run._log.toPlainText(), timeout=20_000)
+    click(dialog, "Stop")
+    assert "Stopping" in words(dialog)
+    assert not button(dialog, "Stop").isEnabled()
+
+
+def test_placements_of_the_recording_or_of_a_file_are_taken(opened, qtbot, tmp_path, monkeypatch):
+    window = opened()
+    context = window.context
+    setup = context.batch.setup
+    context.edits.plan_placements(PlacementGrid((1.0, 2.0, 3.0)))
+    window.show_placements()
+    window.batch_dialogs.show_with_placements()
+    dialog = window.findChild(BatchWindow)
+    qtbot.waitUntil(lambda: not setup.problem, timeout=20_000)
+    assert setup.plan().placement_count == 3
+    choice = dialog._setup._placements
+    assert "3 placements" in choice.currentText()
+    # The plan is followed, as long as its recording is open.
+    context.edits.plan_placements(PlacementGrid((1.0,)))
+    assert setup.placements == PlacementGrid((1.0,))
+    assert "1 placement)" in choice.currentText()
+    context.edits.plan_placements(None)
+    assert setup.placements == PlacementGrid((1.0,))
+    assert "what was planned before (1 placement)" in choice.currentText()
+    file = tmp_path / "two.json"
+    write_placements(file, PlacementGrid((1.0, 2.0)))
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(file), ""))
+    dialog.activateWindow()
+    qtbot.waitUntil(dialog.isActiveWindow)
+    choice.setFocus()
+    QTest.keyClick(choice, Qt.Key.Key_Home)
+    QTest.keyClick(choice, Qt.Key.Key_Down)
+    assert "plans no placements" in words(dialog)
+    assert setup.placements is None
+    QTest.keyClick(choice, Qt.Key.Key_End)
+    assert "plans no placements" not in words(dialog)
+    assert setup.placements == PlacementGrid((1.0, 2.0))
+    assert "two.json (2 placements)" in choice.currentText()
+    QTest.keyClick(choice, Qt.Key.Key_Home)
+    assert setup.placements is None
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(tmp_path / "plan"), ""))
+    qtbot.waitUntil(lambda: not setup.problem, timeout=20_000)
+    click(dialog, "Save plan…")
+    assert read_plan(tmp_path / "plan.toml") == setup.plan()
+
+
+def test_the_window_closes_and_the_batch_goes_on(opened, qtbot):
+    window = opened("--step-s", 20)
+    batch = window.context.batch
+    dialog = begin(window)
+    ready(qtbot, batch)
+    click(dialog, "Start")
+    qtbot.waitUntil(lambda: batch.batch is not None and batch.batch.status is not None)
+    folder = batch.batch.folder
+    window.context.document.undo_stack.clear()
+    window.close()
+    assert not dialog.isVisible()
+    assert folder.live

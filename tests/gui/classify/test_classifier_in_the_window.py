@@ -1,0 +1,369 @@
+"""The classifier in the window, by mouse and keys; one with known answers."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+from dataclasses import replace
+
+import fake_class_command
+import numpy as np
+import pytest
+from answering import answer, once_asked
+from class_tables import a_table
+from fake_classifiers import CLASSES, expected
+from label_hands import CONTROL, LEFT, SHIFT, key
+from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
+from PySide6.QtGui import QDropEvent
+from PySide6.QtWidgets import QFileDialog, QLabel, QToolButton
+from small_pairs import write_pairs
+
+from sd2app.classify.confusion_view import ConfusionView
+from sd2app.classify.curve import ClassCurve
+from sd2app.classify.panel import ClassPanel
+from sd2app.classify.result_dialog import ClassResultDialog
+from sd2app.classify.strip import ClassPlot, ClassReadout, ClassStrip, stacked_image
+from sd2app.denoise.card_dialog import ModelCardDialog
+from sd2app.labels.timeline import LabelTimeline
+from sd2app.suggestions.bar import SuggestionBar
+from sd2app.widgets.inputs import Choice
+from sd2app.widgets.typed_line import TypedLine
+from sd2core.files.resources import resource_path
+
+
+@pytest.fixture
+def fake_classes(fake_classes, tmp_path):
+    """One classifier in a file."""
+    (path := tmp_path / "waves.safetensors").write_bytes(b"weights")
+    fake_classes.add(path, kinds=("synthetic",))
+    return fake_classes
+
+
+@pytest.fixture
+def classified(window, fake_classes, qtbot):
+    """The window on the ball, which approaches and recedes once a second; nothing is marked."""
+    c = window.context
+    (path,) = fake_classes.cards
+    window.class_dialogs.use(path)
+    qtbot.waitUntil(lambda: c.classify.track.complete and not c.classify.busy, timeout=10_000)
+    for _ in range(2):
+        key(window, "N")
+        key(window, "Backspace")
+    c.playback.seek_frame(0)
+    return window
+
+
+def truth(window):
+    return expected(window.context.synthetic.map.values.T)
+
+
+def labels(window):
+    return [(span.label, span.origin) for span in window.context.labels.labels.spans]
+
+
+def found(window, qtbot):
+    key(window, "G", SHIFT)
+    qtbot.waitUntil(lambda: not window.context.suggestions.busy, timeout=10_000)
+
+
+def press(view, text, qtbot):
+    (button,) = (
+        one for one in view.findChildren(QToolButton) if one.isVisible() and one.text() == text
+    )
+    qtbot.mouseClick(button, LEFT)
+
+
+# --- the read-out and the strip ---------------------------------------------------------------
+
+
+def test_a_file_is_chosen_and_the_strip_appears(window, fake_classes, qtbot, monkeypatch):
+    strip = window.findChild(ClassStrip)
+    assert not strip.isVisible()
+    (path,) = fake_classes.cards
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(path), ""))
+    window._actions["open_classifier"].trigger()
+    qtbot.waitUntil(lambda: window.context.classify.track.complete, timeout=10_000)
+    assert strip.isVisible()
+    key(window, "I", SHIFT)
+    assert not strip.isVisible()
+    key(window, "I", SHIFT)
+    assert strip.isVisible()
+    window._classes.fill()
+    entries = {action.text().split("\t")[0]: action for action in window._classes.actions()}
+    assert entries["waves"].isChecked()
+    entries["No model"].trigger()
+    assert not strip.isVisible()
+    assert window.context.classify.reading is None
+
+
+def test_the_readout_follows_keys_and_clicks(classified, qtbot):
+    readout, plot = classified.findChild(ClassReadout), classified.findChild(ClassPlot)
+    c, shares = classified.context, truth(classified)
+    for _ in range(8):
+        key(classified, "Right")
+    for frame in (8, 40):
+        if frame != 8:
+            x = round(plot.scale.x_of(c.playback.timebase.time_of(frame)))
+            qtbot.mouseClick(plot, LEFT, pos=QPoint(x, 10))
+        assert c.playback.frame == frame
+        best = int(shares[frame].argmax())
+        assert readout.text == f"{CLASSES[best]} {100 * shares[frame, best]:.0f} %"
+    classified.grab()  # all of it can be painted
+
+
+def test_what_belongs_to_another_sensor_is_not_shown_as_current(classified, fake_classes, qtbot):
+    c, readout = classified.context, classified.findChild(ClassReadout)
+    before = readout.text
+    assert before
+    fake_classes.gate.clear()
+    # Typed: until the map has followed, what is on screen is of where the sensor was.
+    c.edits.place_sensor(replace(c.sensor.sensor, position_m=(0.3, 0.0, 0.0)))
+    assert readout.text == ""
+    position = c.sensor.sensor.position_m
+    c.edits.begin_sensor_drag()
+    c.edits.drag_sensor((position[0] + 0.5, position[1], position[2]))
+    qtbot.waitUntil(lambda: c.synthesis.moving, timeout=10_000)
+    assert readout.text == ""
+    c.edits.end_sensor_drag()
+    fake_classes.gate.set()
+    qtbot.waitUntil(
+        lambda: c.synthesis.complete and c.classify.track.complete and not c.classify.busy,
+        timeout=20_000,
+    )
+    shares = truth(classified)[c.playback.frame]
+    assert readout.text == f"{CLASSES[int(shares.argmax())]} {100 * shares.max():.0f} %"
+
+
+def test_another_map_is_looked_at(classified, qtbot):
+    c, strip = classified.context, classified.findChild(ClassStrip)
+    choice = strip.findChild(Choice)
+    assert [choice.itemText(at) for at in range(choice.count())] == [
+        "on synthetic", "on radar (simulated)",
+    ]  # fmt: skip
+    choice.setFocus()
+    qtbot.keyClick(choice, Qt.Key.Key_Down)
+    choice.activated.emit(choice.currentIndex())
+    qtbot.waitUntil(lambda: c.classify.track.complete, timeout=10_000)
+    assert c.classify.source is c.real
+    assert not c.classify.knows_source
+
+
+def test_the_strip_stacks_what_is_probable():
+    shares = np.array([[0.5, 0.25, 0.25], [0.0, 1.0, 0.0]], np.float32)
+    frames = np.array([0, 1, -1])
+    image = stacked_image(shares, np.array([True, False]), frames, [1, 2, 3], 4)
+    column = [[image.pixelColor(x, y).getRgb() for y in range(4)] for x in range(3)]
+    # From the top: the last class, the middle one, twice the first.
+    assert [pixel[2] for pixel in column[0]] == [3, 2, 1, 1]
+    assert {pixel[2] for pixel in column[1]} == {2}
+    assert column[0][0][3] == 255
+    assert 0 < column[1][0][3] < 255  # not of the map as it is
+    assert {pixel[3] for pixel in column[2]} == {0}
+
+
+# --- predictions as suggestions ---------------------------------------------------------------
+
+
+def test_found_by_a_key_decided_on_and_undone(classified, qtbot):
+    c, bar = classified.context, classified.findChild(SuggestionBar)
+    found(classified, qtbot)
+    assert bar.isVisible()
+    names = [label for label, _ in labels(classified)]
+    assert set(names) == {"horizontal", "vertical"}
+    assert {origin for _, origin in labels(classified)} == {"suggestion"}
+    first = c.labels.selected[0]
+    best = CLASSES.index(first.label)
+    frames = slice(*c.playback.timebase.frames_between(first.start_s, first.end_s))
+    assert first.confidence == pytest.approx(truth(classified)[frames, best].mean(), abs=1e-5)
+    key(classified, "Y")
+    taken = next(span for span in c.labels.labels.spans if span.origin == "person")
+    assert (taken.label, taken.confidence) == (first.label, first.confidence)
+    # The next one is corrected, and one is turned down.
+    key(classified, "3")
+    assert ("up-to-down", "person") in labels(classified)
+    key(classified, "W")
+    count = len(labels(classified))
+    key(classified, "Z", CONTROL)
+    assert len(labels(classified)) == count + 1
+    key(classified, "Y", SHIFT)
+    assert {origin for _, origin in labels(classified)} == {"person"}
+    for _ in range(3):
+        key(classified, "Z", CONTROL)
+    assert {origin for _, origin in labels(classified)} == {"suggestion"}
+
+
+def test_an_edge_is_dragged_before_it_is_accepted(classified, qtbot):
+    c = classified.context
+    found(classified, qtbot)
+    span = c.labels.selected[0]
+    view = classified.findChild(LabelTimeline)
+    row = view.rows.row_of("Suggestions")
+    y = round(row.top_px + row.height_px / 2)
+    start = QPoint(round(view.scale.x_of(span.end_s)) - 2, y)
+    end = QPoint(round(view.scale.x_of(span.end_s - 0.2)) - 2, y)
+    qtbot.mousePress(view, LEFT, Qt.KeyboardModifier.AltModifier, start)
+    for share in (0.5, 1.0):
+        qtbot.mouseMove(view, start + (end - start) * share)
+    qtbot.mouseRelease(view, LEFT, Qt.KeyboardModifier.AltModifier, end)
+    shorter = c.labels.labels.span(span.id)
+    assert shorter.end_s < span.end_s
+    assert (shorter.origin, shorter.confidence) == ("suggestion", span.confidence)
+
+
+def test_how_sure_it_must_be_is_typed(classified, qtbot):
+    c, bar = classified.context, classified.findChild(SuggestionBar)
+    found(classified, qtbot)
+    many = len(c.suggestions.pending)
+    sure = sorted(span.confidence for span in c.suggestions.pending)
+    box = bar._threshold
+    assert box.suffix() == " %"
+    box.setFocus()
+    box.selectAll()
+    limit = round(100 * sure[0]) + 1
+    qtbot.keyClicks(box, str(limit))
+    qtbot.keyClick(box, Qt.Key.Key_Return)
+    qtbot.waitUntil(lambda: not c.suggestions.busy, timeout=10_000)
+    assert c.suggestions.threshold == limit
+    assert len(c.suggestions.pending) < many
+
+
+def test_without_a_classifier_the_key_says_what_to_do(window, qtbot):
+    action = window._actions["find_gestures"]
+    assert not action.isEnabled()
+    assert "Choose a classifier" in action.toolTip()
+
+
+# --- files ------------------------------------------------------------------------------------
+
+
+def test_the_card_calls_simulated_what_is(classified, qtbot):
+    texts = []
+
+    def read(dialog):
+        texts.extend(label.text() for label in dialog.findChildren(QLabel))
+        dialog.reject()
+
+    once_asked(ModelCardDialog, read)
+    classified._actions["classifier_card"].trigger()
+    assert {"waves", "simulated data only", "background, horizontal, vertical"} <= set(texts)
+
+
+def test_a_classifier_that_is_dropped_is_used(window, fake_classes, qtbot):
+    (path,) = fake_classes.cards
+    data = QMimeData()
+    data.setUrls([QUrl.fromLocalFile(str(path))])
+    none = Qt.KeyboardModifier.NoModifier
+    window.dropEvent(QDropEvent(QPointF(50, 50), Qt.DropAction.CopyAction, data, LEFT, none))
+    qtbot.waitUntil(lambda: window.context.classify.track.complete, timeout=10_000)
+    assert window.context.classify.path == path
+    assert window.context.denoise.path is None
+
+
+def test_what_is_no_classifier_is_said(window, tmp_path):
+    window.class_dialogs.use(tmp_path / "other.safetensors")
+    assert "other.safetensors is no classifier" in window.messages.text
+    assert window.context.classify.path is None
+
+
+# --- training and comparing -------------------------------------------------------------------
+
+
+@pytest.fixture
+def trainable(window, tmp_path, qtbot):
+    """The page of classifiers with data, and a command that learns nothing."""
+    training = window.context.class_training
+    training._command = (sys.executable, "-u", fake_class_command.__file__)
+    key(window, "C", SHIFT)
+    panel = window.findChild(ClassPanel)
+    assert panel.isVisible()
+    training.setup.add(write_pairs(tmp_path / "campaign.zarr"))
+    qtbot.waitUntil(lambda: not training.setup.problem, timeout=10_000)
+    yield window
+    if training.under_way:
+        training.run.cancel()
+        qtbot.waitUntil(lambda: training.run is None, timeout=20_000)
+
+
+def test_trained_by_clicks_watched_and_used(trainable, fake_classes, qtbot):
+    training, panel = trainable.context.class_training, trainable.findChild(ClassPanel)
+    training.select(None)
+    press(panel, "Start training", qtbot)
+    qtbot.waitUntil(lambda: training.run is not None and not training.run.under_way, timeout=20_000)
+    curve = panel.findChild(ClassCurve)
+    assert curve.isVisible()
+    curve.setFocus(Qt.FocusReason.TabFocusReason)
+    assert curve.pointed.recall == 0.8
+    qtbot.keyClick(curve, Qt.Key.Key_Right)
+    assert curve.pointed.recall == 0.7
+    assert "Recall 70.0 %" in curve.accessibleDescription()
+    kept = training._folder / f"{training.run.folder.path.name}.safetensors"
+    fake_classes.add(kept)
+    press(panel, "Use this model", qtbot)
+    assert trainable.context.classify.path == kept
+    assert kept.is_file()
+    answer(qtbot, "Discard")
+    press(panel, "Delete…", qtbot)
+    assert training.run is None
+
+
+def test_a_person_is_typed_and_who_does_what_is_said(trainable, tmp_path, qtbot):
+    training, panel = trainable.context.class_training, trainable.findChild(ClassPanel)
+    setup = training.setup
+    shutil.copytree(resource_path("swipes.sd2"), copy := tmp_path / "copy.sd2")
+    setup.remove(tmp_path / "campaign.zarr")
+    setup.add(resource_path("swipes.sd2"))
+    setup.add(copy)
+    qtbot.waitUntil(lambda: not setup.problem, timeout=10_000)
+
+    def said() -> str:
+        return " ".join(one.text() for one in panel.findChildren(QLabel) if one.isVisible())
+
+    assert "All of it is of one person" in said()
+    lines = [one for one in panel.findChildren(TypedLine) if "copy.sd2" in one.accessibleName()]
+    lines[-1].setFocus()
+    qtbot.keyClicks(lines[-1], "ben")
+    qtbot.keyClick(lines[-1], Qt.Key.Key_Return)
+    qtbot.waitUntil(lambda: setup.division is not None, timeout=10_000)
+    assert [one.person for one in setup.data] == ["", "ben"]
+    assert "Learns from 1 person; the best model is chosen by ben." in said()
+    # A step is timed while the page is looked at.
+    qtbot.waitUntil(lambda: training.estimate_s is not None, timeout=60_000)
+    assert "Takes " in said()
+    assert "timed here" in said()
+
+
+def test_stopped_by_a_click(trainable, qtbot):
+    training, panel = trainable.context.class_training, trainable.findChild(ClassPanel)
+    training._command = (*training._command, "--step-s", "0.5")
+    press(panel, "Start training", qtbot)
+    qtbot.waitUntil(lambda: training.run.history.done >= 1, timeout=20_000)
+    assert trainable.side.tabText(2).startswith("Train · ")
+    press(panel, "Stop", qtbot)
+    qtbot.waitUntil(lambda: not training.run.under_way, timeout=20_000)
+    assert training.run.phase == "stopped"
+    assert training.run.result is not None
+
+
+def test_a_result_is_opened_and_looked_at(window, tmp_path, qtbot, monkeypatch):
+    from sd2core.classify.comparison_text import as_json
+    from sd2core.cli.output import finite
+
+    path = tmp_path / "table.json"
+    path.write_text(json.dumps(finite(as_json(a_table()))))
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(path), ""))
+    window.class_dialogs.open_result()
+    dialog = window.findChild(ClassResultDialog)
+    left, right = dialog.findChildren(ConfusionView)
+    assert left.matrix.title == "radar only"
+    assert right.matrix.title == "+ denoised synthetic"
+    assert "horizontal taken for horizontal: 81.0 ± 1.0 %" in left.accessibleDescription()
+    choice = dialog.findChild(Choice)
+    choice.setFocus()
+    qtbot.keyClick(choice, Qt.Key.Key_Up)
+    assert right.matrix.title == "+ synthetic"
+    dialog.grab()
+    dialog.close()
+    path.write_text("{}")
+    window.class_dialogs.open_result()
+    assert "is no such result" in window.messages.text

@@ -1,0 +1,128 @@
+"""A data set exported by real keys and clicks in the whole window; what counts is on disk."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import Qt, QUrl
+from PySide6.QtGui import QDesktopServices
+from PySide6.QtWidgets import (
+    QApplication,
+    QCheckBox,
+    QComboBox,
+    QFileDialog,
+    QLabel,
+    QProgressBar,
+    QToolButton,
+)
+
+from sd2app.dataset_export.dialog import ExportDialog
+from sd2app.widgets.inputs import NumberBox
+from sd2core.datasets.reading import open_dataset
+
+LEFT = Qt.MouseButton.LeftButton
+FAKE = Path(__file__).resolve().parents[2] / "fake_export.py"
+
+
+@pytest.fixture
+def dialog(window, qtbot):
+    """The dialog, opened by its key, with the counts of the small recording."""
+    window.messages.hide()
+    qtbot.keyClick(window, Qt.Key.Key_D, Qt.KeyboardModifier.ControlModifier
+                   | Qt.KeyboardModifier.ShiftModifier)  # fmt: skip
+    found = QApplication.activeModalWidget()
+    assert isinstance(found, ExportDialog)
+    qtbot.waitUntil(lambda: not window.context.export.counting, timeout=20_000)
+    yield found
+    model = window.context.export
+    if model.exporting:
+        model.stop()
+        qtbot.waitUntil(lambda: not model.exporting, timeout=20_000)
+
+
+def button(dialog: ExportDialog, text: str) -> QToolButton:
+    return next(one for one in dialog.findChildren(QToolButton) if one.text() == text)
+
+
+def check(dialog: ExportDialog, text: str, qtbot) -> None:
+    box = next(one for one in dialog.findChildren(QCheckBox) if one.text() == text)
+    qtbot.mouseClick(box, LEFT)
+
+
+def type_frames(dialog: ExportDialog, tip: str, number: str, qtbot) -> None:
+    box = next(one for one in dialog.findChildren(NumberBox) if one.toolTip() == tip)
+    box.setFocus()
+    box.selectAll()
+    qtbot.keyClicks(box, number)
+    qtbot.keyClick(box, Qt.Key.Key_Return)
+
+
+def words(dialog: ExportDialog) -> list[str]:
+    return [one.text() for one in dialog.findChildren(QLabel) if one.isVisible()]
+
+
+def test_counts_follow_and_the_data_set_is_written(
+    window, dialog, qtbot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = window.context.export
+    # The recording has 60 frames: none of 72 on end.
+    assert "No recording has 72 frames on end with a person." in words(dialog)
+    assert not button(dialog, "Export…").isEnabled()
+    type_frames(dialog, "Frames of a segment", "20", qtbot)
+    type_frames(dialog, "Frames that neighbouring segments share", "0", qtbot)
+    check(dialog, "denoised", qtbot)
+    assert (model.choice.length, model.choice.overlap) == (20, 0)
+    assert model.choice.maps == {"synthetic", "radar"}
+    qtbot.waitUntil(lambda: model.ready, timeout=20_000)
+    assert any(text.startswith("3 segments of 0.7 s from 1 view") for text in words(dialog))
+    formats = next(one for one in dialog.findChildren(QComboBox) if "Format" in one.toolTip())
+    qtbot.keyClick(formats, Qt.Key.Key_Down)
+    assert model.choice.ending == ".h5"
+
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_, **__: (str(tmp_path / "s"), ""))
+    qtbot.mouseClick(button(dialog, "Export…"), LEFT)
+    assert dialog.findChild(QProgressBar).isVisible()
+    assert not formats.isEnabled()
+    qtbot.waitUntil(lambda: not model.exporting, timeout=60_000)
+    with open_dataset(tmp_path / "s.h5") as dataset:
+        assert len(dataset) == 3
+        assert dataset.header.kinds == ("synthetic", "simulated")
+    assert window.messages.text == f"3 segments from 1 view are in {tmp_path / 's.h5'}."
+    picture = next(
+        one for one in dialog.findChildren(QLabel) if one.accessibleName() == "Preview sheet"
+    )
+    assert picture.isVisible()
+    assert not picture.pixmap().isNull()
+    shown: list[QUrl] = []
+    monkeypatch.setattr(QDesktopServices, "openUrl", shown.append)
+    qtbot.mouseClick(button(dialog, "Open folder"), LEFT)
+    assert shown == [QUrl.fromLocalFile(str(tmp_path))]
+    qtbot.mouseClick(button(dialog, "Close"), LEFT)
+    qtbot.waitUntil(lambda: QApplication.activeModalWidget() is None)
+
+
+def test_it_goes_on_when_the_dialog_is_closed_and_can_be_stopped(
+    window, dialog, qtbot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = window.context.export
+    monkeypatch.setattr(model, "_command", (sys.executable, str(FAKE), "slow"))
+    type_frames(dialog, "Frames of a segment", "20", qtbot)
+    qtbot.waitUntil(lambda: model.ready, timeout=20_000)
+    out = tmp_path / "s.zarr"
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_, **__: (str(out), ""))
+    qtbot.mouseClick(button(dialog, "Export…"), LEFT)
+    qtbot.waitUntil(lambda: model.progress == (500, 2000), timeout=20_000)
+    qtbot.keyClick(dialog, Qt.Key.Key_Escape)
+    qtbot.waitUntil(lambda: QApplication.activeModalWidget() is None)
+    assert model.exporting
+    assert [job.title for job in window.context.jobs.jobs] == ["Exporting s.zarr"]
+    window._actions["export_dataset"].trigger()
+    again = QApplication.activeModalWidget()
+    assert isinstance(again, ExportDialog)
+    qtbot.mouseClick(button(again, "Stop"), LEFT)
+    qtbot.waitUntil(lambda: not model.exporting, timeout=20_000)
+    assert button(again, "Export…").isEnabled()
+    assert not window.context.jobs.jobs
+    again.close()

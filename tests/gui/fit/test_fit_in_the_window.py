@@ -1,0 +1,282 @@
+"""A body fitted from the window, by mouse and keys; the fit itself is pretended."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from answering import once_asked
+from fake_denoisers import FakeDenoisers
+from PySide6.QtCore import QCoreApplication, QEvent, QPoint, Qt
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QFileDialog,
+    QMessageBox,
+    QPushButton,
+    QToolButton,
+)
+
+from sd2app.fit.bar import FitBar
+from sd2app.fit.dialog import NewFromVideoDialog
+from sd2app.fit.request import FitRequest, Person
+from sd2app.fit.setup import FitSetupModel
+from sd2app.settings import Settings
+from sd2app.shell.window import MainWindow
+from sd2app.video.landmark_overlay import bones
+from sd2app.video.view import VideoView
+from sd2core.body.fit import DEFAULT_STATURE_M
+from sd2core.body.track import LANDMARKS, MIRRORED
+from sd2core.recording.recording import Recording, open_recording
+from sd2core.sensor import VirtualSensor
+
+FAKE = Path(__file__).resolve().parents[2] / "fake_fit.py"
+
+
+@pytest.fixture
+def video(small_recording, tmp_path) -> Path:
+    return Path(shutil.copy(small_recording / "video.mp4", tmp_path / "walk.mp4"))
+
+
+@pytest.fixture
+def made(qtbot, compiled_kernels, fake):
+    """Makes windows whose fit is pretended; options are those of ``fake_fit.py``."""
+    windows: list[MainWindow] = []
+
+    def make(*options: object, settings: Settings | None = None) -> MainWindow:
+        command = [sys.executable, "-u", str(FAKE), *map(str, options)]
+        window = MainWindow(
+            settings or Settings.forgetful(), fake.ladder, command, FakeDenoisers().library
+        )
+        windows.append(window)
+        window.resize(1280, 800)
+        window.show()
+        window.populate()
+        qtbot.waitUntil(lambda: window.settled, timeout=20_000)
+        return window
+
+    yield make
+    for window in windows:
+        if window.ready:
+            window.context.fit.close()
+            window.context.fit._state = "idle"
+            window.context.document.undo_stack.clear()
+        window.close()
+        window.deleteLater()
+    QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+
+
+def show(window, qtbot, path: Path) -> None:
+    with qtbot.waitSignal(window.context.document.opened, timeout=20_000):
+        window.open_paths([path])
+    qtbot.waitUntil(lambda: window.settled, timeout=20_000)
+
+
+def click(window, qtbot, text: str) -> None:
+    bar = window.findChild(FitBar)
+    button = next(b for b in bar.findChildren(QToolButton) if b.text() == text)
+    assert button.isVisible()
+    qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
+
+
+def test_from_the_offer_to_the_recording(made, qtbot, video) -> None:
+    window = made("--body")
+    show(window, qtbot, video)
+    bar = window.findChild(FitBar)
+    assert bar.isVisible()
+    asked: list[FitRequest] = []
+
+    def fill(dialog: NewFromVideoDialog) -> None:
+        qtbot.waitUntil(lambda: dialog.picker._setup.picture is not None, timeout=10_000)
+        picker = dialog.picker
+        box = picker.box
+
+        def at(x: float, y: float) -> QPoint:
+            scale = box.width() / 160
+            return QPoint(round(box.x() + x * scale), round(box.y() + y * scale))
+
+        qtbot.mousePress(picker, Qt.MouseButton.LeftButton, pos=at(120, 100))
+        qtbot.mouseMove(picker, at(60, 60))
+        qtbot.mouseRelease(picker, Qt.MouseButton.LeftButton, pos=at(40, 20))
+        known = dialog.findChild(QCheckBox)
+        qtbot.mouseClick(known, Qt.MouseButton.LeftButton, pos=QPoint(8, known.height() // 2))
+        fit = next(b for b in dialog.findChildren(QPushButton) if b.text() == "Fit")
+        asked.append(dialog.picker._setup.request())
+        qtbot.mouseClick(fit, Qt.MouseButton.LeftButton)
+
+    once_asked(NewFromVideoDialog, fill)
+    click(window, qtbot, "Fit a body…")
+    fit = window.context.fit
+    person = asked[0].person
+    assert isinstance(person, Person)
+    assert (person.x, person.y) == pytest.approx((40, 20), abs=1)
+    assert (person.width, person.height) == pytest.approx((80, 80), abs=1)
+    assert asked[0].stature_m == DEFAULT_STATURE_M
+    assert fit.request == asked[0]
+    with qtbot.waitSignal(window.context.document.opened, timeout=30_000):
+        pass
+    made_of = open_recording(video.with_name("walk.sd2"))
+    assert made_of.video == video
+    assert window.context.document.recording.folder == made_of.folder
+    assert window.context.document.mesh.frame_count == 60
+    qtbot.waitUntil(lambda: window.messages.text == "This was no fit.")
+    assert fit.state == "idle"
+    assert not bar.isVisible()
+
+
+def test_landmarks_are_drawn_and_the_clock_goes_along_until_it_is_moved(made, qtbot, video) -> None:
+    window = made("--pause-s", 0.01, "--stop-at", 30)
+    show(window, qtbot, video)
+    c = window.context
+    c.fit.start(FitRequest(video, video.with_name("walk.sd2")))
+    qtbot.waitUntil(lambda: c.video.shown_frame == 30 == c.playback.frame, timeout=20_000)
+    view = window.findChild(VideoView)
+
+    def blue_and_orange() -> tuple[int, int]:
+        image = view.grab().toImage().convertToFormat(image_format())
+        pixels = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), -1, 4)
+        blue, red = (pixels[..., k].astype(int) for k in (0, 2))
+        return int((blue - red > 60).sum()), int((red - blue > 60).sum())
+
+    left, right = blue_and_orange()
+    assert left > 50
+    assert right > 50
+    qtbot.keyClick(window, Qt.Key.Key_Left)
+    assert not c.fit_follower.following
+    qtbot.wait(200)
+    assert c.playback.frame == 29
+    click(window, qtbot, "Follow")
+    assert c.fit_follower.following
+    click(window, qtbot, "Cancel")
+    assert c.fit.state == "cancelling"
+    qtbot.waitUntil(lambda: c.fit.state == "stopped", timeout=10_000)
+    click(window, qtbot, "Discard")
+    assert blue_and_orange() == (0, 0)
+    assert not video.with_name("walk.sd2").exists()
+
+
+def image_format():
+    from PySide6.QtGui import QImage
+
+    return QImage.Format.Format_RGB32
+
+
+def test_a_failure_is_shown_and_put_away(made, qtbot, video) -> None:
+    window = made("--refuse", "There is nobody in walk.mp4. Film a person.")
+    show(window, qtbot, video)
+    window.context.fit.start(FitRequest(video, video.with_name("walk.sd2")))
+    qtbot.waitUntil(lambda: window.context.fit.state == "failed", timeout=20_000)
+    bar = window.findChild(FitBar)
+    assert bar._reason.text() == "There is nobody in walk.mp4. Film a person."
+    assert bar._reason.isVisible()
+    asked: list[Path | None] = []
+
+    def look(dialog: NewFromVideoDialog) -> None:
+        asked.append(dialog.picker._setup.video)
+        dialog.reject()
+
+    once_asked(NewFromVideoDialog, look)
+    click(window, qtbot, "Change…")
+    assert asked == [video]
+    click(window, qtbot, "✕")
+    assert window.context.fit.state == "idle"
+
+
+def test_closing_asks_and_the_next_start_continues(made, qtbot, video) -> None:
+    settings = Settings.forgetful()
+    window = made("--stop-at", 10, settings=settings)
+    show(window, qtbot, video)
+    window.context.fit.start(FitRequest(video, video.with_name("walk.sd2")))
+    qtbot.waitUntil(lambda: window.context.fit.landmarks_at(10) is not None, timeout=20_000)
+    once_asked(QMessageBox, lambda box: box.button(QMessageBox.StandardButton.Cancel).click())
+    window.close()
+    assert window.isVisible()
+    assert window.context.fit.state == "running"
+    once_asked(QMessageBox, lambda box: box.button(QMessageBox.StandardButton.Ok).click())
+    window.close()
+    assert not window.isVisible()
+    again = made("--body", settings=settings)
+    assert again.context.fit.state == "stopped"
+    click(again, qtbot, "Resume")
+    # Nothing else is open: the video is shown, and then the recording.
+    made_of = video.with_name("walk.sd2")
+    document = again.context.document
+    qtbot.waitUntil(
+        lambda: document.content and document.recording.folder == made_of, timeout=30_000
+    )
+
+
+def test_a_folder_in_which_a_fit_was_stopped_can_be_opened(made, qtbot, video) -> None:
+    request = FitRequest(video, video.with_name("walk.sd2"))
+    request.save()
+    window = made()
+    show(window, qtbot, request.folder)
+    assert window.context.document.recording.video == video
+    assert window.context.fit.state == "stopped"
+
+
+def test_what_is_open_meanwhile_stays_open(made, qtbot, video, small_recording) -> None:
+    window = made("--body", "--pause-s", 0.02)
+    show(window, qtbot, small_recording)
+    c = window.context
+    c.fit.start(FitRequest(video, video.with_name("walk.sd2")))
+    qtbot.waitUntil(lambda: c.fit.state == "finished", timeout=30_000)
+    assert c.document.recording.folder == small_recording
+    with qtbot.waitSignal(c.document.opened, timeout=20_000):
+        click(window, qtbot, "Open")
+    assert c.document.recording.folder == video.with_name("walk.sd2")
+
+
+def test_a_recording_that_is_open_keeps_its_edits_and_gets_the_mesh(made, qtbot, video) -> None:
+    saved = Recording.create(video.with_name("mine.sd2"), video=video, title="Mine")
+    window = made("--body", "--pause-s", 0.02)
+    show(window, qtbot, saved.folder)
+    c = window.context
+    setup = FitSetupModel()
+    setup.choose_video(c.fit_offer.video, c.document.recording)
+    qtbot.waitUntil(lambda: setup.ready, timeout=10_000)
+    assert setup.completes
+    c.fit.start(setup.request())
+    setup.close()
+    sensor = VirtualSensor(position_m=(0.5, 0.0, 0.0))
+    c.edits.place_sensor(sensor)
+    # There is an edit that is not saved: nothing is opened over it.
+    qtbot.waitUntil(lambda: c.fit.state == "finished", timeout=30_000)
+    assert window.dialogs.save()
+    kept = open_recording(saved.folder)
+    assert kept.mesh == saved.folder / "mesh.zarr"
+    assert (kept.sensor, kept.title) == (sensor, "Mine")
+    with qtbot.waitSignal(c.document.opened, timeout=20_000):
+        click(window, qtbot, "Open")
+    assert c.document.mesh is not None
+
+
+def test_the_key_asks_for_a_video(made, qtbot, monkeypatch) -> None:
+    window = made()
+    asked = []
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *a, **k: asked.append(a) or ("", ""))
+    qtbot.keyClick(window, Qt.Key.Key_N, Qt.KeyboardModifier.ControlModifier)
+    assert len(asked) == 1
+    assert not window.context.fit.busy
+
+
+def test_no_offer_where_there_is_a_mesh_or_it_was_declined(made, qtbot, video, small_recording):
+    window = made()
+    bar = window.findChild(FitBar)
+    assert not bar.isVisible()
+    show(window, qtbot, small_recording)
+    assert not bar.isVisible()
+    show(window, qtbot, video)
+    assert bar.isVisible()
+    click(window, qtbot, "✕")
+    assert not bar.isVisible()
+
+
+def test_the_skeleton_has_two_equal_sides() -> None:
+    lines = {(a, b): colour for a, b, colour in bones()}
+    for (a, b), colour in lines.items():
+        mirrored = lines.get((MIRRORED[a], MIRRORED[b])) or lines[(MIRRORED[b], MIRRORED[a])]
+        across = LANDMARKS[a].split(".")[0] == LANDMARKS[b].split(".")[0]
+        assert (mirrored == colour) == across

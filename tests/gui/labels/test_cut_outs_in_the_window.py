@@ -1,0 +1,87 @@
+"""Spans cut out by real keys and clicks in the whole window; what counts is on disk."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from answering import answer, once_asked
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QCheckBox, QComboBox, QFileDialog, QPushButton
+
+from sd2app.labels.cut_out_dialog import CutOutDialog
+from sd2core.io.video import open_video
+
+LEFT = Qt.MouseButton.LeftButton
+
+
+@pytest.fixture
+def cuts(tmp_path, monkeypatch) -> Path:
+    folder = tmp_path / "cuts"
+    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: str(folder))
+    return folder
+
+
+def cut(window, qtbot, which: str, *left_out: str) -> None:
+    def work(dialog: CutOutDialog) -> None:
+        dialog.findChild(QComboBox).setCurrentText(which)
+        for box in dialog.findChildren(QCheckBox):
+            if box.text() in left_out:
+                box.click()
+        button = next(one for one in dialog.findChildren(QPushButton) if "folder" in one.text())
+        qtbot.mouseClick(button, LEFT)
+
+    window.messages.hide()
+    once_asked(CutOutDialog, work)
+    window._actions["cut_out"].trigger()
+    qtbot.waitUntil(lambda: bool(window.messages.text), timeout=30_000)
+    assert not window.context.jobs.jobs
+
+
+def listed(folder: Path) -> list[tuple[str, list[int], list[str]]]:
+    spans = json.loads((folder / "index.json").read_text("utf-8"))["spans"]
+    return [(one["span"]["label"], one["frames"], one["files"]) for one in spans]
+
+
+def test_all_spans_with_all_that_there_is(window, qtbot, cuts) -> None:
+    cut(window, qtbot, "all (2)")
+    files = ["video.mp4", "mesh.zarr", "synthetic.npz", "radar.npz"]
+    assert listed(cuts) == [("there", [6, 24], files), ("back", [30, 60], files)]
+    assert window.messages.text == f"2 spans cut out into {cuts}."
+    with open_video(next(cuts.glob("*_there_*")) / "video.mp4") as clip:
+        assert len(clip) == 18
+        # The brightness is the frame number.
+        assert float(clip.read(0).mean()) == pytest.approx(40 + 3 * 6, abs=4)
+
+
+def test_one_label_and_some_parts_then_something_else(window, qtbot, cuts) -> None:
+    cut(window, qtbot, "back (1)", "mesh", "maps: synthetic, radar")
+    assert listed(cuts) == [("back", [30, 60], ["video.mp4"])]
+    answer(qtbot, "Keep them")
+    cut(window, qtbot, "all (2)", "video", "mesh")
+    assert window.messages.text.endswith("1 stayed as they were.")
+    assert [files for _, _, files in listed(cuts)] == [
+        ["synthetic.npz", "radar.npz"],
+        ["video.mp4"],
+    ]
+    answer(qtbot, "Replace")
+    cut(window, qtbot, "all (2)", "video", "mesh")
+    assert [files for _, _, files in listed(cuts)] == [["synthetic.npz", "radar.npz"]] * 2
+
+
+def test_cancelled_it_leaves_whole_folders_only(window, qtbot, cuts) -> None:
+    c = window.context
+    c.cut_out.start(c.labels.labels.spans, ("video", "mesh", "maps"), cuts)
+    (job,) = c.jobs.jobs
+    assert job.title == "Cutting out 2 spans"
+    c.jobs.cancel(job)
+    assert not c.jobs.jobs
+    c.cut_out.close()
+    assert not list(cuts.glob(".sd2-cut-*"))
+
+
+def test_a_folder_that_cannot_be_is_said(window, qtbot, cuts) -> None:
+    cuts.write_text("a file")
+    cut(window, qtbot, "all (2)")
+    assert str(cuts) in window.messages.text

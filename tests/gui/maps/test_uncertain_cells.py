@@ -1,0 +1,124 @@
+"""How well the map is known, by key and mouse."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtWidgets import QLabel, QToolButton
+
+from sd2app.maps.heatmap import HeatmapView
+from sd2app.maps.level_bar import LevelBar
+from sd2app.shell.status_bar import StatusLine
+from sd2core.doppler_map import DopplerMap
+from sd2core.io.mesh import load_mesh, save_mesh
+from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
+from sd2core.sensor import VirtualSensor
+
+
+@pytest.fixture
+def fitted(empty_window, recording_copy, qtbot):
+    """The window on the ball, whose velocity is known to ±0.5 m/s from the camera."""
+    ball = load_mesh(recording_copy / "mesh.npz")
+    frames = ball.frame_count
+    known = VelocityUncertainty(
+        ("ball",),
+        np.zeros(ball.vertex_count, int),
+        np.full((frames, 1), 0.5),
+        np.full((frames, 1), 0.001),
+    )
+    save_mesh(replace(ball, uncertainty=known), recording_copy / "mesh.npz")
+    with qtbot.waitSignal(empty_window.context.document.opened, timeout=20_000):
+        empty_window.open_paths([recording_copy])
+    wait(empty_window, qtbot)
+    return empty_window
+
+
+def wait(window, qtbot):
+    c = window.context
+    qtbot.waitUntil(
+        lambda: window.settled and c.synthesis.complete and not c.uncertainty.busy, timeout=20_000
+    )
+
+
+def colour_of(view):
+    """How far from grey is what is shown of the ball at its fastest."""
+    image = view.grab().toImage()
+    x, y = round(view.scale.x_of(0.5)), round(view.y_of(1.2))
+    return int(np.ptp(image.pixelColor(x, y).getRgb()[:3]))
+
+
+def test_a_key_takes_the_colour_from_what_is_not_known(fitted, qtbot, tmp_path):
+    c, view = fitted.context, fitted.findChildren(HeatmapView)[0]
+    assert c.synthetic.uncertainty is None
+    assert colour_of(view) > 60
+    qtbot.keyClick(fitted, Qt.Key.Key_U)
+    wait(fitted, qtbot)
+    assert c.synthetic.uncertainty is not None
+    assert colour_of(view) < 10
+    assert "grey: ±50 % or worse" in view._status()
+    place = QPoint(round(view.scale.x_of(0.5)), round(view.y_of(1.2)))
+    qtbot.mouseMove(view, place)
+    reading = c.pointer.reading
+    frame = reading.frame
+    known = c.synthetic.uncertainty
+    missed = known.expected[25, frame] - reading.value
+    assert reading.deviation == pytest.approx(np.hypot(known.sd[25, frame], missed), rel=1e-5)
+    assert reading.deviation > 0.5 * reading.value
+    texts = [label.text() for label in fitted.findChild(StatusLine).findChildren(QLabel)]
+    assert any(f"{reading.value:.3g} ± {reading.deviation:.2g}" in text for text in texts)
+    c.synthesis.export(tmp_path / "map.npz")
+    np.testing.assert_array_equal(
+        DopplerMap.load(tmp_path / "map.npz").uncertainty.sd, c.synthetic.uncertainty.sd
+    )
+    qtbot.keyClick(fitted, Qt.Key.Key_U)
+    assert c.synthetic.uncertainty is None
+    assert colour_of(view) > 60
+    qtbot.mouseMove(view, place + QPoint(1, 0))
+    assert c.pointer.reading.deviation is None
+
+
+def test_it_follows_the_sensor_and_is_remembered(fitted, qtbot):
+    c, view = fitted.context, fitted.findChildren(HeatmapView)[0]
+    button = next(
+        b for b in fitted.findChild(LevelBar).findChildren(QToolButton) if b.text() == "Uncertain"
+    )
+    qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
+    wait(fitted, qtbot)
+    assert button.isChecked()
+    assert c.settings.flag("uncertain_cells", False)
+    ahead = c.synthetic.uncertainty
+    # From aside, across the camera's view, velocities are known well.
+    c.edits.place_sensor(VirtualSensor(position_m=(2.0, 0.0, 2.0)), "Move sensor")
+    assert c.synthetic.uncertainty is not ahead or c.synthesis.busy
+    wait(fitted, qtbot)
+    aside = c.synthetic.uncertainty
+    assert aside is not None
+    assert aside.sd.max() < 0.5 * ahead.sd.max()
+    qtbot.keyClick(fitted, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    wait(fitted, qtbot)
+    np.testing.assert_allclose(c.synthetic.uncertainty.sd, ahead.sd)
+    assert view.isVisible()
+
+
+def test_without_knowledge_the_action_says_why(window, qtbot):
+    action = window._actions["uncertain"]
+    assert not action.isEnabled()
+    assert "does not say how well its velocities are known" in action.toolTip()
+    button = next(
+        b for b in window.findChild(LevelBar).findChildren(QToolButton) if b.text() == "Uncertain"
+    )
+    assert not button.isEnabled()
+    assert button.toolTip() == action.toolTip()
+    qtbot.keyClick(window, Qt.Key.Key_U)
+    assert not window.context.uncertainty.shown
+    assert window.context.synthetic.uncertainty is None
+
+
+def test_closing_while_it_is_found_is_safe(fitted, qtbot):
+    qtbot.keyClick(fitted, Qt.Key.Key_U)
+    assert fitted.context.uncertainty.busy
+    fitted.context.document.undo_stack.clear()
+    fitted.close()

@@ -1,0 +1,186 @@
+"""Two meshes of one video side by side, by mouse and keys."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtWidgets import QComboBox, QFileDialog, QToolButton
+
+from sd2app.mesh_comparison.curves import JointCurves, joint_words
+from sd2app.mesh_comparison.model import name_of
+from sd2app.mesh_comparison.pictures import ComparedPicture
+from sd2app.mesh_comparison.table import JointTable
+from sd2app.mesh_comparison.window import ComparisonWindow
+from sd2app.shell.file_dialogs import mesh_of
+from sd2core.body.model import Body
+from sd2core.body.rotations import about
+from sd2core.io.mesh import save_mesh
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.recording.recording import Recording
+from sd2core.sensor import VirtualSensor
+from sd2core.timebase import Timebase
+
+ASIDE_M = 0.05
+TIMES = np.arange(36) / 30.0
+
+
+@pytest.fixture(scope="module")
+def waving() -> MeshSequence:
+    """The coarse body at 2.5 m swings its right forearm by 70°."""
+    body = Body.load("low")
+    turns = np.tile(np.eye(3), (len(TIMES), len(body.skeleton), 1, 1))
+    swing = np.clip((TIMES - 0.3) / 0.6, 0.0, 1.0)
+    elbow = body.skeleton.index["lowerarm01.R"]
+    turns[:, elbow] = about(np.array([1.0, 0.0, 0.0]), -70.0 * np.sin(np.pi * swing) ** 2)
+    vertices = (body.pose(turns) + np.array([0.0, 1.0, 2.5])).astype(np.float32)
+    return MeshSequence(vertices, body.faces, Timebase(TIMES))
+
+
+@pytest.fixture
+def meshes(waving, tmp_path) -> tuple[Path, Path]:
+    """The mesh of a recording, and the same mesh 5 cm aside."""
+    own, other = tmp_path / "own.npz", tmp_path / "aside.npz"
+    save_mesh(waving, own)
+    moved = np.asarray(waving.vertices) + np.array([ASIDE_M, 0, 0], np.float32)
+    save_mesh(replace(waving, vertices=moved), other)
+    return own, other
+
+
+@pytest.fixture
+def compared(empty_window, meshes, qtbot):
+    """The window of the comparison, everything worked out."""
+    own, other = meshes
+    with qtbot.waitSignal(empty_window.context.document.opened, timeout=20_000):
+        empty_window.open_paths([own])
+    qtbot.waitUntil(lambda: empty_window.settled, timeout=20_000)
+    empty_window.compare_with_mesh(other)
+    window = empty_window.findChild(ComparisonWindow)
+    qtbot.waitUntil(lambda: window._model.comparison is not None, timeout=30_000)
+    return window
+
+
+def row_of(window, joint: str):
+    return next(row for row in window._model.rows if row.name == joint)
+
+
+def test_a_known_shift_is_what_is_found(compared):
+    model = compared._model
+    assert model.labels == ("own.npz", "aside.npz")
+    for row in model.rows:
+        assert row.distance_m == pytest.approx(ASIDE_M, abs=1e-4)
+        assert row.jitter_mps3[0] == pytest.approx(row.jitter_mps3[1], rel=1e-2, abs=1.0)
+    # Seen from the camera the two hands move nearly alike.
+    hand = row_of(compared, "hand.R")
+    assert hand.correlation > 0.99
+    assert hand.velocity_rms_mps < 0.1
+    times_s, velocity = model.curve(0)
+    assert len(times_s) == len(TIMES)
+    assert np.abs(velocity).max() > 0.5
+    assert model.tracks[0].map.values.max() > 0
+    assert model.tracks[0].reference == model.tracks[1].reference
+
+
+def test_a_click_in_the_table_shows_that_joint(compared, qtbot):
+    table = compared.findChild(JointTable)
+    row = next(k for k in range(table.rowCount()) if table.item(k, 0).text() == "Left elbow")
+    place = table.visualItemRect(table.item(row, 1)).center()
+    qtbot.mouseClick(table.viewport(), Qt.MouseButton.LeftButton, pos=place)
+    assert compared._model.joint == "elbow.L"
+    assert np.abs(compared._model.curve(0)[1]).max() < 0.1  # it is the right one that swings
+
+
+def test_a_click_in_the_curves_moves_the_clock(compared, qtbot):
+    curves = compared.findChild(JointCurves)
+    place = QPoint(round(curves.scale.x_of(0.6)), curves.height() // 2)
+    qtbot.mouseClick(curves, Qt.MouseButton.LeftButton, pos=place)
+    assert compared._context.playback.time_s == pytest.approx(0.6, abs=1 / 30)
+
+
+def test_the_keys_of_the_main_window_work_here(compared, qtbot):
+    before = compared._context.playback.frame
+    compared.activateWindow()
+    qtbot.waitUntil(compared.isActiveWindow)
+    qtbot.keyClick(compared, Qt.Key.Key_Right)
+    assert compared._context.playback.frame == before + 1
+
+
+def test_the_other_one_can_be_the_reference(compared, qtbot):
+    choice = compared.findChild(QComboBox)
+    qtbot.keyClick(choice, Qt.Key.Key_Down)
+    qtbot.waitUntil(lambda: compared._model.comparison.reference == 1, timeout=20_000)
+    assert row_of(compared, "head").distance_m == pytest.approx(ASIDE_M, abs=1e-4)
+
+
+def test_it_follows_the_sensor(compared, qtbot):
+    sensor = VirtualSensor(position_m=(1.5, 0.0, 1.0))
+    compared._context.edits.place_sensor(sensor)
+    qtbot.waitUntil(lambda: compared._model.comparison.sensor == sensor, timeout=20_000)
+
+
+def test_each_mesh_is_drawn_in_its_own_colour(compared, qtbot):
+    def tinted(picture) -> tuple[int, int]:
+        image = picture.grab().toImage()
+        colours = [
+            image.pixelColor(x, y)
+            for x in range(0, image.width(), 4)
+            for y in range(30, image.height(), 4)
+        ]
+        blue = sum(c.blue() - c.red() > 40 for c in colours)
+        orange = sum(c.red() - c.blue() > 40 for c in colours)
+        return blue, orange
+
+    first, second = (tinted(picture) for picture in compared.findChildren(ComparedPicture))
+    assert first[0] > 100
+    assert first[1] == 0
+    assert second[0] == 0
+    assert second[1] > 100
+
+
+def test_the_figure_is_written(compared, qtbot, tmp_path, monkeypatch):
+    path = tmp_path / "both.svg"
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *a, **k: (str(path), ""))
+    qtbot.mouseClick(compared.findChild(QToolButton), Qt.MouseButton.LeftButton)
+    assert "<svg" in path.read_text()[:600]
+
+
+def test_another_recording_closes_it(compared, empty_window, meshes, qtbot):
+    with qtbot.waitSignal(compared.closed, timeout=20_000):
+        empty_window.open_paths([meshes[1]])
+    assert empty_window.dialogs._comparison is None
+
+
+def test_what_cannot_be_compared_is_explained(empty_window, small_recording, meshes, qtbot):
+    with qtbot.waitSignal(empty_window.context.document.opened, timeout=20_000):
+        empty_window.open_paths([small_recording])
+    qtbot.waitUntil(lambda: empty_window.settled, timeout=20_000)
+    empty_window.compare_with_mesh(small_recording / "mesh.npz")  # a ball has no joints
+    window = empty_window.findChild(ComparisonWindow)
+    qtbot.waitUntil(lambda: bool(window._model.problem), timeout=20_000)
+    assert "joints" in window._notes.text()
+    assert window._notes.objectName() == "warning"
+
+
+def test_names(tmp_path):
+    assert name_of(Path("a/walk.sd2/mesh.zarr")) == "walk.sd2"
+    assert name_of(Path("a/vibe_output.pkl")) == "vibe_output.pkl"
+    assert mesh_of(tmp_path / "walk.zarr" / "zarr.json") == tmp_path / "walk.zarr"
+    assert mesh_of(tmp_path / "frames" / "f_01.obj") == tmp_path / "frames" / "f_01.obj"
+    (tmp_path / "frames").mkdir()
+    assert mesh_of(tmp_path / "frames" / "f_01.obj") == tmp_path / "frames"
+    assert joint_words("hand.R") == "Right hand"
+    assert joint_words("pelvis") == "Pelvis"
+
+
+def test_the_mesh_of_another_recording(empty_window, meshes, tmp_path, qtbot):
+    other = Recording.create(tmp_path / "other.sd2", mesh=meshes[1])
+    with qtbot.waitSignal(empty_window.context.document.opened, timeout=20_000):
+        empty_window.open_paths([meshes[0]])
+    qtbot.waitUntil(lambda: empty_window.settled, timeout=20_000)
+    empty_window.compare_with_mesh(other.folder)
+    model = empty_window.findChild(ComparisonWindow)._model
+    qtbot.waitUntil(lambda: model.comparison is not None, timeout=20_000)
+    assert model.labels == ("own.npz", "other.sd2")

@@ -1,0 +1,68 @@
+"""Stages for the tests of the scene view."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from PySide6.QtGui import QGuiApplication
+from scene_stage import Document, Placements, Stage, Synthesis, two_plates
+
+from sd2app.session.display import DisplayModel
+from sd2app.session.playback import PlaybackModel
+from sd2app.session.sensor import SensorModel
+
+SIZE = (600, 450)
+
+
+@pytest.fixture
+def make_stage(qtbot: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str], Stage]]:
+    """Build a stage with one of the two backends."""
+    made: list[Stage] = []
+
+    def make(backend: str) -> Stage:
+        from sd2app.scene import SceneView
+
+        monkeypatch.setenv("SD2_SCENE", backend)
+        document, synthesis, placements = Document(), Synthesis(), Placements()
+        playback, sensor, display = PlaybackModel(), SensorModel(), DisplayModel()
+        log: list[str] = []
+
+        def drag(position: tuple[float, float, float]) -> None:
+            log.append("drag")
+            sensor.set_sensor(replace(sensor.sensor, position_m=position))
+
+        view = SceneView(
+            document,
+            playback,
+            sensor,
+            display,
+            synthesis,
+            placements,
+            begin_drag=lambda: log.append("begin"),
+            drag=drag,
+            end_drag=lambda: log.append("end"),
+        )
+        qtbot.addWidget(view)
+        view.resize(*SIZE)
+        view.show()
+        QGuiApplication.processEvents()
+        models = (document, playback, sensor, display, synthesis, placements)
+        made.append(Stage(view, *models, log))
+        return made[-1]
+
+    yield make
+    for stage in made:
+        stage.view.close()
+
+
+@pytest.fixture
+def stage(make_stage: Callable[[str], Stage]) -> Stage:
+    """A stage that draws off-screen, with two plates seen from the camera."""
+    made = make_stage("image")
+    made.open(two_plates())
+    made.view.set_view("camera")
+    made.view.grab()
+    return made

@@ -1,0 +1,138 @@
+"""A scene view over small stand-ins for the models that compute."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from PySide6.QtCore import QObject, QPoint, Signal
+from PySide6.QtGui import QColor
+
+from sd2app.sensor.placements import Planned
+from sd2app.session.display import DisplayModel
+from sd2app.session.playback import PlaybackModel
+from sd2app.session.sensor import SensorModel
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.placements.body_extent import Sight
+from sd2core.placements.placements import Place
+from sd2core.sensor import PAPER_RADAR
+from sd2core.timebase import Timebase
+
+
+class Document(QObject):
+    """A recording with a mesh, or none."""
+
+    opened = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.mesh: MeshSequence | None = None
+
+
+class Synthesis(QObject):
+    """Scattering as the test wants it."""
+
+    frame_changed = Signal()
+    v_max_mps = 2.0
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.frame: Any = None
+        self.asked = 0
+
+    def __getattribute__(self, name: str) -> Any:
+        if name == "frame":
+            super().__setattr__("asked", super().__getattribute__("asked") + 1)
+        return super().__getattribute__(name)
+
+
+class Placements(QObject):
+    """Planned places as the test wants them, and which was picked."""
+
+    changed = Signal()
+    radar = PAPER_RADAR
+    shown = True
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.planned = Planned()
+        self.picked: list[int] = []
+
+    def use(self, number: int) -> None:
+        self.picked.append(number)
+
+
+@dataclass
+class Stage:
+    """The view with everything it follows."""
+
+    view: Any
+    document: Document
+    playback: PlaybackModel
+    sensor: SensorModel
+    display: DisplayModel
+    synthesis: Synthesis
+    placements: Placements
+    log: list[str]
+
+    def open(self, mesh: MeshSequence | None) -> None:
+        """Show another recording."""
+        self.document.mesh = mesh
+        if mesh is not None:
+            self.playback.set_timebase(mesh.timebase)
+        self.document.opened.emit()
+
+    def scatter(self, velocity_mps: Any, visible: Any) -> None:
+        """Hand the view other velocities and visibility."""
+        self.synthesis.frame = SimpleNamespace(
+            velocity_mps=np.asarray(velocity_mps, np.float32),
+            visible=np.asarray(visible, bool),
+        )
+        self.synthesis.frame_changed.emit()
+
+    def plan(self, places: tuple[Place, ...], beyond: tuple[bool, ...] | None = None) -> None:
+        """Plan places around (0, 0, 2)."""
+        sensors = tuple(place.sensor((0.0, 0.0, 2.0)) for place in places)
+        sight = None
+        if beyond is not None:
+            nothing = np.zeros(len(places))
+            sight = Sight(np.array(beyond), nothing, nothing)
+        self.placements.planned = Planned(places, sensors, sight)
+        self.placements.changed.emit()
+
+    def marker_middles_m(self) -> list[tuple[float, float, float]]:
+        """Inside every marker, away from its edges."""
+        return [
+            tuple(np.add(sensor.position_m, np.multiply(0.03, sensor.boresight)).tolist())
+            for sensor in self.placements.planned.sensors
+        ]
+
+    def pixel_of(self, point_m: tuple[float, float, float]) -> QPoint:
+        """Where in the view a point is."""
+        size = (self.view.width(), self.view.height())
+        x, y, _ = self.view.scene.pose.project(point_m, size)[0]
+        return QPoint(round(x), round(y))
+
+    def colour_at(self, point_m: tuple[float, float, float]) -> QColor:
+        """Colour of the picture where a point is."""
+        picture = self.view.grab().toImage()
+        return picture.pixelColor(self.pixel_of(point_m))
+
+
+def two_plates(frames: int = 1) -> MeshSequence:
+    """A left and a right square 2 m ahead, facing the camera; frame k is k/10 m nearer."""
+    square = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * 0.25
+    left = np.column_stack([np.add(square, (-0.4, 0.0)), np.full(4, 2.0)])
+    vertices = np.concatenate([left, np.add(left, (0.8, 0.0, 0.0))])
+    faces = np.array([(0, 1, 2), (0, 2, 3)])
+    steps = np.arange(frames)[:, None, None] * (0.0, 0.0, -0.1)
+    return MeshSequence(
+        (vertices + steps).astype(np.float32),
+        np.concatenate([faces, faces + 4])[:, ::-1],
+        Timebase.regular(frames, 10.0),
+    )
+
+
+LEFT, RIGHT = (-0.4, 0.0, 2.0), (0.4, 0.0, 2.0)

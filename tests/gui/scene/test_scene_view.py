@@ -1,0 +1,571 @@
+"""The 3D view with the off-screen backend: colours, gestures, models."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
+from PySide6.QtGui import QColor, QGuiApplication, QImage, QWheelEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QLabel
+from scene_stage import LEFT, RIGHT, Stage, two_plates
+
+from sd2app.scene import backend_choice as choose
+from sd2app.scene import offscreen_backend as image_backend
+from sd2app.scene.colours import SceneColours
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.placements.placements import Place, PlacementCloud
+from sd2core.sensor import VirtualSensor
+from sd2core.timebase import Timebase
+
+ALL = np.ones(8, bool)
+HALF = np.arange(8) < 4
+
+
+def as_array(picture: QImage) -> np.ndarray:
+    picture = picture.convertToFormat(QImage.Format.Format_RGB888)
+    rows = np.frombuffer(picture.constBits(), np.uint8)
+    rows = rows.reshape(picture.height(), picture.bytesPerLine())
+    return rows[:, : 3 * picture.width()].reshape(picture.height(), picture.width(), 3).astype(int)
+
+
+def greyness(colour: QColor) -> int:
+    return max(colour.red(), colour.green(), colour.blue()) - min(
+        colour.red(), colour.green(), colour.blue()
+    )
+
+
+def drag(stage: Stage, start: QPoint, *stops: QPoint, modifiers: Any = None) -> None:
+    held = modifiers or Qt.KeyboardModifier.NoModifier
+    widget = stage.view.childAt(start)
+    QTest.mousePress(widget, Qt.MouseButton.LeftButton, held, start)
+    for stop in stops:
+        QTest.mouseMove(widget, stop)
+    QTest.mouseRelease(widget, Qt.MouseButton.LeftButton, held, stops[-1])
+
+
+# Colours
+
+
+def test_an_approaching_plate_is_red_and_a_receding_one_blue(stage: Stage) -> None:
+    stage.scatter(np.where(HALF, 1.5, -1.5), ALL)
+    left, right = stage.colour_at(LEFT), stage.colour_at(RIGHT)
+    assert left.red() > left.blue() + 60
+    assert right.blue() > right.red() + 60
+
+
+def test_hidden_vertices_are_grey(stage: Stage) -> None:
+    stage.scatter(np.full(8, 1.5), HALF)
+    assert greyness(stage.colour_at(LEFT)) > 60
+    assert greyness(stage.colour_at(RIGHT)) < 25
+
+
+def test_a_mesh_of_unknown_velocity_is_plain(stage: Stage) -> None:
+    assert greyness(stage.colour_at(LEFT)) < 25
+
+
+def test_range_colours_follow_the_distance_to_the_sensor(stage: Stage) -> None:
+    stage.display.set_mesh_colour("range")
+    stage.sensor.set_sensor(VirtualSensor((-2.0, 0.0, 2.0)))
+    near, far = stage.colour_at(LEFT), stage.colour_at(RIGHT)
+    assert near.green() > far.green() + 40
+    low, high = stage.view.scene.range_limits_m
+    assert low <= 1.35
+    assert high >= 2.65
+    assert high - low < 2.2
+
+
+def test_visibility_is_the_accent_or_grey(stage: Stage) -> None:
+    stage.display.set_mesh_colour("visibility")
+    stage.scatter(np.zeros(8), HALF)
+    assert greyness(stage.colour_at(LEFT)) > 60
+    assert greyness(stage.colour_at(RIGHT)) < 25
+
+
+def test_dots_leave_gaps_that_the_surface_fills(stage: Stage) -> None:
+    ground = QColor(stage.view.scene.colours.background)
+    assert stage.colour_at(LEFT) != ground
+    stage.display.set_as_dots(True)
+    assert stage.colour_at(LEFT) == ground
+    assert stage.colour_at((-0.65, -0.25, 2.0)) != ground
+    stage.display.set_as_dots(False)
+    assert stage.colour_at(LEFT) != ground
+
+
+def test_a_point_cloud_is_drawn_as_dots(stage: Stage) -> None:
+    plates = two_plates()
+    stage.open(MeshSequence(plates.vertices, None, plates.timebase))
+    stage.view.set_view("camera")
+    ground = QColor(stage.view.scene.colours.background)
+    assert stage.colour_at(LEFT) == ground
+    assert stage.colour_at((-0.65, -0.25, 2.0)) != ground
+
+
+def test_both_themes_have_their_ground(stage: Stage) -> None:
+    for dark in (True, False):
+        stage.display.set_dark(dark)
+        ground = stage.view.grab().toImage().pixelColor(300, 20)
+        expected = SceneColours.of(stage.display.palette, dark).background
+        assert ground.name() == expected
+
+
+@pytest.mark.parametrize(("mode", "drawn"), [("velocity", True), ("range", True), ("plain", False)])
+def test_a_colour_bar_says_what_colours_mean(stage: Stage, mode: str, drawn: bool) -> None:
+    stage.display.set_mesh_colour(mode)
+    stage.scatter(np.zeros(8), ALL)
+    corner = as_array(stage.view.grab().toImage())[20:260, -40:-10]
+    colours = np.unique(corner.reshape(-1, 3), axis=0)
+    saturated = np.ptp(colours, axis=1) > 60
+    assert (saturated.sum() > 60) == drawn
+
+
+# Time and models
+
+
+def test_another_frame_moves_the_vertices(stage: Stage) -> None:
+    stage.open(two_plates(5))
+    stage.view.grab()
+    stage.playback.seek(0.4)
+    stage.view.grab()
+    np.testing.assert_allclose(stage.view.scene.vertices_m[:, 2], 1.6, atol=1e-6)
+
+
+def test_a_turn_of_the_event_loop_renders_once(stage: Stage) -> None:
+    stage.open(two_plates(5))
+    QGuiApplication.processEvents()
+    backend = stage.view.findChild(image_backend.ImageBackend)
+    before = backend.renderings
+    stage.playback.seek(0.2)
+    stage.sensor.set_sensor(VirtualSensor((0.5, 0.0, 0.0)))
+    stage.display.set_dark(True)
+    QGuiApplication.processEvents()
+    assert backend.renderings == before + 1
+
+
+def test_a_hidden_view_neither_renders_nor_computes(stage: Stage) -> None:
+    stage.open(two_plates(5))
+    stage.view.grab()
+    backend = stage.view.findChild(image_backend.ImageBackend)
+    stage.view.hide()
+    before = (backend.renderings, stage.synthesis.asked)
+    for time_s in (0.1, 0.2, 0.3):
+        stage.playback.seek(time_s)
+        QGuiApplication.processEvents()
+    assert (backend.renderings, stage.synthesis.asked) == before
+
+
+def test_the_picture_becomes_smooth_at_rest(stage: Stage, qtbot: Any) -> None:
+    stage.scatter(np.full(8, 1.5), ALL)
+    stage.view.set_view("overview")
+    QGuiApplication.processEvents()
+    backend = stage.view.findChild(image_backend.ImageBackend)
+    before = backend.renderings
+    qtbot.waitUntil(lambda: backend.renderings == before + 1, timeout=5000)
+    coarse = stage.view.grab().toImage()
+    assert coarse.size() == stage.view.size()
+
+
+def test_a_recording_without_a_mesh_shows_the_sensor_and_says_so(stage: Stage) -> None:
+    stage.open(None)
+    assert "mesh" in stage.view.overlay.message
+    stage.view.set_view("overview")
+    stage.view.grab()
+    sensor = stage.colour_at(stage.sensor.sensor.position_m)
+    assert greyness(sensor) > 60
+
+
+def test_wrongly_sized_scattering_of_another_mesh_is_not_used(stage: Stage) -> None:
+    stage.scatter(np.full(3, 1.5), np.ones(3, bool))
+    assert greyness(stage.colour_at(LEFT)) < 25
+
+
+# The picture and the projection agree
+
+
+@pytest.mark.parametrize("preset", ["overview", "camera", "side", "top"])
+def test_vtk_draws_where_the_projection_says(stage: Stage, preset: str) -> None:
+    corner = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], np.float32) * 0.04
+    faces = np.array([(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)])
+    where = np.array([0.3, 0.2, 1.7], np.float32)
+    vertices = np.concatenate([corner - corner.mean(axis=0) + where, [(-1, -1, 1), (1, 1, 3)]])
+    mesh = MeshSequence(vertices[None].astype(np.float32), faces, Timebase([0.0]))
+    stage.sensor.set_sensor(VirtualSensor((-2.0, 0.0, 0.0)))
+    stage.open(mesh)
+    stage.display.set_mesh_colour("visibility")
+    stage.scatter(np.zeros(6), np.ones(6, bool))
+    stage.view.scene.ground.show(False)
+    stage.view.scene.body.shadow.SetPosition(0.0, 9.0, 0.0)
+    stage.view.set_view(preset)
+    picture = as_array(stage.view.grab().toImage())
+    expected = stage.view.scene.pose.project(where, (stage.view.width(), stage.view.height()))[0]
+    x0, y0 = round(expected[0]), round(expected[1])
+    patch = picture[y0 - 14 : y0 + 15, x0 - 14 : x0 + 15]
+    rows, columns = np.nonzero(patch[..., 2] - patch[..., 0] > 50)
+    assert len(rows) > 3
+    assert abs(columns.mean() - 14 + 0.5 + x0 - expected[0]) < 2.0
+    assert abs(rows.mean() - 14 + 0.5 + y0 - expected[1]) < 2.0
+
+
+# Gestures with real events
+
+
+def test_the_sensor_follows_the_mouse_to_the_pixel(stage: Stage) -> None:
+    stage.view.set_view("overview")
+    stage.view.grab()
+    start = stage.pixel_of(stage.sensor.sensor.position_m)
+    for offset in (QPoint(60, 30), QPoint(-25, 90)):
+        start = stage.pixel_of(stage.sensor.sensor.position_m)
+        drag(stage, start, start + offset / 2, start + offset)
+        reached = stage.pixel_of(stage.sensor.sensor.position_m)
+        assert (reached - (start + offset)).manhattanLength() <= 1
+    assert stage.log == ["begin", "drag", "drag", "end"] * 2
+    picture = stage.view.grab().toImage()
+    assert greyness(picture.pixelColor(reached)) > 60  # the sphere is drawn there
+
+
+def test_turning_the_view_leaves_the_sensor_alone(stage: Stage) -> None:
+    stage.view.set_view("overview")
+    stage.view.grab()
+    pose = stage.view.scene.pose
+    drag(stage, QPoint(300, 420), QPoint(340, 400))
+    assert stage.view.scene.pose != pose
+    assert stage.sensor.sensor == VirtualSensor()
+    assert stage.log == []
+
+
+def test_a_double_click_resets_the_view(stage: Stage) -> None:
+    stage.view.set_view("overview")
+    stage.view.grab()
+    pose = stage.view.scene.pose
+    drag(stage, QPoint(300, 420), QPoint(340, 400))
+    QTest.mouseDClick(stage.view.childAt(300, 420), Qt.MouseButton.LeftButton, pos=QPoint(300, 420))
+    stage.view.grab()
+    assert stage.view.scene.pose == pose
+
+
+def test_the_wheel_zooms(stage: Stage) -> None:
+    distance = stage.view.scene.pose.distance_m
+    where = QPointF(250, 200)
+    turn = QWheelEvent(
+        where,
+        where,
+        QPoint(),
+        QPoint(0, 120),
+        Qt.MouseButton.NoButton,
+        Qt.KeyboardModifier.NoModifier,
+        Qt.ScrollPhase.NoScrollPhase,
+        False,
+    )
+    QGuiApplication.sendEvent(stage.view.childAt(250, 200), turn)
+    assert stage.view.scene.pose.distance_m < distance
+
+
+def test_the_cursor_tells_what_can_be_held(stage: Stage) -> None:
+    stage.view.set_view("overview")
+    stage.view.grab()
+    here = stage.pixel_of(stage.sensor.sensor.position_m)
+    widget = stage.view.childAt(here)
+    QTest.mouseMove(widget, here)
+    assert widget.cursor().shape() == Qt.CursorShape.OpenHandCursor
+    QTest.mousePress(widget, Qt.MouseButton.LeftButton, pos=here)
+    assert widget.cursor().shape() == Qt.CursorShape.ClosedHandCursor
+    QTest.mouseRelease(widget, Qt.MouseButton.LeftButton, pos=here)
+    QTest.mouseMove(widget, QPoint(300, 430))
+    assert widget.cursor().shape() == Qt.CursorShape.ArrowCursor
+    QGuiApplication.sendEvent(widget, QEvent(QEvent.Type.Leave))
+    assert not stage.view.navigator.hovers_sensor
+
+
+def test_the_view_keeps_no_keys_for_itself(stage: Stage) -> None:
+    assert stage.view.focusPolicy() == Qt.FocusPolicy.NoFocus
+    widget = stage.view.childAt(10, 10)
+    assert widget.focusPolicy() == Qt.FocusPolicy.NoFocus
+    QTest.mouseClick(widget, Qt.MouseButton.LeftButton, pos=QPoint(300, 430))
+    assert not widget.hasFocus()
+
+
+def test_resizing_keeps_a_ready_made_view_framed(stage: Stage) -> None:
+    stage.view.set_view("overview")
+    stage.view.grab()
+    stage.view.resize(320, 400)
+    QGuiApplication.processEvents()
+    stage.view.grab()
+    points = stage.view.scene.extent.points_m
+    x, y, _ = stage.view.scene.pose.project(points, (320, 400)).T
+    assert ((x > 0) & (x < 320) & (y > 0) & (y < 400)).all()
+
+
+def test_the_view_from_the_sensor_goes_with_it(stage: Stage) -> None:
+    stage.view.set_view("sensor")
+    stage.sensor.set_sensor(VirtualSensor((0.3, -0.2, -0.5), azimuth_deg=20.0))
+    stage.view.grab()
+    np.testing.assert_allclose(stage.view.scene.pose.position, (0.3, -0.2, -0.5), atol=1e-9)
+    assert stage.view.scene.pose.azimuth_deg == 20.0
+
+
+def test_dragging_the_sensor_does_not_move_the_view(stage: Stage) -> None:
+    stage.view.set_view("overview")
+    stage.view.grab()
+    pose = stage.view.scene.pose
+    stage.sensor.set_sensor(VirtualSensor((1.0, 0.0, -3.0)))
+    stage.view.grab()
+    assert stage.view.scene.pose == pose
+
+
+def test_hiding_the_view_ends_a_drag(stage: Stage) -> None:
+    stage.view.set_view("overview")
+    stage.view.grab()
+    here = stage.pixel_of(stage.sensor.sensor.position_m)
+    QTest.mousePress(stage.view.childAt(here), Qt.MouseButton.LeftButton, pos=here)
+    stage.view.hide()
+    assert stage.log == ["begin", "end"]
+
+
+@pytest.mark.parametrize("mode", ["velocity", "range"])
+@pytest.mark.parametrize(
+    ("vertices", "sensor"),
+    [
+        ([(0, 0, 2)], (0, 0, 0)),  # a single point
+        ([(0, 0, 2)] * 3, (0, 0, 2)),  # no extent, and the sensor is on it
+        ([(1e6, 0, 2), (1e6, 1, 2), (1e6 + 1, 0, 2)], (0, 0, 0)),
+        ([(0, 0, 0), (1, 0, 0), (0, 1, 0)], (1e6, -1e6, 1e6)),
+        ([(0, 0, -2), (1, 0, -2), (0, 1, -2)], (0, 0, 0)),  # behind the camera
+    ],
+)
+@pytest.mark.parametrize("preset", ["overview", "camera", "sensor", "side", "top"])
+def test_odd_places_are_drawn_without_complaint(
+    stage: Stage, mode: str, vertices: list[Any], sensor: Any, preset: str
+) -> None:
+    points = np.asarray(vertices, np.float64)
+    faces = np.array([(0, 1, 2)]) if len(points) == 3 else None
+    stage.display.set_mesh_colour(mode)
+    stage.sensor.set_sensor(VirtualSensor(sensor))
+    stage.open(MeshSequence(points[None], faces, Timebase([0.0])))
+    stage.scatter(np.zeros(len(points)), np.ones(len(points), bool))
+    stage.view.set_view(preset)
+    picture = as_array(stage.view.grab().toImage())
+    ground = QColor(stage.view.scene.colours.background)
+    assert (picture[2, 2] == (ground.red(), ground.green(), ground.blue())).all()
+    assert np.isfinite(stage.view.scene.pose.position).all()
+
+
+def test_a_mesh_that_cannot_be_read_any_more_is_said(stage: Stage) -> None:
+    class Gone:
+        shape = (3, 8, 3)
+        dtype = np.float32
+
+        def __getitem__(self, key: slice) -> np.ndarray:
+            if stage.playback.time_s > 0.0:
+                raise OSError("the disk was taken away")
+            return np.asarray(two_plates(3).vertices)[key]
+
+    stage.open(MeshSequence(Gone(), two_plates().faces, Timebase.regular(3, 10.0)))
+    stage.view.grab()
+    stage.playback.seek(0.1)
+    stage.view.grab()
+    assert "taken away" in stage.view.overlay.message
+
+
+def test_when_the_window_cannot_be_drawn_into_the_picture_is_painted(
+    make_stage: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(choose, "_has_no_window", lambda: False)
+    monkeypatch.setitem(sys.modules, "pyvistaqt", None)
+    assert make_stage("gl").view.backend_name == "image"
+
+
+def test_an_unknown_view_is_an_error(stage: Stage) -> None:
+    with pytest.raises(ValueError, match="behind"):
+        stage.view.set_view("behind")
+
+
+# Without OpenGL, and the end
+
+
+@pytest.mark.parametrize("cause", ["library", "driver"])
+def test_without_opengl_the_view_says_what_to_install(
+    make_stage: Any, monkeypatch: pytest.MonkeyPatch, cause: str
+) -> None:
+    if cause == "library":
+        monkeypatch.setattr(image_backend, "missing_library", lambda _: "libEGL.so.1")
+    else:
+        monkeypatch.setattr(image_backend, "_answers", lambda _: False)
+    made = make_stage("image")
+    assert made.view.backend_name is None
+    text = made.view.findChild(QLabel).text()
+    assert "OpenGL" in text
+    assert "apt-get install" in text
+    made.open(two_plates())
+    made.view.set_view("top")
+    made.display.set_dark(True)
+    made.view.request_render()
+    made.view.grab()
+
+
+def test_a_closed_view_stays_quiet(stage: Stage) -> None:
+    stage.view.close()
+    stage.playback.seek(0.0)
+    stage.sensor.set_sensor(VirtualSensor((1.0, 0.0, 0.0)))
+    stage.display.set_dark(True)
+    stage.open(two_plates(3))
+    stage.view.set_view("top")
+    stage.view.grab()
+
+
+_LEFT_OPEN = """
+from PySide6.QtWidgets import QApplication
+from sd2app.scene.offscreen_backend import ImageBackend
+from sd2app.scene.scene import Scene
+application = QApplication([])
+backend = ImageBackend()
+scene = Scene(backend.renderer)
+backend.start(scene.prepare)
+backend.show()
+application.processEvents()
+assert backend.renderings == 1
+print("drawn")
+"""
+
+
+def test_a_view_that_nobody_closed_does_not_crash_at_exit() -> None:
+    run = subprocess.run(
+        [sys.executable, "-c", _LEFT_OPEN], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.strip() == "drawn"
+    assert run.stderr == ""
+
+
+_WITHOUT_DRIVER = """
+from PySide6.QtWidgets import QApplication
+from sd2app.scene.backend import NoOpenGL
+from sd2app.scene.offscreen_backend import ImageBackend
+application = QApplication([])
+try:
+    ImageBackend()
+except NoOpenGL as problem:
+    print(problem)
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="libglvnd is on Linux")
+def test_a_machine_without_a_driver_gets_a_sentence_and_no_crash(tmp_path: Path) -> None:
+    run = subprocess.run(
+        [sys.executable, "-c", _WITHOUT_DRIVER],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+        env={
+            **os.environ,
+            "QT_QPA_PLATFORM": "offscreen",
+            "__EGL_VENDOR_LIBRARY_DIRS": str(tmp_path),
+        },
+    )
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.strip() == choose.GL_BROKEN
+    assert run.stderr == ""
+
+
+def test_importing_the_view_loads_neither_pyvista_nor_matplotlib() -> None:
+    code = (
+        "import sys; import sd2app.scene, sd2app.scene.offscreen_backend;"
+        "print([m for m in ('pyvista', 'pyvistaqt', 'matplotlib', 'scipy') if m in sys.modules])"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=True
+    )
+    assert run.stdout.strip() == "[]"
+
+
+# Which backend
+
+
+def test_the_wish_decides_unless_there_is_no_window(
+    qapp: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(choose, "_has_no_window", lambda: False)
+    for wish in ("gl", "image"):
+        monkeypatch.setenv("SD2_SCENE", wish)
+        assert choose.chosen_backend() == wish
+    monkeypatch.setattr(choose, "_has_no_window", lambda: True)
+    monkeypatch.setenv("SD2_SCENE", "gl")
+    assert choose.chosen_backend() == "image"
+
+
+@pytest.mark.parametrize(
+    ("gpu", "renderer", "expected"),
+    [
+        (False, "NVIDIA H200", "image"),
+        (True, "llvmpipe (LLVM 15.0.6, 256 bits)", "image"),
+        (True, None, "image"),
+        (True, "NVIDIA GeForce RTX 4060/PCIe/SSE2", "gl"),
+        (True, "Mesa Intel(R) UHD Graphics 620 (KBL GT2)", "gl"),
+        (True, "GDI Generic", "image"),
+    ],
+)
+def test_a_gpu_that_draws_gets_the_window(
+    monkeypatch: pytest.MonkeyPatch, gpu: bool, renderer: str | None, expected: str
+) -> None:
+    monkeypatch.delenv("SD2_SCENE", raising=False)
+    monkeypatch.setattr(choose, "_has_no_window", lambda: False)
+    monkeypatch.setattr(choose, "_has_gpu_device", lambda: gpu)
+    monkeypatch.setattr(choose, "opengl_renderer", lambda: renderer)
+    assert choose.chosen_backend() == expected
+
+
+# Planned places
+
+
+def test_planned_places_are_drawn_in_the_colour_of_their_range(stage: Stage) -> None:
+    stage.view.set_view("side")
+    stage.plan((Place(0.9), Place(1.9, 0.0, 30.0)))
+    stage.view.grab()
+    near, far = (stage.colour_at(point_m) for point_m in stage.marker_middles_m())
+    # Bright yellow and dark violet, both shaded.
+    assert near.green() > near.blue() + 60
+    assert far.blue() > far.green() + 10
+    stage.placements.shown = False
+    stage.placements.changed.emit()
+    ground = stage.view.scene.colours.background
+    assert greyness(stage.colour_at(stage.marker_middles_m()[1])) <= greyness(QColor(ground)) + 6
+
+
+def test_a_place_beyond_the_radar_has_the_colour_of_a_warning(stage: Stage) -> None:
+    stage.view.set_view("side")
+    stage.plan((Place(0.9), Place(1.9, 0.0, 30.0)), (False, True))
+    stage.view.grab()
+    colour = stage.colour_at(stage.marker_middles_m()[1])
+    assert colour.red() > colour.blue() + 40
+
+
+def test_a_click_on_a_place_picks_it_and_its_words_are_shown(stage: Stage) -> None:
+    stage.view.set_view("side")
+    stage.plan((Place(0.9), Place(1.9, 0.0, 30.0)))
+    stage.view.grab()
+    place = stage.pixel_of(tuple(stage.view.scene.markers.positions_m[1]))
+    widget = stage.view.childAt(place)
+    QTest.mouseMove(widget, place + QPoint(60, 60))
+    before = as_array(stage.view.grab().toImage())
+    QTest.mouseMove(widget, place)
+    assert stage.view.navigator.marker == 1
+    assert widget.cursor().shape() == Qt.CursorShape.PointingHandCursor
+    assert (as_array(stage.view.grab().toImage()) != before).any()
+    QTest.mouseClick(widget, Qt.MouseButton.LeftButton, pos=place)
+    assert stage.placements.picked == [1]
+    assert stage.log == []
+
+
+def test_a_thousand_places_are_one_actor(stage: Stage) -> None:
+    renderer = stage.view.scene.renderer
+    count = renderer.GetActors().GetNumberOfItems()
+    stage.plan(PlacementCloud(1000, (1.0, 4.0), (-180.0, 180.0), (-90.0, 90.0)).places())
+    stage.view.grab()
+    assert len(stage.view.scene.markers.positions_m) == 1000
+    assert renderer.GetActors().GetNumberOfItems() == count

@@ -1,0 +1,116 @@
+"""A recording with frames in which there is no person."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint
+from PySide6.QtWidgets import QLabel
+
+from sd2app.maps.heatmap import HeatmapView
+from sd2app.maps.spectrum import SpectrumView
+from sd2app.playback.timeline import Overview
+from sd2app.shell.status_bar import StatusLine
+from sd2app.video.view import VideoView
+from sd2core.io.mesh import load_mesh, save_mesh
+
+GONE = (25, 40)
+
+
+@pytest.fixture
+def window(empty_window, recording_copy, qtbot):
+    """The window on the ball, which is not there for half a second."""
+    ball = load_mesh(recording_copy / "mesh.npz")
+    present = np.ones(ball.frame_count, bool)
+    present[slice(*GONE)] = False
+    save_mesh(replace(ball, present=present), recording_copy / "mesh.npz")
+    with qtbot.waitSignal(empty_window.context.document.opened, timeout=20_000):
+        empty_window.open_paths([recording_copy])
+    qtbot.waitUntil(lambda: empty_window.settled, timeout=20_000)
+    qtbot.waitUntil(lambda: empty_window.context.synthesis.complete, timeout=20_000)
+    return empty_window
+
+
+def show(window, qtbot, frame):
+    window.context.playback.seek_frame(frame)
+    qtbot.waitUntil(lambda: window.settled, timeout=20_000)
+
+
+def colours(widget, area=None):
+    """How many pixels there are of every colour."""
+    image = widget.grab(area) if area is not None else widget.grab()
+    image = image.toImage()
+    pixels = [image.pixel(x, y) for x in range(image.width()) for y in range(image.height())]
+    return set(pixels)
+
+
+def test_the_map_is_empty_there_and_says_so_under_the_pointer(window, qtbot):
+    view, real = window._tracks.synthetic, window._tracks.real
+    c = window.context
+    assert not c.synthetic.map.values[:, slice(*GONE)].any()
+    assert c.synthetic.map.values[:, : GONE[0]].any()
+    middle = QPoint(round(view.scale.x_of(32 / 30)), round(view.y_of(1.0)))
+    qtbot.mouseMove(view, middle)
+    assert c.pointer.reading.note == "no person"
+    line = window.findChild(StatusLine)
+    assert any("no person" in label.text() for label in line.findChildren(QLabel))
+    qtbot.mouseMove(view, QPoint(round(view.scale.x_of(10 / 30)), middle.y()))
+    assert c.pointer.reading.note == ""
+    assert real.isVisible()
+    assert "no person in 0.50 s" in view._status()
+
+
+def test_what_is_unknown_does_not_have_the_colour_of_nothing(window):
+    view = window.findChildren(HeatmapView)[0]
+    for dark in (False, True):
+        window.set_dark(dark)
+        assert_hatched(window, view)
+
+
+def assert_hatched(window, view):
+    nothing = view.grab().toImage().pixel(round(view.scale.x_of(0.25)), round(view.y_of(-1.8)))
+    for widget in (view, window.findChild(Overview)):
+        left, right = (round(widget.scale.x_of(frame / 30)) for frame in (26, 39))
+        gap = widget.grab().toImage()
+        row = round(0.8 * widget.height())
+        assert all(gap.pixel(x, row) != nothing for x in range(left, right))
+
+
+def lines_drawn(window):
+    """Pixels of the synthetic curve in the spectrum of the frame."""
+    view = window.findChild(SpectrumView)
+    blue, image = window.context.display.palette.synthetic, view.grab().toImage()
+    rows = range(56, image.height() - 44)  # between legend and axis
+    return sum(image.pixelColor(x, y).name() == blue for y in rows for x in range(48, view.width()))
+
+
+def test_nothing_shows_the_pose_that_was_held(window, qtbot):
+    video, c = window.findChild(VideoView), window.context
+    c.overlay.set_style(opacity=1.0)
+    show(window, qtbot, 20)
+    assert lines_drawn(window) > 10
+    assert window._actions["aim_sensor"].isEnabled()
+    assert len(colours(video)) > 20  # a shaded ball
+    assert window._scene.overlay.message == ""
+    show(window, qtbot, 30)
+    assert lines_drawn(window) == 0
+    assert len(colours(video)) < 10  # a grey picture
+    window._scene._prepare((400.0, 300.0), 1.0)
+    assert window._scene.overlay.message == "No person at this time"
+    assert c.synthesis.readout() is None
+    assert not window._actions["aim_sensor"].isEnabled()
+
+
+def test_another_place_has_the_same_gap(window, qtbot):
+    before = window.context.synthetic.map
+    window.context.sensor.set_sensor(
+        replace(window.context.sensor.sensor, position_m=(0.3, 0.0, 0.0))
+    )
+    qtbot.waitUntil(lambda: window.context.synthesis.complete, timeout=20_000)
+    after = window.context.synthetic.map
+    assert after is not before
+    assert not after.values[:, slice(*GONE)].any()
+    assert after.present is not None
+    assert not after.present[slice(*GONE)].any()

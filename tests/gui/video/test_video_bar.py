@@ -1,0 +1,61 @@
+"""The bar over the video, by mouse and keys."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtWidgets import QSlider, QToolButton
+
+from sd2app.video.bar import VideoBar
+
+
+def buttons(window):
+    bar = window.findChild(VideoBar)
+    return bar.findChild(QSlider), *bar.findChildren(QToolButton)
+
+
+def test_mesh_dots_and_opacity(window, qtbot):
+    slider, mesh, dots = buttons(window)
+    overlay = window.context.overlay
+    qtbot.mouseClick(mesh, Qt.MouseButton.LeftButton)
+    assert not overlay.style.shown
+    assert not slider.isEnabled()
+    qtbot.keyClick(window, Qt.Key.Key_M)
+    assert overlay.style.shown
+    assert mesh.isChecked()
+    qtbot.mouseClick(dots, Qt.MouseButton.LeftButton)
+    assert overlay.style.as_dots
+    qtbot.keyClick(window, Qt.Key.Key_M, Qt.KeyboardModifier.ShiftModifier)
+    assert not overlay.style.as_dots
+    before = overlay.style.opacity
+    qtbot.mouseClick(
+        slider, Qt.MouseButton.LeftButton, pos=QPoint(slider.width() - 3, slider.height() // 2)
+    )
+    assert overlay.style.opacity > before
+
+
+def test_the_video_shows_the_mesh_as_strongly_as_asked(window, qtbot):
+    from sd2app.video.view import VideoView
+
+    view = window.findChild(VideoView)
+    window.context.playback.seek_frame(0)
+    qtbot.waitUntil(lambda: window.context.video.shown_frame == 0)
+
+    def middle():
+        colour = view.grab().toImage().pixelColor(view.width() // 2, view.height() // 2)
+        return colour.red(), colour.green(), colour.blue()
+
+    overlay = window.context.overlay
+    overlay.set_style(shown=False)
+    red, green, blue = middle()
+    assert abs(red - 40) < 8
+    assert abs(blue - red) < 8
+    overlay.set_style(shown=True, opacity=1.0)
+    tinted = middle()
+    assert tinted[1] > green + 100  # the ball is at the centre, the tint is greenish
+    overlay.set_style(opacity=0.5)
+    assert green < middle()[1] < tinted[1]
+
+
+def test_without_a_mesh_there_is_nothing_to_choose(empty_window):
+    slider, mesh, dots = buttons(empty_window)
+    assert not any(widget.isEnabled() for widget in (slider, mesh, dots))
