@@ -28,8 +28,9 @@ if TYPE_CHECKING:
     from sd2core.io.radar import RadarCapture, load_capture
     from sd2core.io.video import VideoReader, open_video
     from sd2core.mesh.sequence import MeshSequence
+    from sd2core.radar_config import PAPER_RADAR, RadarConfig
     from sd2core.recording.recording import Recording, Span, open_recording
-    from sd2core.sensor import PAPER_RADAR, RadarConfig, VelocityAxis, VirtualSensor
+    from sd2core.sensor import VelocityAxis, VirtualSensor
     from sd2core.timebase import Timebase
 
 __all__ = [
@@ -59,12 +60,12 @@ __all__ = [
 ]
 
 _HOME = {
-    "PAPER_RADAR": "sensor",
+    "PAPER_RADAR": "radar_config",
     "PRESETS": "doppler",
     "DopplerMap": "doppler_map",
     "MeshSequence": "mesh.sequence",
     "RadarCapture": "io.radar",
-    "RadarConfig": "sensor",
+    "RadarConfig": "radar_config",
     "Recording": "recording.recording",
     "Sd2Error": "errors",
     "Span": "recording.recording",

@@ -9,8 +9,8 @@ import numpy as np
 from sd2core.io.mesh import save_mesh
 from sd2core.io.radar.infineon import write_capture
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.radar_config import PAPER_RADAR
 from sd2core.recording.recording import Recording, Span
-from sd2core.sensor import PAPER_RADAR
 from sd2core.timebase import Timebase
 
 RATE_HZ = 30.0

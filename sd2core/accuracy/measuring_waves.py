@@ -29,8 +29,9 @@ from sd2core.mesh.decimation import decimate
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import workers
 from sd2core.progress import Progress
+from sd2core.radar_config import PAPER_RADAR, RadarConfig
 from sd2core.scattering.facets import visible_facets
-from sd2core.sensor import PAPER_RADAR, RadarConfig, VirtualSensor
+from sd2core.sensor import VirtualSensor
 
 _FRAMES = 6
 _MOST_CUTS = 3

@@ -17,7 +17,8 @@ from sd2core.batch.plan import Export, Step, Synthesise
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import DISK_FULL
 from sd2core.progress import silent
-from sd2core.sensor import RadarConfig, VelocityAxis, VirtualSensor
+from sd2core.radar_config import RadarConfig
+from sd2core.sensor import VelocityAxis, VirtualSensor
 
 BEGUN = "begun"
 """Folder of what is under way; it is there only while a batch runs."""

@@ -17,8 +17,9 @@ if TYPE_CHECKING:
     from sd2core.placements.body_extent import Sight
     from sd2core.placements.cost import PlacementCost
     from sd2core.placements.placements import Placements
+    from sd2core.radar_config import RadarConfig
     from sd2core.recording.recording import Recording
-    from sd2core.sensor import RadarConfig, VirtualSensor
+    from sd2core.sensor import VirtualSensor
 
 _TOLERANCE = 0.02
 _LIMITS = (
@@ -164,7 +165,7 @@ def _spec(options: argparse.Namespace, recording: Recording | None) -> Placement
 
 def _radar(recording: Recording | None) -> RadarConfig:
     """Of the recording's capture, or the paper's."""
-    from sd2core.sensor import PAPER_RADAR
+    from sd2core.radar_config import PAPER_RADAR
 
     if recording is None or recording.radar is None or "radar" in recording.missing():
         return PAPER_RADAR

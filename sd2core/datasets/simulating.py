@@ -20,7 +20,8 @@ from sd2core.fmcw.simulation import simulate_radar
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mocap.recording_pairs import on_clock
 from sd2core.progress import Progress, silent
-from sd2core.sensor import PAPER_RADAR, RadarConfig, VelocityAxis, VirtualSensor
+from sd2core.radar_config import PAPER_RADAR, RadarConfig
+from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase
 
 CLUTTER: Clutter = "mean"

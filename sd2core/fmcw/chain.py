@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.io.radar.capture import RadarCapture
-from sd2core.sensor import RadarConfig
+from sd2core.radar_config import RadarConfig
 
 Clutter = Literal["none", "mean", "moving"]
 """none; mean: each frame's mean over its chirps; moving: that mean averaged over frames."""

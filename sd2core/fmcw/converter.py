@@ -15,7 +15,8 @@ from numpy.typing import DTypeLike, NDArray
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.options import SignalOptions
 from sd2core.io.radar.capture import RadarCapture
-from sd2core.sensor import RadarConfig, VirtualSensor
+from sd2core.radar_config import RadarConfig
+from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 from sd2core.version import __version__
 

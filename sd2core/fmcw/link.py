@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from sd2core.sensor import RadarConfig
+from sd2core.radar_config import RadarConfig
 
 
 @dataclass(frozen=True)

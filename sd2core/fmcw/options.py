@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.link import LinkBudget
-from sd2core.sensor import RadarConfig, Vector, VirtualSensor
+from sd2core.radar_config import RadarConfig
+from sd2core.sensor import Vector, VirtualSensor
 
 Model = Literal["nufft", "direct"]
 Motion = Literal["constant", "interpolated"]

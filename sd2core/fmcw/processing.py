@@ -27,7 +27,8 @@ from sd2core.fmcw.chain import Chain, Clutter, ProcessingOptions, Window
 from sd2core.io.radar.capture import RadarCapture
 from sd2core.mesh.presence import gaps_in_words, runs
 from sd2core.progress import Progress, silent
-from sd2core.sensor import RadarConfig, VelocityAxis
+from sd2core.radar_config import RadarConfig
+from sd2core.sensor import VelocityAxis
 from sd2core.version import __version__
 
 UNIT = "power (1 = full-scale sine)"

@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.triangle import mean_phasor
 from sd2core.mesh.sequence import MeshSequence, refuse_missing
+from sd2core.radar_config import RadarConfig
 from sd2core.scattering.facets import visible_facets
-from sd2core.sensor import RadarConfig, VirtualSensor
+from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 
 NEAREST_M = 0.05

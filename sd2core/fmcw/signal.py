@@ -25,11 +25,8 @@ from sd2core.io.radar.capture import RadarCapture
 from sd2core.mesh.presence import runs
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Progress, silent
-from sd2core.sensor import (
-    SPEED_OF_LIGHT_MPS,
-    RadarConfig,
-    VirtualSensor,
-)
+from sd2core.radar_config import SPEED_OF_LIGHT_MPS, RadarConfig
+from sd2core.sensor import VirtualSensor
 
 _CHUNK = 4096
 """Scatterers per matrix product: their phasors stay in the cache."""

@@ -23,7 +23,8 @@ from sd2core.mesh.presence import runs
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import worker_count, workers
 from sd2core.progress import Cancelled, Progress, silent
-from sd2core.sensor import RadarConfig, VirtualSensor
+from sd2core.radar_config import RadarConfig
+from sd2core.sensor import VirtualSensor
 
 _POLL_S = 0.03
 _QUEUED = 8

@@ -15,7 +15,8 @@ from sd2core.fmcw.processing import rebinning
 from sd2core.fmcw.wave import WaveScene
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import workers
-from sd2core.sensor import RadarConfig, VelocityAxis, VirtualSensor
+from sd2core.radar_config import RadarConfig
+from sd2core.sensor import VelocityAxis, VirtualSensor
 
 
 def frame_spectra(

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.fmcw.kernels import direct_sum, recurrent_sum
-from sd2core.sensor import SPEED_OF_LIGHT_MPS, RadarConfig
+from sd2core.radar_config import SPEED_OF_LIGHT_MPS, RadarConfig
 
 NUFFT_TOLERANCE = 1e-9
 """Relative to the norm of the amplitudes; 1e-6 would save a tenth of the time."""

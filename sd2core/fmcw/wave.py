@@ -13,7 +13,8 @@ from sd2core.fmcw.options import Antenna, Reflector, WaveOptions, paths
 from sd2core.fmcw.scene import NEAREST_M, FacetsSeen, MeshScene
 from sd2core.fmcw.sums import Echoes, direct, nufft
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.sensor import RadarConfig, VirtualSensor
+from sd2core.radar_config import RadarConfig
+from sd2core.sensor import VirtualSensor
 
 GoOn = Callable[[], None]
 """Called every few ten milliseconds; raises when the result is no longer wanted."""

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Progress, silent
-from sd2core.sensor import RadarConfig, Vector, VirtualSensor
+from sd2core.radar_config import RadarConfig
+from sd2core.sensor import Vector, VirtualSensor
 
 _SAMPLED_FRAMES = 100
 _SAMPLED_VERTICES = 200

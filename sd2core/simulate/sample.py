@@ -24,9 +24,10 @@ from sd2core.io.video_writing import write_video
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import worker_count, workers
 from sd2core.progress import Progress, silent
+from sd2core.radar_config import PAPER_RADAR
 from sd2core.recording.recording import SUFFIX, Recording, Span
 from sd2core.scattering.facets import facet_visibility
-from sd2core.sensor import PAPER_RADAR, VirtualSensor
+from sd2core.sensor import VirtualSensor
 from sd2core.simulate.encode import write_compact_mesh
 from sd2core.simulate.gestures import DURATION_S, SPANS, swipes
 from sd2core.simulate.render import Camera, Renderer

@@ -23,8 +23,9 @@ from sd2core.fmcw.simulation import simulate_radar
 from sd2core.fmcw.sums import NUFFT_TOLERANCE, Echoes, direct, nufft, recurrent
 from sd2core.fmcw.triangle import mean_phasor
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.radar_config import SPEED_OF_LIGHT_MPS, RadarConfig
 from sd2core.scattering.facets import facet_visibility
-from sd2core.sensor import SPEED_OF_LIGHT_MPS, RadarConfig, VirtualSensor
+from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 
 DOUBLE = 2.0**-53

@@ -9,8 +9,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
+from sd2core.radar_config import PAPER_RADAR
 from sd2core.sensor import (
-    PAPER_RADAR,
     VelocityAxis,
     VirtualSensor,
     aimed_at,

@@ -15,7 +15,8 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.placements.body_extent import Sight, Whereabouts
 from sd2core.placements.cost import PlacementCost
 from sd2core.placements.placements import Place, Placements
-from sd2core.sensor import PAPER_RADAR, RadarConfig, VelocityAxis, VirtualSensor
+from sd2core.radar_config import PAPER_RADAR, RadarConfig
+from sd2core.sensor import VelocityAxis, VirtualSensor
 
 
 @dataclass(frozen=True, eq=False)

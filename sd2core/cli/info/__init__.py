@@ -19,8 +19,9 @@ if TYPE_CHECKING:
     from sd2core.io.radar import RadarCapture
     from sd2core.io.video import VideoReader
     from sd2core.mesh.sequence import MeshSequence
+    from sd2core.radar_config import RadarConfig
     from sd2core.recording.recording import Recording
-    from sd2core.sensor import RadarConfig, VelocityAxis
+    from sd2core.sensor import VelocityAxis
     from sd2core.timebase import Timebase
 
 

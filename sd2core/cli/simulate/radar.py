@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from sd2core.fmcw import SignalOptions, WaveOptions
     from sd2core.io.radar import RadarCapture
     from sd2core.mesh.sequence import MeshSequence
-    from sd2core.sensor import RadarConfig, VirtualSensor
+    from sd2core.radar_config import RadarConfig
+    from sd2core.sensor import VirtualSensor
 
 
 def add_radar(kinds: argparse._SubParsersAction) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.sensor import RadarConfig
+from sd2core.radar_config import RadarConfig
 from sd2core.timebase import Timebase
 
 

@@ -23,7 +23,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write, atomic_write_text
 from sd2core.io.radar.capture import RadarCapture, check_cube
-from sd2core.sensor import RadarConfig
+from sd2core.radar_config import RadarConfig
 from sd2core.timebase import Timebase
 
 ADC_BITS = 12

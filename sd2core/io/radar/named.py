@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from sd2core.io.radar.infineon import read_radar_config
-from sd2core.sensor import PAPER_RADAR, RadarConfig
+from sd2core.radar_config import PAPER_RADAR, RadarConfig
 
 PAPER = "paper"
 

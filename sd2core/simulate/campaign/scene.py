@@ -8,7 +8,8 @@ import numpy as np
 
 from sd2core.body.rotations import Floats, about
 from sd2core.fmcw.options import Reflector
-from sd2core.sensor import RadarConfig, Vector, VirtualSensor, aimed_at, position_from_spherical
+from sd2core.radar_config import RadarConfig
+from sd2core.sensor import Vector, VirtualSensor, aimed_at, position_from_spherical
 
 RANGES_M = (1.5, 4.0)
 """Of the person from the camera, and of the person's chest from the other sensors."""

@@ -16,7 +16,7 @@ from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.pairs.store import Take
-from sd2core.sensor import PAPER_RADAR, RadarConfig
+from sd2core.radar_config import PAPER_RADAR, RadarConfig
 from sd2core.simulate.campaign.fit_errors import FitErrors
 from sd2core.simulate.campaign.motion import perform
 from sd2core.simulate.campaign.people import random_subject

@@ -476,7 +476,7 @@ class TestTwoWindows:
 
 def write_capture_of_nothing(folder: Path) -> None:
     from sd2core.io.radar.infineon import write_capture
-    from sd2core.sensor import PAPER_RADAR
+    from sd2core.radar_config import PAPER_RADAR
 
     shape = (30, 1, PAPER_RADAR.chirps_per_frame, PAPER_RADAR.samples_per_chirp)
     samples = np.full(shape, 2048, np.uint16)

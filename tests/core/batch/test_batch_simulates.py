@@ -24,7 +24,8 @@ from sd2core.datasets.simulating import Simulation, simulated_map
 from sd2core.doppler_map import DopplerMap, joined
 from sd2core.errors import Sd2Error
 from sd2core.io.mesh import load_mesh
-from sd2core.sensor import PAPER_RADAR, VelocityAxis, VirtualSensor
+from sd2core.radar_config import PAPER_RADAR
+from sd2core.sensor import VelocityAxis, VirtualSensor
 
 PLAN = """
 out = "made"

@@ -21,8 +21,9 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.placements.body_extent import Whereabouts
 from sd2core.placements.placements import PlacementGrid
 from sd2core.progress import silent
+from sd2core.radar_config import PAPER_RADAR
 from sd2core.recording.recording import Recording
-from sd2core.sensor import PAPER_RADAR, VelocityAxis, VirtualSensor
+from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase
 
 GRID = PlacementGrid((1.0, 2.5), (30.0,))

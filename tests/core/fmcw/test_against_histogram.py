@@ -21,8 +21,9 @@ from sd2core.fmcw import (
 )
 from sd2core.io.mesh import load_mesh
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.radar_config import PAPER_RADAR
 from sd2core.scattering.facets import facet_visibility
-from sd2core.sensor import PAPER_RADAR, VelocityAxis, VirtualSensor
+from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase
 
 AXIS = VelocityAxis()

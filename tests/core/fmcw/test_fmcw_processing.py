@@ -16,7 +16,8 @@ from sd2core.fmcw.chain import taper
 from sd2core.fmcw.processing import doppler_map, range_doppler, rebinning
 from sd2core.io.radar import RadarCapture, load_capture
 from sd2core.progress import Cancelled
-from sd2core.sensor import PAPER_RADAR, SPEED_OF_LIGHT_MPS, RadarConfig, VelocityAxis
+from sd2core.radar_config import PAPER_RADAR, SPEED_OF_LIGHT_MPS, RadarConfig
+from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 
 # 16 bits, so that rounding to counts stays out of the comparison.

@@ -16,7 +16,8 @@ from sd2core.fmcw.sums import direct
 from sd2core.fmcw.wave import WaveScene
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Cancelled
-from sd2core.sensor import PAPER_RADAR, VelocityAxis, VirtualSensor
+from sd2core.radar_config import PAPER_RADAR
+from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase
 
 CAMERA = VirtualSensor()

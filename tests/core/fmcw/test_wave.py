@@ -37,7 +37,8 @@ from sd2core.fmcw.wave import WaveScene
 from sd2core.io.radar import load_capture, write_capture
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Cancelled
-from sd2core.sensor import PAPER_RADAR, SPEED_OF_LIGHT_MPS, RadarConfig, VirtualSensor
+from sd2core.radar_config import PAPER_RADAR, SPEED_OF_LIGHT_MPS, RadarConfig
+from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 
 CAMERA = VirtualSensor()

@@ -21,8 +21,9 @@ from sd2core.fmcw.spectra import frame_spectra
 from sd2core.fmcw.wave import WaveScene
 from sd2core.io.radar import load_capture, write_capture
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.radar_config import PAPER_RADAR
 from sd2core.scattering.facets import facet_visibility
-from sd2core.sensor import PAPER_RADAR, VirtualSensor
+from sd2core.sensor import VirtualSensor
 
 FRAMES = 15
 THERE = np.ones(FRAMES, bool)

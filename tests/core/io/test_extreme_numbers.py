@@ -15,7 +15,8 @@ from sd2core.errors import Sd2Error
 from sd2core.fmcw.simulation import simulate_radar
 from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.sensor import PAPER_RADAR, VirtualSensor
+from sd2core.radar_config import PAPER_RADAR
+from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 
 FACES = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]], np.int32)

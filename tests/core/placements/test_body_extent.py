@@ -9,7 +9,8 @@ from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.placements.body_extent import Whereabouts
 from sd2core.placements.placements import PlacementGrid
-from sd2core.sensor import PAPER_RADAR, VirtualSensor
+from sd2core.radar_config import PAPER_RADAR
+from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 
 

@@ -12,7 +12,8 @@ from sd2core.fmcw.options import Reflector
 from sd2core.fmcw.scene import MeshScene
 from sd2core.fmcw.sums import Echoes, nufft
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.sensor import PAPER_RADAR, VelocityAxis, VirtualSensor
+from sd2core.radar_config import PAPER_RADAR
+from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.simulate.campaign import radar
 from sd2core.simulate.campaign.radar import LinkBudget, TargetOptions, radar_target
 from sd2core.timebase import Timebase

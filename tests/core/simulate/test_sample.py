@@ -14,9 +14,10 @@ from sd2core.io.mesh import load_mesh
 from sd2core.io.radar import load_capture
 from sd2core.io.video import open_video
 from sd2core.progress import Cancelled
+from sd2core.radar_config import PAPER_RADAR
 from sd2core.recording.recording import Recording, open_recording
 from sd2core.scattering.facets import facet_visibility
-from sd2core.sensor import PAPER_RADAR, VirtualSensor
+from sd2core.sensor import VirtualSensor
 from sd2core.simulate.gestures import DURATION_S, SPANS
 from sd2core.simulate.render import Camera
 from sd2core.simulate.sample import (

@@ -17,7 +17,7 @@ from sd2app.session.sensor import SensorModel
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.placements.body_extent import Sight
 from sd2core.placements.placements import Place
-from sd2core.sensor import PAPER_RADAR
+from sd2core.radar_config import PAPER_RADAR
 from sd2core.timebase import Timebase
 
 
