@@ -33,8 +33,8 @@ from sd2core.denoise.registry import options as options_of
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.figure_files import save_figure
 from sd2core.pairs.store import read_pairs
+from sd2core.runs.progress import read_events, standing
 from sd2core.train.folder import RunFolder
-from sd2core.train.progress import read_events, standing
 
 DOCS = Path(__file__).resolve().parent
 IMAGES = DOCS / "images"

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
+from sd2core.runs.progress import read_events, standing
 from sd2core.train.folder import RunFolder
-from sd2core.train.progress import read_events, standing
 
 PILOT_EPOCHS = 4
 

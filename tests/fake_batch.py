@@ -17,9 +17,9 @@ from pathlib import Path
 
 from sd2core.batch.folder import PROGRESS_FORMAT, BatchFolder
 from sd2core.batch.plan_file import plan_text, read_plan
+from sd2core.runs.control import Control, write_control
+from sd2core.runs.progress import ProgressWriter
 from sd2core.sensor import VirtualSensor
-from sd2core.train.control import Control, write_control
-from sd2core.train.progress import ProgressWriter
 
 ERROR = {"found": "It is damaged", "expected": "a mesh", "remedy": "Make it again"}
 

@@ -13,6 +13,8 @@ import sys
 import time
 from pathlib import Path
 
+from sd2core.runs.control import Control
+from sd2core.runs.progress import ProgressWriter
 from sd2core.train.config import (
     DataConfig,
     ModelConfig,
@@ -21,9 +23,7 @@ from sd2core.train.config import (
     config_text,
     read_config,
 )
-from sd2core.train.control import Control
 from sd2core.train.folder import RunFolder
-from sd2core.train.progress import ProgressWriter
 
 STEPS = 4
 """Per epoch."""

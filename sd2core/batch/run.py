@@ -24,8 +24,8 @@ from sd2core.batch.task_graph import Flow
 from sd2core.batch.tasks import BEGUN
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
-from sd2core.train.control import Control, signals_kept, write_control
-from sd2core.train.progress import Event, ProgressWriter
+from sd2core.runs.control import Control, signals_kept, write_control
+from sd2core.runs.progress import Event, ProgressWriter
 from sd2core.version import __version__
 
 Outcome = Literal["finished", "stopped"]

@@ -11,15 +11,15 @@ import torch
 
 from sd2core.denoise.scaling import Scaling
 from sd2core.errors import Sd2Error
+from sd2core.runs.control import Control, Word
+from sd2core.runs.progress import ProgressWriter, StepLines
 from sd2core.sensor import VelocityAxis
 from sd2core.train.checkpoint import Checkpoint, Position, write_checkpoint
 from sd2core.train.clock import Clock
 from sd2core.train.config import TrainConfig
-from sd2core.train.control import Control, Word
 from sd2core.train.data import Order
 from sd2core.train.folder import RunFolder, State
 from sd2core.train.optimiser import rate_factor
-from sd2core.train.progress import ProgressWriter, StepLines
 from sd2core.train.validate import Exam, Validation, validate
 
 if TYPE_CHECKING:

@@ -15,8 +15,8 @@ from typing import Any, Literal
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.lock import FileLock, is_locked
-from sd2core.train.control import Word, write_control
-from sd2core.train.progress import Event, last_of, read_events, standing
+from sd2core.runs.control import Word, write_control
+from sd2core.runs.progress import Event, last_of, read_events, standing
 from sd2core.version import __version__
 
 State = Literal[

@@ -20,15 +20,15 @@ from sd2core.denoise.model import Denoiser, parameter_count
 from sd2core.denoise.registry import build, options
 from sd2core.denoise.scaling import Scaling
 from sd2core.errors import Sd2Error
+from sd2core.runs.control import Control, signals_kept
+from sd2core.runs.progress import ProgressWriter
 from sd2core.train.callbacks import Course, Outcome
 from sd2core.train.checkpoint import Checkpoint, Position, read_checkpoint
 from sd2core.train.config import TrainConfig
-from sd2core.train.control import Control, signals_kept
 from sd2core.train.data import Order, TrainingData, prepare, read_mixed
 from sd2core.train.folder import RunFolder
 from sd2core.train.learner import Learner, Steps
 from sd2core.train.machine import device_of, give_way, machine_words, precision_of, settled
-from sd2core.train.progress import ProgressWriter
 from sd2core.train.validate import Exam, Validation
 
 

@@ -21,10 +21,10 @@ from typing import TYPE_CHECKING, Any, Literal
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.lock import FileLock
+from sd2core.runs.control import Control, signals_kept, write_control
+from sd2core.runs.progress import Event, ProgressWriter
 from sd2core.train.config import TrainConfig, config_text, read_config
-from sd2core.train.control import Control, signals_kept, write_control
 from sd2core.train.folder import RunFolder
-from sd2core.train.progress import Event, ProgressWriter
 
 if TYPE_CHECKING:
     from sd2core.train.checkpoint import Position

@@ -16,7 +16,7 @@ from sd2app.background.detached import last_words, launch
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.lock import FileLock, is_locked
 from sd2core.processes import ONE_THREAD
-from sd2core.train.progress import ProgressTail
+from sd2core.runs.progress import ProgressTail
 
 COMMAND = (sys.executable, "-u", "-m", "sd2app.background.run_in_folder")
 

@@ -16,7 +16,7 @@ from sd2app.background.detached import is_alive, last_words
 from sd2app.background.poller import RepeatedLook
 from sd2core.batch.folder import BatchFolder, BatchStatus, status_of
 from sd2core.errors import Sd2Error
-from sd2core.train.progress import Event, ProgressTail
+from sd2core.runs.progress import Event, ProgressTail
 
 Phase = Literal[
     "starting", "running", "stopping", "finished", "stopped", "failed", "died", "gone"

@@ -7,9 +7,9 @@ from typing import Any, Literal
 
 from sd2app.training.history import TrainingHistory
 from sd2core.errors import Sd2Error
-from sd2core.train.control import Word, read_control
+from sd2core.runs.control import Word, read_control
+from sd2core.runs.progress import ProgressTail
 from sd2core.train.folder import LIVE, RunFolder
-from sd2core.train.progress import ProgressTail
 
 Phase = Literal[
     "starting", "running", "pausing", "paused", "resuming", "stopping", "cancelling",

@@ -18,10 +18,10 @@ from sd2app.training.command import output_of
 from sd2app.training.history import TrainingHistory
 from sd2app.training.phase import UNDER_WAY, Look, Phase, look_at, phase_of
 from sd2core.errors import Sd2Error
+from sd2core.runs.control import Word, write_control
+from sd2core.runs.progress import ProgressTail
 from sd2core.train.config import TrainConfig, read_config
-from sd2core.train.control import Word, write_control
 from sd2core.train.folder import RunFolder
-from sd2core.train.progress import ProgressTail
 
 POLL_MS = 250
 SLOW_POLL_MS = 1000

@@ -20,7 +20,7 @@ from sd2app.training.model import TrainingModel
 from sd2app.training.text import division_text
 from sd2core.cli.train import _config
 from sd2core.errors import Sd2Error
-from sd2core.train.control import read_control
+from sd2core.runs.control import read_control
 from sd2core.train.data import prepare, read_mixed
 from sd2core.train.folder import RunFolder
 

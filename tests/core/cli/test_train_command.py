@@ -13,8 +13,8 @@ import pytest
 from cli_outcome import Sd2
 from small_pairs import write_pairs
 
+from sd2core.runs.progress import ProgressWriter, read_events
 from sd2core.train.folder import RunFolder
-from sd2core.train.progress import ProgressWriter, read_events
 
 SMALL = ("--model", "gru", "--set", "channels=4", "--set", "depth=1", "--segment-frames", "30")
 QUICK = (*SMALL, "--device", "cpu", "--threads", "1", "--epochs", "2")
@@ -74,7 +74,7 @@ class TestTrain:
         number: int,
         code: int,
     ) -> None:
-        from sd2core.train.progress import ProgressWriter
+        from sd2core.runs.progress import ProgressWriter
 
         said = ProgressWriter.say
 

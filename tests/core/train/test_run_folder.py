@@ -11,15 +11,15 @@ from hypothesis import strategies as st
 from lock_holders import held
 
 from sd2core.errors import Sd2Error
-from sd2core.train.control import Control, read_control, write_control
-from sd2core.train.folder import RunFolder, runs_in
-from sd2core.train.progress import (
+from sd2core.runs.control import Control, read_control, write_control
+from sd2core.runs.progress import (
     ProgressTail,
     ProgressWriter,
     StepLines,
     read_events,
     standing,
 )
+from sd2core.train.folder import RunFolder, runs_in
 
 
 class TestProgress:
@@ -92,7 +92,7 @@ class TestControl:
             if len(naps) == 3:
                 write_control(path, "cancel")
 
-        monkeypatch.setattr("sd2core.train.control.time.sleep", nap)
+        monkeypatch.setattr("sd2core.runs.control.time.sleep", nap)
         assert Control(path).wait_while_paused()[0] == "cancel"
         assert len(naps) == 3
 

@@ -20,6 +20,8 @@ from small_pairs import write_pairs
 
 from sd2core.denoise.files import describe_model, load_model
 from sd2core.errors import Sd2Error
+from sd2core.runs.control import write_control
+from sd2core.runs.progress import Event, ProgressTail, read_events, standing
 from sd2core.train.config import (
     DataConfig,
     MachineConfig,
@@ -28,9 +30,7 @@ from sd2core.train.config import (
     TrainingConfig,
     config_text,
 )
-from sd2core.train.control import write_control
 from sd2core.train.folder import RunFolder
-from sd2core.train.progress import Event, ProgressTail, read_events, standing
 from sd2core.train.start import Ending, begin, go_on
 from sd2core.train.validate import Validation
 
@@ -198,7 +198,7 @@ class TestSteering:
             states.append(run.state())
             run.tell("run")
 
-        monkeypatch.setattr("sd2core.train.control.time.sleep", nap)
+        monkeypatch.setattr("sd2core.runs.control.time.sleep", nap)
         pause = at(5, lambda: run.tell("pause"))
         assert begin(config, run.path, watch=pause).outcome == "finished"
         assert states == ["paused"]

@@ -1,0 +1,1 @@
+"""Runs: processes that work in a folder, through which they are followed and steered."""
