@@ -7,7 +7,7 @@ import time
 from dataclasses import replace
 
 from sd2app.accuracy.ladder import Ladder
-from sd2core.accuracy.plans import Plan, reference_plan
+from sd2core.accuracy.plans import AccuracyPlan, reference_plan
 from sd2core.accuracy.results import (
     Choice,
     Cost,
@@ -20,8 +20,8 @@ from sd2core.accuracy.results import (
 )
 from sd2core.accuracy.synthesizers import synthesizer_for
 
-EXACT = Plan()
-FACING = Plan(visibility="facing")
+EXACT = AccuracyPlan()
+FACING = AccuracyPlan(visibility="facing")
 REASONS = (
     Reason("static", False, 0.91, "91 % of the vertices never leave the nulled bins: not modelled"),
     Reason("occlusion", True, 0.14, "what stands in between changes this map by 14 %: modelled"),
@@ -51,13 +51,13 @@ def measurement_of(*results, family="histogram", scene="here"):
 
 COUNTING = (
     result_of(FACING, 0.13, 0.02),
-    result_of(Plan(visibility="depth", depth_resolution=128), 0.03, 1.0),
-    result_of(Plan(mask_stride=5), 0.008, 0.6),
+    result_of(AccuracyPlan(visibility="depth", depth_resolution=128), 0.03, 1.0),
+    result_of(AccuracyPlan(mask_stride=5), 0.008, 0.6),
     result_of(EXACT, 0.0, 2.1),
 )
 WAVES = (
-    result_of(Plan(signal="fmcw"), 0.02, 4.0),
-    result_of(Plan(signal="direct", motion="interpolated"), 0.0, 400.0),
+    result_of(AccuracyPlan(signal="fmcw"), 0.02, 4.0),
+    result_of(AccuracyPlan(signal="direct", motion="interpolated"), 0.0, 400.0),
 )
 
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from sd2core.accuracy.plans import Plan, reference_plan
+from sd2core.accuracy.plans import AccuracyPlan, reference_plan
 from sd2core.accuracy.results import (
     Choice,
     Cost,
@@ -31,12 +31,12 @@ if TYPE_CHECKING:
     from sd2core.accuracy.synthesizers import synthesizer_for
 
 __all__ = [
+    "AccuracyPlan",
     "Choice",
     "Cost",
     "Errors",
     "Machine",
     "Measurement",
-    "Plan",
     "PlanResult",
     "Reason",
     "Spread",

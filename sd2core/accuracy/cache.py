@@ -7,7 +7,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from sd2core.accuracy.plans import Family, Plan
+from sd2core.accuracy.plans import AccuracyPlan, Family
 from sd2core.accuracy.results import Cost, Errors, Machine, Measurement, PlanResult, Spread
 from sd2core.accuracy.scene import clip_fingerprint, scene_fingerprint, this_machine
 from sd2core.doppler.options import SynthesisOptions
@@ -70,7 +70,7 @@ def _from_json(content: dict[str, Any]) -> Measurement:
         raise ValueError(f"format {content['format']}")
     return Measurement(
         family=content["family"],
-        reference=Plan.from_json(content["reference"]),
+        reference=AccuracyPlan.from_json(content["reference"]),
         results=tuple(_result(entry) for entry in content["results"]),
         scene=content["scene"],
         machine=Machine(**content["machine"]),
@@ -84,7 +84,7 @@ def _from_json(content: dict[str, Any]) -> Measurement:
 
 def _result(content: dict[str, Any]) -> PlanResult:
     return PlanResult(
-        Plan.from_json(content["plan"]),
+        AccuracyPlan.from_json(content["plan"]),
         Errors(**_with_spreads(content["errors"])),
         Cost(**_with_spreads(content["cost"])),
     )

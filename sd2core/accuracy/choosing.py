@@ -6,7 +6,7 @@ import math
 import time
 from dataclasses import replace
 
-from sd2core.accuracy.plans import MASK_REUSE_M, Plan, counting_plans
+from sd2core.accuracy.plans import MASK_REUSE_M, AccuracyPlan, counting_plans
 from sd2core.accuracy.reasons import reasons_for
 from sd2core.accuracy.results import Choice, Errors
 from sd2core.accuracy.survey import Survey, survey_scene
@@ -136,14 +136,14 @@ def _check(tolerance: float | None, budget_ms: float | None) -> None:
 
 def _by_tolerance(
     survey: Survey, tolerance: float, progress: Progress
-) -> tuple[Plan, bool, Errors]:
+) -> tuple[AccuracyPlan, bool, Errors]:
     """The cheapest of those tried that holds; else the nearest of them."""
     plans = sorted(_candidates(survey, tolerance), key=lambda plan: _dearness(survey, plan))
     forecast = {plan: survey.forecast_error(plan) for plan in plans}
     safe = [plan for plan in plans if forecast[plan] <= tolerance]
     # What must hold if anything does.
     safe.append(min(plans, key=forecast.__getitem__))
-    failed: list[tuple[Plan, Errors]] = []
+    failed: list[tuple[AccuracyPlan, Errors]] = []
     for plan in (*safe[: _MOST_TRIALS - 1], safe[-1]):
         errors = _tried(survey, plan, tolerance, progress)
         if errors.l1 <= tolerance:
@@ -167,7 +167,7 @@ def _by_tolerance(
 
 def _by_budget(
     survey: Survey, budget_ms: float, dragging: bool, progress: Progress
-) -> tuple[Plan, bool, Errors]:
+) -> tuple[AccuracyPlan, bool, Errors]:
     plans = _candidates(survey, _USUAL_TOLERANCE)
     reach_m = _reach_m(survey) if dragging else None
     if reach_m is not None:
@@ -185,7 +185,7 @@ def _by_budget(
     return plan, bool(within), errors
 
 
-def _dearness(survey: Survey, plan: Plan) -> tuple[int, int]:
+def _dearness(survey: Survey, plan: AccuracyPlan) -> tuple[int, int]:
     """Cost in steps that are worth taking, and within a step how much is unlike the base.
 
     A rung that saves nothing to speak of is not taken down.
@@ -207,7 +207,7 @@ def _reach_m(survey: Survey) -> float | None:
     return max(kept, default=None)
 
 
-def _tried(survey: Survey, plan: Plan, tolerance: float, progress: Progress) -> Errors:
+def _tried(survey: Survey, plan: AccuracyPlan, tolerance: float, progress: Progress) -> Errors:
     """Errors on the frames to check on; on those to choose on, if they are too large there."""
     sample = survey.trial.sample
     errors = survey.trial.errors(plan, sample.chosen_on, progress=progress)
@@ -216,7 +216,7 @@ def _tried(survey: Survey, plan: Plan, tolerance: float, progress: Progress) -> 
     return survey.trial.errors(plan, sample.checked_on, progress=progress)
 
 
-def _candidates(survey: Survey, tolerance: float) -> list[Plan]:
+def _candidates(survey: Survey, tolerance: float) -> list[AccuracyPlan]:
     options = survey.trial.options
     dropped = survey.change[replace(survey.base, beyond="drop")]
     return [

@@ -8,22 +8,22 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from sd2core.accuracy.deviation import spread
-from sd2core.accuracy.plans import Plan
+from sd2core.accuracy.plans import AccuracyPlan
 from sd2core.accuracy.results import Spread
 from sd2core.progress import Progress
 
 
 def in_turns(
-    plans: Sequence[Plan],
+    plans: Sequence[AccuracyPlan],
     repeats: int,
-    milliseconds: Callable[[Plan], tuple[float, float]],
+    milliseconds: Callable[[AccuracyPlan], tuple[float, float]],
     progress: Progress,
 ) -> list[tuple[Spread, Spread]]:
     """Time every plan, all of them before any again: a busy machine slows all alike.
 
     Parameters
     ----------
-    plans : sequence of Plan
+    plans : sequence of AccuracyPlan
     repeats : int
     milliseconds : callable
         Per frame, on one thread and on all cores.

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from sd2core.accuracy.choosing import checked_options
 from sd2core.accuracy.cost import in_turns, peak_bytes
-from sd2core.accuracy.plans import Family, Plan, compared_plans, reference_plan
+from sd2core.accuracy.plans import AccuracyPlan, Family, compared_plans, reference_plan
 from sd2core.accuracy.results import Cost, Measurement, PlanResult
 from sd2core.accuracy.sample import all_frames, take_sample
 from sd2core.accuracy.scene import scene_fingerprint, this_machine
@@ -98,7 +98,7 @@ def measure(
     )
 
 
-def _watched(trial: Trial, plan: Plan) -> tuple[int, float]:
+def _watched(trial: Trial, plan: AccuracyPlan) -> tuple[int, float]:
     """Most bytes allocated at once from scratch, and seconds before the first frame."""
     trial.forget()
     setup_s = 0.0

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from sd2core.accuracy.cost import in_turns, peak_bytes
 from sd2core.accuracy.deviation import errors
-from sd2core.accuracy.plans import Plan, reference_plan, wave_plans
+from sd2core.accuracy.plans import AccuracyPlan, reference_plan, wave_plans
 from sd2core.accuracy.results import Cost, Errors, Measurement, PlanResult
 from sd2core.accuracy.sample import take_sample
 from sd2core.accuracy.scene import scene_fingerprint, this_machine
@@ -83,7 +83,7 @@ class WaveTrial:
         signals = np.stack([converged.signal for converged in found])
         return self._shares(signal_spectra(signals, self.config, axis=self.options.axis)), found
 
-    def columns(self, plan: Plan, threads: int | None = None) -> NDArray[np.float64]:
+    def columns(self, plan: AccuracyPlan, threads: int | None = None) -> NDArray[np.float64]:
         """A plan's columns, each adding up to 1, (bins, n)."""
         mesh = self.counted(plan)
         return self._shares(
@@ -99,13 +99,13 @@ class WaveTrial:
             )
         )
 
-    def errors(self, plan: Plan, reference: NDArray[np.float64]) -> Errors:
+    def errors(self, plan: AccuracyPlan, reference: NDArray[np.float64]) -> Errors:
         """How far a plan's columns are from the reference's."""
         found = self.columns(plan)
         smooth, truth = self._smoothing @ found, self._smoothing @ reference
         return errors(found, reference, smooth, truth, self.options.axis)
 
-    def counted(self, plan: Plan) -> MeshSequence:
+    def counted(self, plan: AccuracyPlan) -> MeshSequence:
         """The mesh that a plan takes."""
         if plan.vertices_kept not in self._meshes:
             start = time.perf_counter()
@@ -113,12 +113,14 @@ class WaveTrial:
             self._setup_s[plan.vertices_kept] = time.perf_counter() - start
         return self._meshes[plan.vertices_kept]
 
-    def setup_s(self, plan: Plan) -> float:
+    def setup_s(self, plan: AccuracyPlan) -> float:
         """How long it took to make that mesh."""
         self.counted(plan)
         return self._setup_s[plan.vertices_kept]
 
-    def _visible(self, plan: Plan, threads: int | None) -> NDArray[np.bool_] | Literal["facing"]:
+    def _visible(
+        self, plan: AccuracyPlan, threads: int | None
+    ) -> NDArray[np.bool_] | Literal["facing"]:
         """Visible facets where a plan wants to know more than which face the sensor."""
         if plan.visibility == "facing":
             return "facing"
@@ -204,7 +206,7 @@ def measure_waves(
     )
 
 
-def _milliseconds(trial: WaveTrial, plan: Plan) -> tuple[float, float]:
+def _milliseconds(trial: WaveTrial, plan: AccuracyPlan) -> tuple[float, float]:
     """Per frame: processor time of one thread, and time that passes on all cores."""
     start = time.thread_time()
     trial.columns(plan, threads=1)

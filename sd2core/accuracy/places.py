@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from sd2core.accuracy.choosing import checked_options, choose
-from sd2core.accuracy.plans import Plan, reference_plan
+from sd2core.accuracy.plans import AccuracyPlan, reference_plan
 from sd2core.accuracy.sample import take_sample
 from sd2core.accuracy.survey import survey_scene
 from sd2core.accuracy.synthesizers import synthesizer_for
@@ -49,7 +49,7 @@ class PlacedPlan:
 
     Parameters
     ----------
-    plan : Plan
+    plan : AccuracyPlan
     error_l1 : float
         The largest on the places that were checked; 0 for the most accurate plan, against
         which errors are measured.
@@ -57,7 +57,7 @@ class PlacedPlan:
         Sentences.
     """
 
-    plan: Plan
+    plan: AccuracyPlan
     error_l1: float
     reasons: tuple[str, ...]
 
@@ -143,7 +143,7 @@ class _Search:
             "histogram", options.weight, surface=mesh.faces is not None
         )
         # Wrapping costs nothing, and is what the most accurate plan does.
-        self.plain = Plan(
+        self.plain = AccuracyPlan(
             visibility=options.visibility,
             depth_resolution=options.depth_resolution,
             mask_stride=options.mask_stride,
@@ -157,7 +157,7 @@ class _Search:
         """The most accurate plan."""
         return PlacedPlan(self.most_accurate, 0.0, (f"{reason}: the most accurate one is taken",))
 
-    def checked(self, plan: Plan, reasons: tuple[str, ...]) -> PlacedPlan | None:
+    def checked(self, plan: AccuracyPlan, reasons: tuple[str, ...]) -> PlacedPlan | None:
         """The plan, if it holds everywhere."""
         worst = 0.0
         for trial in self._tried():
@@ -200,7 +200,7 @@ class _Search:
             spent_s.append(time.thread_time() - begun_s)
         return float(np.mean(spent_s[1:]))
 
-    def frame_s(self, plan: Plan) -> float:
+    def frame_s(self, plan: AccuracyPlan) -> float:
         """Processor seconds of a frame of a map, with what all places share prepared."""
         synthesizer = synthesizer_for(plan, self._mesh, self._options)
         here = self._places[0]

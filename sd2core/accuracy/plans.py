@@ -31,7 +31,7 @@ _OCCLUSION = ("depth", "exact")
 
 
 @dataclass(frozen=True)
-class Plan:
+class AccuracyPlan:
     """One choice of every rung.
 
     Parameters
@@ -148,7 +148,7 @@ class Plan:
         return {"plan": self.to_json() | {"text": str(self)}, "plan_error_l1": error_l1}
 
     @classmethod
-    def from_json(cls, content: dict[str, Any]) -> Plan:
+    def from_json(cls, content: dict[str, Any]) -> AccuracyPlan:
         """A plan from :meth:`to_json`.
 
         Raises
@@ -162,30 +162,32 @@ class Plan:
         return cls(**content)
 
 
-def reference_plan(family: Family, weight: Weight = "count", *, surface: bool = True) -> Plan:
+def reference_plan(
+    family: Family, weight: Weight = "count", *, surface: bool = True
+) -> AccuracyPlan:
     """What errors are measured against: the top of every rung.
 
     Of a point cloud, without a ``surface``, every point is seen.
     """
     if family == "fmcw":
-        return Plan(signal="direct", weight=weight, motion="interpolated")
-    return Plan(
+        return AccuracyPlan(signal="direct", weight=weight, motion="interpolated")
+    return AccuracyPlan(
         visibility="exact" if surface else "none",
         weight=weight,
         frame_rate_factor=max(FRAME_RATE_FACTORS),
     )
 
 
-def sights(*, surface: bool = True) -> Iterator[Plan]:
+def sights(*, surface: bool = True) -> Iterator[AccuracyPlan]:
     """Every choice of visibility; for a point cloud there is but one."""
-    yield Plan(visibility="none")
+    yield AccuracyPlan(visibility="none")
     if not surface:
         return
-    yield Plan(visibility="facing")
+    yield AccuracyPlan(visibility="facing")
     for stride in MASK_STRIDES:
         for resolution in get_args(DepthResolution):
-            yield Plan(visibility="depth", depth_resolution=resolution, mask_stride=stride)
-        yield Plan(mask_stride=stride)
+            yield AccuracyPlan(visibility="depth", depth_resolution=resolution, mask_stride=stride)
+        yield AccuracyPlan(mask_stride=stride)
 
 
 def counting_plans(
@@ -194,7 +196,7 @@ def counting_plans(
     surface: bool = True,
     range_law: bool = True,
     vertices_kept: Sequence[float] = VERTICES_KEPT,
-) -> Iterator[Plan]:
+) -> Iterator[AccuracyPlan]:
     """Every combination of the counting rungs, masks made for the place at hand.
 
     Parameters
@@ -221,12 +223,12 @@ def compared_plans(
     surface: bool = True,
     range_law: bool = True,
     vertices_kept: Sequence[float] = VERTICES_KEPT,
-) -> Iterator[Plan]:
+) -> Iterator[AccuracyPlan]:
     """The counting plans of a table: every rung alone, and the main combinations.
 
     Parameters as for :func:`counting_plans`.
     """
-    base = Plan(visibility="exact" if surface else "none", weight=weight)
+    base = AccuracyPlan(visibility="exact" if surface else "none", weight=weight)
     for plan in counting_plans(
         weight, surface=surface, range_law=range_law, vertices_kept=vertices_kept
     ):
@@ -248,9 +250,9 @@ def compared_plans(
             yield replace(base, mask_reuse_m=reach_m)
 
 
-def wave_plans() -> Iterator[Plan]:
+def wave_plans() -> Iterator[AccuracyPlan]:
     """The FMCW plans worth a look; the last one leaves nothing out but subdivision."""
-    base = Plan(signal="fmcw")
+    base = AccuracyPlan(signal="fmcw")
     for sight in ("facing", "exact"):
         for kept in VERTICES_KEPT[:3]:
             yield replace(base, visibility=sight, vertices_kept=kept)

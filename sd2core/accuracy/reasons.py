@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sd2core.accuracy.plans import Plan
+from sd2core.accuracy.plans import AccuracyPlan
 from sd2core.accuracy.results import Reason, percent
 from sd2core.accuracy.trial import Trial
 from sd2core.progress import Progress, silent
@@ -45,7 +45,7 @@ def look_at(trial: Trial, progress: Progress = silent) -> SceneFacts:
     options = trial.options
     axis = options.axis
     synthesizer = trial.synthesizer(
-        Plan(visibility="none", weight=options.weight), progress=progress
+        AccuracyPlan(visibility="none", weight=options.weight), progress=progress
     )
     live = np.zeros(synthesizer.mesh.vertex_count, np.bool_)
     beyond: list[float] = []
@@ -81,9 +81,9 @@ def look_at(trial: Trial, progress: Progress = silent) -> SceneFacts:
 
 
 def reasons_for(
-    plan: Plan,
-    base: Plan,
-    change: Mapping[Plan, float],
+    plan: AccuracyPlan,
+    base: AccuracyPlan,
+    change: Mapping[AccuracyPlan, float],
     facts: SceneFacts,
     v_max_mps: float,
 ) -> tuple[Reason, ...]:
@@ -91,9 +91,9 @@ def reasons_for(
 
     Parameters
     ----------
-    plan : Plan
+    plan : AccuracyPlan
         The one chosen.
-    base : Plan
+    base : AccuracyPlan
         The top of every rung but the frame rate.
     change : mapping
         Relative L1 after smoothing of what was tried: of plans that differ from
@@ -131,7 +131,9 @@ def _static(facts: SceneFacts) -> Reason:
     )
 
 
-def _occlusion(plan: Plan, base: Plan, change: Mapping[Plan, float]) -> Reason:
+def _occlusion(
+    plan: AccuracyPlan, base: AccuracyPlan, change: Mapping[AccuracyPlan, float]
+) -> Reason:
     facing = change[replace(base, visibility="facing")]
     every = change[replace(base, visibility="none")]
     # What no other visibility can do: inside a body the facing test hides all of it.
@@ -151,7 +153,9 @@ def _occlusion(plan: Plan, base: Plan, change: Mapping[Plan, float]) -> Reason:
     )
 
 
-def _mask_age(plan: Plan, base: Plan, change: Mapping[Plan, float]) -> list[Reason]:
+def _mask_age(
+    plan: AccuracyPlan, base: AccuracyPlan, change: Mapping[AccuracyPlan, float]
+) -> list[Reason]:
     if plan.visibility not in ("depth", "exact") or plan.mask_reuse_m:
         return []
     if plan.mask_stride > 1:
@@ -166,7 +170,9 @@ def _mask_age(plan: Plan, base: Plan, change: Mapping[Plan, float]) -> list[Reas
     return [Reason("mask_age", True, off, text)]
 
 
-def _mask_reuse(plan: Plan, base: Plan, change: Mapping[Plan, float]) -> list[Reason]:
+def _mask_reuse(
+    plan: AccuracyPlan, base: AccuracyPlan, change: Mapping[AccuracyPlan, float]
+) -> list[Reason]:
     if plan.visibility not in ("depth", "exact"):
         return []
     tried = [other for other in change if other == replace(base, mask_reuse_m=other.mask_reuse_m)]
@@ -182,7 +188,9 @@ def _mask_reuse(plan: Plan, base: Plan, change: Mapping[Plan, float]) -> list[Re
     return [Reason("mask_reuse", not plan.mask_reuse_m, off, f"{text} {percent(off)}: {use}")]
 
 
-def _geometry(plan: Plan, base: Plan, change: Mapping[Plan, float]) -> list[Reason]:
+def _geometry(
+    plan: AccuracyPlan, base: AccuracyPlan, change: Mapping[AccuracyPlan, float]
+) -> list[Reason]:
     tried = sorted(
         (other for other in change if other == replace(base, vertices_kept=other.vertices_kept)),
         key=lambda other: -other.vertices_kept,
@@ -200,7 +208,7 @@ def _geometry(plan: Plan, base: Plan, change: Mapping[Plan, float]) -> list[Reas
 
 
 def _range_law(
-    plan: Plan, base: Plan, change: Mapping[Plan, float], facts: SceneFacts
+    plan: AccuracyPlan, base: AccuracyPlan, change: Mapping[AccuracyPlan, float], facts: SceneFacts
 ) -> list[Reason]:
     by_frame = replace(base, range_law="frame")
     if by_frame not in change:
@@ -216,7 +224,11 @@ def _range_law(
 
 
 def _aliasing(
-    plan: Plan, base: Plan, change: Mapping[Plan, float], facts: SceneFacts, v_max_mps: float
+    plan: AccuracyPlan,
+    base: AccuracyPlan,
+    change: Mapping[AccuracyPlan, float],
+    facts: SceneFacts,
+    v_max_mps: float,
 ) -> Reason:
     off = change[replace(base, beyond="drop")]
     if facts.beyond_share <= 0:
@@ -231,7 +243,9 @@ def _aliasing(
     return Reason("aliasing", wrapped, off, f"{text}: {use}")
 
 
-def _motion(plan: Plan, base: Plan, change: Mapping[Plan, float], facts: SceneFacts) -> Reason:
+def _motion(
+    plan: AccuracyPlan, base: AccuracyPlan, change: Mapping[AccuracyPlan, float], facts: SceneFacts
+) -> Reason:
     off = change[replace(base, frame_rate_factor=1)]
     text = (
         f"velocities change by {facts.motion_bins:.2g} bins from frame to frame, which changes the"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
-from sd2core.accuracy.plans import Family, Plan
+from sd2core.accuracy.plans import AccuracyPlan, Family
 
 _LEAST_PERCENT = 1e-3
 
@@ -93,7 +93,7 @@ class Cost:
 class PlanResult:
     """A plan, what it costs here, and how far it is off here."""
 
-    plan: Plan
+    plan: AccuracyPlan
     errors: Errors
     cost: Cost
 
@@ -121,7 +121,7 @@ class Measurement:
     Parameters
     ----------
     family : {"histogram", "fmcw"}
-    reference : Plan
+    reference : AccuracyPlan
         In words: what the errors are relative to.
     results : tuple of PlanResult
         Cheapest first.
@@ -140,7 +140,7 @@ class Measurement:
     """
 
     family: Family
-    reference: Plan
+    reference: AccuracyPlan
     results: tuple[PlanResult, ...]
     scene: str
     machine: Machine
@@ -162,7 +162,7 @@ class Measurement:
         """Plain content, with plans also in words."""
         return asdict(self) | {"results": [result.to_json() for result in self.results]}
 
-    def of(self, plan: Plan) -> PlanResult | None:
+    def of(self, plan: AccuracyPlan) -> PlanResult | None:
         """What was measured of a plan, if it was; else of the same with velocities wrapped."""
         wrapped = replace(plan, beyond="wrap")
         found = {result.plan: result for result in self.results}
@@ -198,7 +198,7 @@ class Choice:
 
     Parameters
     ----------
-    plan : Plan
+    plan : AccuracyPlan
     holds : bool
         Whether tolerance or budget is held; otherwise the plan is the best that
         can be had.
@@ -219,7 +219,7 @@ class Choice:
         than ten frames has none to spare.
     """
 
-    plan: Plan
+    plan: AccuracyPlan
     holds: bool
     errors: Errors
     cost_ms: float

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise, product
 
 from sd2core.accuracy.deviation import relative_l1
-from sd2core.accuracy.plans import FRAME_RATE_FACTORS, MASK_REUSE_M, Plan, sights
+from sd2core.accuracy.plans import FRAME_RATE_FACTORS, MASK_REUSE_M, AccuracyPlan, sights
 from sd2core.accuracy.reasons import SceneFacts, look_at
 from sd2core.accuracy.sample import take_sample
 from sd2core.accuracy.trial import Trial
@@ -27,13 +27,13 @@ class Survey:
     Parameters
     ----------
     trial : Trial
-    base : Plan
+    base : AccuracyPlan
         Every rung at its top but the frame rate, which would make all others dear.
-    change : dict of Plan to float
+    change : dict of AccuracyPlan to float
         Relative L1 after smoothing on the frames to choose on: of ``base`` with one
         rung taken down, against ``base``; of ``base`` at several frame rates, against
         the reference.
-    mask_ms, count_ms : dict of Plan to float
+    mask_ms, count_ms : dict of AccuracyPlan to float
         Milliseconds of processor time per frame for visibility, and for counting.
     cost_share : dict of float to float
         What a share of the vertices costs, of what all of them cost.
@@ -41,20 +41,20 @@ class Survey:
     """
 
     trial: Trial
-    base: Plan
+    base: AccuracyPlan
     facts: SceneFacts
-    change: dict[Plan, float] = field(default_factory=dict)
-    mask_ms: dict[Plan, float] = field(default_factory=dict)
-    count_ms: dict[Plan, float] = field(default_factory=dict)
+    change: dict[AccuracyPlan, float] = field(default_factory=dict)
+    mask_ms: dict[AccuracyPlan, float] = field(default_factory=dict)
+    count_ms: dict[AccuracyPlan, float] = field(default_factory=dict)
     cost_share: dict[float, float] = field(default_factory=lambda: {1.0: 1.0})
 
-    def forecast_error(self, plan: Plan) -> float:
+    def forecast_error(self, plan: AccuracyPlan) -> float:
         """What the rungs of a plan change, added up: more than they do together."""
         rate = replace(self.base, frame_rate_factor=plan.frame_rate_factor)
         down = (self.change[alone] for alone in self._alone(plan) if alone != self.base)
         return self.change[rate] + sum(down)
 
-    def forecast_ms(self, plan: Plan) -> float:
+    def forecast_ms(self, plan: AccuracyPlan) -> float:
         """Milliseconds per frame that a plan should take when all cores share the work."""
         base = self.base
         mask_ms = 0.0 if plan.mask_reuse_m else self.mask_ms[_sight_of(plan, base)]
@@ -65,12 +65,12 @@ class Survey:
             count_ms -= min(max(saved, 0.0), 0.9 * per_vertex)
         return self.cost_share[plan.vertices_kept] * (mask_ms + count_ms) / worker_count()
 
-    def rungs_down(self, plan: Plan) -> int:
+    def rungs_down(self, plan: AccuracyPlan) -> int:
         """In how many rungs a plan differs from the base."""
         alone = [*self._alone(plan), replace(self.base, frame_rate_factor=plan.frame_rate_factor)]
         return sum(other != self.base for other in alone)
 
-    def _alone(self, plan: Plan) -> Iterator[Plan]:
+    def _alone(self, plan: AccuracyPlan) -> Iterator[AccuracyPlan]:
         """The base with each rung of a plan alone; frame rates stand for themselves."""
         yield _sight_of(plan, self.base)
         yield replace(self.base, vertices_kept=plan.vertices_kept)
@@ -110,7 +110,7 @@ def survey_scene(
         trial = like.trial.at(sensor)
     elif trial is None:
         trial = Trial(mesh, sensor, options, take_sample(mesh, options))
-    base = Plan(visibility="exact" if surface else "none", weight=options.weight)
+    base = AccuracyPlan(visibility="exact" if surface else "none", weight=options.weight)
     single = [replace(sight, weight=options.weight) for sight in sights(surface=surface)]
     single += [replace(base, vertices_kept=kept) for kept in trial.vertices_kept if kept < 1]
     if options.range_exponent:
@@ -170,7 +170,7 @@ def survey_scene(
     return survey
 
 
-def _sight_of(plan: Plan, base: Plan) -> Plan:
+def _sight_of(plan: AccuracyPlan, base: AccuracyPlan) -> AccuracyPlan:
     return replace(
         base,
         visibility=plan.visibility,

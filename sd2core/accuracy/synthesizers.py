@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sd2core.accuracy.plans import Plan
+from sd2core.accuracy.plans import AccuracyPlan
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.doppler.synthesizer import Synthesizer
 from sd2core.errors import Sd2Error
@@ -11,7 +11,7 @@ from sd2core.mesh.sequence import MeshSequence
 
 
 def synthesizer_for(
-    plan: Plan,
+    plan: AccuracyPlan,
     mesh: MeshSequence,
     options: SynthesisOptions,
     *,
@@ -21,7 +21,7 @@ def synthesizer_for(
 
     Parameters
     ----------
-    plan : Plan
+    plan : AccuracyPlan
     mesh : MeshSequence
         The full one.
     options : SynthesisOptions

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.accuracy.deviation import errors
-from sd2core.accuracy.plans import VERTICES_KEPT, Plan, reference_plan, sights
+from sd2core.accuracy.plans import VERTICES_KEPT, AccuracyPlan, reference_plan, sights
 from sd2core.accuracy.results import Errors
 from sd2core.accuracy.sample import Run, Sample
 from sd2core.doppler.masks import Visibility
@@ -116,7 +116,9 @@ class Trial:
             self._references[run] = Columns(raw, self._smoothed(raw, run))
         return _joined([self._references[run] for run in runs])
 
-    def columns(self, plan: Plan, runs: Sequence[Run], *, progress: Progress = silent) -> Columns:
+    def columns(
+        self, plan: AccuracyPlan, runs: Sequence[Run], *, progress: Progress = silent
+    ) -> Columns:
         """A plan's columns, with masks made for them alone.
 
         A plan that reuses masks is tried with masks made to the left and to the
@@ -134,7 +136,9 @@ class Trial:
             )
         return _joined(parts)
 
-    def errors(self, plan: Plan, runs: Sequence[Run], *, progress: Progress = silent) -> Errors:
+    def errors(
+        self, plan: AccuracyPlan, runs: Sequence[Run], *, progress: Progress = silent
+    ) -> Errors:
         """How far a plan is from the reference on some runs."""
         reference = self.reference(runs, progress=progress)
         found = self.columns(plan, runs, progress=progress)
@@ -143,7 +147,7 @@ class Trial:
         return errors(found.raw, reference.raw, found.smooth, reference.smooth, self.options.axis)
 
     def milliseconds(
-        self, plan: Plan, threads: int | None = None, *, progress: Progress = silent
+        self, plan: AccuracyPlan, threads: int | None = None, *, progress: Progress = silent
     ) -> float:
         """How long a plan takes per frame, over all sampled frames, after the sensor has moved.
 
@@ -163,7 +167,7 @@ class Trial:
 
     def load_kernels(self, progress: Progress = silent) -> None:
         """Call what is compiled once, so that reading it from disk is not timed."""
-        for plan in (Plan(visibility="none"), *sights(surface=self.mesh.faces is not None)):
+        for plan in (AccuracyPlan(visibility="none"), *sights(surface=self.mesh.faces is not None)):
             if plan.mask_stride == 1:
                 run = self.sample.runs[0]
                 self._counted(
@@ -174,7 +178,7 @@ class Trial:
                 )
 
     def synthesizer(
-        self, plan: Plan, threads: int | None = None, *, progress: Progress = silent
+        self, plan: AccuracyPlan, threads: int | None = None, *, progress: Progress = silent
     ) -> Synthesizer:
         """What carries a plan out on the sampled frames; prepared."""
         key = plan.vertices_kept, plan.frame_rate_factor
@@ -189,7 +193,7 @@ class Trial:
         self._prepared.setdefault(key, made)
         return made
 
-    def decimating_s(self, plan: Plan) -> float:
+    def decimating_s(self, plan: AccuracyPlan) -> float:
         """How long it took to make the clip's mesh for a plan, once."""
         self._sampled(plan.vertices_kept)
         return self._decimating_s[plan.vertices_kept]

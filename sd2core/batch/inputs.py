@@ -56,7 +56,7 @@ class MeshInput:
     frames, vertices : int
     frames_per_s : float
     target_m : tuple of 3 floats
-        Where the body is, see :class:`~sd2core.placements.body_extent.Whereabouts`.
+        Where the body is, see :class:`~sd2core.placements.body_extent.BodyExtent`.
     faces : str, optional
     reading : mapping
         Arguments for ``load_mesh``.
@@ -374,10 +374,10 @@ def mesh_input_of(
     Sd2Error
         As :func:`open_mesh`, and when there is nobody in it.
     """
-    from sd2core.placements.body_extent import Whereabouts
+    from sd2core.placements.body_extent import BodyExtent
 
     mesh = open_mesh(path, faces, reading or {})
-    x, y, z = (round(value, 6) for value in Whereabouts.of(mesh).target_m)
+    x, y, z = (round(value, 6) for value in BodyExtent.of(mesh).target_m)
     rate = mesh.timebase.frames_per_s
     shape = mesh.frame_count, mesh.vertex_count
     return MeshInput(str(path), identity, *shape, rate, (x, y, z), faces, reading)

@@ -19,7 +19,7 @@ from sd2core.sensor import VirtualSensor
 if TYPE_CHECKING:
     from sd2core.doppler import Synthesizer
     from sd2core.mesh.sequence import MeshSequence
-    from sd2core.placements.body_extent import Whereabouts
+    from sd2core.placements.body_extent import BodyExtent
 
 PREPARED_BYTES = 128 << 20
 """For what is prepared of a mesh; with less a block would be made twice."""
@@ -56,7 +56,7 @@ class _Kept:
 
     mesh_of: MeshInput | None = None
     mesh: MeshSequence | None = None
-    body: Whereabouts | None = None
+    body: BodyExtent | None = None
     made_for: tuple[Any, ...] = ()
     synthesizer: Synthesizer | None = None
 
@@ -108,12 +108,12 @@ def refuse_inside(mesh: MeshInput, sensor: VirtualSensor) -> None:
     ------
     Sd2Error
     """
-    from sd2core.placements.body_extent import Whereabouts
+    from sd2core.placements.body_extent import BodyExtent
 
     opened = kept_mesh(mesh)
     if _kept.body is None:
-        _kept.body = Whereabouts.of(opened)
-    if _kept.body.seen_by((sensor,)).inside[0]:
+        _kept.body = BodyExtent.of(opened)
+    if _kept.body.coverage((sensor,)).inside[0]:
         x, y, z = sensor.position_m
         raise Sd2Error(
             f"A sensor at {x:g}, {y:g}, {z:g} m stands in the body",
@@ -141,7 +141,7 @@ def kept_mesh(wanted: MeshInput) -> MeshSequence:
 
 
 def _synthesizer(mesh: MeshInput, told: Synthesise, plan: dict[str, Any] | None) -> Synthesizer:
-    from sd2core.accuracy.plans import Plan
+    from sd2core.accuracy.plans import AccuracyPlan
     from sd2core.doppler import Synthesizer
     from sd2core.mesh.decimation import decimate
 
@@ -151,7 +151,7 @@ def _synthesizer(mesh: MeshInput, told: Synthesise, plan: dict[str, Any] | None)
         _kept.synthesizer = None
         options, share = told.options(), told.vertices_kept or 1.0
         if plan is not None:
-            rungs = Plan.from_json(plan["plan"])
+            rungs = AccuracyPlan.from_json(plan["plan"])
             options, share = rungs.options(options), rungs.vertices_kept
         _kept.synthesizer = Synthesizer(
             decimate(opened, share), options, memory_budget_bytes=PREPARED_BYTES, threads=1

@@ -14,7 +14,7 @@ from sd2core.errors import Sd2Error
 if TYPE_CHECKING:
     from sd2core.accuracy import Choice
     from sd2core.mesh.sequence import MeshSequence
-    from sd2core.placements.body_extent import Sight
+    from sd2core.placements.body_extent import SensorCoverage
     from sd2core.placements.cost import PlacementCost
     from sd2core.placements.placements import Placements
     from sd2core.radar_config import RadarConfig
@@ -75,7 +75,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 def _placements(options: argparse.Namespace) -> int:
     from sd2core.cli.reading import check_output, load_mesh_as_told, recording_as_told
-    from sd2core.placements.body_extent import Whereabouts
+    from sd2core.placements.body_extent import BodyExtent
     from sd2core.placements.placements import write_placements
     from sd2core.recording.recording import is_recording
 
@@ -90,10 +90,10 @@ def _placements(options: argparse.Namespace) -> int:
     else:
         with progress_bar("Reading the mesh") as progress:
             mesh = recording.load_mesh(progress)
-    body = Whereabouts.of(mesh)
+    body = BodyExtent.of(mesh)
     sensors = placements.sensors(body.target_m)
     with progress_bar("Looking", "place") as progress:
-        sight = body.seen_by(sensors, progress)
+        coverage = body.coverage(sensors, progress)
     choice, cost = _cost(mesh, placements, sensors, options)
     if options.out is not None:
         write_placements(options.out, placements)
@@ -108,7 +108,7 @@ def _placements(options: argparse.Namespace) -> int:
                     "range_max_m": radar.range_max_m,
                     "v_max_mps": radar.v_max_mps,
                 },
-                "places": _listed(placements, sensors, sight, radar),
+                "places": _listed(placements, sensors, coverage, radar),
                 "cost": {
                     "maps": cost.maps,
                     "frames": cost.frames,
@@ -120,7 +120,7 @@ def _placements(options: argparse.Namespace) -> int:
             }
         )
     else:
-        _print(options.mesh, placements, sensors, sight, radar, cost, choice)
+        _print(options.mesh, placements, sensors, coverage, radar, cost, choice)
     return 0
 
 
@@ -199,19 +199,19 @@ def _cost(
 def _listed(
     placements: Placements,
     sensors: tuple[VirtualSensor, ...],
-    sight: Sight,
+    coverage: SensorCoverage,
     radar: RadarConfig,
 ) -> list[dict[str, Any]]:
-    out_of_range, aliasing = sight.out_of_range(radar), sight.aliasing(radar)
+    out_of_range, aliasing = coverage.out_of_range(radar), coverage.aliasing(radar)
     return [
         {
             "range_m": place.range_m,
             "azimuth_deg": place.azimuth_deg,
             "elevation_deg": place.elevation_deg,
             "position_m": sensor.position_m,
-            "farthest_m": float(sight.farthest_m[number]),
-            "fastest_mps": float(sight.fastest_mps[number]),
-            "inside": bool(sight.inside[number]),
+            "farthest_m": float(coverage.farthest_m[number]),
+            "fastest_mps": float(coverage.fastest_mps[number]),
+            "inside": bool(coverage.inside[number]),
             "out_of_range": bool(out_of_range[number]),
             "aliasing": bool(aliasing[number]),
         }
@@ -223,12 +223,12 @@ def _print(
     path: Path,
     placements: Placements,
     sensors: tuple[VirtualSensor, ...],
-    sight: Sight,
+    coverage: SensorCoverage,
     radar: RadarConfig,
     cost: PlacementCost,
     choice: Choice,
 ) -> None:
-    listed = _listed(placements, sensors, sight, radar)
+    listed = _listed(placements, sensors, coverage, radar)
     numbers = {name: sum(one[name] for one in listed) for name, _ in _LIMITS}
     beyond = [f"{numbers[name]} {words}" for name, words in _LIMITS if numbers[name]]
     limits = f"{radar.range_max_m:.1f} m, ±{radar.v_max_mps:.2f} m/s"

@@ -36,7 +36,7 @@ from sd2core.fmcw.processing import doppler_map
 from sd2core.labels.spans import Labels
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mocap.recording_pairs import on_clock
-from sd2core.placements.body_extent import Whereabouts
+from sd2core.placements.body_extent import BodyExtent
 from sd2core.placements.placements import Place, Placements
 from sd2core.progress import Progress
 from sd2core.recording.recording import Recording, open_recording
@@ -286,7 +286,7 @@ class _Opened:
 
     def _target(self) -> Vector | None:
         if self._target_m is None and self._mesh is not None:
-            self._target_m = Whereabouts.of(self._mesh).target_m
+            self._target_m = BodyExtent.of(self._mesh).target_m
         return self._target_m
 
     def _counted(self, sensor: VirtualSensor, progress: Progress) -> DopplerMap:

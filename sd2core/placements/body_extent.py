@@ -20,7 +20,7 @@ _FASTEST_SHARE = 0.01
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
+class SensorCoverage:
     """What the body asks of each of N sensors.
 
     Parameters
@@ -51,7 +51,7 @@ class Sight:
 
 
 @dataclass(frozen=True, eq=False)
-class Whereabouts:
+class BodyExtent:
     """A body in up to 100 frames with a person, spread over the clip.
 
     Parameters
@@ -73,7 +73,7 @@ class Whereabouts:
     velocity_mps: NDArray[np.float32]
 
     @classmethod
-    def of(cls, mesh: MeshSequence) -> Whereabouts:
+    def of(cls, mesh: MeshSequence) -> BodyExtent:
         """Of a clip, which is read frame by frame.
 
         Raises
@@ -105,8 +105,10 @@ class Whereabouts:
         x, y, z = middle.mean(axis=0).tolist()
         return cls((x, y, z), low, high, points, velocity)
 
-    def seen_by(self, sensors: Sequence[VirtualSensor], progress: Progress = silent) -> Sight:
-        """What the body asks of sensors; less than a millisecond for each."""
+    def coverage(
+        self, sensors: Sequence[VirtualSensor], progress: Progress = silent
+    ) -> SensorCoverage:
+        """Coverage of the body by sensors; takes less than a millisecond for each."""
         inside = np.zeros(len(sensors), dtype=bool)
         farthest_m, fastest_mps = np.zeros((2, len(sensors)))
         # Which of the vertices of a frame 1 % are faster than.
@@ -117,13 +119,13 @@ class Whereabouts:
             inside[number] = self._holds(sensor)
             corner = np.maximum(np.abs(self.low_m - position), np.abs(self.high_m - position))
             farthest_m[number] = np.linalg.norm(corner, axis=1).max()
-            sight = self.points_m - position.astype(np.float32)
-            range_m = np.sqrt(np.einsum("nki,nki->nk", sight, sight))
-            radial_mps = np.abs(np.einsum("nki,nki->nk", self.velocity_mps, sight))
+            sight_m = self.points_m - position.astype(np.float32)
+            range_m = np.sqrt(np.einsum("nki,nki->nk", sight_m, sight_m))
+            radial_mps = np.abs(np.einsum("nki,nki->nk", self.velocity_mps, sight_m))
             radial_mps /= np.maximum(range_m, 1e-9)
             fastest_mps[number] = np.partition(radial_mps, rank, axis=1)[:, rank].max()
         progress(len(sensors), len(sensors))
-        return Sight(inside, farthest_m, fastest_mps)
+        return SensorCoverage(inside, farthest_m, fastest_mps)
 
     def _holds(self, sensor: VirtualSensor) -> bool:
         position = np.asarray(sensor.position_m)

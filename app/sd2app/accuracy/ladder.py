@@ -12,7 +12,7 @@ from sd2core.progress import Progress
 from sd2core.sensor import VirtualSensor
 
 if TYPE_CHECKING:
-    from sd2core.accuracy.plans import Family, Plan
+    from sd2core.accuracy.plans import AccuracyPlan, Family
     from sd2core.accuracy.results import Choice, Measurement
     from sd2core.accuracy.survey import Survey
     from sd2core.doppler.synthesizer import Synthesizer
@@ -27,7 +27,9 @@ class Ladder:
     measure: Callable[..., Measurement]
     remembered: Callable[..., Measurement | None]
     remember: Callable[[MeshSequence, Measurement], None]
-    synthesizer_for: Callable[[Plan, MeshSequence, SynthesisOptions, Synthesizer | None], Any]
+    synthesizer_for: Callable[
+        [AccuracyPlan, MeshSequence, SynthesisOptions, Synthesizer | None], Any
+    ]
 
 
 # Imported in the functions: they run in a background thread, and the signal
@@ -73,7 +75,7 @@ def _remember(mesh: MeshSequence, measurement: Measurement) -> None:
 
 
 def _synthesizer_for(
-    plan: Plan, mesh: MeshSequence, options: SynthesisOptions, like: Synthesizer | None
+    plan: AccuracyPlan, mesh: MeshSequence, options: SynthesisOptions, like: Synthesizer | None
 ) -> Synthesizer:
     from sd2core.accuracy.synthesizers import synthesizer_for
 

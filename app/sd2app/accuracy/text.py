@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
-    from sd2core.accuracy.plans import Plan
+    from sd2core.accuracy.plans import AccuracyPlan
     from sd2core.accuracy.results import PlanResult
 
 Origin = Literal["chosen", "clicked"]
@@ -18,7 +18,7 @@ class InUse:
 
     Parameters
     ----------
-    plan : Plan
+    plan : AccuracyPlan
     error : float
         Relative L1 after smoothing, as measured on this scene.
     cost_ms : float
@@ -29,7 +29,7 @@ class InUse:
         Whether error and cost were measured with the sensor at another place.
     """
 
-    plan: Plan
+    plan: AccuracyPlan
     error: float
     cost_ms: float
     origin: Origin = "chosen"
@@ -72,7 +72,7 @@ def seconds(value_s: float) -> str:
     return milliseconds(1e3 * value_s) if value_s < 1 else f"{number(value_s)} s"
 
 
-def short(plan: Plan) -> str:
+def short(plan: AccuracyPlan) -> str:
     """What of a plan tells maps of one scene apart: visibility, masks, geometry, time."""
     sight = plan.visibility
     words = [f"visibility {sight}"]

@@ -33,7 +33,7 @@ from sd2core.progress import Cancelled
 from sd2core.sensor import Vector, VirtualSensor
 
 if TYPE_CHECKING:
-    from sd2core.accuracy.plans import Plan
+    from sd2core.accuracy.plans import AccuracyPlan
 
 _REST_MS = 300
 """A hand that holds the sensor still for so long is at rest."""
@@ -237,8 +237,8 @@ class SynthesisModel(QObject):
     def _forget(self) -> None:
         self._painted.forget()
         self._reader.forget()
-        self._plan: Plan | None = None
-        self._dragging_plan: Plan | None = None
+        self._plan: AccuracyPlan | None = None
+        self._dragging_plan: AccuracyPlan | None = None
         self._readier.forget()
         self._again = False
         self._sweeping = False

@@ -12,7 +12,7 @@ from sd2app.maps.synthesizers import Carriers
 from sd2core.sensor import VirtualSensor
 
 if TYPE_CHECKING:
-    from sd2core.accuracy.plans import Plan
+    from sd2core.accuracy.plans import AccuracyPlan
 
 _MAP_BUDGET_MS = 15.0
 """For one map while a hand moves the sensor and the video plays: 20 of them a second, with most
@@ -30,12 +30,14 @@ def distance_m(one: VirtualSensor | None, other: VirtualSensor) -> float:
     return math.inf if one is None else math.dist(one.position_m, other.position_m)
 
 
-def rough_way(carriers: Carriers, plan: Plan | None, dragging: InUse | None, moved_m: float) -> Way:
+def rough_way(
+    carriers: Carriers, plan: AccuracyPlan | None, dragging: InUse | None, moved_m: float
+) -> Way:
     """For a moving sensor, and where nothing is known yet.
 
     Parameters
     ----------
-    plan : Plan or None
+    plan : AccuracyPlan or None
         In use at rest: its masks serve until one for dragging is known.
     dragging : InUse or None
     moved_m : float
@@ -56,7 +58,7 @@ def rough_way(carriers: Carriers, plan: Plan | None, dragging: InUse | None, mov
     return Way(lambda: newest, AS_DRAGGED, "preview: visibility of the nearest place", "frozen")
 
 
-def final_way(carriers: Carriers, plan: Plan | None, in_use: InUse | None) -> Way:
+def final_way(carriers: Carriers, plan: AccuracyPlan | None, in_use: InUse | None) -> Way:
     """As the plan says; without one, as well as it gets."""
     return Way(lambda: carriers.of(plan), FINAL, final_words(carriers, in_use))
 

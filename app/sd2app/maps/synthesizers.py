@@ -13,7 +13,7 @@ from sd2core.doppler.synthesizer import Synthesizer
 from sd2core.mesh.sequence import MeshSequence
 
 if TYPE_CHECKING:
-    from sd2core.accuracy.plans import Plan
+    from sd2core.accuracy.plans import AccuracyPlan
 
 _KEPT = 3
 """The plan at rest, the one for dragging, and the one before."""
@@ -44,10 +44,10 @@ class Carriers:
         self.options = options
         self.full = Synthesizer(mesh, options)
         self._ladder = ladder
-        self._made: OrderedDict[Plan, Synthesizer] = OrderedDict()
+        self._made: OrderedDict[AccuracyPlan, Synthesizer] = OrderedDict()
         self._lock = threading.Lock()
 
-    def of(self, plan: Plan | None) -> Synthesizer:
+    def of(self, plan: AccuracyPlan | None) -> Synthesizer:
         """The synthesizer of a plan; the first time it takes as long as decimating."""
         if plan is None:
             return self.full
@@ -64,17 +64,17 @@ class Carriers:
                 self._made.popitem(last=False)
         return synthesizer
 
-    def ready(self, plan: Plan | None) -> Synthesizer | None:
+    def ready(self, plan: AccuracyPlan | None) -> Synthesizer | None:
         """The synthesizer of a plan if there is one already; never waits."""
         return self.full if plan is None else self._made.get(_key(plan))
 
-    def _like(self, plan: Plan) -> Synthesizer | None:
+    def _like(self, plan: AccuracyPlan) -> Synthesizer | None:
         if plan.vertices_kept == 1:
             return self.full
         same = [made for key, made in self._made.items() if key.vertices_kept == plan.vertices_kept]
         return same[-1] if same else None
 
 
-def _key(plan: Plan) -> Plan:
+def _key(plan: AccuracyPlan) -> AccuracyPlan:
     # How long a mask is kept is up to the window; it changes no synthesizer.
     return replace(plan, mask_reuse_m=0.0)

@@ -12,7 +12,7 @@ from sd2app.maps.synthesizers import Carriers
 from sd2core.sensor import VirtualSensor
 
 if TYPE_CHECKING:
-    from sd2core.accuracy.plans import Plan
+    from sd2core.accuracy.plans import AccuracyPlan
 
 
 class Readier(QObject):
@@ -33,7 +33,7 @@ class Readier(QObject):
         return self._ready_at
 
     def make_ready(
-        self, carriers: Carriers, plan: Plan, sensor: VirtualSensor, frames: View
+        self, carriers: Carriers, plan: AccuracyPlan, sensor: VirtualSensor, frames: View
     ) -> None:
         """Carry a plan out once, for frames that will follow a hand."""
 

@@ -247,8 +247,10 @@ class SceneView(QWidget):
         self._planned = planned
         sensors = model.planned.sensors if model.shown else ()
         range_m = np.array([place.range_m for place in model.planned.places])
-        sight = model.planned.sight
-        self.scene.set_markers(sensors, range_m, None if sight is None else sight.beyond(radar))
+        coverage = model.planned.coverage
+        self.scene.set_markers(
+            sensors, range_m, None if coverage is None else coverage.beyond(radar)
+        )
         self.overlay.marker_words = [place.words for place in model.planned.places]
         self._framed = None
         self.navigator.look_again()

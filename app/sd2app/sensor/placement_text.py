@@ -25,24 +25,24 @@ def count_text(model: PlacementsModel) -> str:
 
 def limit_facts(model: PlacementsModel) -> list[tuple[str, str]]:
     """What is wrong with how many of them."""
-    sight, radar = model.planned.sight, model.radar
-    if sight is None:
+    coverage, radar = model.planned.coverage, model.radar
+    if coverage is None:
         return []
     facts = (
-        ("In the body", sight.inside),
-        (f"Beyond R max {radar.range_max_m:.1f} m", sight.out_of_range(radar)),
-        (f"Faster than ±{radar.v_max_mps:.2f} m/s", sight.aliasing(radar)),
+        ("In the body", coverage.inside),
+        (f"Beyond R max {radar.range_max_m:.1f} m", coverage.out_of_range(radar)),
+        (f"Faster than ±{radar.v_max_mps:.2f} m/s", coverage.aliasing(radar)),
     )
     return [(name, f"{int(some.sum()):,}") for name, some in facts if some.any()]
 
 
 def limits_text(model: PlacementsModel) -> str:
     """Whose limits these are, and what is done about it."""
-    sight, radar = model.planned.sight, model.radar
-    if sight is None:
+    coverage, radar = model.planned.coverage, model.radar
+    if coverage is None:
         return "Looking at what they see…" if model.planned.places else ""
     where = f"{radar.name}: {radar.range_max_m:.1f} m, ±{radar.v_max_mps:.2f} m/s."
-    if not sight.beyond(radar).any():
+    if not coverage.beyond(radar).any():
         return f"All within the limits of the radar. {where}"
     return f"Beyond the radar, part of the body is seen at another range or velocity. {where}"
 

@@ -12,7 +12,7 @@ from sd2app.background.latest import Emit, LatestRunner
 from sd2app.session.document import DocumentModel
 from sd2app.session.sensor import SensorModel
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.placements.body_extent import Sight, Whereabouts
+from sd2core.placements.body_extent import BodyExtent, SensorCoverage
 from sd2core.placements.cost import PlacementCost
 from sd2core.placements.placements import Place, Placements
 from sd2core.radar_config import PAPER_RADAR, RadarConfig
@@ -28,13 +28,13 @@ class Planned:
     places : tuple of Place
     sensors : tuple of VirtualSensor
         One per place.
-    sight : Sight or None
+    coverage : SensorCoverage or None
         What each sees; None while that is being found out.
     """
 
     places: tuple[Place, ...] = ()
     sensors: tuple[VirtualSensor, ...] = ()
-    sight: Sight | None = None
+    coverage: SensorCoverage | None = None
 
 
 class PlanEdits(Protocol):
@@ -94,7 +94,7 @@ class PlacementsModel(QObject):
         self.edits = edits
         self._shown = True
         self._wish: _Wish | None = None
-        self._body: tuple[MeshSequence, Whereabouts] | None = None
+        self._body: tuple[MeshSequence, BodyExtent] | None = None
         self._planned = Planned()
         self._runner = LatestRunner("placements", self)
         self._runner.partial.connect(self._receive)
@@ -213,14 +213,14 @@ class PlacementsModel(QObject):
 
 
 def _worked_out(
-    wish: _Wish, known: tuple[MeshSequence, Whereabouts] | None, emit: Emit
-) -> tuple[tuple[MeshSequence, Whereabouts], Planned]:
+    wish: _Wish, known: tuple[MeshSequence, BodyExtent] | None, emit: Emit
+) -> tuple[tuple[MeshSequence, BodyExtent], Planned]:
     """In the background; the places come before what they see."""
     body = known if known is not None and known[0] is wish.mesh else None
     if body is None:
-        body = (wish.mesh, Whereabouts.of(wish.mesh))
+        body = (wish.mesh, BodyExtent.of(wish.mesh))
     places = wish.plan.places()
     sensors = tuple(place.sensor(body[1].target_m) for place in places)
     emit((body, Planned(places, sensors)))
-    sight = body[1].seen_by(sensors, lambda done, total: emit(None))
-    return body, Planned(places, sensors, sight)
+    coverage = body[1].coverage(sensors, lambda done, total: emit(None))
+    return body, Planned(places, sensors, coverage)

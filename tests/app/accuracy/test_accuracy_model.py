@@ -10,7 +10,7 @@ from PySide6.QtCore import QObject
 from sd2app.accuracy.model import TradeModel
 from sd2app.session.tasks import JobsModel
 from sd2app.settings import DEFAULT_TOLERANCE, Settings
-from sd2core.accuracy.plans import Plan
+from sd2core.accuracy.plans import AccuracyPlan
 from sd2core.doppler.options import PRESETS
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
@@ -48,7 +48,7 @@ class Desk:
 
 @pytest.fixture
 def desk(qapp):
-    desk = Desk(plan=Plan(mask_stride=5), error=0.008)
+    desk = Desk(plan=AccuracyPlan(mask_stride=5), error=0.008)
     yield desk
     desk.fake.gate.set()
     desk.trade.close()
@@ -58,7 +58,7 @@ def test_a_choice_gives_the_plans_for_rest_and_for_dragging(desk, qtbot):
     trade = desk.trade
     assert trade.in_use is None
     desk.choose(qtbot)
-    assert trade.in_use.plan == Plan(mask_stride=5)
+    assert trade.in_use.plan == AccuracyPlan(mask_stride=5)
     assert (trade.in_use.error, trade.in_use.cost_ms) == (0.008, 0.6)
     assert trade.while_dragging.plan == FACING
     assert desk.fake.asked == [(DEFAULT_TOLERANCE, None, HERE), (None, BUDGET_MS, HERE)]
@@ -164,7 +164,7 @@ def test_a_clicked_point_rules_until_the_tolerance_is_set_again(desk, qtbot):
     assert trade.in_use.origin == "chosen"
     trade.use(COUNTING[0])
     trade.choose_by_tolerance()
-    assert trade.in_use.plan == Plan(mask_stride=5)
+    assert trade.in_use.plan == AccuracyPlan(mask_stride=5)
 
 
 def test_an_fmcw_point_is_for_comparison(desk, qtbot):
@@ -205,9 +205,9 @@ def test_no_plan_within_a_tolerance_has_no_cost(desk, qtbot):
 
 
 def test_the_cost_of_a_tolerance_counts_the_chosen_plan_and_no_kept_mask(desk, qtbot):
-    kept = result_of(Plan(mask_reuse_m=0.1), 0.004, 0.01)
+    kept = result_of(AccuracyPlan(mask_reuse_m=0.1), 0.004, 0.01)
     desk.fake.known["histogram", THERE] = measurement_of(*COUNTING, kept)
-    desk.fake.plan, desk.fake.error = Plan(mask_stride=10), 0.001
+    desk.fake.plan, desk.fake.error = AccuracyPlan(mask_stride=10), 0.001
     desk.trade.rest_at(THERE)
     qtbot.waitUntil(lambda: desk.trade.measured.counting is not None)
     assert desk.trade.cost_at(0.005) == 2.1
@@ -218,7 +218,7 @@ def test_the_cost_of_a_tolerance_counts_the_chosen_plan_and_no_kept_mask(desk, q
 def test_a_plan_that_keeps_its_mask_is_not_used_at_rest(desk, qtbot):
     desk.choose(qtbot)
     before = desk.trade.in_use
-    desk.trade.use(result_of(Plan(mask_reuse_m=0.1), 0.004, 0.01))
+    desk.trade.use(result_of(AccuracyPlan(mask_reuse_m=0.1), 0.004, 0.01))
     assert desk.trade.in_use == before
     assert "while the sensor moves" in desk.notes[0]
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from sd2app.accuracy.text import InUse, deviation, milliseconds, percent, seconds, short
-from sd2core.accuracy.plans import Plan
+from sd2core.accuracy.plans import AccuracyPlan
 
 
 @pytest.mark.parametrize(
@@ -42,10 +42,10 @@ def test_a_clip_takes_seconds_or_less():
 
 
 def test_a_plan_is_said_shortly_and_with_its_figures():
-    plan = Plan(mask_stride=5, vertices_kept=0.25, frame_rate_factor=2)
+    plan = AccuracyPlan(mask_stride=5, vertices_kept=0.25, frame_rate_factor=2)
     assert short(plan) == (
         "visibility exact · mask every 5 frames · 25 % of the vertices · frame rate × 2"
     )
-    assert short(Plan(visibility="depth", depth_resolution=128)) == "depth 128"
+    assert short(AccuracyPlan(visibility="depth", depth_resolution=128)) == "depth 128"
     text = str(InUse(plan, 0.008, 0.6))
     assert text == f"{plan} · ±0.8 % · 0.6 ms/frame"

@@ -14,7 +14,7 @@ from sd2app.maps import compiling
 from sd2app.maps.partial_map import FINAL, ROUGH
 from sd2app.settings import Settings
 from sd2app.shell.wiring import build_context
-from sd2core.accuracy.plans import Plan
+from sd2core.accuracy.plans import AccuracyPlan
 from sd2core.accuracy.synthesizers import synthesizer_for
 from sd2core.doppler.synthesizer import Synthesizer
 from sd2core.doppler_map import DopplerMap
@@ -183,7 +183,13 @@ def wait_until_done(context, qtbot):
 
 
 @pytest.mark.parametrize(
-    "plan", [FACING, Plan(mask_stride=5), Plan(vertices_kept=0.5), Plan(frame_rate_factor=2)]
+    "plan",
+    [
+        FACING,
+        AccuracyPlan(mask_stride=5),
+        AccuracyPlan(vertices_kept=0.5),
+        AccuracyPlan(frame_rate_factor=2),
+    ],
 )
 def test_the_plan_in_use_is_carried_out(context, fake, qtbot, ball, plan):
     fake.plan, fake.error = plan, 0.008
@@ -258,7 +264,7 @@ def test_a_new_place_first_gets_the_plan_in_use_and_then_a_choice_of_its_own(
 
 
 def test_a_hand_gets_the_plan_for_dragging(context, fake, qtbot, ball):
-    fake.dragging = Plan(visibility="depth", depth_resolution=128, mask_stride=5)
+    fake.dragging = AccuracyPlan(visibility="depth", depth_resolution=128, mask_stride=5)
     open_ball(context, qtbot, ball)
     wait_until_done(context, qtbot)
     qtbot.waitUntil(lambda: context.synthesis._readier.ready_at is not None, timeout=10_000)
@@ -278,7 +284,7 @@ def test_a_hand_gets_the_plan_for_dragging(context, fake, qtbot, ball):
 
 
 def test_masks_are_kept_within_their_reach_and_not_beyond(context, fake, qtbot, ball):
-    fake.dragging = Plan(mask_reuse_m=0.1)
+    fake.dragging = AccuracyPlan(mask_reuse_m=0.1)
     open_ball(context, qtbot, ball)
     wait_until_done(context, qtbot)
     qtbot.waitUntil(lambda: context.synthesis._readier.ready_at is not None, timeout=10_000)
@@ -318,7 +324,7 @@ def test_a_choice_that_fails_leaves_exact_visibility(context, fake, qtbot, ball)
 
 
 def test_the_exported_map_names_its_plan(context, fake, qtbot, ball, tmp_path):
-    fake.plan, fake.error = Plan(mask_stride=5), 0.008
+    fake.plan, fake.error = AccuracyPlan(mask_stride=5), 0.008
     open_ball(context, qtbot, ball)
     wait_until_done(context, qtbot)
     context.synthesis.export(tmp_path / "map.npz")
@@ -326,7 +332,7 @@ def test_the_exported_map_names_its_plan(context, fake, qtbot, ball, tmp_path):
     np.testing.assert_array_equal(saved.values, context.synthetic.map.values)
     plan = saved.meta["plan"]
     assert plan.pop("text") == str(fake.plan)
-    assert Plan.from_json(plan) == fake.plan
+    assert AccuracyPlan.from_json(plan) == fake.plan
     assert saved.meta["plan_error_l1"] == 0.008
 
 

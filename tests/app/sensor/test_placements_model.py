@@ -18,7 +18,7 @@ from sd2app.sensor.placement_text import (
 )
 from sd2app.sensor.placements import PlacementsModel
 from sd2app.session.sensor import SensorModel
-from sd2core.accuracy.plans import Plan
+from sd2core.accuracy.plans import AccuracyPlan
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.placements.placements import PlacementCloud, PlacementGrid
 from sd2core.sensor import VirtualSensor
@@ -87,7 +87,7 @@ def stage(qtbot):
 
 
 def settle(qtbot, model):
-    qtbot.waitUntil(lambda: not model.busy and model.planned.sight is not None, timeout=10_000)
+    qtbot.waitUntil(lambda: not model.busy and model.planned.coverage is not None, timeout=10_000)
 
 
 GRID = PlacementGrid((1.0, 2.0, 12.0), (0.0, 30.0))
@@ -140,7 +140,7 @@ def test_the_cost_is_that_of_the_plan_in_use_times_the_places(stage, qtbot):
     document.open(a_cube(), GRID)
     settle(qtbot, stage)
     assert stage.cost is None
-    trade.in_use = InUse(Plan(), 0.01, 2.5)
+    trade.in_use = InUse(AccuracyPlan(), 0.01, 2.5)
     with qtbot.waitSignal(stage.changed):
         trade.plan_changed.emit()
     assert stage.cost.total_s == pytest.approx(6 * 10 * 2.5e-3)

@@ -12,7 +12,7 @@ from accuracy_scenes import ball, swinging
 
 from sd2core.accuracy import cache
 from sd2core.accuracy.cache import remember, remembered
-from sd2core.accuracy.plans import Plan, reference_plan
+from sd2core.accuracy.plans import AccuracyPlan, reference_plan
 from sd2core.accuracy.results import Cost, Errors, Machine, Measurement, PlanResult, Spread
 from sd2core.accuracy.scene import scene_fingerprint, this_machine
 from sd2core.doppler import PRESETS
@@ -33,7 +33,7 @@ def mesh() -> MeshSequence:
     return ball(swinging((0, 0, 3), 1.0, 0.5), fineness=1)
 
 
-def result(plan: Plan, cost_ms: float, error: float) -> PlanResult:
+def result(plan: AccuracyPlan, cost_ms: float, error: float) -> PlanResult:
     some = Spread(0.1, 0.2)
     errors = Errors(error, 2 * error, some, some, some, some, some, 60)
     return PlanResult(plan, errors, Cost(some, Spread(cost_ms, cost_ms), 1000, 0.5))
@@ -44,10 +44,10 @@ def measured(mesh: MeshSequence) -> Measurement:
         "histogram",
         reference_plan("histogram"),
         (
-            result(Plan(visibility="none"), 0.01, 0.9),
-            result(Plan(visibility="facing"), 0.02, 0.1),
-            result(Plan(visibility="depth"), 0.5, 0.2),
-            result(Plan(), 1.0, 0.0),
+            result(AccuracyPlan(visibility="none"), 0.01, 0.9),
+            result(AccuracyPlan(visibility="facing"), 0.02, 0.1),
+            result(AccuracyPlan(visibility="depth"), 0.5, 0.2),
+            result(AccuracyPlan(), 1.0, 0.0),
         ),
         scene_fingerprint(mesh, CAMERA, PAPER, "histogram"),
         this_machine(),

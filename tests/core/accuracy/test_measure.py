@@ -9,7 +9,7 @@ import pytest
 from accuracy_scenes import ball, plate, steady, swinging, together
 
 from sd2core.accuracy.measuring import measure
-from sd2core.accuracy.plans import Plan, compared_plans, wave_plans
+from sd2core.accuracy.plans import AccuracyPlan, compared_plans, wave_plans
 from sd2core.accuracy.results import Measurement
 from sd2core.doppler import PRESETS
 from sd2core.errors import Sd2Error
@@ -30,7 +30,7 @@ def table(scene: MeshSequence) -> Measurement:
     return measure(scene, CAMERA, repeats=2)
 
 
-def error(table: Measurement, plan: Plan) -> float:
+def error(table: Measurement, plan: AccuracyPlan) -> float:
     result = table.of(plan)
     assert result is not None, plan
     return result.errors.l1
@@ -44,15 +44,15 @@ def test_every_plan_is_there_once(table: Measurement) -> None:
 
 def test_the_reference_plan_itself_is_right(table: Measurement) -> None:
     """In single precision only vertices at the very edge of a bin can differ."""
-    assert error(table, Plan(frame_rate_factor=8)) < 1e-3
+    assert error(table, AccuracyPlan(frame_rate_factor=8)) < 1e-3
 
 
 def test_each_rung_brings_the_map_nearer(table: Measurement) -> None:
-    raised = replace(Plan(), frame_rate_factor=4)
+    raised = replace(AccuracyPlan(), frame_rate_factor=4)
     kinds = [replace(raised, visibility=kind) for kind in ("none", "facing", "exact")]
     found = [error(table, plan) for plan in kinds]
     assert found == sorted(found, reverse=True)
-    rates = [error(table, Plan(frame_rate_factor=factor)) for factor in (1, 2, 4, 8)]
+    rates = [error(table, AccuracyPlan(frame_rate_factor=factor)) for factor in (1, 2, 4, 8)]
     assert rates == sorted(rates, reverse=True)
 
 
@@ -61,7 +61,10 @@ def test_costs_are_there_and_finer_work_costs_more(table: Measurement) -> None:
         assert result.cost.one_thread_ms.median > 0
         assert result.cost.all_cores_ms.median > 0
         assert result.cost.peak_bytes > 0
-    cheap, dear = table.of(Plan(visibility="facing")), table.of(Plan(frame_rate_factor=8))
+    cheap, dear = (
+        table.of(AccuracyPlan(visibility="facing")),
+        table.of(AccuracyPlan(frame_rate_factor=8)),
+    )
     assert cheap is not None
     assert dear is not None
     assert dear.cost.one_thread_ms.median > cheap.cost.one_thread_ms.median
@@ -79,7 +82,7 @@ def test_the_front_is_a_staircase(table: Measurement) -> None:
 def test_the_table_says_what_it_is_of(table: Measurement) -> None:
     assert table.source == "scene"
     assert table.machine.cores >= 1
-    best = table.of(Plan(frame_rate_factor=8))
+    best = table.of(AccuracyPlan(frame_rate_factor=8))
     assert best is not None
     assert len(table.frames) == len(set(table.frames)) == best.errors.frames
 
@@ -108,7 +111,7 @@ def test_measuring_can_be_stopped(scene: MeshSequence) -> None:
 def test_the_weight_is_measured_against_its_own_reference(scene: MeshSequence) -> None:
     options = replace(PRESETS["paper"], weight="projected")
     table = measure(scene, CAMERA, options=options, repeats=1)
-    assert error(table, Plan(weight="projected", frame_rate_factor=8)) < 1e-3
+    assert error(table, AccuracyPlan(weight="projected", frame_rate_factor=8)) < 1e-3
 
 
 def test_waves_converge_and_blocks_and_motion_bring_them_nearer() -> None:
@@ -118,11 +121,11 @@ def test_waves_converge_and_blocks_and_motion_bring_them_nearer() -> None:
     changes = [change for _, change in table.convergence]
     assert changes
     assert changes[-1] < 0.02
-    fine = error(table, Plan(signal="fmcw", motion="interpolated"))
+    fine = error(table, AccuracyPlan(signal="fmcw", motion="interpolated"))
     # A ball of flat facets has speckle of its own: fewer facets are another surface.
-    coarse = error(table, Plan(signal="fmcw", vertices_kept=0.25))
+    coarse = error(table, AccuracyPlan(signal="fmcw", vertices_kept=0.25))
     assert fine < 0.02
     assert fine < coarse
-    direct = error(table, Plan(signal="direct"))
-    assert direct == pytest.approx(error(table, Plan(signal="fmcw", blocks=4)), abs=1e-3)
+    direct = error(table, AccuracyPlan(signal="direct"))
+    assert direct == pytest.approx(error(table, AccuracyPlan(signal="fmcw", blocks=4)), abs=1e-3)
     assert np.isfinite([result.errors.l1 for result in table.results]).all()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sd2core.accuracy.plans import (
-    Plan,
+    AccuracyPlan,
     compared_plans,
     counting_plans,
     reference_plan,
@@ -30,14 +30,16 @@ def test_different_plans_have_different_lines() -> None:
     assert all("\n" not in str(plan) for plan in plans)
 
 
-@pytest.mark.parametrize("plan", [Plan(), reference_plan("fmcw"), Plan(mask_reuse_m=0.1)])
-def test_a_plan_survives_a_file(plan: Plan) -> None:
-    assert Plan.from_json(json.loads(json.dumps(plan.to_json()))) == plan
+@pytest.mark.parametrize(
+    "plan", [AccuracyPlan(), reference_plan("fmcw"), AccuracyPlan(mask_reuse_m=0.1)]
+)
+def test_a_plan_survives_a_file(plan: AccuracyPlan) -> None:
+    assert AccuracyPlan.from_json(json.loads(json.dumps(plan.to_json()))) == plan
 
 
 def test_a_plan_of_another_version_is_refused() -> None:
     with pytest.raises(Sd2Error, match="magic"):
-        Plan.from_json({"magic": 1})
+        AccuracyPlan.from_json({"magic": 1})
 
 
 @pytest.mark.parametrize(
@@ -54,12 +56,12 @@ def test_a_plan_of_another_version_is_refused() -> None:
 )
 def test_what_cannot_be_is_refused(rungs: dict[str, object], message: str) -> None:
     with pytest.raises(Sd2Error, match=message):
-        Plan(**rungs)  # type: ignore[arg-type]
+        AccuracyPlan(**rungs)  # type: ignore[arg-type]
 
 
 def test_a_plan_changes_only_its_rungs() -> None:
     base = replace(PRESETS["paper"], velocity_sigma_bins=3.0, null_bins=())
-    plan = Plan(visibility="depth", depth_resolution=128, mask_stride=5, range_law="frame")
+    plan = AccuracyPlan(visibility="depth", depth_resolution=128, mask_stride=5, range_law="frame")
     options = plan.options(base)
     assert options.visibility == "depth"
     assert options.depth_resolution == 128
@@ -67,7 +69,7 @@ def test_a_plan_changes_only_its_rungs() -> None:
     assert options.range_law == "frame"
     assert options.velocity_sigma_bins == 3.0
     assert options.null_bins == ()
-    wave = replace(Plan(signal="direct"), blocks=4).wave(WaveOptions(coherent=False))
+    wave = replace(AccuracyPlan(signal="direct"), blocks=4).wave(WaveOptions(coherent=False))
     assert (wave.model, wave.blocks, wave.coherent) == ("direct", 4, False)
 
 

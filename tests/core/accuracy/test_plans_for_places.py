@@ -13,7 +13,7 @@ from moving_spheres import swinging_sphere
 
 from sd2core.accuracy import Choice, places
 from sd2core.accuracy.places import MOST_PLACES, choose_for_places, spread
-from sd2core.accuracy.plans import Plan, reference_plan
+from sd2core.accuracy.plans import AccuracyPlan, reference_plan
 from sd2core.accuracy.synthesizers import synthesizer_for
 from sd2core.doppler import PRESETS
 from sd2core.mesh.sequence import MeshSequence
@@ -29,7 +29,7 @@ AROUND = [VirtualSensor(place) for place in ((0.0, 0.0, 0.0), (2.0, 0.0, 2.0), (
 def free(monkeypatch: pytest.MonkeyPatch) -> None:
     """Choosing costs nothing, and every plan but the most accurate as little."""
     monkeypatch.setattr(places._Search, "reference_s", lambda _: 0.0)
-    costs = {TOP: 1.0, Plan(): 0.5}
+    costs = {TOP: 1.0, AccuracyPlan(): 0.5}
     monkeypatch.setattr(places._Search, "frame_s", lambda _, plan: costs.get(plan, 0.1))
 
 
@@ -67,7 +67,7 @@ def test_where_nothing_else_holds_the_most_accurate_is_taken() -> None:
 @pytest.mark.usefixtures("free")
 def test_a_plan_that_fails_elsewhere_is_chosen_anew_there(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[VirtualSensor] = []
-    bad, good, really = Plan(visibility="none"), Plan(mask_stride=5), places.choose
+    bad, good, really = AccuracyPlan(visibility="none"), AccuracyPlan(mask_stride=5), places.choose
 
     def chosen(mesh: MeshSequence, place: VirtualSensor, **told: Any) -> Choice:
         asked.append(place)
@@ -81,10 +81,10 @@ def test_a_plan_that_fails_elsewhere_is_chosen_anew_there(monkeypatch: pytest.Mo
 
 @pytest.mark.usefixtures("free")
 def test_what_is_chosen_and_is_not_cheaper_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
-    costs = {TOP: 1.0, Plan(): 0.1}
+    costs = {TOP: 1.0, AccuracyPlan(): 0.1}
     monkeypatch.setattr(places._Search, "frame_s", lambda _, plan: costs.get(plan, 0.2))
     found = choose_for_places(swinging_sphere(90), AROUND, 10**6, 0.3, PAPER)
-    assert found.plan == Plan()
+    assert found.plan == AccuracyPlan()
     assert 0 < found.error_l1 <= 0.3
 
 
@@ -107,7 +107,7 @@ def test_where_choosing_takes_longer_than_it_saves_nothing_is_chosen(
     # A check takes a fraction of choosing: it pays earlier.
     monkeypatch.setattr(places._Search, "reference_s", lambda _: 0.02)
     checked = choose_for_places(swinging_sphere(30), AROUND, 10_000, 0.3, PAPER)
-    assert checked.plan == Plan()
+    assert checked.plan == AccuracyPlan()
     assert 0 < checked.error_l1 <= 0.3
     with pytest.raises(TypeError):  # the survey is called
         choose_for_places(swinging_sphere(30), AROUND, 200_000, 0.3, PAPER)

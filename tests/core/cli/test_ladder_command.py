@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from cli_outcome import Sd2
 
-from sd2core.accuracy import Plan
+from sd2core.accuracy import AccuracyPlan
 from sd2core.doppler_map import DopplerMap
 
 
@@ -86,7 +86,7 @@ def test_synth_carries_the_plan_out(sd2: Sd2, plate: Path, tmp_path: Path) -> No
     outcome = sd2("synth", plate, "--out", out, "--tolerance", "5%")
     assert outcome.code == 0, outcome.err
     made = DopplerMap.load(out)
-    plan = Plan.from_json({k: v for k, v in made.meta["plan"].items() if k != "text"})
+    plan = AccuracyPlan.from_json({k: v for k, v in made.meta["plan"].items() if k != "text"})
     assert made.meta["plan"]["text"] == str(plan)
     assert made.meta["options"]["visibility"] == plan.visibility
     assert made.meta["plan_error_l1"] <= 0.05

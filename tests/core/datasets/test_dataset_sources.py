@@ -12,7 +12,7 @@ from small_pairs import write_pairs
 from swinging_recordings import FRAMES, RATE_HZ, recording
 
 from sd2core.accuracy.places import PlacedPlan
-from sd2core.accuracy.plans import Plan
+from sd2core.accuracy.plans import AccuracyPlan
 from sd2core.accuracy.synthesizers import synthesizer_for
 from sd2core.datasets.inputs import gather
 from sd2core.datasets.options import DatasetOptions
@@ -29,7 +29,7 @@ from sd2core.labels.files import write_labels
 from sd2core.labels.label_set import Label, LabelSet
 from sd2core.labels.spans import Labels, Span, Track
 from sd2core.pairs.store import read_pairs
-from sd2core.placements.body_extent import Whereabouts
+from sd2core.placements.body_extent import BodyExtent
 from sd2core.placements.placements import PlacementGrid
 from sd2core.progress import silent
 
@@ -72,7 +72,7 @@ def test_every_placement_is_seen_from_there(tmp_path: Path) -> None:
     assert ["simulated" in source.maps for source in sources] == [True] + [False] * 4
     mesh = one.load_mesh()
     maps = Synthesizer(mesh, PRESETS["paper"])
-    target_m = Whereabouts.of(mesh).target_m
+    target_m = BodyExtent.of(mesh).target_m
     for source, place in zip(sources[1:], GRID.places(), strict=True):
         assert source.sensor == place.sensor(target_m)
         assert source.spherical == pytest.approx(
@@ -97,7 +97,7 @@ def test_a_tolerance_chooses_a_plan_and_says_so(
 ) -> None:
     one = recording(tmp_path / "anna.sd2", radar=False)
     asked: list[tuple[int, int, float]] = []
-    plan = Plan(visibility="facing", beyond="drop")
+    plan = AccuracyPlan(visibility="facing", beyond="drop")
 
     def choose(mesh: Any, places: Any, frames: int, tolerance: float, _: Any) -> PlacedPlan:
         asked.append((len(places), frames, tolerance))

@@ -18,7 +18,7 @@ from sd2core.errors import Sd2Error
 from sd2core.fmcw import LinkBudget, SignalOptions, WaveOptions, simulate_radar
 from sd2core.io.radar import write_capture
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.placements.body_extent import Whereabouts
+from sd2core.placements.body_extent import BodyExtent
 from sd2core.placements.placements import PlacementGrid
 from sd2core.progress import silent
 from sd2core.radar_config import PAPER_RADAR
@@ -72,7 +72,7 @@ def test_every_place_shows_what_a_radar_there_would_have_recorded(
     mesh = one.load_mesh()
     sources = made(one, SIMULATED)
     assert [tuple(source.maps) for source in sources] == [("synthetic", "simulated")] * 3
-    target_m = Whereabouts.of(mesh).target_m
+    target_m = BodyExtent.of(mesh).target_m
     sensors = [one.sensor, *(place.sensor(target_m) for place in GRID.places())]
     for number, (source, sensor) in enumerate(zip(sources, sensors, strict=True)):
         own = with_own_radar(tmp_path / f"own{number}.sd2", one.folder / "mesh.npz", sensor)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.placements.body_extent import Whereabouts
+from sd2core.placements.body_extent import BodyExtent
 from sd2core.placements.placements import PlacementGrid
 from sd2core.radar_config import PAPER_RADAR
 from sd2core.sensor import VirtualSensor
@@ -25,29 +25,29 @@ def cube_walking_right(present=None, interval_s=0.1):
 
 
 def test_the_target_is_the_mean_over_time_of_where_the_body_is():
-    np.testing.assert_allclose(Whereabouts.of(cube_walking_right()).target_m, (4.5, 0.0, 3.0))
+    np.testing.assert_allclose(BodyExtent.of(cube_walking_right()).target_m, (4.5, 0.0, 3.0))
 
 
 def test_frames_without_a_person_do_not_count():
-    body = Whereabouts.of(cube_walking_right(present=np.arange(10) < 2))
+    body = BodyExtent.of(cube_walking_right(present=np.arange(10) < 2))
     np.testing.assert_allclose(body.target_m, (0.5, 0.0, 3.0))
     assert body.low_m.shape == (2, 3)
 
 
 def test_a_sensor_is_in_the_body_when_it_is_there_at_some_time():
-    body = Whereabouts.of(cube_walking_right())
+    body = BodyExtent.of(cube_walking_right())
     # 0.6 m in front of where the cube passes, and 4.2 m beside the middle, in its way.
     in_front, in_its_way = PlacementGrid((0.6,)), PlacementGrid((4.2,), (90.0,))
-    assert not body.seen_by(in_front.sensors(body.target_m)).inside.any()
-    assert body.seen_by(in_its_way.sensors(body.target_m)).inside.all()
+    assert not body.coverage(in_front.sensors(body.target_m)).inside.any()
+    assert body.coverage(in_its_way.sensors(body.target_m)).inside.all()
 
 
 def test_radial_velocity_is_that_of_the_walk_seen_from_its_end_and_none_from_above():
-    body = Whereabouts.of(cube_walking_right())  # 1 m in 0.1 s
+    body = BodyExtent.of(cube_walking_right())  # 1 m in 0.1 s
     # So far away that all lines of sight are parallel.
     ahead, above = PlacementGrid((1000.0,), (90.0, 0.0), (0.0, 90.0)).sensors(body.target_m)[:2]
-    sight = body.seen_by([ahead, above])
-    np.testing.assert_allclose(sight.fastest_mps, (10.0, 0.0), atol=0.06)
+    coverage = body.coverage([ahead, above])
+    np.testing.assert_allclose(coverage.fastest_mps, (10.0, 0.0), atol=0.06)
 
 
 @given(
@@ -55,23 +55,23 @@ def test_radial_velocity_is_that_of_the_walk_seen_from_its_end_and_none_from_abo
 )
 def test_range_is_that_of_the_farthest_vertex(position):
     mesh = cube_walking_right()
-    sight = Whereabouts.of(mesh).seen_by([VirtualSensor(position)])
+    coverage = BodyExtent.of(mesh).coverage([VirtualSensor(position)])
     away = np.linalg.norm(np.asarray(mesh.vertices, float) - position, axis=2)
     # The vertices of the cube are the corners of its box.
-    assert sight.farthest_m[0] == pytest.approx(away.max())
+    assert coverage.farthest_m[0] == pytest.approx(away.max())
 
 
 def test_what_folds_in_range_or_velocity_is_beyond_a_radar():
-    body = Whereabouts.of(cube_walking_right())
+    body = BodyExtent.of(cube_walking_right())
     # Beside the walk, in line with it behind its end, and far away.
     beside, in_line, far = PlacementGrid((4.8, 30.0), (0.0, 90.0)).sensors(body.target_m)[:3]
-    slow = Whereabouts.of(cube_walking_right(interval_s=10.0)).seen_by([beside, in_line, far])
+    slow = BodyExtent.of(cube_walking_right(interval_s=10.0)).coverage([beside, in_line, far])
     assert PAPER_RADAR.range_max_m == pytest.approx(9.6, abs=0.01)
     assert slow.out_of_range(PAPER_RADAR).tolist() == [False, True, True]
     assert not slow.aliasing(PAPER_RADAR).any()
-    assert body.seen_by([in_line]).aliasing(PAPER_RADAR).all()
+    assert body.coverage([in_line]).aliasing(PAPER_RADAR).all()
 
 
 def test_a_clip_without_anybody_is_refused():
     with pytest.raises(Sd2Error, match="cube has a person in no frame"):
-        Whereabouts.of(cube_walking_right(present=np.zeros(10, bool)))
+        BodyExtent.of(cube_walking_right(present=np.zeros(10, bool)))

@@ -14,10 +14,10 @@ from sd2app.accuracy.tolerance_row import ToleranceRow
 from sd2app.widgets.elided import ElidedLabel
 from sd2app.widgets.inputs import Choice as ChoiceBox
 from sd2app.widgets.inputs import NumberBox
-from sd2core.accuracy.plans import Plan
+from sd2core.accuracy.plans import AccuracyPlan
 from sd2core.sensor import VirtualSensor
 
-STRIDE = Plan(mask_stride=5)
+STRIDE = AccuracyPlan(mask_stride=5)
 
 
 @pytest.fixture
@@ -231,7 +231,9 @@ def test_many_points_are_painted_in_both_themes(panel, window, fake, qtbot):
     """Every state of the plot is painted without a word from Qt."""
     here = window.context.sensor.sensor
     many = [
-        result_of(Plan(mask_stride=stride, vertices_kept=kept), 0.1 * kept / stride, kept / stride)
+        result_of(
+            AccuracyPlan(mask_stride=stride, vertices_kept=kept), 0.1 * kept / stride, kept / stride
+        )
         for stride in (1, 2, 5, 10)
         for kept in (1.0, 0.5, 0.25, 0.1)
     ]

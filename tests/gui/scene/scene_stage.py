@@ -15,7 +15,7 @@ from sd2app.session.display import DisplayModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.sensor import SensorModel
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.placements.body_extent import Sight
+from sd2core.placements.body_extent import SensorCoverage
 from sd2core.placements.placements import Place
 from sd2core.radar_config import PAPER_RADAR
 from sd2core.timebase import Timebase
@@ -95,11 +95,11 @@ class Stage:
     def plan(self, places: tuple[Place, ...], beyond: tuple[bool, ...] | None = None) -> None:
         """Plan places around (0, 0, 2)."""
         sensors = tuple(place.sensor((0.0, 0.0, 2.0)) for place in places)
-        sight = None
+        coverage = None
         if beyond is not None:
             nothing = np.zeros(len(places))
-            sight = Sight(np.array(beyond), nothing, nothing)
-        self.placements.planned = Planned(places, sensors, sight)
+            coverage = SensorCoverage(np.array(beyond), nothing, nothing)
+        self.placements.planned = Planned(places, sensors, coverage)
         self.placements.changed.emit()
 
     def marker_middles_m(self) -> list[tuple[float, float, float]]:

@@ -54,7 +54,7 @@ def write(field: TypedLine, text: str) -> None:
 
 def settle(qtbot, window) -> None:
     places = window.context.placements
-    qtbot.waitUntil(lambda: places.planned.sight is not None and not places.busy, timeout=10_000)
+    qtbot.waitUntil(lambda: places.planned.coverage is not None and not places.busy, timeout=10_000)
 
 
 def test_a_grid_is_typed_counted_as_it_is_typed_and_is_one_step_back(window, page, qtbot):

@@ -12,7 +12,7 @@ from sd2app.playback.timeline import Overview, TimeRuler
 from sd2app.shell.actions import ACTIONS
 from sd2app.shell.keys.dialog import KeysDialog
 from sd2app.video.view import VideoView
-from sd2core.accuracy.plans import Plan
+from sd2core.accuracy.plans import AccuracyPlan
 from sd2core.doppler_map import DopplerMap
 from sd2core.sensor import VirtualSensor
 
@@ -420,7 +420,7 @@ def test_dropped_files_are_opened_and_added(empty_window, small_recording, qtbot
 
 
 def test_a_point_cloud_counts_every_point(empty_window, fake, tmp_path, qtbot):
-    fake.plan = fake.dragging = Plan(visibility="none")
+    fake.plan = fake.dragging = AccuracyPlan(visibility="none")
     rng = np.random.default_rng(0)
     points = np.repeat(rng.normal(size=(1, 25, 3)), 20, axis=0)
     points[:, :, 2] += 3.0 - np.arange(20)[:, None] / 30.0  # approaches at 1 m/s
