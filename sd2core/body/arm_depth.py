@@ -30,7 +30,7 @@ _MOST = 3.0
 """Standard deviations at which depths and habits stop to count more."""
 
 
-def with_leaning_arms(evidence: Evidence, rig: Rig) -> Evidence:
+def resolve_arm_depths(evidence: Evidence, rig: Rig) -> Evidence:
     """Depths of elbows, wrists and hands by the lengths of the arms.
 
     Parameters

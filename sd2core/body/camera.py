@@ -1,14 +1,18 @@
-"""The camera that took a video: a pinhole at the origin of the camera frame."""
+"""Pinhole camera of a video, and its focal length from the user, the file or a default."""
 
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
+from sd2core.io.video import VideoReader
 
 DEFAULT_FIELD_OF_VIEW_DEG = 2.0 * math.degrees(math.atan(320.0 / 600.0))
 """Across the longer side, where neither file nor user says: 56°, a webcam's or phone's."""
@@ -58,3 +62,75 @@ class PinholeCamera:
     def slopes(self, points_px: NDArray[np.float64]) -> NDArray[np.float64]:
         """X / z and y / z of what is seen at pixel coordinates (..., 2)."""
         return (points_px - self.centre_px) / self.focal_px
+
+
+Source = Literal["user", "metadata", "default"]
+"""How a focal length is known, in the words of recordings."""
+
+# com.apple.quicktime.camera.focal_length.35mm_equivalent, FocalLengthIn35mmFormat, …
+_EQUIVALENT = re.compile(r"focal.?length.*35.?mm", re.IGNORECASE)
+_NUMBER = re.compile(r"\d+(?:\.\d+)?(?:/\d+(?:\.\d+)?)?")
+_DIAGONAL_35MM = math.hypot(36.0, 24.0)
+_PLAUSIBLE_MM = (8.0, 800.0)
+
+
+def camera_of(
+    video: VideoReader,
+    focal_px: float | None = None,
+    field_of_view_deg: float | None = None,
+) -> tuple[PinholeCamera, Source]:
+    """The camera of a video, and how its focal length is known.
+
+    Parameters
+    ----------
+    video : VideoReader
+    focal_px : float, optional
+        Focal length in pixels of the upright picture, from the user.
+    field_of_view_deg : float, optional
+        Instead of it, the angle across the longer side of the picture.
+
+    Returns
+    -------
+    PinholeCamera
+    {"user", "metadata", "default"}
+        Metadata: the focal length equivalent on 35 mm film, by the diagonal of the
+        picture, where the file has one, as phones write it. Default: 56° across the
+        longer side.
+
+    Raises
+    ------
+    Sd2Error
+        When both are given, or are none of a camera.
+    """
+    size = video.width, video.height
+    if focal_px is not None and field_of_view_deg is not None:
+        raise Sd2Error(
+            "Both a focal length and a field of view are given", "one of them: each gives the other"
+        )
+    if focal_px is not None:
+        return PinholeCamera(*size, float(focal_px)), "user"
+    if field_of_view_deg is not None:
+        if not 1.0 <= field_of_view_deg <= 170.0:
+            raise Sd2Error(
+                f"The field of view is {field_of_view_deg:g}°",
+                "1° to 170°, across the longer side of the picture",
+            )
+        half = math.radians(field_of_view_deg) / 2.0
+        return PinholeCamera(*size, max(size) / 2.0 / math.tan(half)), "user"
+    written = written_focal_mm(video.metadata)
+    if written is not None:
+        return PinholeCamera(*size, written * math.hypot(*size) / _DIAGONAL_35MM), "metadata"
+    return PinholeCamera.default(*size), "default"
+
+
+def written_focal_mm(metadata: Mapping[str, str]) -> float | None:
+    """Focal length equivalent on 35 mm film among what a file says of itself, or None."""
+    for name, value in metadata.items():
+        found = _NUMBER.search(value) if _EQUIVALENT.search(name) else None
+        if found is None:
+            continue
+        numerator, _, denominator = found[0].partition("/")
+        focal_mm = float(numerator) / (float(denominator or 1) or math.nan)
+        if _PLAUSIBLE_MM[0] <= focal_mm <= _PLAUSIBLE_MM[1]:
+            return focal_mm
+    return None

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.camera import PinholeCamera
-from sd2core.body.lifted import CENTRE, Lifted, LiftedTrack
+from sd2core.body.lifter import Lifted, LiftedTrack
 from sd2core.body.rotations import Floats
-from sd2core.body.track import Landmarks, LandmarkTrack, parts
+from sd2core.body.track import TORSO_CORNERS, Landmarks, LandmarkTrack, parts
 
 _PICTURE_SD = 0.006
 """Of a landmark that is well visible, in apparent statures: 3 pixels of 480."""
@@ -81,14 +81,14 @@ def evidence_of(
         Gives everything its scale.
     """
     # How the trunk moves is told better by how the person grows in the picture.
-    trunk = lifted.velocity[:, CENTRE].mean(axis=1, keepdims=True)
+    trunk = lifted.velocity[:, TORSO_CORNERS].mean(axis=1, keepdims=True)
     visibility = np.clip(track.visibility.astype(np.float64), _LEAST_VISIBILITY, 1.0)
     depth_m = stature_m * lifted.centre_depth
     return Evidence(
         times_s=np.array(track.timebase.times_s),
         slopes=camera.slopes(track.image_px.astype(np.float64)),
         slopes_sd=_PICTURE_SD * (stature_m / depth_m)[:, None] / visibility,
-        trunk=CENTRE,
+        trunk=TORSO_CORNERS,
         depth_m=stature_m * lifted.depth,
         depth_sd_m=DEPTH_CAUTION * stature_m * lifted.depth_sigma,
         trunk_m=depth_m,

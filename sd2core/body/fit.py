@@ -10,16 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.body.arm_depth import with_leaning_arms
+from sd2core.body.arm_depth import resolve_arm_depths
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.evidence import EvidenceInParts
 from sd2core.body.fit_windows import Windows
-from sd2core.body.fitted import PER_FRAME, BodyFit, FittedMotion, of_limbs
+from sd2core.body.fitted import PER_FRAME, BodyFit, FittedMotion, mean_over_limbs
 from sd2core.body.initial import initial_pose
 from sd2core.body.keypoints import KeypointSpace
-from sd2core.body.lifted import Lifted
-from sd2core.body.lifter import Lifter
-from sd2core.body.lifting import LiftedInParts
+from sd2core.body.lifter import Lifted, LiftedInParts, Lifter
 from sd2core.body.limbs import LIMBS
 from sd2core.body.rig import Rig
 from sd2core.body.rotations import Floats
@@ -116,8 +114,8 @@ def fit_motion(
     residual_m = quality = 0.0
     for part in fitting.finished(progress):
         frames = slice(done, done + len(part))
-        along_mps[frames] = of_limbs(part.along_sd_mps)
-        across_mps[frames] = of_limbs(part.across_sd_mps)
+        along_mps[frames] = mean_over_limbs(part.along_sd_mps)
+        across_mps[frames] = mean_over_limbs(part.across_sd_mps)
         residuals += int(part.present.sum()) * part.residual_m.shape[1]
         residual_m += float(np.nansum(part.residual_m))
         quality += float(part.quality[part.present].sum())
@@ -198,7 +196,7 @@ class Fitting:
         part, track, _ = self._evidence.part(start, stop)
         if self.windows.is_kept(number, part):
             return
-        leaning = with_leaning_arms(part, rig)
+        leaning = resolve_arm_depths(part, rig)
         first = initial_pose(rig, leaning.points_m, track.visibility.astype(np.float64))
         self.windows.keep(number, part, solve(rig, leaning, first, tick))
 
@@ -263,11 +261,6 @@ class Fitting:
                 _ACROSS_PER_S * evidence.slopes_sd * keypoints_m[..., 2], track.present
             ),
         )
-
-
-def _lift(track: Landmarks, camera: PinholeCamera) -> Lifted:
-    """As the bundled lifter does it."""
-    return LiftedInParts(Lifter.load(), track, camera)
 
 
 class _People:

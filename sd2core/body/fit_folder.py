@@ -78,7 +78,7 @@ def _is_ours(partial: Path) -> bool:
 
 
 @contextmanager
-def claimed(partial: Path, restart: bool) -> Iterator[None]:
+def claim_folder(partial: Path, restart: bool) -> Iterator[None]:
     """Make the folder of the work, or take it over; nobody else's until the end.
 
     Raises
@@ -108,7 +108,7 @@ def claimed(partial: Path, restart: bool) -> Iterator[None]:
 
 
 @contextmanager
-def left_only_with_work(partial: Path) -> Iterator[None]:
+def remove_without_landmarks(partial: Path) -> Iterator[None]:
     """Remove the folder when the video turns out not to be one of a person."""
     try:
         yield

@@ -17,15 +17,14 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.body.camera import PinholeCamera
-from sd2core.body.camera_metadata import Source, camera_of
+from sd2core.body.camera import PinholeCamera, Source, camera_of
 from sd2core.body.fit import DEFAULT_STATURE_M, fit_motion
 from sd2core.body.fit_folder import (
     LANDMARKS,
     PARTIAL,
     check_fit_output,
-    claimed,
-    left_only_with_work,
+    claim_folder,
+    remove_without_landmarks,
 )
 from sd2core.body.fitted import FittedMotion
 from sd2core.body.landmark_files import save_track
@@ -55,7 +54,7 @@ class FitChoices:
     person : Rectangle, optional
         Around the person in one frame; the most prominent one by default.
     focal_px, field_of_view_deg : float, optional
-        Of the camera; see :func:`~sd2core.body.camera_metadata.camera_of`.
+        Of the camera; see :func:`~sd2core.body.camera.camera_of`.
     stature_m : float, optional
         How tall the person is.
     max_gap_s : float
@@ -163,7 +162,7 @@ def fit_video(
     with open_video(path) as video:
         camera, camera_source = camera_of(video, choices.focal_px, choices.field_of_view_deg)
         found_models = landmark_models(models, report.progress_of("models"))
-        with claimed(partial, restart), left_only_with_work(partial):
+        with claim_folder(partial, restart), remove_without_landmarks(partial):
             report.started(video, (partial / LANDMARKS).is_dir())
             stages = _Stages(report)
             track = find_landmarks(

@@ -87,8 +87,8 @@ class BodyFit:
             self.timebase,
             Pose(self.turns, self.translation_m).at,
             self.present,
-            of_limbs(self.along_sd_mps),
-            of_limbs(self.across_sd_mps),
+            mean_over_limbs(self.along_sd_mps),
+            mean_over_limbs(self.across_sd_mps),
             resolution,
         )
 
@@ -189,7 +189,7 @@ class FittedVertices:
         return vertices[(slice(None) if rows.ndim else 0, *rest)]
 
 
-def of_limbs(landmarks: Floats) -> NDArray[np.float32]:
+def mean_over_limbs(landmarks: Floats) -> NDArray[np.float32]:
     """Mean over the landmarks of each limb, (T, L)."""
     rows = [[LANDMARKS.index(name) for name in LIMB_LANDMARKS[limb]] for limb in LIMBS]
     return np.stack([landmarks[:, row].mean(axis=1) for row in rows], axis=1).astype(np.float32)

@@ -1,18 +1,19 @@
-"""What the landmark model gets wrong, found and mended: swapped sides, outliers, gaps.
+"""Repair of detected landmarks: swapped sides, outliers and gaps.
 
-Pure functions of arrays; :mod:`sd2core.body.mending` has them follow one another, over clips
-of any length. Limits are in seconds and metres, so that they mean the same at
-every frame rate and size of picture.
+Limits are in seconds and metres, so that they mean the same at every frame rate and size of
+picture. What is repaired in a frame depends on the frames within a second or two: a long clip
+is repaired in parts, each with a margin on both sides.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.body.track import LANDMARKS, MIRRORED
+from sd2core.body.track import LANDMARKS, MIRRORED, parts
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
@@ -37,7 +38,7 @@ _BRIDGED_VISIBILITY = 0.25
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class RawTrack:
     """What was found in each frame; T frames.
 
     Parameters
@@ -60,7 +61,7 @@ class Found:
     world_m: Singles
     visibility: Singles
 
-    def picked(self, order: NDArray[np.intp], frames: NDArray[np.bool_]) -> Found:
+    def picked(self, order: NDArray[np.intp], frames: NDArray[np.bool_]) -> RawTrack:
         """The landmarks of some frames in another order (33,)."""
         changed = {}
         for name in ("image_px", "depth_px", "world_m", "visibility"):
@@ -69,15 +70,15 @@ class Found:
             changed[name] = values
         return replace(self, **changed)
 
-    def part(self, start: int, stop: int) -> Found:
+    def part(self, start: int, stop: int) -> RawTrack:
         """Frames ``start`` to ``stop``."""
-        return Found(**{name: values[start:stop] for name, values in vars(self).items()})
+        return RawTrack(**{name: values[start:stop] for name, values in vars(self).items()})
 
 
 # -- Left and right ------------------------------------------------------------------------------
 
 
-def unswapped(found: Found) -> tuple[Found, dict[str, NDArray[np.bool_]]]:
+def undo_side_swaps(found: RawTrack) -> tuple[RawTrack, dict[str, NDArray[np.bool_]]]:
     """Undo swaps of left and right: of head and trunk, of the arms, of the legs, or of all.
 
     A swap is undone where that makes the motion smoother (the sum of accelerations over
@@ -86,7 +87,7 @@ def unswapped(found: Found) -> tuple[Found, dict[str, NDArray[np.bool_]]]:
 
     Returns
     -------
-    Found
+    RawTrack
     dict of str to bool array, shape (T,)
         Per part, the frames that were changed.
     """
@@ -96,7 +97,7 @@ def unswapped(found: Found) -> tuple[Found, dict[str, NDArray[np.bool_]]]:
     for part, members in SIDED_PARTS.items():
         swapped = np.zeros(len(found.times_s), bool)
         if len(rows) >= 3:
-            scale = metre_px(found)[rows, None]
+            scale = pixels_per_metre(found)[rows, None]
             cost = np.zeros((2, 2, 2, len(rows) - 2))
             for landmark in members:
                 sides = [_place_m(found, rows, scale, each) for each in _pair(landmark)]
@@ -104,12 +105,12 @@ def unswapped(found: Found) -> tuple[Found, dict[str, NDArray[np.bool_]]]:
             switch = np.abs(np.diff(np.indices((2, 2, 2)), axis=0)).sum(axis=0)  # (a, b, c)
             cost += 0.5 * len(members) * _SWITCH_M**2 * switch[..., None]
             swapped[rows] = _smoothest(cost)
-        found = resided(found, part, swapped)
+        found = swap_sides(found, part, swapped)
         swaps[part] = swapped
     return found, swaps
 
 
-def resided(found: Found, part: str, frames: NDArray[np.bool_]) -> Found:
+def swap_sides(found: RawTrack, part: str, frames: NDArray[np.bool_]) -> RawTrack:
     """Left and right of one of :data:`SIDED_PARTS` swapped in some frames (T,)."""
     members = list(SIDED_PARTS[part])
     order = np.arange(len(LANDMARKS))
@@ -121,7 +122,7 @@ def _pair(landmark: int) -> tuple[int, int]:
     return landmark, MIRRORED[landmark]
 
 
-def _place_m(found: Found, rows: NDArray[np.intp], scale: Floats, landmark: int) -> Floats:
+def _place_m(found: RawTrack, rows: NDArray[np.intp], scale: Floats, landmark: int) -> Floats:
     """Picture and model's own place of one landmark side by side, in metres, (N, 5)."""
     picture = found.image_px[rows, landmark] / scale
     return np.concatenate([picture, found.world_m[rows, landmark]], axis=1, dtype=np.float64)
@@ -176,7 +177,7 @@ def _smoothest(cost: Floats) -> NDArray[np.bool_]:
     return states
 
 
-def metre_px(found: Found) -> Floats:
+def pixels_per_metre(found: RawTrack) -> Floats:
     """How many pixels a metre across the person takes, (T,): a median over half a second."""
     from scipy.ndimage import median_filter
 
@@ -198,7 +199,7 @@ def metre_px(found: Found) -> Floats:
 # -- Outliers ------------------------------------------------------------------------------------
 
 
-def without_outliers(found: Found) -> tuple[Found, NDArray[np.bool_]]:
+def replace_outliers(found: RawTrack) -> tuple[RawTrack, NDArray[np.bool_]]:
     """Replace landmarks that jump away and back within a tenth of a second.
 
     A run of frames is replaced by the cubic through two frames before and after it
@@ -209,7 +210,7 @@ def without_outliers(found: Found) -> tuple[Found, NDArray[np.bool_]]:
 
     Returns
     -------
-    Found
+    RawTrack
     bool array, shape (T, 33)
         What was replaced.
     """
@@ -218,11 +219,11 @@ def without_outliers(found: Found) -> tuple[Found, NDArray[np.bool_]]:
     rows = np.flatnonzero(found.present)
     if len(rows) < 5:
         return found, replaced
-    times, scale = found.times_s[rows], metre_px(found)[rows, None]
+    times, scale = found.times_s[rows], pixels_per_metre(found)[rows, None]
     for landmark in range(len(LANDMARKS)):
         place = _place_m(found, rows, scale, landmark)
-        seen = spikes(times, place[:, :2])
-        deep = spikes(times, place[:, 2:])
+        seen = find_spikes(times, place[:, :2])
+        deep = find_spikes(times, place[:, 2:])
         replaced[rows, landmark] = seen | deep
         for name, wrong in (
             ("image_px", seen),
@@ -235,7 +236,7 @@ def without_outliers(found: Found) -> tuple[Found, NDArray[np.bool_]]:
     return replace(found, **changed), replaced
 
 
-def spikes(times_s: Floats, places_m: Floats) -> NDArray[np.bool_]:
+def find_spikes(times_s: Floats, places_m: Floats) -> NDArray[np.bool_]:
     """Which of the places (T, d) of one point are outliers, (T,)."""
     from scipy.ndimage import median_filter
 
@@ -319,7 +320,7 @@ def _filled(times_s: Floats, values: Floats, wrong: NDArray[np.bool_]) -> Floats
 # -- Gaps ----------------------------------------------------------------------------------------
 
 
-def bridged(found: Found, max_gap_s: float) -> Found:
+def bridge_gaps(found: RawTrack, max_gap_s: float) -> RawTrack:
     """Interpolate across gaps of up to ``max_gap_s``; longer ones stay empty.
 
     By a curve that does not overshoot (monotone piecewise cubic).
@@ -342,3 +343,141 @@ def bridged(found: Found, max_gap_s: float) -> Found:
         changed[name] = values
     changed["visibility"][fill] *= _BRIDGED_VISIBILITY
     return replace(found, present=found.present | fill, bridged=found.bridged | fill, **changed)
+
+
+_MARGIN_FRAMES = 300
+
+Read = Callable[[int, int], RawTrack]
+"""Gives what was found in frames ``start`` to ``stop``."""
+
+
+def repair_landmarks(
+    read: Read,
+    times_s: Floats,
+    seen: NDArray[np.bool_],
+    max_gap_s: float,
+    write: Callable[[RawTrack], None],
+) -> tuple[str, ...]:
+    """Mend everything that was found.
+
+    Parameters
+    ----------
+    read : callable
+    times_s : float64 array, shape (T,)
+    seen : bool array, shape (T,)
+        Frames in which the person was found.
+    max_gap_s : float
+        The longest gap that is bridged, from the last frame before to the first after.
+    write : callable
+        Called with the mended parts, in order.
+
+    Returns
+    -------
+    tuple of str
+        Sentences about it.
+    """
+    swapped = find_side_swaps(read, seen)
+    tally = _Tally(swapped={part: int(frames.sum()) for part, frames in swapped.items()})
+    for start, stop in parts(len(times_s)):
+        first, last = _around(start, stop, times_s, seen, max_gap_s)
+        found = read(first, last)
+        for part, frames in swapped.items():
+            found = swap_sides(found, part, frames[first:last])
+        found, replaced = replace_outliers(found)
+        found = bridge_gaps(found, max_gap_s).part(start - first, stop - first)
+        tally.add(found, replaced[start - first : stop - first])
+        write(found)
+    return tally.sentences(max_gap_s)
+
+
+def find_side_swaps(read: Read, seen: NDArray[np.bool_]) -> dict[str, NDArray[np.bool_]]:
+    """Frames (T,) in which left and right are to be swapped back, for each part of the body.
+
+    Which of the two sides is right is what most frames say: not those of one part of the
+    clip, but of all parts that are linked by frames that they share.
+    """
+    frames = len(seen)
+    swapped = {part: np.zeros(frames, bool) for part in SIDED_PARTS}
+    linked, decided = 0, 0  # where what is linked began, and up to where all is decided
+    for start, stop in parts(frames):
+        first, last = max(start - _MARGIN_FRAMES, 0), min(stop + _MARGIN_FRAMES, frames)
+        shared = seen[first:decided]
+        if not shared.any():
+            linked = start
+        for part, here in undo_side_swaps(read(first, last))[1].items():
+            whole = swapped[part]
+            both = slice(first, decided)
+            if shared.any() and (whole[both] != here[: decided - first])[shared].mean() > 0.5:
+                here = ~here & seen[first:last]
+            whole[start:last] = here[start - first :]
+            counted = whole[linked:last][seen[linked:last]]
+            if counted.any() and counted.mean() > 0.5:
+                whole[linked:last] = ~whole[linked:last] & seen[linked:last]
+        decided = last
+    return swapped
+
+
+def _around(
+    start: int, stop: int, times_s: Floats, seen: NDArray[np.bool_], max_gap_s: float
+) -> tuple[int, int]:
+    """The frames that a part is mended with.
+
+    A gap that is bridged belongs to them with three frames on either side, on which its
+    curve rests, however long it is.
+    """
+    rows = np.flatnonzero(seen)
+
+    def bridged_after(number: int) -> bool:
+        if not 0 <= number < len(rows) - 1:
+            return False
+        here, there = rows[number], rows[number + 1]
+        return bool(there - here > 1 and times_s[there] - times_s[here] <= max_gap_s + 1e-9)
+
+    before = int(np.searchsorted(rows, start)) - 1
+    if bridged_after(before):
+        start = min(start, int(rows[max(before - 2, 0)]))
+    after = int(np.searchsorted(rows, stop))
+    if bridged_after(after - 1):
+        stop = max(stop, int(rows[min(after + 2, len(rows) - 1)]) + 1)
+    return max(start - _MARGIN_FRAMES, 0), min(stop + _MARGIN_FRAMES, len(times_s))
+
+
+@dataclass
+class _Tally:
+    """How much was mended."""
+
+    swapped: dict[str, int]
+    landmarks: int = 0
+    outlying: int = 0
+    bridged: int = 0
+    missing: int = 0
+
+    def add(self, found: RawTrack, replaced: NDArray[np.bool_]) -> None:
+        self.landmarks += int(replaced.sum())
+        self.outlying += int(replaced.any(axis=1).sum())
+        self.bridged += int(found.bridged.sum())
+        self.missing += int((~found.present).sum())
+
+    def sentences(self, max_gap_s: float) -> tuple[str, ...]:
+        notes = [
+            f"Left and right of {part} swapped back in {_count(frames)}."
+            for part, frames in self.swapped.items()
+            if frames
+        ]
+        if self.landmarks:
+            notes.append(
+                "Replaced from the frames around them:"
+                f" {_count(self.landmarks, 'outlying landmark')} in {_count(self.outlying)}."
+            )
+        if self.bridged:
+            notes.append(
+                f"Interpolated, in gaps of up to {max_gap_s:g} s without the person:"
+                f" {_count(self.bridged)}."
+            )
+        if self.missing:
+            notes.append(f"Left empty, without the person: {_count(self.missing)}.")
+        return tuple(notes)
+
+
+def _count(number: int, what: str = "frame") -> str:
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"

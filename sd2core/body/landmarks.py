@@ -11,13 +11,11 @@ from numpy.typing import NDArray
 from sd2core.body.blazepose import Pose, PoseDetector, PoseLandmarker
 from sd2core.body.landmark_files import load_track, save_track
 from sd2core.body.landmark_models import LandmarkModels
-from sd2core.body.person_selection import Rectangle, Start, choose, chosen_by
+from sd2core.body.landmark_store import RefinedStretches, SearchStore, TrackInParts
+from sd2core.body.person_selection import Rectangle, Start, find_person_in, find_prominent_person
 from sd2core.body.refining import Refiner
-from sd2core.body.roi import Roi
-from sd2core.body.roi_path import Sightings, roi_numbers, roi_of, roi_path
-from sd2core.body.search_store import SearchStore
-from sd2core.body.track_in_parts import RefinedStretches, TrackInParts
-from sd2core.body.tracking import Follower, Search
+from sd2core.body.roi import Roi, Sightings, roi_numbers, roi_of, roi_path
+from sd2core.body.tracking import PersonTracker, Search
 from sd2core.errors import Sd2Error
 from sd2core.io.video import VideoReader
 from sd2core.numerics.compiled import worker_count
@@ -55,7 +53,7 @@ def find_landmarks(
     """Find the landmarks of one person in every frame.
 
     The person is followed from a first frame both ways; the path of the square around
-    them is smoothed without lag, and every frame looked at again in it. Swapped sides
+    them is smooth_over_time without lag, and every frame looked at again in it. Swapped sides
     and outliers are mended, short gaps bridged.
 
     Parameters
@@ -134,11 +132,11 @@ def _found(
         x, y, size, angle = (float(value) for value in kept["roi"])
         start = Start(int(kept["frame"]), Roi(x, y, size, angle))
     elif person is not None:
-        start = chosen_by(person, video, detector, landmarker)
+        start = find_person_in(person, video, detector, landmarker)
     else:
-        start = choose(video, detector, landmarker, progress)
+        start = find_prominent_person(video, detector, landmarker, progress)
     store.write("start.npz", {"frame": np.array(start.frame), "roi": roi_numbers(start.roi)})
-    search = Search(video, start, Follower(detector, landmarker))
+    search = Search(video, start, PersonTracker(detector, landmarker))
     kept = store.read("search.npz")
     if kept is not None:
         search.restore(kept)

@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.body.lifted import CENTRE
-from sd2core.body.track import LANDMARKS, MIRRORED
+from sd2core.body.track import LANDMARKS, MIRRORED, TORSO_CORNERS
 
 Floats = NDArray[np.floating]
 Singles = NDArray[np.float32]
@@ -16,7 +15,7 @@ Singles = NDArray[np.float32]
 RATE_HZ = 30.0
 """Frames per second that the network is trained on; other tracks are resampled."""
 
-_SHOULDERS, _HIPS = list(CENTRE[:2]), list(CENTRE[2:])
+_SHOULDERS, _HIPS = list(TORSO_CORNERS[:2]), list(TORSO_CORNERS[2:])
 _TORSO_M = 0.5
 """A torso's length, which the landmark model's own metres are brought to."""
 
@@ -133,7 +132,7 @@ def features(seen: Seen, scale: Scale | None = None) -> Singles:
     slopes = np.asarray(seen.slopes)
     size = apparent_size(slopes)  # (..., T)
     unit = scale.size[..., None]  # (..., 1)
-    centre = slopes[..., list(CENTRE), :].mean(axis=-2)  # (..., T, 2)
+    centre = slopes[..., list(TORSO_CORNERS), :].mean(axis=-2)  # (..., T, 2)
     around, world = _measured(seen, scale.size, scale.torso_m)
     depth = seen.depth / unit[..., None]
     apparent = np.log(size / unit)[..., None]
@@ -166,7 +165,7 @@ def features(seen: Seen, scale: Scale | None = None) -> Singles:
 def _measured(seen: Seen, size: Floats, torso_m: Floats) -> tuple[Floats, Floats]:
     """Slopes around the body's centre and the model's own places, in a stretch's measures."""
     slopes = np.asarray(seen.slopes)
-    centre = slopes[..., list(CENTRE), :].mean(axis=-2)
+    centre = slopes[..., list(TORSO_CORNERS), :].mean(axis=-2)
     around = (slopes - centre[..., None, :]) / size[..., None][..., None, None]
     metres = (_TORSO_M / np.maximum(torso_m, 0.05))[..., None, None, None]
     return around, np.asarray(seen.world_m) * metres

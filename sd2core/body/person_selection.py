@@ -55,7 +55,7 @@ class Start:
     roi: Roi
 
 
-def choose(
+def find_prominent_person(
     video: VideoReader,
     detector: PoseDetector,
     landmarker: PoseLandmarker,
@@ -139,7 +139,7 @@ def _prominence(roi: Roi, width: int, height: int) -> float:
     return min(roi.size_px / min(width, height), 2.0) * (1.0 - min(off, 0.8))
 
 
-def chosen_by(
+def find_person_in(
     rectangle: Rectangle, video: VideoReader, detector: PoseDetector, landmarker: PoseLandmarker
 ) -> Start:
     """The person in a rectangle of one frame.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from functools import partial
 
@@ -11,9 +12,23 @@ import numpy as np
 from sd2core.body.evidence import Evidence
 from sd2core.body.initial import Pose
 from sd2core.body.objective import Objective, Residuals, cost, weighted
-from sd2core.body.one_thread import one_thread
 from sd2core.body.rig import Rig
 from sd2core.body.rotations import Floats
+
+
+def one_thread() -> AbstractContextManager[object]:
+    """Until it is left, products and factorisations of this process use one thread.
+
+    A fit consists of many small ones, which gain nothing from threads; beside other work
+    threads that wait for each other made it seven times as slow.
+    """
+    # SciPy's own copy of the library is limited only once it is loaded.
+    import scipy.linalg  # noqa: F401
+    from threadpoolctl import threadpool_limits
+
+    limits: AbstractContextManager[object] = threadpool_limits(limits=1, user_api="blas")
+    return limits
+
 
 _FIRST_ROTATION_RADPS2 = 60.0
 _FIRST_TRANSLATION_MPS2 = 6.0
@@ -37,7 +52,7 @@ def solve(
 
     The smoothness follows the motion: after each round, every degree of freedom may
     accelerate as much as it was found to do around each moment. What is still is
-    smoothed hard, what is fast hardly.
+    smooth_over_time hard, what is fast hardly.
 
     Parameters
     ----------

@@ -57,6 +57,10 @@ MIRRORED = tuple(
 )
 """For every landmark the one on the other side."""
 
+TORSO_CORNERS = tuple(
+    LANDMARKS.index(name) for name in ("shoulder.L", "shoulder.R", "hip.L", "hip.R")
+)
+"""Landmarks whose mean is the body's centre."""
 
 PER_FRAME = (
     "image_px",

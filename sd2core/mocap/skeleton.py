@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.evidence import Evidence
-from sd2core.body.lifted import CENTRE
 from sd2core.body.rotations import Floats
-from sd2core.body.track import LANDMARKS
+from sd2core.body.track import LANDMARKS, TORSO_CORNERS
 from sd2core.errors import Sd2Error
 from sd2core.io.radar.mars import JOINTS
 
@@ -120,7 +119,7 @@ class SkeletonClip:
         points_m = np.empty((frames, len(LANDMARKS), 3))
         points_m[:, rows] = self.joints_m[:, [marker.joint for marker in markers]]
         bare = np.setdiff1d(np.arange(len(LANDMARKS)), rows)
-        points_m[:, bare] = points_m[:, CENTRE].mean(axis=1)[:, None]
+        points_m[:, bare] = points_m[:, TORSO_CORNERS].mean(axis=1)[:, None]
         sd_m = np.full((frames, len(LANDMARKS)), np.inf)
         sd_m[:, rows] = [marker.sd_m for marker in markers]
         if self.known is not None:
@@ -141,12 +140,12 @@ def evidence_of_points(times_s: Floats, points_m: Floats, sd_m: Floats) -> Evide
         In every direction alike; infinite where nothing is known.
     """
     depth = points_m[..., 2]
-    trunk_m = depth[:, CENTRE].mean(axis=1)
+    trunk_m = depth[:, TORSO_CORNERS].mean(axis=1)
     return Evidence(
         times_s=times_s,
         slopes=points_m[..., :2] / depth[..., None],
         slopes_sd=sd_m / depth,
-        trunk=CENTRE,
+        trunk=TORSO_CORNERS,
         depth_m=depth - trunk_m[:, None],
         depth_sd_m=sd_m,
         trunk_m=trunk_m,

@@ -29,18 +29,17 @@ from numpy.typing import NDArray
 from peaks import forget_peak, peak_mb
 
 from sd2core.body import fit as fitting
-from sd2core.body import fit_windows, lifting
+from sd2core.body import fit_windows, lifter
 from sd2core.body import track as tracks
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.fit import fit_body
 from sd2core.body.fit_folder import LANDMARKS, MARKER, PARTIAL
 from sd2core.body.fit_video import FitChoices, FitReport, fit_video
 from sd2core.body.landmark_models import landmark_models
+from sd2core.body.landmark_store import RefinedStretches, SearchStore
 from sd2core.body.landmarks import DEFAULT_SILHOUETTES, SIGHTINGS, find_landmarks
 from sd2core.body.refining import Stretch
-from sd2core.body.search_store import SearchStore
 from sd2core.body.track import LandmarkTrack
-from sd2core.body.track_in_parts import RefinedStretches
 from sd2core.files.resources import resource_path
 from sd2core.io.video import VideoReader, open_video
 from sd2core.io.video_writing import write_video
@@ -136,7 +135,7 @@ def seams(track: LandmarkTrack, part_frames: int, window_frames: int) -> Apart:
     velocities = []
     for part, window in ((frames, frames), (part_frames, window_frames)):
         with ExitStack() as stack:
-            for module in (tracks, fitting, lifting):
+            for module in (tracks, fitting, lifter):
                 stack.enter_context(patch.object(module, "PART_FRAMES", part))
             stack.enter_context(patch.object(fit_windows, "_WINDOW_FRAMES", window))
             spans = fit_windows.Windows(track.present, None).spans

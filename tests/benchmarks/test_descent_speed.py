@@ -18,10 +18,10 @@ import pytest
 from sd2core.body.evidence import Evidence
 from sd2core.body.initial import Pose, initial_pose
 from sd2core.body.keypoints import KeypointSpace
-from sd2core.body.lifted import CENTRE
 from sd2core.body.objective import Objective, Residuals, cost
 from sd2core.body.rig import Rig
 from sd2core.body.shape import ShapeSpace
+from sd2core.body.track import TORSO_CORNERS
 from sd2core.simulate.gestures import swipes
 
 FRAMES = 150
@@ -44,13 +44,13 @@ def problem() -> tuple[Objective, Pose]:
     )
     points_m = rig.marks.positions(transforms)[:, :33]
     depth_m = points_m[..., 2]
-    centre_m = depth_m[:, CENTRE].mean(axis=1)
+    centre_m = depth_m[:, TORSO_CORNERS].mean(axis=1)
     full = np.ones(depth_m.shape)
     evidence = Evidence(
         times_s=times_s,
         slopes=points_m[..., :2] / depth_m[..., None] + 0.005 * rng.normal(size=(FRAMES, 33, 2)),
         slopes_sd=0.005 * full,
-        trunk=tuple(CENTRE),
+        trunk=tuple(TORSO_CORNERS),
         depth_m=depth_m - centre_m[:, None] + 0.05 * rng.normal(size=full.shape),
         depth_sd_m=0.1 * full,
         trunk_m=centre_m,

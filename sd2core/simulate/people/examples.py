@@ -8,9 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.body.lifted import CENTRE
 from sd2core.body.lifter_features import Seen, features, mirrored, rate, typical_size
-from sd2core.body.track import MIRRORED
+from sd2core.body.track import MIRRORED, TORSO_CORNERS
 from sd2core.simulate.people.emulate import Emulator, Walk
 from sd2core.simulate.people.takes import Take
 
@@ -79,7 +78,7 @@ def batch(examples: Sequence[Example]) -> Batch:
     """Whole examples of equal length, as they are."""
     seen = Seen(*(np.stack(parts) for parts in zip(*(e.seen for e in examples), strict=True)))
     truth = np.stack([e.depth for e in examples])
-    centre = truth[..., list(CENTRE)].mean(axis=-1)
+    centre = truth[..., list(TORSO_CORNERS)].mean(axis=-1)
     size = typical_size(seen.slopes)
     root = np.log(centre * size[:, None])
     return Batch(

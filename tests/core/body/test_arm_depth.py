@@ -5,13 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sd2core.body.arm_depth import with_leaning_arms
+from sd2core.body.arm_depth import resolve_arm_depths
 from sd2core.body.evidence import Evidence
 from sd2core.body.keypoints import KeypointSpace
-from sd2core.body.lifted import CENTRE
 from sd2core.body.rig import Rig
 from sd2core.body.shape import ShapeSpace
-from sd2core.body.track import LANDMARKS
+from sd2core.body.track import LANDMARKS, TORSO_CORNERS
 from sd2core.simulate.gestures import swipes
 
 SPACE = ShapeSpace()
@@ -28,13 +27,13 @@ def swiping() -> tuple[Rig, np.ndarray, Evidence]:
     place = motion.translation_m + np.array([0.0, 1.1, 2.3])
     transforms = SPACE.skeleton(shape).transforms(motion.rotations, place)
     truth = KeypointSpace(SPACE).of(shape).positions(transforms)
-    trunk = truth[:, CENTRE, 2].mean(axis=1)
+    trunk = truth[:, TORSO_CORNERS, 2].mean(axis=1)
     sd = np.full(truth.shape[:2], 0.15)
     evidence = Evidence(
         times_s=times_s,
         slopes=truth[..., :2] / truth[..., 2:],
         slopes_sd=np.full(truth.shape[:2], 0.005),
-        trunk=CENTRE,
+        trunk=TORSO_CORNERS,
         depth_m=0.5 * (truth[..., 2] - trunk[:, None]),
         depth_sd_m=sd,
         trunk_m=trunk,
@@ -47,7 +46,7 @@ def swiping() -> tuple[Rig, np.ndarray, Evidence]:
 
 def test_lengths_give_back_the_depths_that_were_drawn_in() -> None:
     rig, truth, evidence = swiping()
-    found = with_leaning_arms(evidence, rig).points_m
+    found = resolve_arm_depths(evidence, rig).points_m
     before = np.abs(evidence.points_m - truth)[:, ARM, 2].mean()
     after = np.abs(found - truth)[:, ARM, 2].mean()
     assert after < 0.3 * before
@@ -56,7 +55,7 @@ def test_lengths_give_back_the_depths_that_were_drawn_in() -> None:
 
 def test_only_arms_are_changed() -> None:
     rig, _, evidence = swiping()
-    found = with_leaning_arms(evidence, rig)
+    found = resolve_arm_depths(evidence, rig)
     np.testing.assert_array_equal(found.depth_m[:, OTHERS], evidence.depth_m[:, OTHERS])
     np.testing.assert_array_equal(found.depth_sd_m[:, OTHERS], evidence.depth_sd_m[:, OTHERS])
     np.testing.assert_array_equal(found.velocity_mps, evidence.velocity_mps)
@@ -64,7 +63,7 @@ def test_only_arms_are_changed() -> None:
 
 def test_an_arm_has_its_lengths_where_the_picture_allows() -> None:
     rig, _, evidence = swiping()
-    points = with_leaning_arms(evidence, rig).points_m
+    points = resolve_arm_depths(evidence, rig).points_m
     rest = rig.keypoints.rest_m
     shoulder = LANDMARKS.index("shoulder.R")
     for start, end in ((shoulder, ARM[0]), (ARM[0], ARM[1])):
@@ -81,8 +80,8 @@ def test_a_few_frames_of_the_wrong_sign_do_not_turn_an_arm_round() -> None:
     wrong = slice(40, 44)
     depth_m[wrong, ARM[0]] *= -1.0
     depth_m[wrong, ARM[1]] *= -1.0
-    found = with_leaning_arms(replace(evidence, depth_m=depth_m), rig).points_m
-    kept = with_leaning_arms(evidence, rig).points_m
+    found = resolve_arm_depths(replace(evidence, depth_m=depth_m), rig).points_m
+    kept = resolve_arm_depths(evidence, rig).points_m
     away = np.abs(found - kept)[:, ARM, 2]
     assert np.median(away[wrong]) < 0.02
     assert np.abs(truth - found)[wrong][:, ARM, 2].mean() < 0.08

@@ -11,11 +11,11 @@ from sd2core.body.camera import PinholeCamera
 from sd2core.body.fit import fit_body
 from sd2core.body.fitted import BodyFit
 from sd2core.body.keypoints import KeypointSpace
-from sd2core.body.lifted import CENTRE, LiftedTrack, lifted_by_world
+from sd2core.body.lifter import LiftedTrack
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.silhouette import overlap, silhouette
 from sd2core.body.skinning import pose_vertices
-from sd2core.body.track import LANDMARKS, Landmarks, LandmarkTrack
+from sd2core.body.track import LANDMARKS, TORSO_CORNERS, Landmarks, LandmarkTrack
 from sd2core.errors import Sd2Error
 from sd2core.progress import Cancelled
 from sd2core.simulate.gestures import swipes
@@ -32,7 +32,7 @@ class Known:
     def __init__(self, keypoints_m: np.ndarray, times_s: np.ndarray, stature_m: float) -> None:
         rng = np.random.default_rng(4)
         depth = keypoints_m[..., 2]
-        centre = depth[:, CENTRE].mean(axis=1)
+        centre = depth[:, TORSO_CORNERS].mean(axis=1)
         velocity = np.gradient(depth, times_s, axis=0) if len(times_s) > 1 else 0.0 * depth
         self.lifted = LiftedTrack(
             timebase=Timebase(times_s),
@@ -274,21 +274,3 @@ def test_mesh_is_read_in_any_stretch(fitted: BodyFit, resolution) -> None:
     np.testing.assert_array_equal(mesh.vertices[12], whole[2])
     np.testing.assert_array_equal(mesh.vertices[10:14, :5], whole[:, :5])
     np.testing.assert_array_equal(mesh.vertices[[13, 10]], whole[[3, 0]])
-
-
-def test_depth_by_world_coordinates(scene: Scene) -> None:
-    """A landmark model that is right but for scale and place gives the true depths."""
-    track = Scene(20).track
-    true = scene.keypoints_m[:20]
-    track.world_m[:] = 0.9 * (true - true[:, CENTRE[2:]].mean(axis=1, keepdims=True))
-    track.image_px[:] = CAMERA.project(true)
-    lifted = lifted_by_world(track, CAMERA)
-    stature_m = scene.shape.stature_m
-    centre = true[:, CENTRE, 2].mean(axis=1)
-    # The torso's length in statures differs from person to person.
-    factor = np.median(lifted.depth * stature_m / (true[..., 2] - centre[:, None]))
-    assert factor == pytest.approx(1.0, abs=0.05)
-    np.testing.assert_allclose(
-        lifted.depth * stature_m, factor * (true[..., 2] - centre[:, None]), atol=1e-6
-    )
-    np.testing.assert_allclose(lifted.centre_depth * stature_m, factor * centre, rtol=0.05)

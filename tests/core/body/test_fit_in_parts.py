@@ -12,20 +12,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sd2core.body import evidence, fit_windows, lifting, mending, track
+from sd2core.body import evidence, fit_windows, landmark_repair, lifter, track
 from sd2core.body import fit as fitting
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.fit import fit_body, fit_motion
 from sd2core.body.keypoints import KeypointSpace
 from sd2core.body.landmark_files import load_track, save_track
-from sd2core.body.landmark_repair import Found, resided
-from sd2core.body.lifter import Lifter
-from sd2core.body.lifting import LiftedInParts
+from sd2core.body.landmark_repair import RawTrack, swap_sides
+from sd2core.body.landmark_store import RefinedStretches, SearchStore, TrackInParts
+from sd2core.body.lifter import LiftedInParts, Lifter
 from sd2core.body.refining import Stretch
-from sd2core.body.search_store import SearchStore
 from sd2core.body.shape import ShapeSpace
 from sd2core.body.track import LANDMARKS, PER_FRAME, LandmarkTrack
-from sd2core.body.track_in_parts import RefinedStretches, TrackInParts
 from sd2core.errors import Sd2Error
 from sd2core.simulate.gestures import swipes
 from sd2core.timebase import Timebase
@@ -112,7 +110,7 @@ def stored(known: LandmarkTrack, folder: Path | None, max_gap_s: float = 0.5) ->
 @pytest.fixture
 def short_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(track, "PART_FRAMES", 50)
-    monkeypatch.setattr(mending, "_MARGIN_FRAMES", 30)
+    monkeypatch.setattr(landmark_repair, "_MARGIN_FRAMES", 30)
 
 
 @settings(max_examples=200)
@@ -130,25 +128,27 @@ def test_parts_follow_one_another(frames: int) -> None:
 class TestMending:
     FRAMES = 150
 
-    def both(self, spoilt: Found, max_gap_s: float = 0.5) -> list[tuple[Found, tuple[str, ...]]]:
+    def both(
+        self, spoilt: RawTrack, max_gap_s: float = 0.5
+    ) -> list[tuple[RawTrack, tuple[str, ...]]]:
         """Mended as a whole, and in parts of 50 frames."""
         outcomes = []
         for part_frames in (self.FRAMES, 50):
-            parts: list[Found] = []
+            parts: list[RawTrack] = []
             with pytest.MonkeyPatch.context() as patch:
                 patch.setattr(track, "PART_FRAMES", part_frames)
-                patch.setattr(mending, "_MARGIN_FRAMES", 30)
-                notes = mending.mended(
+                patch.setattr(landmark_repair, "_MARGIN_FRAMES", 30)
+                notes = landmark_repair.repair_landmarks(
                     spoilt.part, spoilt.times_s, spoilt.present, max_gap_s, parts.append
                 )
             joined = {n: np.concatenate([getattr(p, n) for p in parts]) for n in vars(spoilt)}
-            outcomes.append((Found(**joined), notes))
+            outcomes.append((RawTrack(**joined), notes))
         return outcomes
 
-    def found(self, known: LandmarkTrack) -> Found:
+    def found(self, known: LandmarkTrack) -> RawTrack:
         names = ("present", "bridged", "image_px", "depth_px", "world_m", "visibility")
         arrays = {name: getattr(known, name).copy() for name in names}
-        return Found(times_s=known.timebase.times_s, **arrays)
+        return RawTrack(times_s=known.timebase.times_s, **arrays)
 
     @settings(max_examples=4)
     @given(
@@ -168,7 +168,7 @@ class TestMending:
         wrong = np.zeros(self.FRAMES, bool)
         for start, length in swaps:
             wrong[start : start + length] = True
-        spoilt = resided(self.found(known), part, wrong & known.present)
+        spoilt = swap_sides(self.found(known), part, wrong & known.present)
         for frame, landmark in jumps:
             spoilt.image_px[frame, landmark] += 90.0
         (whole, notes), (parts, other) = self.both(spoilt)
@@ -184,7 +184,7 @@ class TestMending:
         true = self.found(swiping(self.FRAMES))
         wrong = np.zeros(self.FRAMES, bool)
         wrong[first:last] = True
-        (whole, notes), (parts, other) = self.both(resided(true, "the arms", wrong))
+        (whole, notes), (parts, other) = self.both(swap_sides(true, "the arms", wrong))
         assert notes == other
         np.testing.assert_array_equal(parts.image_px, whole.image_px)
 
@@ -332,7 +332,7 @@ class TestMotion:
             monkeypatch.setattr(fit_windows, name, frames)
         for module, name in ((fitting, "_FINISHED_FRAMES"), (fitting, "PART_FRAMES")):
             monkeypatch.setattr(module, name, 50)
-        monkeypatch.setattr(lifting, "PART_FRAMES", 50)
+        monkeypatch.setattr(lifter, "PART_FRAMES", 50)
         monkeypatch.setattr(fitting, "solve", lambda rig, part, start, tick: start)
         longest: dict[str, int] = {}
 

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from sd2core.body.landmark_repair import (
     ARMS,
     LEGS,
-    Found,
-    bridged,
-    metre_px,
-    spikes,
-    unswapped,
-    without_outliers,
+    RawTrack,
+    bridge_gaps,
+    find_spikes,
+    pixels_per_metre,
+    repair_landmarks,
+    replace_outliers,
+    undo_side_swaps,
 )
-from sd2core.body.mending import mended
 from sd2core.body.track import LANDMARKS, MIRRORED
 
 PX_PER_M = 150.0
@@ -47,10 +47,10 @@ def minimum_jerk(phase: NDArray[np.float64]) -> NDArray[np.float64]:
     return u**3 * (10 - 15 * u + 6 * u**2)
 
 
-def found_from(points_m: NDArray[np.float64], times_s: NDArray[np.float64]) -> Found:
+def found_from(points_m: NDArray[np.float64], times_s: NDArray[np.float64]) -> RawTrack:
     """What a faultless model would find, (T, 33, 3)."""
     frames = len(times_s)
-    return Found(
+    return RawTrack(
         times_s=times_s,
         present=np.ones(frames, bool),
         bridged=np.zeros(frames, bool),
@@ -61,7 +61,7 @@ def found_from(points_m: NDArray[np.float64], times_s: NDArray[np.float64]) -> F
     )
 
 
-def waving(times_s: NDArray[np.float64]) -> Found:
+def waving(times_s: NDArray[np.float64]) -> RawTrack:
     """The right arm swings by 0.3 m, 1.2 times a second; the whole person sways."""
     points = np.repeat(standing()[None], len(times_s), axis=0)
     swing = 0.3 * np.sin(2 * np.pi * 1.2 * times_s)
@@ -72,15 +72,15 @@ def waving(times_s: NDArray[np.float64]) -> Found:
     return found_from(points, times_s)
 
 
-def repaired(found: Found, max_gap_s: float) -> tuple[Found, tuple[str, ...]]:
+def repaired(found: RawTrack, max_gap_s: float) -> tuple[RawTrack, tuple[str, ...]]:
     """Everything mended, and the sentences about it."""
-    parts: list[Found] = []
-    notes = mended(found.part, found.times_s, found.present, max_gap_s, parts.append)
+    parts: list[RawTrack] = []
+    notes = repair_landmarks(found.part, found.times_s, found.present, max_gap_s, parts.append)
     arrays = {name: [getattr(part, name) for part in parts] for name in vars(found)}
-    return Found(**{name: np.concatenate(each) for name, each in arrays.items()}), notes
+    return RawTrack(**{name: np.concatenate(each) for name, each in arrays.items()}), notes
 
 
-def same(one: Found, two: Found) -> bool:
+def same(one: RawTrack, two: RawTrack) -> bool:
     names = ("image_px", "depth_px", "world_m", "visibility", "present", "bridged")
     return all(np.array_equal(getattr(one, n), getattr(two, n), equal_nan=True) for n in names)
 
@@ -91,7 +91,7 @@ def at(frames: int, *numbers: int) -> NDArray[np.bool_]:
     return chosen
 
 
-def swapped(found: Found, frames: NDArray[np.bool_], members: tuple[int, ...]) -> Found:
+def swapped(found: RawTrack, frames: NDArray[np.bool_], members: tuple[int, ...]) -> RawTrack:
     order = np.arange(33)
     order[list(members)] = np.array(MIRRORED)[list(members)]
     return found.picked(order, frames)
@@ -111,12 +111,12 @@ class TestSides:
         wrong = np.zeros(60, bool)
         for start, length in runs:
             wrong[start : start + length] = True
-        mended, _ = unswapped(swapped(true, wrong, members))
+        mended, _ = undo_side_swaps(swapped(true, wrong, members))
         assert same(mended, true)
 
     def test_nothing_is_changed_where_nothing_is_wrong(self) -> None:
         true = waving(np.arange(90) / 30.0)
-        mended, swaps = unswapped(true)
+        mended, swaps = undo_side_swaps(true)
         assert same(mended, true)
         assert not any(frames.any() for frames in swaps.values())
 
@@ -128,7 +128,7 @@ class TestSides:
         for number in ARMS[2:]:
             points[:, number, 0] *= 1.0 - 2.0 * way
         true = found_from(points, times)
-        assert same(unswapped(true)[0], true)
+        assert same(undo_side_swaps(true)[0], true)
 
     def test_a_person_who_turns_round_keeps_their_sides(self) -> None:
         times = np.arange(90) / 30.0
@@ -143,12 +143,12 @@ class TestSides:
             axis=2,
         )
         true = found_from(points, times)
-        assert same(unswapped(true)[0], true)
+        assert same(undo_side_swaps(true)[0], true)
 
     def test_most_frames_say_which_side_is_right(self) -> None:
         true = waving(np.arange(60) / 30.0)
         mostly = ~at(60, *range(20))
-        mended, _ = unswapped(swapped(true, mostly, tuple(range(33))))
+        mended, _ = undo_side_swaps(swapped(true, mostly, tuple(range(33))))
         assert same(mended, swapped(true, np.ones(60, bool), tuple(range(33))))
 
 
@@ -161,13 +161,13 @@ class TestOutliers:
             path = np.zeros((len(times), 2))
             path[:, 0] = 0.8 * minimum_jerk((times - 0.5 - shift) / 0.25)
             path[:, 0] -= 0.8 * minimum_jerk((times - 0.9 - shift) / 0.25)
-            assert not spikes(times, path).any()
+            assert not find_spikes(times, path).any()
 
     def test_a_fast_wave_is_untouched(self) -> None:
         """4 turns a second over 0.4 m: 126 m/s²."""
         times = np.arange(60) / 30.0
         path = np.stack([0.2 * np.sin(2 * np.pi * 4 * times), 0 * times], axis=1)
-        assert not spikes(times, path).any()
+        assert not find_spikes(times, path).any()
 
     @settings(max_examples=8)
     @given(
@@ -183,8 +183,8 @@ class TestOutliers:
         image = true.image_px.copy()
         jump = size_m * PX_PER_M * np.array([np.cos(direction), np.sin(direction)])
         image[frame, WRIST] += jump.astype(np.float32)
-        spoilt = Found(**{**vars(true), "image_px": image})
-        mended, replaced = without_outliers(spoilt)
+        spoilt = RawTrack(**{**vars(true), "image_px": image})
+        mended, replaced = replace_outliers(spoilt)
         expected = np.zeros((60, 33), bool)
         expected[frame, WRIST] = True
         np.testing.assert_array_equal(replaced, expected)
@@ -196,22 +196,24 @@ class TestOutliers:
         path = np.stack([0.3 * times, 0.1 * times**2], axis=1)
         spoilt = path.copy()
         spoilt[20 : 20 + length] += [0.9, -0.7]
-        np.testing.assert_array_equal(np.flatnonzero(spikes(times, spoilt)), range(20, 20 + length))
+        np.testing.assert_array_equal(
+            np.flatnonzero(find_spikes(times, spoilt)), range(20, 20 + length)
+        )
 
     def test_two_jumps_with_a_good_frame_between(self) -> None:
         times = np.arange(40) / 30.0
         spoilt = np.stack([0.3 * times, 0.1 * times**2], axis=1)
         spoilt[[20, 22]] += [0.9, -0.7]
-        np.testing.assert_array_equal(np.flatnonzero(spikes(times, spoilt)), [20, 22])
+        np.testing.assert_array_equal(np.flatnonzero(find_spikes(times, spoilt)), [20, 22])
 
     def test_noise_is_no_outlier(self) -> None:
         noise = 0.03 * np.random.default_rng(1).standard_normal((600, 2))
-        assert not spikes(np.arange(600) / 120.0, noise).any()
+        assert not find_spikes(np.arange(600) / 120.0, noise).any()
 
     def test_a_step_to_another_place_is_no_outlier(self) -> None:
         path = np.zeros((60, 2))
         path[30:, 0] = 0.9
-        assert not spikes(np.arange(60) / 30.0, path).any()
+        assert not find_spikes(np.arange(60) / 30.0, path).any()
 
     @pytest.mark.parametrize("frames", [1, 2, 3, 4])
     def test_few_frames(self, frames: int) -> None:
@@ -220,19 +222,19 @@ class TestOutliers:
 
 
 class TestGaps:
-    def lost(self, found: Found, frames: NDArray[np.bool_]) -> Found:
+    def lost(self, found: RawTrack, frames: NDArray[np.bool_]) -> RawTrack:
         arrays = {name: value.copy() for name, value in vars(found).items()}
         arrays["present"][frames] = False
         for name in ("image_px", "depth_px", "world_m"):
             arrays[name][frames] = np.nan
         arrays["visibility"][frames] = 0.0
-        return Found(**arrays)
+        return RawTrack(**arrays)
 
     def test_a_steady_motion_is_continued_exactly(self) -> None:
         times = np.arange(60) / 30.0
         points = standing()[None] + 0.4 * times[:, None, None]
         true = found_from(points, times)
-        mended = bridged(self.lost(true, at(60, *range(20, 30))), 0.5)
+        mended = bridge_gaps(self.lost(true, at(60, *range(20, 30))), 0.5)
         np.testing.assert_allclose(mended.image_px, true.image_px, rtol=1e-5)
         np.testing.assert_allclose(mended.world_m, true.world_m, atol=1e-5)
         np.testing.assert_array_equal(np.flatnonzero(mended.bridged), range(20, 30))
@@ -244,7 +246,7 @@ class TestGaps:
         true = waving(np.arange(400) / frames_per_s)
         for length, filled in ((longest, True), (longest + 1, False)):
             lost = self.lost(true, at(400, *range(100, 100 + length)))
-            mended = bridged(lost, 0.5)
+            mended = bridge_gaps(lost, 0.5)
             assert mended.present.all() == filled
             if not filled:
                 assert same(mended, lost)
@@ -253,16 +255,16 @@ class TestGaps:
         """Of several gaps each is filled as if it were the only one."""
         true = waving(np.arange(120) / 30.0)
         gaps = [range(20, 25), range(28, 31), range(60, 90), range(100, 104)]
-        together = bridged(self.lost(true, at(120, *(k for gap in gaps for k in gap))), 0.5)
+        together = bridge_gaps(self.lost(true, at(120, *(k for gap in gaps for k in gap))), 0.5)
         assert not together.present[60:90].any()
-        alone = bridged(self.lost(true, at(120, *gaps[3])), 0.5)
+        alone = bridge_gaps(self.lost(true, at(120, *gaps[3])), 0.5)
         np.testing.assert_array_equal(together.image_px[100:104], alone.image_px[100:104])
-        first = bridged(self.lost(true, at(120, *gaps[0], *gaps[1])), 0.5)
+        first = bridge_gaps(self.lost(true, at(120, *gaps[0], *gaps[1])), 0.5)
         np.testing.assert_array_equal(together.world_m[:60], first.world_m[:60])
 
     def test_both_ends_stay_empty(self) -> None:
         true = waving(np.arange(60) / 30.0)
-        mended = bridged(self.lost(true, at(60, 0, 1, 58, 59)), 0.5)
+        mended = bridge_gaps(self.lost(true, at(60, 0, 1, 58, 59)), 0.5)
         assert np.isnan(mended.image_px[[0, 1, 58, 59]]).all()
         assert not mended.present[[0, 1, 58, 59]].any()
 
@@ -289,4 +291,4 @@ def test_what_was_done_is_said() -> None:
 
 def test_pixels_of_a_metre() -> None:
     found = waving(np.arange(10) / 30.0)
-    np.testing.assert_allclose(metre_px(found), PX_PER_M, rtol=1e-4)
+    np.testing.assert_allclose(pixels_per_metre(found), PX_PER_M, rtol=1e-4)

@@ -11,12 +11,10 @@ import pytest
 
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.keypoints import KeypointSpace
-from sd2core.body.lifted import CENTRE, LiftedTrack
-from sd2core.body.lifter import OUTPUTS, Lifter, Network
+from sd2core.body.lifter import OUTPUTS, LiftedInParts, LiftedTrack, Lifter, Network
 from sd2core.body.lifter_features import Seen, features
-from sd2core.body.lifting import LiftedInParts
 from sd2core.body.shape import ShapeSpace
-from sd2core.body.track import LANDMARKS, MIRRORED, LandmarkTrack
+from sd2core.body.track import LANDMARKS, MIRRORED, TORSO_CORNERS, LandmarkTrack
 from sd2core.errors import Sd2Error
 from sd2core.simulate.people.motion import Deed, random_motion
 from sd2core.timebase import Timebase
@@ -69,7 +67,7 @@ def lifted_by(lifter: Lifter, track: LandmarkTrack, camera: PinholeCamera) -> Li
 
 def _track(places_m: np.ndarray, rate_hz: float = 30.0) -> LandmarkTrack:
     """What a perfect landmark model would say, its depth apart, which is that of a board."""
-    hips = places_m[:, CENTRE[2:]].mean(axis=1, keepdims=True)
+    hips = places_m[:, TORSO_CORNERS[2:]].mean(axis=1, keepdims=True)
     world = places_m - hips
     depth = world[..., 2] * CAMERA.focal_px / hips[..., 2]
     count = len(places_m)
@@ -154,7 +152,7 @@ def test_unseen_motion_is_followed_along_the_line_of_sight(lifter: Lifter) -> No
         found.append(stature_m * lifted.velocity[:, elbow])
         sigma_mps = stature_m * lifted.velocity_sigma[:, elbow]
         within.append(np.abs(found[-1] - wanted[-1]) < sigma_mps)
-        centre = places[:, CENTRE, 2].mean(axis=1)
+        centre = places[:, TORSO_CORNERS, 2].mean(axis=1)
         np.testing.assert_allclose(stature_m * lifted.centre_depth, centre, rtol=0.15)
     v, w = np.concatenate(found), np.concatenate(wanted)
     assert np.corrcoef(v, w)[0, 1] > 0.6

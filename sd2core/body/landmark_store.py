@@ -1,22 +1,85 @@
-"""A track of landmarks of any length, of which a part is in memory at a time."""
+"""Landmarks of a clip of any length in a folder, of which a part is in memory at a time."""
 
 from __future__ import annotations
 
+import hashlib
+import json
+import os
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.body.landmark_repair import Found
-from sd2core.body.mending import mended
+from sd2core.body.landmark_files import read_arrays, write_arrays
+from sd2core.body.landmark_repair import RawTrack, repair_landmarks
+from sd2core.body.person_selection import Rectangle
 from sd2core.body.refining import Stretch
-from sd2core.body.search_store import SearchStore
 from sd2core.body.track import PER_FRAME, LandmarkTrack, parts
 from sd2core.errors import Sd2Error
 from sd2core.io.video import VideoReader
 from sd2core.timebase import Timebase
+
+_VERSION = 1
+
+
+class SearchStore:
+    """Arrays by name: files of a folder, or without one in memory.
+
+    Files of another search are as if they were not there.
+
+    Parameters
+    ----------
+    folder : Path, optional
+    video : VideoReader
+    person : Rectangle, optional
+    silhouettes : int, optional
+        What was asked for, which is what a search is known by.
+    """
+
+    def __init__(
+        self,
+        folder: Path | None,
+        video: VideoReader,
+        person: Rectangle | None,
+        silhouettes: int | None,
+    ) -> None:
+        self._folder = folder
+        self._in_memory: dict[str, dict[str, Any]] = {}
+        if folder is None:
+            return
+        folder.mkdir(parents=True, exist_ok=True)
+        about = os.stat(video.path)
+        identity = {
+            "version": _VERSION,
+            "video": [str(video.path.resolve()), about.st_size, about.st_mtime_ns],
+            "frames": [len(video), video.width, video.height],
+            "person": None if person is None else list(vars(person).values()),
+            "silhouettes": silhouettes,
+        }
+        self._key = hashlib.sha256(json.dumps(identity).encode()).hexdigest()
+
+    def read(self, name: str) -> dict[str, Any] | None:
+        """What was written under a name, if it is there and of this search."""
+        if self._folder is None:
+            return self._in_memory.get(name)
+        if not (self._folder / name).is_file():
+            return None
+        try:
+            arrays, meta = read_arrays(self._folder / name)
+        except Sd2Error:
+            return None
+        return arrays if meta.get("key") == self._key else None
+
+    def write(self, name: str, arrays: Mapping[str, Any]) -> None:
+        """Keep arrays under a name."""
+        if self._folder is None:
+            self._in_memory[name] = dict(arrays)
+        else:
+            write_arrays(self._folder / name, arrays, {"key": self._key})
+
 
 _PLACES = ("image_px", "depth_px", "world_m", "visibility")
 
@@ -58,7 +121,7 @@ class TrackInParts:
         self.present, self.bridged = np.zeros((2, len(timebase)), bool)
         written = 0
 
-        def write(found: Found) -> None:
+        def write(found: RawTrack) -> None:
             nonlocal written
             frames = slice(written, written + len(found.present))
             known = vars(found) | {"confidence": refined.confidence[frames]}
@@ -66,7 +129,7 @@ class TrackInParts:
             self.present[frames], self.bridged[frames] = found.present, found.bridged
             written = frames.stop
 
-        self.notes = mended(
+        self.notes = repair_landmarks(
             refined.found, timebase.times_s, refined.confidence > 0.0, max_gap_s, write
         )
 
@@ -132,7 +195,7 @@ class RefinedStretches:
         frames, masks = zip(*self._masks, strict=True)
         return np.concatenate(frames), np.concatenate(masks)
 
-    def found(self, start: int, stop: int) -> Found:
+    def found(self, start: int, stop: int) -> RawTrack:
         """Frames ``start`` to ``stop``, not mended."""
         step = self._frames_each
         begin = start // step * step
@@ -147,7 +210,7 @@ class RefinedStretches:
                 )
             stretches.append(vars(stretch))
         cut = slice(start - begin, stop - begin)
-        return Found(
+        return RawTrack(
             times_s=self._times_s[start:stop],
             present=self.confidence[start:stop] > 0.0,
             bridged=np.zeros(stop - start, bool),

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from filmed_people import film
 
-from sd2core.body.camera_metadata import camera_of, written_focal_mm
+from sd2core.body.camera import camera_of, written_focal_mm
 from sd2core.errors import Sd2Error
 from sd2core.io.video import open_video
 

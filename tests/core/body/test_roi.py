@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sd2core.body.appearance import similarity
-from sd2core.body.roi_path import Sightings, roi_of, roi_path, smoothed
+from sd2core.body.roi import Sightings, roi_of, roi_path, smooth_over_time
+from sd2core.body.tracking import similarity
 
 
 class TestSmoothing:
@@ -15,19 +15,19 @@ class TestSmoothing:
         if not even:
             times = np.sort(times + 0.02 * rng.standard_normal(80))
         lines = np.stack([3.0 + 7.0 * times, -2.0 * times], axis=1)
-        np.testing.assert_allclose(smoothed(times, lines, 0.2), lines, atol=1e-9)
+        np.testing.assert_allclose(smooth_over_time(times, lines, 0.2), lines, atol=1e-9)
 
     def test_noise_is_averaged(self) -> None:
         """Over 2 σ √π f frames, for Gaussian weights inside the clip."""
         noise = np.random.default_rng(5).standard_normal((4000, 1))
-        smooth = smoothed(np.arange(4000) / 15.0, noise, 0.5)
+        smooth = smooth_over_time(np.arange(4000) / 15.0, noise, 0.5)
         expected = 1.0 / np.sqrt(2.0 * 0.5 * np.sqrt(np.pi) * 15.0)
         assert smooth.std() == pytest.approx(expected, rel=0.1)
 
     def test_no_lag(self) -> None:
         times = np.arange(300) / 15.0
         wave = np.sin(2 * np.pi * 0.5 * times)[:, None]
-        smooth = smoothed(times, wave, 0.2)[60:240, 0]
+        smooth = smooth_over_time(times, wave, 0.2)[60:240, 0]
         inner = wave[60:240, 0]
         shifted = [np.corrcoef(smooth, np.roll(wave[:, 0], k)[60:240])[0, 1] for k in (-1, 0, 1)]
         assert int(np.argmax(shifted)) == 1
@@ -38,7 +38,7 @@ class TestSmoothing:
     def test_few(self, count: int) -> None:
         values = np.arange(count, dtype=float)[:, None]
         np.testing.assert_allclose(
-            smoothed(np.arange(count) / 15.0, values, 0.2), values, atol=1e-12
+            smooth_over_time(np.arange(count) / 15.0, values, 0.2), values, atol=1e-12
         )
 
 
