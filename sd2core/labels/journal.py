@@ -1,25 +1,184 @@
-"""Every edit on disk when it is made, apart from the user's file.
+"""Journal of label edits: each edit is on disk when it is made, apart from the user's file.
 
-A session of editing writes parts: files of records (:mod:`.journal_records`) that begin with
-all labels, followed by what each edit changed. When the edits of a part have grown longer
-than its labels, the next part begins, and the one before the last is deleted: what is read
-back is in the newest part, and in the one before it should the newest be damaged.
+A session of editing writes parts. A part begins with all labels, and every edit adds a record
+of what it changed. When the edits of a part have grown longer than its labels, the next part
+begins and the one before the last is deleted: the labels are read back from the newest part, and
+from the one before it should the newest be damaged.
+
+A record is one line: eight hexadecimal digits of length in bytes, a space, eight of the CRC-32,
+a space, JSON in UTF-8, and a newline. A file that ends in the middle of a record, or goes on
+with something else, is read up to the last whole record.
 
 A record is written in one go and flushed to the disk (``fsync``) before :meth:`Journal.write`
-returns. So neither the end of the process nor of the power loses an edit that has returned,
-as far as the disk keeps what it says it has (on macOS, ``fsync`` does not empty the drive's
-own cache). It costs some milliseconds per edit; a drag is one edit.
+returns, so neither the end of the process nor of the power loses an edit that has returned, as
+far as the disk keeps what it says it has (on macOS, ``fsync`` does not empty the drive's own
+cache). Decision 43 compares this with SQLite.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import time
+import zlib
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import FiniteFloat, NonNegativeInt
 
 from sd2core.files.atomic import atomic_write
-from sd2core.labels.journal_records import change, head, packed
+from sd2core.labels.comparison import same_ends
+from sd2core.labels.entries import (
+    Entry,
+    LabelsEntry,
+    LabelSetEntry,
+    SpanEntry,
+    TrackEntry,
+    label_set_entry,
+    labels_entry,
+    span_entry,
+    track_entries,
+)
 from sd2core.labels.spans import Labels
+
+FORMAT: Literal["sd2-labels-journal"] = "sd2-labels-journal"
+VERSION = 1
+
+_PREFIX_BYTES = 18
+
+
+class Head(Entry):
+    """First record of a part: the recording, and all its labels at that point.
+
+    ``unsaved`` counts the edits up to here that the user's file does not hold; ``time_unix_s`` is
+    when the last of them was made.
+    """
+
+    format: Literal["sd2-labels-journal"]
+    version: Literal[1]
+    recording: str
+    unsaved: NonNegativeInt
+    last: str
+    time_unix_s: FiniteFloat
+    labels: LabelsEntry
+
+
+class Change(Entry):
+    """Record of one edit: spans deleted (``gone``), new or changed (``put``), tracks, label set.
+
+    A record without any of them says that the user's file was written (``saved``).
+    """
+
+    name: str
+    time_unix_s: FiniteFloat
+    saved: bool = False
+    gone: tuple[int, ...] = ()
+    put: tuple[SpanEntry, ...] = ()
+    tracks: tuple[TrackEntry, ...] | None = None
+    label_set: LabelSetEntry | None = None
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """Result of replaying a part; ``unsaved`` edits are not in the user's file."""
+
+    recording: str
+    labels: Labels
+    unsaved: int
+    last: str
+    time_unix_s: float
+
+
+def packed(content: dict[str, Any]) -> bytes:
+    """Encode one record."""
+    payload = json.dumps(content, ensure_ascii=False, separators=(",", ":")).encode()
+    return b"%08x %08x %b\n" % (len(payload), zlib.crc32(payload), payload)
+
+
+def unpacked(content: bytes) -> tuple[list[bytes], int]:
+    """Return the JSON of all whole records from the start on, and the byte at which they end."""
+    records: list[bytes] = []
+    at = 0
+    while True:
+        prefix = content[at : at + _PREFIX_BYTES]
+        try:
+            length = int(prefix[:8], 16)
+        except ValueError:
+            return records, at
+        start, end = at + _PREFIX_BYTES, at + _PREFIX_BYTES + length
+        payload = content[start:end]
+        if (
+            prefix != b"%08x %08x " % (length, zlib.crc32(payload))
+            or content[end : end + 1] != b"\n"
+        ):
+            return records, at
+        records.append(payload)
+        at = end + 1
+
+
+def head(
+    recording: str, labels: Labels, unsaved: int, last: str, time_unix_s: float
+) -> dict[str, Any]:
+    """Return the content of the first record."""
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "recording": recording,
+        "unsaved": unsaved,
+        "last": last,
+        "time_unix_s": time_unix_s,
+        "labels": labels_entry(labels),
+    }
+
+
+def change(name: str, time_unix_s: float, before: Labels, after: Labels) -> dict[str, Any]:
+    """Return the content of the record of an edit."""
+    content: dict[str, Any] = {"name": name, "time_unix_s": time_unix_s}
+    if before.spans is not after.spans:
+        # Spans that an edit did not touch are the very same; those that equal others do no harm.
+        first, stop = same_ends(before.spans, after.spans)
+        old = {span.id: span for span in before.spans[first : len(before.spans) - stop]}
+        new = after.spans[first : len(after.spans) - stop]
+        put = [span_entry(span) for span in new if old.pop(span.id, None) is not span]
+        if old:
+            content["gone"] = list(old)
+        if put:
+            content["put"] = put
+    if before.tracks != after.tracks:
+        content["tracks"] = track_entries(after.tracks)
+    if before.label_set != after.label_set:
+        content["label_set"] = label_set_entry(after.label_set)
+    return content
+
+
+def replay(records: list[bytes]) -> Replayed:
+    """Replay the edits of a part.
+
+    Raises
+    ------
+    ValueError
+        When a record holds something else than this version writes (pydantic's error).
+    Sd2Error
+        When the resulting labels are not valid.
+    """
+    first = Head.model_validate_json(records[0])
+    spans = {span.id: span for span in first.labels.spans}
+    tracks, label_set = first.labels.tracks, first.labels.label_set
+    unsaved, last, time_unix_s = first.unsaved, first.last, first.time_unix_s
+    for record in records[1:]:
+        edit = Change.model_validate_json(record)
+        for span_id in edit.gone:
+            spans.pop(span_id, None)
+        spans.update((span.id, span) for span in edit.put)
+        tracks = tracks if edit.tracks is None else edit.tracks
+        label_set = label_set if edit.label_set is None else edit.label_set
+        unsaved = 0 if edit.saved else unsaved + 1
+        last, time_unix_s = edit.name, edit.time_unix_s
+    # Only the end is checked: what is between was whole when it was written.
+    entry = LabelsEntry(label_set=label_set, tracks=tracks, spans=tuple(spans.values()))
+    return Replayed(first.recording, entry.made(), unsaved, last, time_unix_s)
+
 
 SUFFIX = ".journal"
 KEPT_PARTS = 2
@@ -28,25 +187,25 @@ SHORTEST_BYTES = 1 << 18
 
 
 class Journal:
-    """The edits of one session; made by :meth:`.recovery.RecoveryPlace.begin`.
+    """Journal of one editing session; made by :meth:`.recovery.RecoveryPlace.begin`.
 
     Parameters
     ----------
     folder : Path
-        There it writes ``SESSION-PART.journal``.
+        Folder of the parts, ``SESSION-PART.journal``.
     session : int
     recording : Path
     labels : Labels
         As they are when the session begins.
     unsaved : int
-        How many edits the user's file does not hold by then.
+        Number of edits that the user's file does not hold by then.
     last : str
         Name of the last of them.
 
     Raises
     ------
     OSError
-        When the first part cannot be written. No journal is no reason not to edit: say it.
+        When the first part cannot be written. Editing may go on without a journal: tell the user.
     """
 
     def __init__(
@@ -69,11 +228,11 @@ class Journal:
 
     @property
     def unsaved(self) -> int:
-        """Edits since the user's file was last saved."""
+        """Number of edits since the user's file was last saved."""
         return self._unsaved
 
     def write(self, name: str, labels: Labels) -> None:
-        """Note what an edit, a step back or a step forward has led to; on disk on return.
+        """Record an edit, an undo or a redo; on disk on return.
 
         Raises
         ------
@@ -87,12 +246,12 @@ class Journal:
         self._append(record)
 
     def saved(self) -> None:
-        """Note that the user's file holds what is here."""
+        """Record that the user's file holds the current labels."""
         self._unsaved = 0
         self._append(packed({"name": self._last, "time_unix_s": time.time(), "saved": True}))
 
     def close(self) -> None:
-        """End the session and delete its parts: all is saved, or the user wants none of it."""
+        """End the session and delete its parts: all is saved, or the user discards it."""
         self._close_stream()
         for path in self._parts:
             path.unlink(missing_ok=True)
@@ -100,7 +259,7 @@ class Journal:
 
     def _append(self, record: bytes) -> None:
         stream = self._stream
-        # Where somebody has deleted the file, what is appended would be nowhere.
+        # Appending to a deleted file would keep nothing.
         if stream is None or self._left_bytes < len(record) or os.fstat(stream).st_nlink == 0:
             self._begin_part()
             return

@@ -1,16 +1,16 @@
-"""What a crash left behind is offered again; and one window at a time edits a recording.
+"""Recovery of label edits after a crash, and the lock that lets one window edit a recording.
 
-Below a folder of the caller's choice every recording has a place of its own::
+Every recording has a folder of its own below a folder of the caller's choice::
 
-    NAME-1234567890ab/         name of the recording, and a number made of its path
-        lock                   held by who edits it, for as long as that process lives
-        holder.json            who that is
+    NAME-1234567890ab/         name of the recording, and a hash of its path
+        lock                   held by the editing process for as long as it lives
+        holder.json            user, host and process that hold the lock
         000003-000001.journal  session 3, part 1
-        000002-000004.declined parts of a session that the user did not want back
-        000001-000001.damaged  what nobody can read, once that was said
+        000002-000004.declined parts of a session that the user discarded
+        000001-000001.damaged  unreadable, and reported once
 
-Nothing that cannot be read is deleted, and nothing that the user has not saved, unless he
-says so.
+Unreadable files are kept, and unsaved edits are deleted only when the user asks for it. A part
+that cannot be read costs that part: the one before it is offered, with a note.
 """
 
 from __future__ import annotations
@@ -21,32 +21,168 @@ import json
 import os
 import socket
 import time
+from collections.abc import Container, Iterable
 from contextlib import suppress
 from dataclasses import asdict, dataclass
+from itertools import groupby
 from pathlib import Path
+
+from pydantic import ValidationError
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text, remove_leftovers
 from sd2core.files.lock import FileLock, is_locked
-from sd2core.labels.journal import SUFFIX, Journal
-from sd2core.labels.recovery_offers import (
-    DAMAGED,
-    DECLINED,
-    Found,
-    Offer,
-    journals,
-    listed,
-    search,
-    session_of,
-)
+from sd2core.labels.entries import first_fault
+from sd2core.labels.journal import SUFFIX, Journal, Replayed, replay, unpacked
 from sd2core.labels.spans import Labels
+
+DECLINED = ".declined"
+"""Suffix of the journal of a session that the user discarded."""
+DAMAGED = ".damaged"
+"""Suffix of a journal that cannot be read, or holds only half an edit beyond the user's file."""
+
+
+class _NoHeadError(ValueError):
+    """Error for a part of which nothing can be read."""
+
+
+@dataclass(frozen=True)
+class Offer:
+    """Labels left behind by a session, with ``edits`` that the user's file does not hold.
+
+    Parameters
+    ----------
+    recording : Path
+        Absolute path of the labelled recording or video.
+    labels : Labels
+        After the last whole edit.
+    edits : int
+        Number of unsaved edits.
+    last : str
+        Name of the last edit, such as "Move span".
+    time_unix_s : float
+        Time of the last edit.
+    declined : bool
+        True if the user discarded it.
+    files : tuple of Path
+        Parts that it was read from.
+    """
+
+    recording: Path
+    labels: Labels
+    edits: int
+    last: str
+    time_unix_s: float
+    declined: bool
+    files: tuple[Path, ...]
+
+
+@dataclass(frozen=True)
+class Found:
+    """Offers, the newest of a recording first, and notes on what could not be read."""
+
+    offers: tuple[Offer, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Search:
+    """Content of the folder of one recording.
+
+    ``settled`` parts hold nothing but what the user's file holds as well; ``damaged`` ones are
+    subject of a note, and no version of this program could offer them.
+    """
+
+    found: Found
+    settled: tuple[Path, ...]
+    damaged: tuple[Path, ...]
+
+
+def search(folder: Path, suffixes: Iterable[str], without: Container[int] = ()) -> Search:
+    """Read what sessions, except ``without``, left in a recording's folder, the newest first."""
+    offers, notes = [], []
+    settled: list[Path] = []
+    damaged: list[Path] = []
+    for session, group in groupby(journals(folder, suffixes), key=session_of):
+        parts = [] if session in without else list(group)
+        while parts:  # the newest first; one before it only where that cannot be read
+            path = parts[0]
+            try:
+                replayed, note = _replayed(path)
+            except (OSError, ValueError, Sd2Error) as error:
+                notes.append(f"{path} cannot be read and is kept ({_words(error)})")
+                if isinstance(error, _NoHeadError):
+                    damaged.append(path)
+                parts = parts[1:]
+                continue
+            if note:
+                notes.append(note)
+            if replayed.unsaved:
+                offers.append(_offer(replayed, tuple(parts)))
+            else:
+                (damaged if note else settled).extend(parts)
+            break
+    return Search(Found(tuple(offers), tuple(notes)), tuple(settled), tuple(damaged))
+
+
+def _offer(replayed: Replayed, files: tuple[Path, ...]) -> Offer:
+    return Offer(
+        Path(replayed.recording),
+        replayed.labels,
+        replayed.unsaved,
+        replayed.last,
+        replayed.time_unix_s,
+        files[0].suffix == DECLINED,
+        files,
+    )
+
+
+def _replayed(path: Path) -> tuple[Replayed, str]:
+    content = path.read_bytes()
+    records, end = unpacked(content)
+    if not records:
+        raise _NoHeadError("it does not begin with a whole record")
+    left = len(content) - end
+    note = f"{path} ends within an edit: {left} bytes are left out" if left else ""
+    return replay(records), note
+
+
+def journals(folder: Path, suffixes: Iterable[str]) -> list[Path]:
+    """List parts by their names, newest session first, and its newest part first."""
+    named = [path for path in listed(folder) if path.suffix in suffixes and _numbers(path)]
+    return sorted(named, key=_numbers, reverse=True)
+
+
+def _numbers(path: Path) -> tuple[int, ...]:
+    parts = path.stem.split("-")
+    return tuple(map(int, parts)) if len(parts) == 2 and all(map(str.isdecimal, parts)) else ()
+
+
+def session_of(path: Path) -> int:
+    """Return the number of the session of a part."""
+    return _numbers(path)[0]
+
+
+def listed(folder: Path) -> list[Path]:
+    """List a folder; empty where there is none."""
+    try:
+        return sorted(folder.iterdir())
+    except OSError:
+        return []
+
+
+def _words(error: Exception) -> str:
+    if isinstance(error, ValidationError):
+        return first_fault(error)
+    return str(error)
+
 
 _LOCK_NAME = "lock"
 _HOLDER_NAME = "holder.json"
 
 
 def recovery_folder() -> Path:
-    """Recovery folder of the user; it need not be there yet."""
+    """Return the user's recovery folder, which may not exist yet."""
     import platformdirs
 
     return Path(platformdirs.user_data_dir("sd2-studio", appauthor=False)) / "recovery"
@@ -54,14 +190,7 @@ def recovery_folder() -> Path:
 
 @dataclass(frozen=True)
 class Holder:
-    """Who edits the labels of a recording; empty or 0 where it is not known.
-
-    Parameters
-    ----------
-    user, host : str
-    pid : int
-    since_unix_s : float
-    """
+    """Process that edits the labels of a recording; empty or 0 where unknown."""
 
     user: str = ""
     host: str = ""
@@ -69,20 +198,20 @@ class Holder:
     since_unix_s: float = 0.0
 
     def __str__(self) -> str:
-        who = self.user or "Somebody"
+        who = self.user or "Another user"
         return f"{who} on {self.host} (process {self.pid})" if self.host else who
 
 
 class RecoveryPlace:
-    """Where the journals of one recording are.
+    """Folder of the journals of one recording, and its lock.
 
     Parameters
     ----------
     root : Path
-        Recovery folder of the program, made when it is needed. Locks hold between those who
-        name the same folder: a folder of the user's keeps out his own windows only.
+        Recovery folder of the program, made when it is needed. Locks hold between processes that
+        name the same folder: a folder of the user's keeps out that user's own windows only.
     recording : Path
-        The recording, or the video, that is labelled; a link is the same as what it leads to.
+        The labelled recording or video; a link is the same as its target.
     """
 
     def __init__(self, root: Path, recording: Path) -> None:
@@ -95,16 +224,16 @@ class RecoveryPlace:
 
     @property
     def recording(self) -> Path:
-        """What is labelled, with links followed."""
+        """Path of the labelled recording, with links resolved."""
         return self._recording
 
     @property
     def held(self) -> bool:
-        """Whether the labels are this place's to edit."""
+        """True while this place holds the lock."""
         return self._lock is not None
 
     def take(self) -> bool:
-        """Become the one who edits; False where another is: show the labels read-only then.
+        """Take the lock; False where another process holds it, and the labels are read-only here.
 
         Raises
         ------
@@ -117,18 +246,18 @@ class RecoveryPlace:
             return self.held
         self._lock = lock
         holder = Holder(_user(), socket.gethostname(), os.getpid(), time.time())
-        with suppress(OSError):  # one can edit without having said who one is
+        with suppress(OSError):  # editing works without it
             atomic_write_text(self._folder / _HOLDER_NAME, json.dumps(asdict(holder)) + "\n")
         return True
 
     def release(self) -> None:
-        """Let others edit. Close the journal first."""
+        """Release the lock. Close the journal first."""
         if self._lock is not None:
             self._lock.release()
             self._lock = None
 
     def holder(self) -> Holder | None:
-        """Who edits, of this process or another; None where nobody does."""
+        """Return the process that holds the lock, this or another one; None where it is free."""
         if not is_locked(self._folder / _LOCK_NAME):
             return None
         try:
@@ -138,7 +267,7 @@ class RecoveryPlace:
             return Holder()
 
     def offers(self, *, declined: bool = False) -> Found:
-        """What earlier sessions left here; those that were declined only when asked for."""
+        """Find labels of earlier sessions; ``declined`` ones only when asked for."""
         suffixes = (SUFFIX, DECLINED) if declined else (SUFFIX,)
         return search(self._folder, suffixes, without=self._begun).found
 
@@ -150,14 +279,14 @@ class RecoveryPlace:
         labels : Labels
             Those that are edited from now on.
         recovered : Offer, optional
-            Where they are from; what it was read from is deleted once they are on disk anew.
+            Source of the labels; its files are deleted once the new journal is on disk.
 
         Raises
         ------
         Sd2Error
             When the place is not held.
         OSError
-            When the disk does not take it.
+            When the journal cannot be written.
         """
         self._check_held()
         remove_leftovers(self._folder)
@@ -177,19 +306,19 @@ class RecoveryPlace:
             self.delete(recovered)
         for path in earlier.settled:
             path.unlink(missing_ok=True)
-        # It has been said: nobody needs to hear of it again at every start.
+        # Reported once: not again at every start.
         for path in earlier.damaged:
             path.rename(path.with_suffix(DAMAGED))
         return journal
 
     def decline(self, offer: Offer) -> None:
-        """Remember that the user does not want it; it is kept, and not offered again."""
+        """Keep an offer's files, but offer it no more."""
         self._check_held()
         for path in offer.files:
             path.rename(path.with_suffix(DECLINED))
 
     def delete(self, offer: Offer) -> None:
-        """Delete what an offer was read from."""
+        """Delete the files of an offer."""
         self._check_held()
         for path in offer.files:
             path.unlink(missing_ok=True)
@@ -205,9 +334,9 @@ class RecoveryPlace:
 
 
 def offers_in(root: Path, *, declined: bool = False) -> Found:
-    """What sessions of all recordings left behind that nobody edits now, the newest first.
+    """Find unsaved labels of all recordings that nobody edits now, the newest first.
 
-    Those that were declined only when asked for.
+    ``declined`` ones only when asked for.
     """
     suffixes = (SUFFIX, DECLINED) if declined else (SUFFIX,)
     found = [

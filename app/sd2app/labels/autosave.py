@@ -14,8 +14,7 @@ from sd2app.session.document import DocumentModel
 from sd2app.training.text import clock_text
 from sd2core.errors import Sd2Error
 from sd2core.labels.journal import Journal
-from sd2core.labels.recovery import RecoveryPlace, offers_in
-from sd2core.labels.recovery_offers import Found, Offer
+from sd2core.labels.recovery import Found, Offer, RecoveryPlace, offers_in
 from sd2core.labels.spans import Labels
 from sd2core.recording.recording import Recording
 

@@ -22,7 +22,7 @@ from sd2app.labels.recovery_text import edits_text, spans_text
 from sd2app.widgets.panel import sentence
 from sd2core.errors import Sd2Error
 from sd2core.labels.files import write_labels
-from sd2core.labels.recovery_offers import Offer
+from sd2core.labels.recovery import Offer
 
 _SAID = (
     "Edits of labels that were not saved when the program ended. Open a recording to see what"

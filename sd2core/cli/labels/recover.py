@@ -14,7 +14,7 @@ from sd2core.cli.output import counted, print_json, print_rows
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
-    from sd2core.labels.recovery_offers import Offer
+    from sd2core.labels.recovery import Offer
 
 
 def add_recover(kinds: argparse._SubParsersAction) -> None:

@@ -23,8 +23,7 @@ from sd2app.session.tasks import JobsModel
 from sd2app.settings import Settings
 from sd2core.labels import edits as core_edits
 from sd2core.labels.files import read_labels, write_labels
-from sd2core.labels.recovery import RecoveryPlace, offers_in
-from sd2core.labels.recovery_offers import Found, Offer
+from sd2core.labels.recovery import Found, Offer, RecoveryPlace, offers_in
 from sd2core.recording.recording import Recording
 
 

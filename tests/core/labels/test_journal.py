@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from labelled import even, imported, many_spans, random_edit
 
 from sd2core.labels import journal as journal_module
-from sd2core.labels.journal import Journal
-from sd2core.labels.journal_records import change, head, packed, replay, unpacked
+from sd2core.labels.journal import Journal, change, head, packed, replay, unpacked
 from sd2core.labels.spans import Labels, Span
 
 FRAMES = even()

@@ -241,7 +241,7 @@ class TestDamage:
         self, taken: Take, root: Path, recording: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         with monkeypatch.context() as patch:
-            patch.setattr("sd2core.labels.journal_records.VERSION", 2)
+            patch.setattr("sd2core.labels.journal.VERSION", 2)
             crashed(root, recording, 1)
         place = taken(root, recording)
         found = place.offers()
@@ -291,7 +291,7 @@ class TestOneWindow:
         try:
             assert not place.take()
             assert place.holder() == Holder()
-            assert str(Holder()) == "Somebody"
+            assert str(Holder()) == "Another user"
         finally:
             process.kill()
             process.communicate()
