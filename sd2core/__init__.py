@@ -21,12 +21,12 @@ from sd2core.version import __version__
 if TYPE_CHECKING:
     from sd2core.denoise.files import load_model
     from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
-    from sd2core.doppler_map import DopplerMap
     from sd2core.errors import Sd2Error
     from sd2core.fmcw import doppler_map
     from sd2core.io.mesh import load_mesh, save_mesh
     from sd2core.io.radar import RadarCapture, load_capture
     from sd2core.io.video import VideoReader, open_video
+    from sd2core.maps import DopplerMap
     from sd2core.mesh.sequence import MeshSequence
     from sd2core.radar_config import PAPER_RADAR, RadarConfig
     from sd2core.recording.recording import Recording, Span, open_recording
@@ -62,7 +62,7 @@ __all__ = [
 _HOME = {
     "PAPER_RADAR": "radar_config",
     "PRESETS": "doppler",
-    "DopplerMap": "doppler_map",
+    "DopplerMap": "maps",
     "MeshSequence": "mesh.sequence",
     "RadarCapture": "io.radar",
     "RadarConfig": "radar_config",

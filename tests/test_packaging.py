@@ -124,9 +124,9 @@ def test_the_wheel_holds_the_program_and_nothing_else(wheel: Path) -> None:
         "sd2_studio",
     }
     sources = {
-        path.relative_to(REPOSITORY).as_posix()
-        for package in ("sd2core", "sd2app")
-        for path in (REPOSITORY / package).rglob("*")
+        path.relative_to(folder).as_posix()
+        for folder, package in ((REPOSITORY, "sd2core"), (REPOSITORY / "app", "sd2app"))
+        for path in (folder / package).rglob("*")
         if path.is_file() and "__pycache__" not in path.parts
     }
     assert sources <= names

@@ -26,8 +26,8 @@ from sd2core.batch.probing import TaskRate, export_s, task_rates
 from sd2core.batch.rates import known_fit_rate
 from sd2core.batch.task_graph import Flow
 from sd2core.batch.tasks import Task
-from sd2core.doppler_map import MapKind
 from sd2core.errors import Sd2Error
+from sd2core.maps import MapKind
 from sd2core.progress import Progress, silent
 
 if TYPE_CHECKING:

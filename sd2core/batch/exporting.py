@@ -16,10 +16,10 @@ from sd2core.batch.folder import BatchFolder
 from sd2core.batch.keys import key_of
 from sd2core.batch.plan import Export
 from sd2core.batch.stretches import LONGEST_FRAMES
-from sd2core.doppler_map import DopplerMap, MapKind, joined
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.digests import file_digest
+from sd2core.maps import DopplerMap, MapKind, joined
 from sd2core.progress import Progress
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase

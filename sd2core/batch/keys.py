@@ -31,7 +31,7 @@ _CODE: dict[Step, tuple[str, ...]] = {
         "numerics",
         "scattering",
         "sensor.py",
-        "doppler_map.py",
+        "maps.py",
         "timebase.py",
     ),
     "denoise": (
@@ -40,7 +40,7 @@ _CODE: dict[Step, tuple[str, ...]] = {
         "denoise",
         "mesh/presence.py",
         "pairs/segments.py",
-        "doppler_map.py",
+        "maps.py",
     ),
     "simulate": (
         "batch/simulation.py",
@@ -52,10 +52,10 @@ _CODE: dict[Step, tuple[str, ...]] = {
         "mocap/recording_pairs.py",
         "scattering",
         "sensor.py",
-        "doppler_map.py",
+        "maps.py",
         "timebase.py",
     ),
-    "export": ("batch/exporting.py", "datasets", "labels", "pairs/segments.py", "doppler_map.py"),
+    "export": ("batch/exporting.py", "datasets", "labels", "pairs/segments.py", "maps.py"),
 }
 """Modules that a step's results depend on, within sd2core."""
 

@@ -28,8 +28,8 @@ from sd2core.doppler.options import (
     Weight,
     chosen_options,
 )
-from sd2core.doppler_map import MapKind
 from sd2core.errors import Sd2Error
+from sd2core.maps import MapKind
 from sd2core.pairs.segments import LENGTH, OVERLAP
 from sd2core.placements.placements import Placements, placements_from_dict
 from sd2core.sensor import Vector, VirtualSensor

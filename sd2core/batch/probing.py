@@ -17,7 +17,7 @@ from sd2core.batch.folder import BatchFolder
 from sd2core.batch.inputs import Inspection
 from sd2core.batch.plan import BatchPlan
 from sd2core.batch.task_graph import Flow, simulation_of
-from sd2core.doppler_map import DopplerMap, MapKind
+from sd2core.maps import DopplerMap, MapKind
 from sd2core.progress import silent
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase

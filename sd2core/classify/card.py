@@ -39,7 +39,7 @@ class ClassifierCard:
     classes : tuple of str
         In the order of its answers; at least two.
     trained_on : tuple of str
-        Kinds of maps that it learnt from, as :data:`sd2core.doppler_map.MapKind` calls them.
+        Kinds of maps that it learnt from, as :data:`sd2core.maps.MapKind` calls them.
     delay_frames : int
         So many frames are seen after one before it is answered.
     title : str

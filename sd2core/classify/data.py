@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from sd2core.classify.card import BACKGROUND
 from sd2core.denoise import resample_to_model as matching
 from sd2core.denoise.live import TrainedDenoiser
-from sd2core.doppler_map import DopplerMap, MapKind
 from sd2core.errors import Sd2Error
 from sd2core.labels.label_set import GESTURES, LabelSet
 from sd2core.labels.spans import Labels
+from sd2core.maps import DopplerMap, MapKind
 from sd2core.pairs.store import PairSet
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase

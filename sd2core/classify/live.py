@@ -12,7 +12,7 @@ from sd2core.classify.card import ClassifierCard
 from sd2core.classify.features import SILENCE, Heard
 from sd2core.classify.models import Classifier, State, probabilities_of
 from sd2core.denoise import resample_to_model as matching
-from sd2core.doppler_map import DopplerMap
+from sd2core.maps import DopplerMap
 from sd2core.progress import Progress, silent
 
 CHUNK = 512

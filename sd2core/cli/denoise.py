@@ -47,8 +47,8 @@ def _denoise(options: argparse.Namespace) -> None:
     from sd2core.cli.reading import check_map_output
     from sd2core.denoise.files import DEFAULT_NAME, describe_model, find_model, load_model
     from sd2core.denoise.resample_to_model import check_map
-    from sd2core.doppler_map import DopplerMap
     from sd2core.io.kinds import kind_of
+    from sd2core.maps import DopplerMap
 
     check_map_output(options.out)
     kind = kind_of(options.map)

@@ -8,7 +8,7 @@ from sd2core.cli.output import progress_bar
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
-    from sd2core.doppler_map import DopplerMap
+    from sd2core.maps import DopplerMap
     from sd2core.mesh.sequence import MeshSequence
     from sd2core.recording.recording import Recording
     from sd2core.sensor import VelocityAxis

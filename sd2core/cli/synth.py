@@ -25,7 +25,7 @@ from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
     from sd2core.doppler import SynthesisOptions, Synthesizer
-    from sd2core.doppler_map import DopplerMap
+    from sd2core.maps import DopplerMap
     from sd2core.mesh.sequence import MeshSequence
     from sd2core.sensor import VirtualSensor
 

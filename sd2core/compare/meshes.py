@@ -21,8 +21,8 @@ from sd2core.compare.joints import (
 from sd2core.compare.maps import map_l1, maps_alike
 from sd2core.compare.measures import correlation, jitter, line_of_sight_velocity, rms
 from sd2core.compare.times import at_times, common_times
-from sd2core.doppler_map import DopplerMap
 from sd2core.errors import Sd2Error
+from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import Presence
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Progress, silent

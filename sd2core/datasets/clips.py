@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from sd2core.classify.data import Clip, ClipSet, in_order
 from sd2core.datasets.reading import Dataset
 from sd2core.datasets.source import KINDS
-from sd2core.doppler_map import MapKind
 from sd2core.errors import Sd2Error
+from sd2core.maps import MapKind
 
 _SLACK_FRAMES = 0.01
 """Of times that were rounded."""

@@ -10,8 +10,8 @@ from sd2core.datasets.layout import Header
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.source import BACKGROUND, Source
 from sd2core.denoise.resample_to_model import MOST_RESAMPLED
-from sd2core.doppler_map import DopplerMap
 from sd2core.errors import Sd2Error
+from sd2core.maps import DopplerMap
 from sd2core.version import __version__
 
 

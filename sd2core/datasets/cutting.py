@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.source import KINDS, Outline, Source
 from sd2core.denoise.resample_to_model import clips, interpolated, is_regular
-from sd2core.doppler_map import MapKind
+from sd2core.maps import MapKind
 from sd2core.pairs.segments import cut, segment_starts
 
 _BLOCK = 256

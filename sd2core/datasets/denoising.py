@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from sd2core.denoise.files import describe_model
 from sd2core.denoise.resample_to_model import check_map
-from sd2core.doppler_map import DopplerMap
+from sd2core.maps import DopplerMap
 
 if TYPE_CHECKING:
     from sd2core.denoise.live import TrainedDenoiser

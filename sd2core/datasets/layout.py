@@ -8,9 +8,9 @@ from typing import Any, Literal
 
 from sd2core.datasets.options import LabelRule
 from sd2core.datasets.source import KINDS
-from sd2core.doppler_map import MapKind
 from sd2core.errors import Sd2Error
 from sd2core.io.kinds import DATASET_FORMAT
+from sd2core.maps import MapKind
 from sd2core.sensor import VelocityAxis
 
 FORMAT = DATASET_FORMAT

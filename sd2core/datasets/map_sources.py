@@ -9,12 +9,12 @@ from typing import Any
 
 from sd2core.datasets.recording_sources import labels_and_classes
 from sd2core.datasets.source import LazySource, Outline, Source, SourceKey, label_per_frame
-from sd2core.doppler_map import DopplerMap
 from sd2core.files.digests import remembered_digest
 from sd2core.io.radar import holds_map, load_recorded_map
 from sd2core.labels.files import read_labels as read_own
 from sd2core.labels.formats import read_labels
 from sd2core.labels.spans import Labels
+from sd2core.maps import DopplerMap
 from sd2core.progress import Progress
 from sd2core.sensor import VirtualSensor
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, get_args
 
 from sd2core.datasets.source import KINDS
-from sd2core.doppler_map import MapKind
 from sd2core.errors import Sd2Error
+from sd2core.maps import MapKind
 from sd2core.pairs.segments import LENGTH, OVERLAP, segment_starts
 
 LabelRule = Literal["foreground", "majority"]

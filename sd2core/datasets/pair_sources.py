@@ -14,9 +14,9 @@ import numpy as np
 from sd2core.datasets.denoising import Denoising
 from sd2core.datasets.source import KINDS, LazySource, Outline, Source, SourceKey
 from sd2core.denoise.files import DEFAULT_NAME, find_model
-from sd2core.doppler_map import DopplerMap, MapKind
 from sd2core.files.digests import remembered_digest
 from sd2core.labels.label_set import GESTURES
+from sd2core.maps import DopplerMap, MapKind
 from sd2core.pairs.store import open_takes
 from sd2core.progress import Progress
 from sd2core.sensor import VelocityAxis, VirtualSensor

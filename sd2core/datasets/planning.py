@@ -10,8 +10,8 @@ from sd2core.datasets.layout import bytes_per_segment
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.source import KINDS, LazySource, Outline, Source
 from sd2core.datasets.splitting import split_people
-from sd2core.doppler_map import MapKind
 from sd2core.errors import Sd2Error
+from sd2core.maps import MapKind
 from sd2core.progress import Progress, silent
 from sd2core.timebase import Timebase
 from sd2core.train.data import Split

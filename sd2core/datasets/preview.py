@@ -13,9 +13,9 @@ from sd2core.datasets.card import card_paths
 from sd2core.datasets.layout import Header
 from sd2core.datasets.reading import Dataset, open_dataset
 from sd2core.datasets.source import KINDS
-from sd2core.doppler_map import MapKind
 from sd2core.files.figure_files import save_figure
 from sd2core.labels.label_set import GESTURES
+from sd2core.maps import MapKind
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -28,12 +28,12 @@ from sd2core.datasets.source import (
     plain_name,
 )
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
-from sd2core.doppler_map import DopplerMap, MapKind
 from sd2core.errors import Sd2Error
 from sd2core.files.digests import remembered_digest
 from sd2core.files.paths import files_at
 from sd2core.fmcw.processing import doppler_map
 from sd2core.labels.spans import Labels
+from sd2core.maps import DopplerMap, MapKind
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mocap.recording_pairs import on_clock
 from sd2core.placements.body_extent import BodyExtent

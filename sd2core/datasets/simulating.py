@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from sd2core.doppler_map import DopplerMap, joined
 from sd2core.fmcw.chain import Clutter
 from sd2core.fmcw.link import LinkBudget
 from sd2core.fmcw.options import SignalOptions, WaveOptions
 from sd2core.fmcw.processing import doppler_map
 from sd2core.fmcw.scene import radar_times_s
 from sd2core.fmcw.simulation import simulate_radar
+from sd2core.maps import DopplerMap, joined
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mocap.recording_pairs import on_clock
 from sd2core.progress import Progress, silent

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.doppler_map import DopplerMap, MapKind
 from sd2core.errors import Sd2Error
+from sd2core.maps import DopplerMap, MapKind
 from sd2core.mesh.presence import Presence
 from sd2core.progress import Progress
 from sd2core.sensor import Vector, VirtualSensor, spherical_from_position

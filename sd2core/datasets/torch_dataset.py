@@ -25,8 +25,8 @@ from torch.utils.data import Dataset as TorchDataset
 from sd2core.datasets.layout import CHUNK_SEGMENTS
 from sd2core.datasets.reading import Dataset, open_dataset
 from sd2core.datasets.source import KINDS
-from sd2core.doppler_map import MapKind
 from sd2core.errors import Sd2Error
+from sd2core.maps import MapKind
 
 LabelTarget = Literal["class", "label", "frame class", "frame label"]
 LABEL_TARGETS: tuple[LabelTarget, ...] = get_args(LabelTarget)

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from sd2core.denoise import resample_to_model as matching
 from sd2core.denoise.card import ModelCard
 from sd2core.denoise.model import Denoiser
-from sd2core.doppler_map import DopplerMap
 from sd2core.errors import Sd2Error
+from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import Presence, runs
 from sd2core.pairs.segments import OVERLAP, cut, join, segment_starts
 from sd2core.progress import Progress, silent

@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.denoise.scaling import Compression
-from sd2core.doppler_map import mean_velocity_mps, peak_velocity_mps
 from sd2core.errors import Sd2Error
+from sd2core.maps import mean_velocity_mps, peak_velocity_mps
 from sd2core.sensor import VelocityAxis
 
 

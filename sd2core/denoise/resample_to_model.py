@@ -9,8 +9,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.doppler_map import DopplerMap
 from sd2core.errors import Sd2Error
+from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import Presence, runs
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase

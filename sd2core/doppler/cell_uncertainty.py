@@ -25,8 +25,8 @@ from sd2core.doppler.masks import Visibility
 from sd2core.doppler.parallel import Ticket, run_jobs
 from sd2core.doppler.prepared import Block
 from sd2core.doppler.smoothing import frames_within_reach, smooth_time, velocity_kernel
-from sd2core.doppler_map import CellUncertainty
 from sd2core.errors import Sd2Error
+from sd2core.maps import CellUncertainty
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
 from sd2core.progress import Progress
 from sd2core.sensor import VirtualSensor

@@ -20,8 +20,8 @@ from sd2core.doppler.prepared import Block, ByteBudget, PreparedMesh
 from sd2core.doppler.results import FrameScattering, Stretch
 from sd2core.doppler.scatterers import Scatterers
 from sd2core.doppler.smoothing import frames_within_reach, smooth
-from sd2core.doppler_map import CellUncertainty, DopplerMap
 from sd2core.errors import Sd2Error
+from sd2core.maps import CellUncertainty, DopplerMap
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import compile_in_background, kernels_ready
 from sd2core.progress import Progress, silent

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.doppler_map import DopplerMap
 from sd2core.errors import Sd2Error
 from sd2core.figures.spans import LANE_IN, add_key, draw_edges, draw_lanes, lanes_of
 from sd2core.files.figure_files import save_figure
 from sd2core.labels.spans import Labels
+from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import runs
 
 if TYPE_CHECKING:

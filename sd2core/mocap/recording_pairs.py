@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
-from sd2core.doppler_map import DopplerMap
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.processing import doppler_map
+from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import Presence, runs
 from sd2core.pairs.store import PairWriter, Take, TakeKey
 from sd2core.progress import Progress, silent

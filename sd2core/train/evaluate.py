@@ -23,8 +23,8 @@ from sd2core.denoise.live import TrainedDenoiser
 from sd2core.denoise.metrics import map_error, stands_out, velocity_error
 from sd2core.denoise.registry import FILTERS, fit_filter, options
 from sd2core.denoise.scaling import Compression, Scaling
-from sd2core.doppler_map import mean_velocity_mps, peak_velocity_mps
 from sd2core.errors import Sd2Error
+from sd2core.maps import mean_velocity_mps, peak_velocity_mps
 from sd2core.pairs.store import PairSet
 from sd2core.progress import Progress, silent
 from sd2core.train.evaluation import Evaluation, Group, Report, Score

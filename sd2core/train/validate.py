@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sd2core.denoise.metrics import velocity_error
 from sd2core.denoise.model import Denoiser
 from sd2core.denoise.scaling import Scaling
-from sd2core.doppler_map import peak_velocity_mps
+from sd2core.maps import peak_velocity_mps
 from sd2core.sensor import VelocityAxis
 from sd2core.train.data import Segments
 

@@ -20,7 +20,7 @@ from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.source import Source
 from sd2core.datasets.torch_dataset import SegmentDataset
 from sd2core.datasets.writing import write_dataset
-from sd2core.doppler_map import DopplerMap, MapKind
+from sd2core.maps import DopplerMap, MapKind
 from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase
 

@@ -19,7 +19,7 @@ from window_on_sample import settle, window_on_sample
 from sd2app.background.model_worker.client import DenoiseProcess
 from sd2core.denoise.card import ModelCard
 from sd2core.denoise.scaling import Compression, Scaling
-from sd2core.doppler_map import DopplerMap
+from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 

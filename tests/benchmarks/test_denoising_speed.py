@@ -16,7 +16,7 @@ from sd2core.denoise.model import parameter_count
 from sd2core.denoise.registry import MODELS as TRAINED
 from sd2core.denoise.registry import build, options
 from sd2core.denoise.scaling import Compression, Scaling
-from sd2core.doppler_map import DopplerMap
+from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 

@@ -15,8 +15,8 @@ from sd2app.classify.library import Classifier, LiveClasses
 from sd2app.denoise.pieces import AT_ONCE, cut_out, known_frames
 from sd2app.session.tracks import TrackModel
 from sd2core.denoise.resample_to_model import check_bins, is_regular, stretches
-from sd2core.doppler_map import DopplerMap
 from sd2core.errors import Sd2Error
+from sd2core.maps import DopplerMap
 
 if TYPE_CHECKING:
     from sd2core.classify.card import ClassifierCard

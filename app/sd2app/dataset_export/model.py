@@ -18,8 +18,8 @@ from sd2core.datasets.inputs import gather, recordings_in
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.planning import Counting, Forecast
 from sd2core.datasets.recording_sources import Making
-from sd2core.doppler_map import MapKind
 from sd2core.errors import Sd2Error
+from sd2core.maps import MapKind
 from sd2core.pairs.segments import LENGTH, OVERLAP
 from sd2core.progress import Cancelled
 from sd2core.recording.recording import is_recording, open_recording

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.doppler_map import DopplerMap
+from sd2core.maps import DopplerMap
 
 if TYPE_CHECKING:
     from sd2app.background.model_worker.client import DenoiseProcess

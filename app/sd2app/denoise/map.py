@@ -21,8 +21,8 @@ from sd2app.session.content import reference_of
 from sd2app.session.tasks import Job, JobsModel
 from sd2app.session.tracks import TrackModel
 from sd2core.denoise.resample_to_model import is_regular
-from sd2core.doppler_map import DopplerMap
 from sd2core.errors import Sd2Error
+from sd2core.maps import DopplerMap
 
 _TOO_SLOW_S = 0.15
 """A model that takes longer for what follows a hand waits until the hand rests."""

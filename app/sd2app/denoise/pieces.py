@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2app.maps.partial_map import View
-from sd2core.doppler_map import DopplerMap
+from sd2core.maps import DopplerMap
 from sd2core.pairs.segments import LENGTH, OVERLAP
 from sd2core.timebase import Timebase
 

@@ -27,8 +27,8 @@ from sd2app.session.time_window import VisibleSpanModel
 from sd2app.session.tracks import TrackModel
 from sd2core.doppler.options import PRESETS
 from sd2core.doppler.synthesizer import FrameScattering, Synthesizer
-from sd2core.doppler_map import DopplerMap
 from sd2core.errors import Sd2Error
+from sd2core.maps import DopplerMap
 from sd2core.progress import Cancelled
 from sd2core.sensor import Vector, VirtualSensor
 

@@ -7,7 +7,7 @@ from sd2app.maps.refine import Part
 from sd2app.session.content import reference_of
 from sd2app.session.tracks import TrackModel
 from sd2core.doppler.options import SynthesisOptions
-from sd2core.doppler_map import DopplerMap
+from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
 
 

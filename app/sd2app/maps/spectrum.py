@@ -13,7 +13,7 @@ from sd2app.session.display import DisplayModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.tracks import PointerModel, TrackModel
 from sd2app.widgets.time_axis import signed_text, ticks
-from sd2core.doppler_map import DopplerMap
+from sd2core.maps import DopplerMap
 
 _LEFT_PX, _TOP_PX, _RIGHT_PX, _BOTTOM_PX = 48, 30, 12, 40
 _LEGEND_PX = 20

@@ -13,7 +13,7 @@ from sd2app.session.document import DocumentModel
 from sd2app.session.tasks import Job, JobsModel
 from sd2app.session.tracks import TrackModel
 from sd2app.settings import Settings
-from sd2core.doppler_map import CellUncertainty, DopplerMap
+from sd2core.maps import CellUncertainty, DopplerMap
 from sd2core.progress import Cancelled
 
 _SHOWN = "uncertain_cells"

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sd2core.doppler_map import DopplerMap
 from sd2core.errors import Sd2Error
 from sd2core.files.resources import is_bundled
 from sd2core.io.kinds import Kind, kind_of
 from sd2core.labels.spans import Labels
+from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Progress
 from sd2core.recording.recording import Recording, open_recording

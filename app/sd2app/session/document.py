@@ -15,8 +15,8 @@ from sd2app.session.content import Content, load_content, recording_of
 from sd2app.session.denoiser_choice import DenoiserChoice
 from sd2app.session.tasks import Job, JobsModel
 from sd2core.body.camera import PinholeCamera
-from sd2core.doppler_map import DopplerMap
 from sd2core.labels.spans import Labels
+from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.placements.placements import Placements
 from sd2core.recording.recording import Recording

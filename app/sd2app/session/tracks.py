@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.session.display import HeatmapLevels
-from sd2core.doppler_map import CellUncertainty, DopplerMap
+from sd2core.maps import CellUncertainty, DopplerMap
 from sd2core.mesh.presence import runs
 
 UNCERTAIN_SHARE = 0.5

@@ -13,9 +13,9 @@ from PySide6.QtCore import QObject, QTimer, Signal, SignalInstance
 
 from sd2app.session.tracks import TrackModel
 from sd2app.training.model import TrainingModel
-from sd2core.doppler_map import DopplerMap
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
+from sd2core.maps import DopplerMap
 
 CALM_MS = 150
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from sd2core.classify.data import ClipSet
     from sd2core.datasets.labelled import LabelledSource
     from sd2core.denoise.live import TrainedDenoiser
-    from sd2core.doppler_map import MapKind
+    from sd2core.maps import MapKind
 
 DATA_HELP = (
     "DATA is one or several of: a data set (`sd2 export`), a store of pairs (`sd2 simulate\n"

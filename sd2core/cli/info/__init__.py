@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from sd2core.doppler_map import DopplerMap
     from sd2core.io.radar import RadarCapture
     from sd2core.io.video import VideoReader
+    from sd2core.maps import DopplerMap
     from sd2core.mesh.sequence import MeshSequence
     from sd2core.radar_config import RadarConfig
     from sd2core.recording.recording import Recording
@@ -105,7 +105,7 @@ def describe(path: Path, options: argparse.Namespace) -> Description:
         from sd2core.cli.info.dataset import describe_dataset_at
 
         return describe_dataset_at(path)
-    from sd2core.doppler_map import DopplerMap
+    from sd2core.maps import DopplerMap
 
     return describe_map(path, DopplerMap.load(path))
 

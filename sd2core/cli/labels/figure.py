@@ -11,7 +11,7 @@ from sd2core.cli.options import add_command, not_negative_float
 from sd2core.cli.recording_maps import MAP_NAMES, maps_of, parsed_maps, usual_maps
 
 if TYPE_CHECKING:
-    from sd2core.doppler_map import DopplerMap
+    from sd2core.maps import DopplerMap
 
 
 def add_figure(kinds: argparse._SubParsersAction) -> None:

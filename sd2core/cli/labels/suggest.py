@@ -14,7 +14,7 @@ from sd2core.cli.recording_maps import MapName, maps_of
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
-    from sd2core.doppler_map import DopplerMap
+    from sd2core.maps import DopplerMap
     from sd2core.recording.recording import Recording
     from sd2core.sensor import VelocityAxis
     from sd2core.timebase import Timebase
@@ -140,9 +140,9 @@ def map_and_clock(
 
     A recording's capture becomes a map on the axis, or on one of its own.
     """
-    from sd2core.doppler_map import DopplerMap
     from sd2core.io.kinds import kind_of
     from sd2core.io.radar import holds_map, load_recorded_map
+    from sd2core.maps import DopplerMap
     from sd2core.recording.recording import open_recording
 
     path: Path = options.map

@@ -21,10 +21,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.doppler_map import DopplerMap
 from sd2core.errors import Sd2Error
 from sd2core.labels.label_set import LONGEST_NAME, Label, LabelSet
 from sd2core.labels.spans import Labels, Span, Track
+from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import runs
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase

@@ -13,8 +13,8 @@ from sd2core.denoise.card import ModelCard
 from sd2core.denoise.live import TrainedDenoiser
 from sd2core.denoise.registry import build
 from sd2core.denoise.scaling import Compression, Scaling
-from sd2core.doppler_map import DopplerMap
 from sd2core.errors import Sd2Error
+from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 

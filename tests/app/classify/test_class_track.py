@@ -13,8 +13,8 @@ from sd2app.classify.text import reading_text
 from sd2app.classify.track import ClassTrack
 from sd2app.denoise.pieces import AT_ONCE
 from sd2app.session.tracks import TrackModel
-from sd2core.doppler_map import DopplerMap
 from sd2core.errors import Sd2Error
+from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 

@@ -15,10 +15,10 @@ from sd2app.labels.model import LabelsModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.tracks import TrackModel
 from sd2app.settings import Settings
-from sd2core.doppler_map import DopplerMap
 from sd2core.errors import Sd2Error
 from sd2core.labels.label_set import Label, LabelSet
 from sd2core.labels.spans import Labels, Track
+from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 

@@ -17,9 +17,9 @@ from sd2app.denoise import map as denoised_map
 from sd2app.denoise import pieces as denoise_pieces
 from sd2app.settings import Settings
 from sd2app.shell.wiring import build_context
-from sd2core.doppler_map import DopplerMap
 from sd2core.errors import Sd2Error
 from sd2core.io.mesh import save_mesh
+from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import warm_up
 from sd2core.recording.recording import Recording, open_recording

@@ -17,8 +17,8 @@ from sd2app.shell.wiring import build_context
 from sd2core.accuracy.plans import AccuracyPlan
 from sd2core.accuracy.synthesizers import synthesizer_for
 from sd2core.doppler.synthesizer import Synthesizer
-from sd2core.doppler_map import DopplerMap
 from sd2core.io.mesh import load_mesh
+from sd2core.maps import DopplerMap
 from sd2core.numerics.compiled import warm_up
 from sd2core.sensor import VirtualSensor
 

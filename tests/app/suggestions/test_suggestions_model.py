@@ -14,8 +14,8 @@ from sd2app.session.playback import PlaybackModel
 from sd2app.session.tracks import TrackModel
 from sd2app.suggestions.finders import Found, MotionFinder, Threshold
 from sd2app.suggestions.model import SuggestionsModel
-from sd2core.doppler_map import DopplerMap
 from sd2core.labels.spans import Labels, Span, Track
+from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 

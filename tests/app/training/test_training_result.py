@@ -12,7 +12,7 @@ from sd2app.session.tracks import TrackModel
 from sd2app.training import result as training_use
 from sd2app.training.result import TrainingUse
 from sd2app.training.text import gain_rows, gain_summary
-from sd2core.doppler_map import DopplerMap
+from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 

@@ -23,9 +23,9 @@ from sd2core.batch.run import BatchEnd, run_batch
 from sd2core.batch.tasks import Task
 from sd2core.denoise.files import find_model
 from sd2core.doppler import PRESETS, Synthesizer
-from sd2core.doppler_map import DopplerMap
 from sd2core.errors import Sd2Error
 from sd2core.io.mesh import load_mesh, save_mesh
+from sd2core.maps import DopplerMap
 from sd2core.recording.recording import Recording
 from sd2core.sensor import VirtualSensor
 

@@ -21,9 +21,9 @@ from sd2core.batch.run import BatchEnd, run_batch
 from sd2core.batch.stretches import stretches_of
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.simulating import Simulation, simulated_map
-from sd2core.doppler_map import DopplerMap, joined
 from sd2core.errors import Sd2Error
 from sd2core.io.mesh import load_mesh
+from sd2core.maps import DopplerMap, joined
 from sd2core.radar_config import PAPER_RADAR
 from sd2core.sensor import VelocityAxis, VirtualSensor
 

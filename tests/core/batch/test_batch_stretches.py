@@ -19,8 +19,8 @@ from sd2core.batch.stretches import LONGEST_FRAMES, stretches_of
 from sd2core.batch.synthesis import synthesise
 from sd2core.denoise.files import find_model, load_model
 from sd2core.doppler import Synthesizer
-from sd2core.doppler_map import DopplerMap, joined
 from sd2core.io.mesh import load_mesh, save_mesh
+from sd2core.maps import DopplerMap, joined
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase

@@ -12,7 +12,7 @@ from sd2core.classify.card import ClassifierCard
 from sd2core.classify.features import Features, Kind
 from sd2core.classify.live import TrainedClassifier
 from sd2core.classify.models import build
-from sd2core.doppler_map import DopplerMap, MapKind
+from sd2core.maps import DopplerMap, MapKind
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 

@@ -6,7 +6,7 @@ import numpy as np
 from classifiers import AXIS, CLASSES, NULLED, RATE_HZ
 
 from sd2core.classify.data import Clip, ClipSet
-from sd2core.doppler_map import MapKind
+from sd2core.maps import MapKind
 
 BINS = (None, 24, 6)
 """Of each class; background shows noise."""

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from sd2core.classify.features import KINDS, NOISE_S, RANGE, STANDS_OUT, Features
 from sd2core.denoise.metrics import stands_out
-from sd2core.doppler_map import peak_velocity_mps
 from sd2core.errors import Sd2Error
+from sd2core.maps import peak_velocity_mps
 
 
 def noise(frames: int, seed: int = 0) -> np.ndarray:

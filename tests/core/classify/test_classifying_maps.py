@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from sd2core.classify.defaults import MODELS
 from sd2core.classify.live import CHUNK
-from sd2core.doppler_map import DopplerMap
 from sd2core.errors import Sd2Error
+from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 

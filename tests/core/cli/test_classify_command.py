@@ -10,9 +10,9 @@ import pytest
 from cli_outcome import Sd2
 
 from sd2core.classify import training
-from sd2core.doppler_map import DopplerMap
 from sd2core.files.resources import resource_path
 from sd2core.labels.files import read_labels
+from sd2core.maps import DopplerMap
 from sd2core.pairs.store import PairWriter, Take
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase

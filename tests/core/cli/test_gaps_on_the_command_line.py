@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from cli_outcome import Sd2
 
-from sd2core.doppler_map import DopplerMap
+from sd2core.maps import DopplerMap
 
 
 @pytest.fixture

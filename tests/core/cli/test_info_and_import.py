@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from cli_outcome import Sd2
 
-from sd2core.doppler_map import DopplerMap
+from sd2core.maps import DopplerMap
 from sd2core.recording.recording import open_recording
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from cli_outcome import Sd2
 
-from sd2core.doppler_map import DopplerMap
 from sd2core.labels import files
 from sd2core.labels.formats import FORMATS, read_labels
 from sd2core.labels.label_set import Label, LabelSet
 from sd2core.labels.spans import Labels, Span, Track
+from sd2core.maps import DopplerMap
 from sd2core.recording.recording import Recording
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase

@@ -15,7 +15,7 @@ from sd2core.cli import build_parser
 from sd2core.cli.synth import synthesis_options
 from sd2core.doppler import PRESETS
 from sd2core.doppler.options import same_velocities
-from sd2core.doppler_map import DopplerMap
+from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis
 
 

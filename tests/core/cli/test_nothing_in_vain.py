@@ -12,7 +12,7 @@ from cli_outcome import Sd2
 
 from sd2core.cli import build_parser
 from sd2core.cli.synth import synthesis_options
-from sd2core.doppler_map import DopplerMap
+from sd2core.maps import DopplerMap
 from sd2core.recording.recording import MeshReading, Recording, open_recording
 
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from cli_outcome import Sd2
 
-from sd2core.doppler_map import DopplerMap
 from sd2core.io.kinds import kind_of
 from sd2core.io.radar.kkt import FRAME_S, load_kkt
+from sd2core.maps import DopplerMap
 
 
 @pytest.fixture

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from cli_outcome import Sd2
 
-from sd2core.doppler_map import DopplerMap
 from sd2core.files.resources import resource_path
 from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.io.radar import load_capture
+from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.timebase import Timebase
 

@@ -12,12 +12,12 @@ import pytest
 
 from sd2core.cutouts.cutting import cut_out, plan_cuts
 from sd2core.cutouts.source import CutSource, folder_name
-from sd2core.doppler_map import DopplerMap
 from sd2core.errors import Sd2Error
 from sd2core.io.mesh import load_mesh
 from sd2core.io.video import open_video
 from sd2core.io.video_writing import write_video
 from sd2core.labels.spans import Span
+from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Cancelled
 from sd2core.sensor import VelocityAxis

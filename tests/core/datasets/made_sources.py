@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from sd2core.datasets.source import Source
-from sd2core.doppler_map import DopplerMap, MapKind
+from sd2core.maps import DopplerMap, MapKind
 from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase
 

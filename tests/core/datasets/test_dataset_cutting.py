@@ -13,8 +13,8 @@ from made_sources import AXIS, LABELS, source
 from sd2core.datasets.cutting import clips_of, count_segments, cut_source, label_of_segments
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.source import KINDS, Source
-from sd2core.doppler_map import DopplerMap
 from sd2core.errors import Sd2Error
+from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import runs
 from sd2core.pairs.segments import join
 from sd2core.timebase import Timebase

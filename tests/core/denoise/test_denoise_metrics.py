@@ -15,8 +15,8 @@ from sd2core.denoise.metrics import (
     velocity_error,
 )
 from sd2core.denoise.scaling import Compression
-from sd2core.doppler_map import DopplerMap, mean_velocity_mps, peak_velocity_mps
 from sd2core.errors import Sd2Error
+from sd2core.maps import DopplerMap, mean_velocity_mps, peak_velocity_mps
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 

@@ -17,8 +17,8 @@ from sd2core.denoise.live import TrainedDenoiser
 from sd2core.denoise.model import Denoiser
 from sd2core.denoise.registry import build
 from sd2core.denoise.state_space import SerialS4Denoiser
-from sd2core.doppler_map import CellUncertainty, DopplerMap
 from sd2core.errors import Sd2Error
+from sd2core.maps import CellUncertainty, DopplerMap
 from sd2core.progress import Cancelled
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase

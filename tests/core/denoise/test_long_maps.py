@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from sd2core.denoise import long_maps
 from sd2core.denoise.resample_to_model import clips
-from sd2core.doppler_map import DopplerMap
+from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import Presence
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer, limb_histograms
 from sd2core.doppler.reference import reference_velocities
 from sd2core.doppler.smoothing import smooth
-from sd2core.doppler_map import CellUncertainty, DopplerMap
 from sd2core.errors import Sd2Error
+from sd2core.maps import CellUncertainty, DopplerMap
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
 from sd2core.sensor import VelocityAxis, VirtualSensor

@@ -10,7 +10,7 @@ from doppler_scenes import CAMERA, sensor_at, wobbling
 
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
 from sd2core.doppler.reference import reference_stretch
-from sd2core.doppler_map import DopplerMap
+from sd2core.maps import DopplerMap
 from sd2core.mesh.decimation import decimate
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.timebase import Timebase

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sd2core.doppler_map import DopplerMap
 from sd2core.errors import Sd2Error
 from sd2core.figures.maps import Levels, MapRow, draw_maps, save_maps
 from sd2core.figures.spans import lanes_of
 from sd2core.labels.spans import Labels, Span, Track
+from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 

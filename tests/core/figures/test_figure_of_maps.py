@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from sd2core.doppler_map import DopplerMap
 from sd2core.errors import Sd2Error
 from sd2core.figures.maps import Levels, MapRow, difference_of, draw_maps, save_maps
+from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
-from sd2core.doppler_map import DopplerMap
 from sd2core.files.resources import resource_path
 from sd2core.fmcw import (
     ProcessingOptions,
@@ -20,6 +19,7 @@ from sd2core.fmcw import (
     velocity_response,
 )
 from sd2core.io.mesh import load_mesh
+from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.radar_config import PAPER_RADAR
 from sd2core.scattering.facets import facet_visibility

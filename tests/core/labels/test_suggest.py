@@ -14,7 +14,6 @@ from hypothesis.extra import numpy as hnp
 from numpy.typing import ArrayLike, NDArray
 
 from sd2core.doppler import Synthesizer
-from sd2core.doppler_map import DopplerMap
 from sd2core.errors import Sd2Error
 from sd2core.files.resources import resource_path
 from sd2core.io.radar.kkt import load_kkt
@@ -26,6 +25,7 @@ from sd2core.labels.suggest import (
     motion_energy_db,
     suggest_spans,
 )
+from sd2core.maps import DopplerMap
 from sd2core.recording.recording import open_recording
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase

@@ -21,7 +21,7 @@ from mars_nulling import (
 
 from sd2core.cli import build_parser, run
 from sd2core.doppler import SynthesisOptions
-from sd2core.doppler_map import DopplerMap
+from sd2core.maps import DopplerMap
 
 
 @pytest.fixture(scope="module", params=PARTS)

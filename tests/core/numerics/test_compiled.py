@@ -65,7 +65,7 @@ def test_the_installation_keeps_its_machine_code(tmp_path: Path) -> None:
 
 def test_a_read_only_installation_uses_the_users_cache(sealed: Path, tmp_path: Path) -> None:
     cache = tmp_path / "cache"
-    code = "from sd2core import compiled; print(compiled.cache_directory())"
+    code = "from sd2core.numerics import compiled; print(compiled.cache_directory())"
     variables = {"XDG_CACHE_HOME": str(cache), "LOCALAPPDATA": str(cache), "HOME": str(cache)}
     (folder,) = run(code, sealed, **variables)
     assert cache in Path(folder).parents
@@ -84,7 +84,7 @@ def test_nothing_writable_but_the_temporary_folder(sealed: Path, tmp_path: Path)
 
 def test_a_chosen_cache_folder_is_used(sealed: Path, tmp_path: Path) -> None:
     chosen = tmp_path / "chosen"
-    code = "from sd2core import compiled; print(compiled.cache_directory())"
+    code = "from sd2core.numerics import compiled; print(compiled.cache_directory())"
     (folder,) = run(code, sealed, NUMBA_CACHE_DIR=str(chosen))
     assert Path(folder).parent == chosen
 

@@ -15,7 +15,7 @@ from sd2app.figures.map_dialog import MapFigureDialog
 from sd2app.maps.spectrum import SpectrumView
 from sd2app.shell.status_bar import StatusLine
 from sd2app.widgets.model_menu import ModelButton, ModelMenu
-from sd2core.doppler_map import DopplerMap
+from sd2core.maps import DopplerMap
 
 
 @pytest.fixture

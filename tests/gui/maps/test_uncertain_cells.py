@@ -12,8 +12,8 @@ from PySide6.QtWidgets import QLabel, QToolButton
 from sd2app.maps.heatmap import HeatmapView
 from sd2app.maps.level_bar import LevelBar
 from sd2app.shell.status_bar import StatusLine
-from sd2core.doppler_map import DopplerMap
 from sd2core.io.mesh import load_mesh, save_mesh
+from sd2core.maps import DopplerMap
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
 from sd2core.sensor import VirtualSensor
 

@@ -13,7 +13,7 @@ from sd2app.shell.actions import ACTIONS
 from sd2app.shell.keys.dialog import KeysDialog
 from sd2app.video.view import VideoView
 from sd2core.accuracy.plans import AccuracyPlan
-from sd2core.doppler_map import DopplerMap
+from sd2core.maps import DopplerMap
 from sd2core.sensor import VirtualSensor
 
 

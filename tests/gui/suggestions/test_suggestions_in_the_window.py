@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QToolButton
 
 from sd2app.suggestions.bar import SuggestionBar
-from sd2core.doppler_map import DopplerMap
+from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis
 
 NONE = Qt.KeyboardModifier.NoModifier

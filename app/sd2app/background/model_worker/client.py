@@ -22,8 +22,8 @@ from sd2app.background.model_worker.protocol import (
     unpacked_map,
     write_message,
 )
-from sd2core.doppler_map import DopplerMap
 from sd2core.errors import Sd2Error
+from sd2core.maps import DopplerMap
 from sd2core.processes import ONE_THREAD
 
 COMMAND = (sys.executable, "-m", "sd2app.background.model_worker.server")
