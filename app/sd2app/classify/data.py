@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from sd2app.training.text import duration_text
+from sd2app.widgets.text import duration_text
 from sd2core.datasets.labelled import (
     LabelledFacts,
     LabelledSource,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sd2app.classify.run import ClassRun
-from sd2app.training.text import about, exact_text
+from sd2app.widgets.text import about, exact_text
 
 _PHASES = {
     "starting": "Starting…",

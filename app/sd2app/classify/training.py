@@ -16,7 +16,7 @@ from sd2app.classify.run import MODEL_NAME, TABLE_NAME, ClassRun
 from sd2app.classify.setup import ClassSetup
 from sd2app.settings import Settings
 from sd2app.training.command import quoted
-from sd2app.training.text import clock_text
+from sd2app.widgets.text import clock_text
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
 

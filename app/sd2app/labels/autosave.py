@@ -11,7 +11,7 @@ from PySide6.QtCore import QObject, Signal
 from sd2app.labels.model import LabelsModel
 from sd2app.session.content import UNTITLED
 from sd2app.session.document import DocumentModel
-from sd2app.training.text import clock_text
+from sd2app.widgets.text import clock_text
 from sd2core.errors import Sd2Error
 from sd2core.labels.journal import Journal
 from sd2core.labels.recovery import Found, Offer, RecoveryPlace, offers_in

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sd2app.training.text import clock_text
+from sd2app.widgets.text import clock_text
 from sd2core.labels.comparison import compare
 from sd2core.labels.recovery import Found, Offer
 from sd2core.labels.spans import Labels

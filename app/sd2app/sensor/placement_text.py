@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sd2app.accuracy.text import InUse, seconds
 from sd2app.sensor.placements import PlacementsModel
-from sd2app.training.text import duration_text
+from sd2app.widgets.text import duration_text
 from sd2core.placements.cost import PlacementCost
 
 _SHORT_S = 10.0

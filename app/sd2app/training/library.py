@@ -8,7 +8,8 @@ from pathlib import Path
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import LatestRunner
-from sd2app.training.text import clock_text, model_name, state_text
+from sd2app.training.text import model_name, state_text
+from sd2app.widgets.text import clock_text
 from sd2core.errors import Sd2Error
 from sd2core.train.folder import LIVE, RunFolder, RunStatus, runs_in
 

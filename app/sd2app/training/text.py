@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-import time
 from typing import TYPE_CHECKING
 
 from sd2app.training.history import EpochPoint
 from sd2app.training.phase import Phase
+from sd2app.widgets.text import about, duration_text, error_text, exact_text
 
 if TYPE_CHECKING:
     from sd2app.background.step_times import StepKey, StepTime, StepTimes
@@ -58,43 +58,6 @@ def state_text(state: State) -> str:
     return {"died": "ended unexpectedly", "running": "training"}.get(state, state)
 
 
-def duration_text(seconds: float) -> str:
-    """Rounded as an estimate deserves."""
-    if seconds < 10:
-        return "a few seconds"
-    if seconds < 57.5:
-        return f"{5 * round(seconds / 5)} s"
-    if seconds < 3570:
-        return f"{max(round(seconds / 60), 1)} min"
-    hours, minutes = divmod(round(seconds / 60), 60)
-    if hours < 10:
-        return f"{hours} h {minutes} min" if minutes else f"{hours} h"
-    if hours < 48:
-        return f"{round(seconds / 3600)} h"
-    return f"{seconds / 86400:.1f} days"
-
-
-def about(seconds: float) -> str:
-    """A duration, called an estimate."""
-    text = duration_text(seconds)
-    return text if text.startswith("a ") else f"about {text}"
-
-
-def exact_text(seconds: float) -> str:
-    """Time that has passed."""
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
-
-
-def clock_text(unix_s: float) -> str:
-    """Date and time, without the date when it is today's."""
-    then, now = time.localtime(unix_s), time.localtime()
-    if then[:3] == now[:3]:
-        return time.strftime("%H:%M", then)
-    return time.strftime("%Y-%m-%d %H:%M", then)
-
-
 def point_text(point: EpochPoint) -> str:
     """What an epoch came to, a line each."""
     lines = [f"Epoch {point.epoch}" + (", better than all before" if point.best else "")]
@@ -106,11 +69,6 @@ def point_text(point: EpochPoint) -> str:
         if math.isfinite(value):
             lines.append(f"{name} {error_text(value)}{unit}")
     return "\n".join(lines)
-
-
-def error_text(value: float) -> str:
-    """An error with three digits."""
-    return f"{value:.3g}" if value < 1000 else f"{value:.0f}"
 
 
 def store_text(facts: PairFacts | None) -> str:

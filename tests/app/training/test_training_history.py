@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from sd2app.training.curves import error_ticks
 from sd2app.training.history import TrainingHistory
 from sd2app.training.phase import Look, phase_of
-from sd2app.training.text import duration_text, metric_rows
+from sd2app.training.text import metric_rows
 from sd2app.widgets.log_axis import LogAxis
+from sd2app.widgets.text import duration_text
 
 START = {"event": "start", "model": "s4", "parameters": 7, "device": "cpu", "epochs": 4,
          "steps_per_epoch": 5, "train_segments": 300}  # fmt: skip
