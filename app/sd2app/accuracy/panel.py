@@ -16,11 +16,12 @@ from sd2app.accuracy.measurements import FAMILIES
 from sd2app.accuracy.model import TradeModel
 from sd2app.accuracy.plot import TradePlot
 from sd2app.accuracy.reason_list import ReasonList
-from sd2app.accuracy.text import deviation, milliseconds, percent, seconds
+from sd2app.accuracy.text import deviation
 from sd2app.accuracy.tolerance_row import ToleranceRow
 from sd2app.session.display import DisplayModel
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.panel import rule, sentence, title
+from sd2app.widgets.text import milliseconds, percent, seconds
 
 _FAMILY_TEXT = {"histogram": "counting", "fmcw": "FMCW signal"}
 _NO_MESH = "Open a mesh: here you choose how exact its synthetic map is to be, and see the cost."

@@ -10,10 +10,11 @@ from PySide6.QtWidgets import QWidget
 
 from sd2app.accuracy.measurements import front_at_rest, serves_at_rest
 from sd2app.accuracy.model import TradeModel
-from sd2app.accuracy.text import percent, point_text
+from sd2app.accuracy.text import point_text
 from sd2app.session.display import DisplayModel
 from sd2app.widgets.log_axis import LogAxis, tick_text
 from sd2app.widgets.point_plot import PointPlot
+from sd2app.widgets.text import percent
 
 if TYPE_CHECKING:
     from sd2core.accuracy.results import PlanResult

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
+from sd2app.widgets.text import milliseconds, percent, seconds
+
 if TYPE_CHECKING:
     from sd2core.accuracy.plans import AccuracyPlan
     from sd2core.accuracy.results import PlanResult
@@ -45,31 +47,9 @@ class InUse:
         return f"{self.plan} · {self.figures}"
 
 
-def number(value: float) -> str:
-    """Two significant digits, but every digit before the point."""
-    return f"{value:.0f}" if abs(value) >= 10 else f"{value:.2g}" if abs(value) >= 1e-3 else "0"
-
-
-def percent(share: float) -> str:
-    """A share with its unit; what is hardly there is said to be so."""
-    if 0 < share < 1e-4:
-        return "<0.01 %"
-    return f"{number(100 * share)} %"
-
-
 def deviation(error: float) -> str:
     """By how much a map is off."""
     return percent(error) if 0 < error < 1e-4 else f"±{percent(error)}"
-
-
-def milliseconds(value_ms: float) -> str:
-    """A cost with its unit."""
-    return f"{number(value_ms)} ms" if value_ms >= 1e-3 or value_ms == 0 else "<0.001 ms"
-
-
-def seconds(value_s: float) -> str:
-    """How long a clip takes, in the unit one would say it in."""
-    return milliseconds(1e3 * value_s) if value_s < 1 else f"{number(value_s)} s"
 
 
 def short(plan: AccuracyPlan) -> str:

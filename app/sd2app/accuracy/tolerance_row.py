@@ -13,9 +13,9 @@ from PySide6.QtWidgets import (
 )
 
 from sd2app.accuracy.model import PRESETS, TradeModel
-from sd2app.accuracy.text import milliseconds, number, percent
 from sd2app.widgets.inputs import NumberBox
 from sd2app.widgets.panel import title
+from sd2app.widgets.text import milliseconds, number, percent
 
 
 class ToleranceRow(QWidget):

@@ -9,11 +9,10 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from sd2app.agreement.model import AgreementModel
 from sd2app.labels.painting import paint_spans
 from sd2app.labels.rows import LabelRows
-from sd2app.maps.map_widget import paint_cursor
 from sd2app.session.display import DisplayModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.time_window import VisibleSpanModel
-from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, TimeScale
+from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, paint_cursor
 
 _MARKS_PX = 7.0
 

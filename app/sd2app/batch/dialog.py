@@ -22,8 +22,8 @@ from sd2app.batch.model import BatchModel
 from sd2app.batch.results import Result
 from sd2app.batch.run_view import BatchRunView
 from sd2app.batch.setup_view import BatchSetupView
-from sd2app.sensor.placement_text import counted
 from sd2app.widgets.panel import outlined, sentence, title
+from sd2app.widgets.text import counted
 from sd2core.batch.plan_file import write_plan
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import plain_path

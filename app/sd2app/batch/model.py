@@ -12,8 +12,8 @@ from sd2app.batch.estimate import COMMAND, BatchEstimateModel
 from sd2app.batch.results import BatchResults
 from sd2app.batch.run import BatchFollower, output_of, plan_of
 from sd2app.batch.setup import BatchSetupModel
-from sd2app.sensor.placement_text import counted
 from sd2app.settings import Settings
+from sd2app.widgets.text import counted
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.plan_file import write_plan
 from sd2core.errors import Sd2Error

@@ -19,7 +19,6 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from sd2app.accuracy.text import percent
 from sd2app.batch.model import BatchModel
 from sd2app.batch.setup import (
     ACCURACIES,
@@ -34,6 +33,7 @@ from sd2app.widgets.elided import ElidedLabel
 from sd2app.widgets.fact_rows import FactRows
 from sd2app.widgets.inputs import Choice, NumberBox
 from sd2app.widgets.panel import outlined, rule, sentence, side_by_side, title
+from sd2app.widgets.text import percent
 
 _SUBJECT_TEXT = {
     "recording": "each recording is somebody of its own",

@@ -6,8 +6,7 @@ from typing import Any
 
 from sd2app.batch.run import BatchFollower, Failed, Phase
 from sd2app.batch.setup import Entry
-from sd2app.sensor.placement_text import bytes_text, counted
-from sd2app.widgets.text import about, duration_text, exact_text
+from sd2app.widgets.text import about, bytes_text, counted, duration_text, exact_text
 
 STEP_WORDS = {
     "inspect": "Look at recordings",

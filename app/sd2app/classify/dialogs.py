@@ -11,9 +11,9 @@ from PySide6.QtWidgets import QApplication, QFileDialog, QWidget
 from sd2app.classify.result import read_result
 from sd2app.classify.result_dialog import ClassResultDialog
 from sd2app.classify.text import classifier_page
-from sd2app.denoise.card_dialog import ModelCardDialog
 from sd2app.session.content import UNTITLED
 from sd2app.widgets.confirm import may_delete
+from sd2app.widgets.model_card_dialog import ModelCardDialog
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:

@@ -22,8 +22,6 @@ from sd2app.classify.model import ClassifyModel
 from sd2app.classify.text import ago_text, delay_text, reading_text
 from sd2app.classify.track import ClassReading
 from sd2app.labels.model import LabelsModel
-from sd2app.maps.map_widget import paint_cursor
-from sd2app.playback.wheel import turn_wheel
 from sd2app.session.display import DisplayModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.time_window import VisibleSpanModel
@@ -31,7 +29,7 @@ from sd2app.widgets.cached_paint import Still
 from sd2app.widgets.elided import ElidedLabel
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.model_menu import ModelButton
-from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, TimeScale
+from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, paint_cursor, turn_wheel
 from sd2core.labels.label_set import LabelSet
 
 _PLOT_PX = 30

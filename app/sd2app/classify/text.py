@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from sd2app.denoise.text import ModelPage, about_sections, map_and_file_rows
+from sd2app.widgets.model_page import ModelPage, about_sections, map_and_file_rows
 
 if TYPE_CHECKING:
     from sd2app.classify.track import ClassReading

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtWidgets import QMenu
 
-from sd2app.shell.keys.bindings import canonical, native
 from sd2app.widgets.icons import swatch_icon
+from sd2app.widgets.key_text import canonical, native
 
 if TYPE_CHECKING:
     from sd2app.shell.window import MainWindow

@@ -11,8 +11,9 @@ from PySide6.QtCore import QAbstractTableModel, QModelIndex, QObject, QPersisten
 
 from sd2app.labels.columns import Change
 from sd2app.labels.model import LabelsModel
-from sd2app.shell.keys.bindings import KeyBindings, canonical, native
+from sd2app.shell.keys.bindings import KeyBindings
 from sd2app.widgets.icons import swatch_icon
+from sd2app.widgets.key_text import canonical, native
 from sd2core.labels.colours import OFFERED, Alike, alike
 from sd2core.labels.label_set import Label, LabelSet
 from sd2core.labels.label_set_edits import (

@@ -10,7 +10,7 @@ from PySide6.QtGui import QMouseEvent
 from sd2app.labels.dragging import LabelDragging
 from sd2app.labels.loop import SpanLoop
 from sd2app.labels.model import LabelsModel
-from sd2app.maps.heatmap import HeatmapView
+from sd2app.widgets.time_plot import TimePlot
 
 _EDGE_PX = 4.0
 _ATTRACT_PX = 8.0
@@ -23,7 +23,7 @@ class RegionHand(QObject):
     """Watches a map, which goes on seeking: only edges of what is selected are kept from it."""
 
     def __init__(
-        self, view: HeatmapView, labels: LabelsModel, dragging: LabelDragging, loop: SpanLoop
+        self, view: TimePlot, labels: LabelsModel, dragging: LabelDragging, loop: SpanLoop
     ) -> None:
         super().__init__(view)
         self._view, self._labels, self._dragging, self._loop = view, labels, dragging, loop

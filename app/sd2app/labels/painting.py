@@ -14,6 +14,7 @@ from sd2app.labels.model import LabelsModel
 from sd2app.labels.rows import TrackRow
 from sd2app.palette import Palette
 from sd2app.widgets.time_axis import TimeScale
+from sd2app.widgets.time_plot import Overlay
 from sd2core.labels.spans import Span
 
 _TINT, _SELECTED_TINT = 64, 136
@@ -117,6 +118,24 @@ def _text(span: Span) -> str:
     if span.origin == "suggestion" and span.confidence is not None:
         return f"{100 * span.confidence:.0f} % {span.label}"
     return span.label
+
+
+def map_overlay(model: LabelsModel) -> Overlay:
+    """Spans over a map."""
+
+    def paint(painter: QPainter, plot: QRectF, scale: TimeScale) -> None:
+        paint_regions(painter, plot, scale, model)
+
+    return Overlay(paint, (model.changed, model.selection_changed))
+
+
+def strip_overlay(model: LabelsModel) -> Overlay:
+    """Spans of all tracks as one line."""
+
+    def paint(painter: QPainter, strip: QRectF, scale: TimeScale) -> None:
+        paint_strip(painter, strip, scale, model)
+
+    return Overlay(paint, (model.changed,))
 
 
 def paint_regions(painter: QPainter, plot: QRectF, scale: TimeScale, model: LabelsModel) -> None:

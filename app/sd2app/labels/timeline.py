@@ -15,13 +15,11 @@ from sd2app.labels.loop import SpanLoop
 from sd2app.labels.model import LabelsModel
 from sd2app.labels.painting import lane_box, paint_span, paint_spans
 from sd2app.labels.rows import ROW_PX, LabelRows
-from sd2app.maps.map_widget import paint_cursor
-from sd2app.playback.wheel import turn_wheel
 from sd2app.session.display import DisplayModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.time_window import VisibleSpanModel
 from sd2app.widgets.cached_paint import Still
-from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, TimeScale
+from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, paint_cursor, turn_wheel
 
 _ATTRACT_PX = 8.0
 _MOVED_PX = 3.0

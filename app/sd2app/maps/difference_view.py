@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QImage, QPainter
 from PySide6.QtWidgets import QWidget
 
-from sd2app.labels.model import LabelsModel
 from sd2app.maps.difference import DifferenceModel
 from sd2app.maps.heatmap import HeatmapView
 from sd2app.maps.heatmap_image import difference_image
@@ -16,6 +17,7 @@ from sd2app.session.playback import PlaybackModel
 from sd2app.session.time_window import VisibleSpanModel
 from sd2app.session.tracks import PointerModel, Reading
 from sd2app.widgets.colour_maps import signed_table
+from sd2app.widgets.time_plot import Overlay
 
 _BAR_PX = 72
 
@@ -33,11 +35,11 @@ class DifferenceView(HeatmapView):
         playback: PlaybackModel,
         display: DisplayModel,
         pointer: PointerModel,
-        labels: LabelsModel,
+        overlays: Sequence[Overlay] = (),
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(
-            difference.denoised, span, playback, display, pointer, labels, parent=parent
+            difference.denoised, span, playback, display, pointer, overlays, parent=parent
         )
         self._difference = difference
         difference.changed.connect(self.invalidate)

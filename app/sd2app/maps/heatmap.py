@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import (
@@ -16,17 +17,23 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from sd2app.labels.model import LabelsModel
-from sd2app.labels.painting import paint_regions
-from sd2app.maps.map_widget import MapWidget, paint_cursor
-from sd2app.playback.wheel import turn_wheel
+from sd2app.maps.map_widget import MapWidget
 from sd2app.session.display import DisplayModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.time_window import VisibleSpanModel
 from sd2app.session.tracks import UNCERTAIN_SHARE, PointerModel, Reading, TrackModel
 from sd2app.widgets.cached_paint import Still
 from sd2app.widgets.colour_maps import lookup_table
-from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, signed_text, ticks
+from sd2app.widgets.time_axis import (
+    GUTTER_PX,
+    MARGIN_PX,
+    TimeScale,
+    paint_cursor,
+    signed_text,
+    ticks,
+    turn_wheel,
+)
+from sd2app.widgets.time_plot import Overlay
 
 _HEADER_PX = 24
 
@@ -49,7 +56,7 @@ class HeatmapView(MapWidget):
         playback: PlaybackModel,
         display: DisplayModel,
         pointer: PointerModel,
-        labels: LabelsModel,
+        overlays: Sequence[Overlay] = (),
         *,
         alignable: bool = False,
         parent: QWidget | None = None,
@@ -58,7 +65,7 @@ class HeatmapView(MapWidget):
         self._span = span
         self._playback = playback
         self._pointer = pointer
-        self._labels = labels
+        self._overlays = tuple(overlays)
         self._alignable = alignable
         self._grab: tuple[str, float] | None = None
         self._hint = ""
@@ -68,7 +75,8 @@ class HeatmapView(MapWidget):
         self._still = Still(self)
         self._room_px = 0
         span.changed.connect(self.invalidate)
-        for signal in (track.status_changed, labels.changed, labels.selection_changed):
+        shown = [signal for overlay in overlays for signal in overlay.changed]
+        for signal in (track.status_changed, *shown):
             signal.connect(self.redraw)
         for signal in (playback.frame_changed, pointer.changed):
             signal.connect(self.update)
@@ -168,7 +176,8 @@ class HeatmapView(MapWidget):
         self.paint_map(painter, plot, self._span.start_s, self._span.end_s)
         self._paint_marked_bins(painter, plot)
         self.paint_gaps(painter, plot, self.scale)
-        paint_regions(painter, plot, self.scale, self._labels)
+        for overlay in self._overlays:
+            overlay.paint(painter, plot, self.scale)
         self._paint_axis(painter, plot)
 
     def _paint_header(self, painter: QPainter) -> None:

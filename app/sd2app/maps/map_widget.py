@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QBrush, QColor, QImage, QPainter, QPen, QResizeEvent
+from PySide6.QtCore import QRectF, Qt
+from PySide6.QtGui import QBrush, QColor, QImage, QPainter, QResizeEvent
 from PySide6.QtWidgets import QWidget
 
 from sd2app.maps.heatmap_image import heatmap_image
 from sd2app.session.display import DisplayModel
 from sd2app.session.tracks import TrackModel
 from sd2app.widgets.time_axis import TimeScale
+from sd2app.widgets.time_plot import TimePlot
 
 _NOBODY = "no person"
 
 
-class MapWidget(QWidget):
+class MapWidget(TimePlot):
     """Keeps the picture of a map until map, stretch, levels, theme or size change."""
 
     def __init__(
@@ -74,11 +75,3 @@ class MapWidget(QWidget):
         painter.fillRect(label, QColor(self._display.palette.well))
         painter.setPen(QColor(self._display.palette.muted))
         painter.drawText(label, Qt.AlignmentFlag.AlignCenter, _NOBODY)
-
-
-def paint_cursor(painter: QPainter, plot: QRectF, x_px: float) -> None:
-    """The line of the time on screen, legible on every colour."""
-    top, bottom = QPointF(x_px, plot.top()), QPointF(x_px, plot.bottom())
-    for pen in (QPen(QColor(0, 0, 0, 140), 3), QPen(QColor(255, 255, 255), 1)):
-        painter.setPen(pen)
-        painter.drawLine(top, bottom)

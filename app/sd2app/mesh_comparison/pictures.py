@@ -13,8 +13,8 @@ from sd2app.session.display import DisplayModel
 from sd2app.session.document import DocumentModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.video import VideoModel
-from sd2app.video.mesh_overlay import draw_mesh
 from sd2app.video.overlay_settings import OverlayModel
+from sd2app.widgets.mesh_painting import draw_mesh
 
 _TITLE_PX = 24
 _GREY = 56

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QAction, QCloseEvent
@@ -18,19 +17,21 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from sd2app.maps.heatmap import HeatmapView
 from sd2app.mesh_comparison.curves import JointCurves
 from sd2app.mesh_comparison.model import ComparisonModel
 from sd2app.mesh_comparison.pictures import ComparedPicture
 from sd2app.mesh_comparison.table import JointTable
-from sd2app.playback.timeline import TimeRuler
+from sd2app.session.display import DisplayModel
+from sd2app.session.document import DocumentModel
+from sd2app.session.playback import PlaybackModel
+from sd2app.session.time_window import VisibleSpanModel
+from sd2app.session.tracks import TrackModel
+from sd2app.session.video import VideoModel
+from sd2app.video.overlay_settings import OverlayModel
 from sd2app.widgets.elided import ElidedLabel
 from sd2app.widgets.figure_file import FIGURES
 from sd2app.widgets.frames import fill, panel, splitter
 from sd2app.widgets.inputs import Choice
-
-if TYPE_CHECKING:
-    from sd2app.shell.wiring import Context
 
 
 class ComparisonWindow(QWidget):
@@ -41,23 +42,40 @@ class ComparisonWindow(QWidget):
     def __init__(
         self,
         model: ComparisonModel,
-        context: Context,
+        document: DocumentModel,
+        video: VideoModel,
+        span: VisibleSpanModel,
+        playback: PlaybackModel,
+        display: DisplayModel,
+        overlay: OverlayModel,
+        *,
+        map_view: Callable[[TrackModel], QWidget],
+        ruler: QWidget,
         keys: list[QAction],
         attempt: Callable[[Callable[[], None]], object],
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent, Qt.WindowType.Window)
         self._model = model
-        self._context = context
+        self._display = display
         self._attempt = attempt
-        simulated = " (simulated)" if context.document.simulated else ""
-        self.setWindowTitle(f"{context.document.title}{simulated}: compare meshes")
+        simulated = " (simulated)" if document.simulated else ""
+        self.setWindowTitle(f"{document.title}{simulated}: compare meshes")
         self.addActions(keys)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(8, 8, 8, 8)
         layout.setSpacing(8)
         layout.addLayout(self._head())
-        left = splitter(Qt.Orientation.Vertical, [self._pictures(), self._tracks()], (320, 420))
+        pictures = [
+            ComparedPicture(number, model, document, video, playback, display, overlay)
+            for number in (0, 1)
+        ]
+        tracks = [*map(map_view, model.tracks), JointCurves(model, span, playback, display)]
+        left = splitter(
+            Qt.Orientation.Vertical,
+            [_side_by_side("pictures", pictures), _below("tracks", tracks, ruler)],
+            (320, 420),
+        )
         body = splitter(Qt.Orientation.Horizontal, [left, self._table()], (820, 400))
         layout.addWidget(body, 1)
         self._notes = QLabel(self)
@@ -91,33 +109,9 @@ class ComparisonWindow(QWidget):
         row.addWidget(self._export)
         return row
 
-    def _pictures(self) -> QFrame:
-        c, frame = self._context, panel("pictures")
-        row = QHBoxLayout()
-        for number in (0, 1):
-            row.addWidget(
-                ComparedPicture(
-                    number, self._model, c.document, c.video, c.playback, c.display, c.overlay
-                ),
-                1,
-            )
-        fill(frame, row)
-        return frame
-
-    def _tracks(self) -> QFrame:
-        c, frame = self._context, panel("tracks")
-        column = QVBoxLayout()
-        for track in self._model.tracks:
-            view = HeatmapView(track, c.span, c.playback, c.display, c.pointer, c.labels)
-            column.addWidget(view, 1)
-        column.addWidget(JointCurves(self._model, c.span, c.playback, c.display), 1)
-        column.addWidget(TimeRuler(c.span, c.playback, c.display))
-        fill(frame, column)
-        return frame
-
     def _table(self) -> QFrame:
         frame = panel("joints")
-        fill(frame, JointTable(self._model, self._context.display))
+        fill(frame, JointTable(self._model, self._display))
         return frame
 
     # --- following the model --------------------------------------------------------------
@@ -167,3 +161,20 @@ class ComparisonWindow(QWidget):
         self._model.close()
         event.accept()
         self.closed.emit()
+
+
+def _side_by_side(name: str, widgets: Sequence[QWidget]) -> QFrame:
+    frame, row = panel(name), QHBoxLayout()
+    for widget in widgets:
+        row.addWidget(widget, 1)
+    fill(frame, row)
+    return frame
+
+
+def _below(name: str, widgets: Sequence[QWidget], ruler: QWidget) -> QFrame:
+    frame, column = panel(name), QVBoxLayout()
+    for widget in widgets:
+        column.addWidget(widget, 1)
+    column.addWidget(ruler)
+    fill(frame, column)
+    return frame

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from sd2app.accuracy.text import InUse, seconds
+from sd2app.accuracy.text import InUse
 from sd2app.sensor.placements import PlacementsModel
-from sd2app.widgets.text import duration_text
+from sd2app.widgets.text import bytes_text, counted, duration_text, seconds
 from sd2core.placements.cost import PlacementCost
 
 _SHORT_S = 10.0
-
-
-def counted(number: int, what: str) -> str:
-    """``1 map``, ``2,000 maps``."""
-    return f"{number:,} {what}" + ("" if number == 1 else "s")
 
 
 def count_text(model: PlacementsModel) -> str:
@@ -67,12 +62,3 @@ def cost_source_text(cost: PlacementCost, in_use: InUse) -> str:
         f"{counted(cost.frames, 'frame')} each, with the plan in use on this machine: {in_use}."
         " Bytes before compression."
     )
-
-
-def bytes_text(count: int) -> str:
-    """In the unit one would say it in."""
-    for unit, size in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
-        if count >= size:
-            value = count / size
-            return f"{value:.0f} {unit}" if value >= 100 else f"{value:.2g} {unit}"
-    return f"{count} bytes"

@@ -16,7 +16,6 @@ from PySide6.QtWidgets import (
 )
 
 from sd2app.dataset_export.dialog import ExportDialog
-from sd2app.denoise.card_dialog import ModelCardDialog
 from sd2app.denoise.text import denoised_words, denoiser_page
 from sd2app.figures.map_dialog import MapFigureDialog
 from sd2app.figures.map_figure import FigureModel
@@ -24,12 +23,16 @@ from sd2app.figures.strip import StripModel
 from sd2app.figures.strip_dialog import StripDialog
 from sd2app.fit.dialog import VIDEOS, NewFromVideoDialog
 from sd2app.fit.setup import FitSetupModel
+from sd2app.labels.painting import map_overlay
 from sd2app.labels.recovery_dialog import choose_recovery
+from sd2app.maps.heatmap import HeatmapView
 from sd2app.mesh_comparison.model import ComparisonModel
 from sd2app.mesh_comparison.window import ComparisonWindow
+from sd2app.playback.timeline import TimeRuler
 from sd2app.shell.actions import MOUSE
 from sd2app.shell.keys.dialog import KeysDialog
 from sd2app.shell.keys.model import KeyListModel
+from sd2app.widgets.model_card_dialog import ModelCardDialog
 from sd2core.errors import Sd2Error
 from sd2core.version import __version__
 
@@ -159,7 +162,23 @@ class Dialogs:
             return
         self.close_comparison()
         model = ComparisonModel(context.document, context.sensor, context.jobs, path, self._parent)
-        window = ComparisonWindow(model, context, keys, self.attempt, self._parent)
+        c, overlays = context, (map_overlay(context.labels),)
+        window = ComparisonWindow(
+            model,
+            c.document,
+            c.video,
+            c.span,
+            c.playback,
+            c.display,
+            c.overlay,
+            map_view=lambda track: HeatmapView(
+                track, c.span, c.playback, c.display, c.pointer, overlays
+            ),
+            ruler=TimeRuler(c.span, c.playback, c.display),
+            keys=keys,
+            attempt=self.attempt,
+            parent=self._parent,
+        )
         window.closed.connect(self._forget_comparison)
         # It is about the recording that was open.
         context.document.opened.connect(window.close)

@@ -10,8 +10,8 @@ from PySide6.QtWidgets import QMenu
 from sd2app.labels.label_keys import LabelActions
 from sd2app.labels.menus import ReactionMenu, TrackMenu
 from sd2app.shell.actions import ACTIONS, Action
-from sd2app.shell.keys.bindings import native
 from sd2app.widgets.icons import transport_icon
+from sd2app.widgets.key_text import native
 
 if TYPE_CHECKING:
     from sd2app.shell.window import MainWindow

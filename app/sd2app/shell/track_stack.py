@@ -7,15 +7,19 @@ from typing import TYPE_CHECKING
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from sd2app.agreement.timeline import OtherTimeline
+from sd2app.classify.chooser import ClassifierChooser
 from sd2app.classify.strip import ClassStrip
+from sd2app.denoise.chooser import DenoiserChooser
 from sd2app.labels.on_maps import RegionHand
+from sd2app.labels.painting import map_overlay, strip_overlay
 from sd2app.labels.timeline import LabelTimeline
 from sd2app.labels.timeline_area import LabelArea
 from sd2app.maps.difference_view import DifferenceView
 from sd2app.maps.heatmap import HeatmapView
-from sd2app.playback.timeline import Overview, TimeRuler
+from sd2app.maps.overview import Overview
+from sd2app.playback.timeline import TimeRuler
 from sd2app.suggestions.bar import SuggestionBar
-from sd2app.widgets.model_menu import ClassifierChooser, DenoiserChooser, ModelButton, ModelMenu
+from sd2app.widgets.model_menu import ModelButton, ModelMenu
 
 if TYPE_CHECKING:
     from sd2app.shell.menus import ActionSet
@@ -38,7 +42,7 @@ class Tracks(QWidget):
     ) -> None:
         super().__init__(parent)
         self._context = c = context
-        common = c.span, c.playback, c.display, c.pointer, c.labels
+        common = c.span, c.playback, c.display, c.pointer, (map_overlay(c.labels),)
         self.synthetic = HeatmapView(c.synthetic, *common)
         self.denoised = HeatmapView(c.denoised, *common)
         self.before = HeatmapView(c.before, *common)
@@ -65,7 +69,9 @@ class Tracks(QWidget):
             c.playback,
             c.display,
         )
-        self.overview = Overview(c.synthetic, c.span, c.playback, c.display, c.labels)
+        self.overview = Overview(
+            c.synthetic, c.span, c.playback, c.display, (strip_overlay(c.labels),)
+        )
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)

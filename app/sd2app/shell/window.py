@@ -144,7 +144,9 @@ class MainWindow(QMainWindow):
         # Imported here so that the skeleton is on screen before NumPy, PyAV,
         # numba and VTK are loaded.
         from sd2app.batch.dialog import BatchDialogs
+        from sd2app.classify.chooser import ClassifierChooser
         from sd2app.classify.dialogs import ClassifyDialogs
+        from sd2app.denoise.chooser import DenoiserChooser
         from sd2app.labels.files_dialogs import LabelFileDialogs
         from sd2app.labels.tracks_dialog import TrackDialogs
         from sd2app.playback.transport import TransportBar
@@ -154,7 +156,7 @@ class MainWindow(QMainWindow):
         from sd2app.shell.status_bar import StatusLine
         from sd2app.shell.wiring import build_context
         from sd2app.widgets.message_bar import MessageBar
-        from sd2app.widgets.model_menu import ClassifierChooser, DenoiserChooser, ModelMenu
+        from sd2app.widgets.model_menu import ModelMenu
 
         self.context = build_context(
             self,

@@ -14,6 +14,7 @@ from sd2app.agreement.model import AgreementModel
 from sd2app.background.model_worker.client import DenoiseProcess
 from sd2app.batch.estimate import COMMAND as BATCH_COMMAND
 from sd2app.batch.model import BatchModel
+from sd2app.classify.finder import GestureFinder
 from sd2app.classify.library import ClassifierLibrary, core_classifiers
 from sd2app.classify.model import ClassifyModel
 from sd2app.classify.training import ClassTraining
@@ -52,7 +53,7 @@ from sd2app.session.video import VideoModel
 from sd2app.settings import Settings
 from sd2app.shell.actions import ACTIONS
 from sd2app.shell.keys.bindings import KeyBindings
-from sd2app.suggestions.finders import GestureFinder, MotionFinder
+from sd2app.suggestions.finders import MotionFinder
 from sd2app.suggestions.model import SuggestionsModel
 from sd2app.training.model import COMMAND as TRAIN_COMMAND
 from sd2app.training.model import TrainingModel

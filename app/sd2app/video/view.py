@@ -15,8 +15,8 @@ from sd2app.session.document import DocumentModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.video import VideoModel
 from sd2app.video.landmark_overlay import draw_landmarks
-from sd2app.video.mesh_overlay import draw_mesh
 from sd2app.video.overlay_settings import OverlayModel
+from sd2app.widgets.mesh_painting import draw_mesh
 
 
 class VideoView(QWidget):

@@ -10,11 +10,6 @@ from PySide6.QtCore import Qt, SignalInstance
 from PySide6.QtGui import QAction, QActionGroup
 from PySide6.QtWidgets import QMenu, QToolButton, QWidget
 
-from sd2app.classify.model import ClassifyModel
-from sd2app.classify.text import classifier_title, learned_text, network_text
-from sd2app.denoise.model import DenoiseModel
-from sd2app.denoise.text import kind_words, model_title, origin_words
-
 Use = Callable[[Path | None], None]
 
 _LONGEST = 14
@@ -65,94 +60,6 @@ class Chooser(Protocol):
 
     def face(self) -> Face:
         """Which one is in use."""
-
-
-class DenoiserChooser:
-    """Denoisers."""
-
-    title = "Denoise with"
-    role = "Denoiser"
-    none_tip = "Show no denoised map for this recording"
-
-    def __init__(self, denoise: DenoiseModel) -> None:
-        self._denoise = denoise
-
-    @property
-    def changed(self) -> SignalInstance:
-        """After which the words may be others."""
-        return self._denoise.changed
-
-    @property
-    def path(self) -> Path | None:
-        """The model in use."""
-        return self._denoise.path
-
-    def entries(self) -> Sequence[Entry]:
-        """The models as they are on disk now."""
-        return [
-            Entry(
-                f"{model_title(card)}\t{kind_words(card)}",
-                f"{kind_words(card)}, {origin_words(card)}\n{card.path}",
-                card.path,
-            )
-            for card in self._denoise.available()
-        ]
-
-    def face(self) -> Face:
-        """Which one is in use."""
-        card, path = self._denoise.card, self._denoise.path
-        if self._denoise.problem:
-            return Face("Denoiser not usable", self._denoise.problem)
-        if card is not None:
-            title = model_title(card)
-            return Face(title, f"{title}: {kind_words(card)}, {origin_words(card)}")
-        if path is not None and self._denoise.busy:
-            return Face(f"Loading {path.stem}…", str(path))
-        return Face("No denoiser", "Choose a model that denoises this map")
-
-
-class ClassifierChooser:
-    """Classifiers."""
-
-    title = "Classify with"
-    role = "Classifier"
-    none_tip = "Say nothing of gestures"
-
-    def __init__(self, classify: ClassifyModel) -> None:
-        self._classify = classify
-
-    @property
-    def changed(self) -> SignalInstance:
-        """After which the words may be others."""
-        return self._classify.changed
-
-    @property
-    def path(self) -> Path | None:
-        """The model in use."""
-        return self._classify.path
-
-    def entries(self) -> Sequence[Entry]:
-        """The models as they are on disk now."""
-        return [
-            Entry(
-                f"{classifier_title(card)}\t{network_text(card)}",
-                f"{network_text(card)}, {learned_text(card)}\n{card.path}",
-                card.path,
-            )
-            for card in self._classify.available()
-        ]
-
-    def face(self) -> Face:
-        """Which one is in use."""
-        card, path = self._classify.card, self._classify.path
-        if self._classify.problem:
-            return Face("Classifier not usable", self._classify.problem)
-        if card is not None:
-            title = classifier_title(card)
-            return Face(title, f"{title}: {network_text(card)}, {learned_text(card)}")
-        if path is not None:
-            return Face(f"Loading {path.stem}…", str(path))
-        return Face("No classifier", "Choose a model that says which gesture a frame shows")
 
 
 class ModelMenu(QMenu):

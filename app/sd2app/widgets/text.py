@@ -45,3 +45,39 @@ def clock_text(unix_s: float) -> str:
 def error_text(value: float) -> str:
     """An error with three digits."""
     return f"{value:.3g}" if value < 1000 else f"{value:.0f}"
+
+
+def number(value: float) -> str:
+    """Two significant digits, but every digit before the point."""
+    return f"{value:.0f}" if abs(value) >= 10 else f"{value:.2g}" if abs(value) >= 1e-3 else "0"
+
+
+def percent(share: float) -> str:
+    """A share with its unit; what is hardly there is said to be so."""
+    if 0 < share < 1e-4:
+        return "<0.01 %"
+    return f"{number(100 * share)} %"
+
+
+def milliseconds(value_ms: float) -> str:
+    """A cost with its unit."""
+    return f"{number(value_ms)} ms" if value_ms >= 1e-3 or value_ms == 0 else "<0.001 ms"
+
+
+def seconds(value_s: float) -> str:
+    """How long a clip takes, in the unit one would say it in."""
+    return milliseconds(1e3 * value_s) if value_s < 1 else f"{number(value_s)} s"
+
+
+def counted(number: int, what: str) -> str:
+    """``1 map``, ``2,000 maps``."""
+    return f"{number:,} {what}" + ("" if number == 1 else "s")
+
+
+def bytes_text(count: int) -> str:
+    """In the unit one would say it in."""
+    for unit, size in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
+        if count >= size:
+            value = count / size
+            return f"{value:.0f} {unit}" if value >= 100 else f"{value:.2g} {unit}"
+    return f"{count} bytes"

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
+
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QPainter, QPen, QWheelEvent
 
 GUTTER_PX = 56
 """Left of every track: room for the velocity axis, so that all tracks line up."""
@@ -68,3 +72,42 @@ def clock_text(time_s: float, decimals: int = 3) -> str:
     hours, minutes = divmod(minutes, 60)
     text = f"{hours}:{minutes:02d}:{seconds:02d}" if hours else f"{minutes:02d}:{seconds:02d}"
     return f"{sign}{text}.{rest:0{decimals}d}" if decimals else f"{sign}{text}"
+
+
+def paint_cursor(painter: QPainter, plot: QRectF, x_px: float) -> None:
+    """The line of the time on screen, legible on every colour."""
+    top, bottom = QPointF(x_px, plot.top()), QPointF(x_px, plot.bottom())
+    for pen in (QPen(QColor(0, 0, 0, 140), 3), QPen(QColor(255, 255, 255), 1)):
+        painter.setPen(pen)
+        painter.drawLine(top, bottom)
+
+
+_ZOOM_PER_NOTCH = 0.8
+
+
+class _Window(Protocol):
+    """Part of the time on screen that can be moved and zoomed."""
+
+    @property
+    def duration_s(self) -> float:
+        """Length of it."""
+
+    def pan(self, seconds: float) -> None:
+        """Move it."""
+
+    def zoom(self, factor: float, anchor_s: float) -> None:
+        """Scale its length about a time."""
+
+
+def turn_wheel(event: QWheelEvent, span: _Window, scale: TimeScale) -> None:
+    """Zoom about the pointer, or pan with Shift or a sideways wheel."""
+    delta = event.angleDelta()
+    sideways = delta.x() or (
+        delta.y() if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 0
+    )
+    if sideways:
+        span.pan(-sideways / 120.0 * span.duration_s * 0.1)
+    elif delta.y():
+        anchor_s = scale.time_of(event.position().x())
+        span.zoom(_ZOOM_PER_NOTCH ** (delta.y() / 120.0), anchor_s)
+    event.accept()

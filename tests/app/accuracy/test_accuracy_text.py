@@ -2,7 +2,8 @@ from __future__ import annotations
 
 import pytest
 
-from sd2app.accuracy.text import InUse, deviation, milliseconds, percent, seconds, short
+from sd2app.accuracy.text import InUse, deviation, short
+from sd2app.widgets.text import milliseconds, percent, seconds
 from sd2core.accuracy.plans import AccuracyPlan
 
 

@@ -9,7 +9,6 @@ from PySide6.QtCore import QObject, Signal
 from sd2app.accuracy.text import InUse
 from sd2app.sensor.placement_fields import PlacementFields
 from sd2app.sensor.placement_text import (
-    bytes_text,
     cost_text,
     count_text,
     current_text,
@@ -18,6 +17,7 @@ from sd2app.sensor.placement_text import (
 )
 from sd2app.sensor.placements import PlacementsModel
 from sd2app.session.sensor import SensorModel
+from sd2app.widgets.text import bytes_text
 from sd2core.accuracy.plans import AccuracyPlan
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.placements.placements import PlacementCloud, PlacementGrid

@@ -24,10 +24,10 @@ from sd2app.classify.curve import ClassCurve
 from sd2app.classify.panel import ClassPanel
 from sd2app.classify.result_dialog import ClassResultDialog
 from sd2app.classify.strip import ClassPlot, ClassReadout, ClassStrip, stacked_image
-from sd2app.denoise.card_dialog import ModelCardDialog
 from sd2app.labels.timeline import LabelTimeline
 from sd2app.suggestions.bar import SuggestionBar
 from sd2app.widgets.inputs import Choice
+from sd2app.widgets.model_card_dialog import ModelCardDialog
 from sd2app.widgets.typed_line import TypedLine
 from sd2core.files.resources import resource_path
 

@@ -10,10 +10,10 @@ from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QTimer, QUrl
 from PySide6.QtGui import QColor, QDropEvent
 from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QPushButton
 
-from sd2app.denoise.card_dialog import ModelCardDialog
 from sd2app.figures.map_dialog import MapFigureDialog
 from sd2app.maps.spectrum import SpectrumView
 from sd2app.shell.status_bar import StatusLine
+from sd2app.widgets.model_card_dialog import ModelCardDialog
 from sd2app.widgets.model_menu import ModelButton, ModelMenu
 from sd2core.maps import DopplerMap
 

@@ -97,15 +97,16 @@ def test_a_click_in_the_curves_moves_the_clock(compared, qtbot):
     curves = compared.findChild(JointCurves)
     place = QPoint(round(curves.scale.x_of(0.6)), curves.height() // 2)
     qtbot.mouseClick(curves, Qt.MouseButton.LeftButton, pos=place)
-    assert compared._context.playback.time_s == pytest.approx(0.6, abs=1 / 30)
+    assert curves._playback.time_s == pytest.approx(0.6, abs=1 / 30)
 
 
 def test_the_keys_of_the_main_window_work_here(compared, qtbot):
-    before = compared._context.playback.frame
+    curves = compared.findChild(JointCurves)
+    before = curves._playback.frame
     compared.activateWindow()
     qtbot.waitUntil(compared.isActiveWindow)
     qtbot.keyClick(compared, Qt.Key.Key_Right)
-    assert compared._context.playback.frame == before + 1
+    assert curves._playback.frame == before + 1
 
 
 def test_the_other_one_can_be_the_reference(compared, qtbot):
@@ -115,9 +116,9 @@ def test_the_other_one_can_be_the_reference(compared, qtbot):
     assert row_of(compared, "head").distance_m == pytest.approx(ASIDE_M, abs=1e-4)
 
 
-def test_it_follows_the_sensor(compared, qtbot):
+def test_it_follows_the_sensor(compared, empty_window, qtbot):
     sensor = VirtualSensor(position_m=(1.5, 0.0, 1.0))
-    compared._context.edits.place_sensor(sensor)
+    empty_window.context.edits.place_sensor(sensor)
     qtbot.waitUntil(lambda: compared._model.comparison.sensor == sensor, timeout=20_000)
 
 

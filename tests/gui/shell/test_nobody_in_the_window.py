@@ -10,8 +10,8 @@ from PySide6.QtCore import QPoint
 from PySide6.QtWidgets import QLabel
 
 from sd2app.maps.heatmap import HeatmapView
+from sd2app.maps.overview import Overview
 from sd2app.maps.spectrum import SpectrumView
-from sd2app.playback.timeline import Overview
 from sd2app.shell.status_bar import StatusLine
 from sd2app.video.view import VideoView
 from sd2core.io.mesh import load_mesh, save_mesh

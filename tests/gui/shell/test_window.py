@@ -8,7 +8,8 @@ from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QTimer, QUrl
 from PySide6.QtGui import QDragEnterEvent, QDropEvent, QWheelEvent
 from PySide6.QtWidgets import QApplication, QMessageBox
 
-from sd2app.playback.timeline import Overview, TimeRuler
+from sd2app.maps.overview import Overview
+from sd2app.playback.timeline import TimeRuler
 from sd2app.shell.actions import ACTIONS
 from sd2app.shell.keys.dialog import KeysDialog
 from sd2app.video.view import VideoView

@@ -7,10 +7,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Protocol
 
 from PySide6.QtCore import QObject, Signal
-from PySide6.QtGui import QKeySequence
 
 from sd2app.labels.model import LabelsModel
 from sd2app.settings import Settings
+from sd2app.widgets.key_text import canonical, native
 from sd2core.errors import Sd2Error
 
 _CHOSEN = "keys"
@@ -191,18 +191,6 @@ class KeyBindings(QObject):
             return self._chosen[action_id]
         taken = {key for keys in self._chosen.values() for key in keys}
         return tuple(key for key in self._usual(action_id) if key not in taken)
-
-
-def canonical(key: str) -> str:
-    """A key as Qt writes it, the same on every machine; empty where it is none."""
-    sequence = QKeySequence(key)
-    one = sequence.count() == 1
-    return sequence.toString(QKeySequence.SequenceFormat.PortableText) if one else ""
-
-
-def native(key: str) -> str:
-    """A key as it is written on this machine."""
-    return QKeySequence(key).toString(QKeySequence.SequenceFormat.NativeText)
 
 
 def _stored(text: str, known: Mapping[str, object]) -> dict[str, tuple[str, ...]]:

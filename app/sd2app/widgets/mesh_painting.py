@@ -1,4 +1,4 @@
-"""The mesh over the picture it was fitted to, drawn as finely as the screen shows it."""
+"""A mesh painted over the picture it was fitted to."""
 
 from __future__ import annotations
 

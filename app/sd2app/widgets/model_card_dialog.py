@@ -1,4 +1,4 @@
-"""What a model says about itself: what it learned from, what it can do, where it fails."""
+"""Page of facts about a model file."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from sd2app.denoise.text import ModelPage
+from sd2app.widgets.model_page import ModelPage
 
 
 class ModelCardDialog(QDialog):

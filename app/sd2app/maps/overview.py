@@ -1,0 +1,151 @@
+"""The whole recording as one narrow map."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import QRectF, Qt
+from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QWidget
+
+from sd2app.maps.map_widget import MapWidget
+from sd2app.session.display import DisplayModel
+from sd2app.session.playback import PlaybackModel
+from sd2app.session.time_window import VisibleSpanModel
+from sd2app.session.tracks import TrackModel
+from sd2app.widgets.time_axis import (
+    GUTTER_PX,
+    MARGIN_PX,
+    TimeScale,
+    paint_cursor,
+)
+from sd2app.widgets.time_plot import Overlay
+
+_EDGE_PX = 6
+
+
+_LABELS_PX = 4.0
+
+
+class Overview(MapWidget):
+    """The whole recording; drag the frame to pan, its edges to zoom."""
+
+    def __init__(
+        self,
+        track: TrackModel,
+        span: VisibleSpanModel,
+        playback: PlaybackModel,
+        display: DisplayModel,
+        overlays: Sequence[Overlay] = (),
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(track, display, parent)
+        self._span = span
+        self._playback = playback
+        self._overlays = tuple(overlays)
+        self._grab: tuple[str, float] | None = None
+        self.setFixedHeight(40)
+        shown = [signal for overlay in overlays for signal in overlay.changed]
+        for signal in (span.changed, playback.frame_changed, *shown):
+            signal.connect(self.update)
+
+    def set_track(self, track: TrackModel) -> None:
+        """Show another track."""
+        self._track.changed.disconnect(self.invalidate)
+        self._track = track
+        track.changed.connect(self.invalidate)
+        self.invalidate()
+
+    @property
+    def scale(self) -> TimeScale:
+        """Time axis of this widget: always everything."""
+        return TimeScale(*self._span.extent_s, self.width())
+
+    def plot_rect(self) -> QRectF:
+        """Rectangle of the map, in pixels."""
+        return QRectF(
+            GUTTER_PX,
+            2,
+            max(self.width() - GUTTER_PX - MARGIN_PX, 1),
+            max(self.height() - 6, 1),
+        )
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Small map, spans, frame of the stretch in view, cursor."""
+        with QPainter(self) as painter:
+            self._paint(painter)
+
+    def _paint(self, painter: QPainter) -> None:
+        colours, scale, plot = self._display.palette, self.scale, self.plot_rect()
+        painter.fillRect(self.rect(), QColor(colours.panel))
+        painter.setPen(QColor(colours.muted))
+        painter.drawText(
+            QRectF(0, plot.top(), GUTTER_PX - 8, plot.height()),
+            Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter,
+            "All",
+        )
+        if self._track.map is not None:
+            self.paint_map(painter, plot, *self._span.extent_s)
+            self.paint_gaps(painter, plot, scale)
+        strip = QRectF(plot.left(), plot.top(), plot.width(), _LABELS_PX)
+        for overlay in self._overlays:
+            overlay.paint(painter, strip, scale)
+        left, right = scale.x_of(self._span.start_s), scale.x_of(self._span.end_s)
+        veil = QColor(colours.panel)
+        veil.setAlpha(150)
+        painter.fillRect(QRectF(plot.left(), plot.top(), left - plot.left(), plot.height()), veil)
+        painter.fillRect(QRectF(right, plot.top(), plot.right() - right, plot.height()), veil)
+        painter.setPen(QPen(QColor(colours.accent), 2))
+        painter.drawRoundedRect(
+            QRectF(left, plot.top(), right - left, plot.height()).adjusted(0, 1, 0, -1), 2, 2
+        )
+        paint_cursor(painter, plot, scale.x_of(self._playback.time_s))
+
+    def _handle_at(self, x: float) -> str:
+        scale = self.scale
+        left, right = scale.x_of(self._span.start_s), scale.x_of(self._span.end_s)
+        if abs(x - left) <= _EDGE_PX:
+            return "left"
+        if abs(x - right) <= _EDGE_PX:
+            return "right"
+        return "pan" if left < x < right else "centre"
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Take hold of the frame or one of its edges; elsewhere jump there."""
+        x = event.position().x()
+        handle = self._handle_at(x)
+        if handle == "centre":
+            middle = 0.5 * (self._span.start_s + self._span.end_s)
+            self._span.pan(self.scale.time_of(x) - middle)
+            handle = "pan"
+        if handle == "pan" and self._span.duration_s >= (
+            self._span.extent_s[1] - self._span.extent_s[0]
+        ):
+            handle = "seek"
+            self._playback.seek(self.scale.time_of(x))
+        self._grab = (handle, x)
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """Drag what is held."""
+        x = event.position().x()
+        if self._grab is None:
+            edge = self._handle_at(x) in ("left", "right")
+            self.setCursor(
+                Qt.CursorShape.SizeHorCursor if edge else Qt.CursorShape.PointingHandCursor
+            )
+            return
+        handle, last_x = self._grab
+        time_s = self.scale.time_of(x)
+        if handle == "seek":
+            self._playback.seek(time_s)
+        elif handle == "pan":
+            self._span.pan((x - last_x) * self.scale.seconds_per_px)
+        elif handle == "left":
+            self._span.set_span(min(time_s, self._span.end_s - 0.2), self._span.end_s)
+        else:
+            self._span.set_span(self._span.start_s, max(time_s, self._span.start_s + 0.2))
+        self._grab = (handle, x)
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        """Let go."""
+        self._grab = None

@@ -1,0 +1,104 @@
+"""The facts of a model file, as rows of a page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    from sd2core.sensor import VelocityAxis
+
+
+_UNITS = {"mps": "m/s", "db": "dB", "s": "s", "hz": "Hz"}
+
+
+class ModelPage(NamedTuple):
+    """What a model says about itself.
+
+    Parameters
+    ----------
+    title : str
+    simulated : bool
+        Whether no real radar was there when it learned.
+    rows : list of tuple
+        Facts, a name and a text each.
+    sections : list of tuple
+        What its makers say, by heading.
+    """
+
+    title: str
+    simulated: bool
+    rows: list[tuple[str, str]]
+    sections: list[tuple[str, list[tuple[str, str]]]]
+
+
+def map_and_file_rows(
+    axis: VelocityAxis, frame_rate_hz: float, path: Path | None
+) -> Iterator[tuple[str, str]]:
+    """The maps that a model knows, and its file."""
+    yield (
+        "Works on",
+        (f"{axis.bins} bins over ±{axis.v_max_mps:g} m/s, {frame_rate_hz:g} frames/s"),
+    )
+    if path is not None:
+        try:
+            size_kb = path.stat().st_size / 1000
+            yield "File", f"{path} ({size_kb:,.0f} kB)"
+        except OSError:
+            yield "File", f"{path} (not there any more)"
+
+
+def about_sections(
+    content: Mapping[str, Any],
+) -> Iterator[tuple[str, list[tuple[str, str]]]]:
+    """What its makers say of it, by heading: what they measured and where it fails first."""
+    about = dict(content)
+    for name in ("limits", "metrics", "data", "command"):
+        if name in about:
+            yield _heading(name), list(_lines(about.pop(name)))
+    for name, value in about.items():
+        yield _heading(name), list(_lines(value))
+
+
+def _heading(name: str) -> str:
+    text = name.replace("_", " ").strip()
+    return text[:1].upper() + text[1:]
+
+
+def _lines(value: Any, prefix: str = "") -> Iterator[tuple[str, str]]:
+    """A value that came from JSON, as rows."""
+    if isinstance(value, Mapping):
+        for name, inner in value.items():
+            label, unit = _unit_of(str(name))
+            full = f"{prefix}, {label}" if prefix else label
+            if isinstance(inner, Mapping | list | tuple):
+                yield from _lines(inner, full)
+            else:
+                yield full, f"{_text(inner)} {unit}".rstrip()
+    elif isinstance(value, list | tuple):
+        if value and all(isinstance(one, str | int | float) for one in value):
+            texts = [_text(one) for one in value]
+            joined = "\n".join(texts) if any(" " in text for text in texts) else ", ".join(texts)
+            yield prefix, joined
+        else:
+            for one in value:
+                yield from _lines(one, prefix)
+    else:
+        yield prefix, _text(value)
+
+
+def _unit_of(name: str) -> tuple[str, str]:
+    """``peak_mae_mps`` is ``peak mae`` in m/s."""
+    head, _, tail = name.rpartition("_")
+    if head and tail in _UNITS:
+        return head.replace("_", " "), _UNITS[tail]
+    return name.replace("_", " "), ""
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.4g}".replace("-", "−")
+    return "–" if value is None else str(value)
