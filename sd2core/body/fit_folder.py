@@ -1,40 +1,34 @@
-"""The folder of a fit under way: what may be there, and whose it is."""
+"""Folder of a running fit: checks before it starts, ownership and clean-up."""
 
 from __future__ import annotations
 
 import json
 import shutil
-import sys
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO
 
 from sd2core.body.landmarks import SIGHTINGS
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
+from sd2core.files.lock import FileLock
 from sd2core.version import __version__
 
 PARTIAL = ".partial"
-"""What the folder's name has after that of the mesh."""
+"""Suffix of the folder's name, after the name of the mesh."""
 
 MARKER = "sd2-fit.json"
-"""A file that tells it is ours."""
+"""File that marks the folder as one of a fit."""
 
 LANDMARKS = "landmarks"
-"""The folder in it for what a search for landmarks keeps."""
+"""Sub-folder in which the search for landmarks keeps its results."""
 
 _LOCK = "lock"
 
 
 def check_fit_output(out: Path) -> None:
-    """Refuse a mesh's name that cannot be written, or that is something else, before the work.
-
-    Raises
-    ------
-    Sd2Error
-    """
+    """Raise Sd2Error for an output mesh that cannot be written, before the work starts."""
     if out.suffix.lower() not in (".zarr", ".npz"):
         raise Sd2Error(
             f"The mesh is to be written as {out.name}", "a name that ends in .zarr or .npz"
@@ -60,7 +54,7 @@ def check_fit_output(out: Path) -> None:
 
 
 def _is_mesh(path: Path) -> bool:
-    """Whether a file or folder holds vertices by that name."""
+    """True if a file or folder holds an array named ``vertices``."""
     if path.is_dir():
         return (path / "vertices").is_dir()
     try:
@@ -79,23 +73,22 @@ def _is_ours(partial: Path) -> bool:
 
 @contextmanager
 def claim_folder(partial: Path, restart: bool) -> Iterator[None]:
-    """Make the folder of the work, or take it over; nobody else's until the end.
+    """Make or take over the folder of a fit and lock it against other processes.
 
     Raises
     ------
     Sd2Error
-        When another process is at it.
+        When another process uses it.
     """
     partial.mkdir(exist_ok=True)
-    with (partial / _LOCK).open("ab") as lock:
-        try:
-            _lock(lock)
-        except OSError as error:
-            raise Sd2Error(
-                f"{partial} is in use: another process fits the same mesh",
-                "one at a time",
-                "Wait until it is done, or write another mesh",
-            ) from error
+    lock = FileLock(partial / _LOCK)
+    if not lock.take():
+        raise Sd2Error(
+            f"{partial} is in use: another process fits the same mesh",
+            "one at a time",
+            "Wait until it is done, or write another mesh",
+        )
+    try:
         if restart:
             for path in partial.iterdir():
                 if path.is_dir():
@@ -105,26 +98,16 @@ def claim_folder(partial: Path, restart: bool) -> Iterator[None]:
         text = json.dumps({"format": "sd2-fit-partial", "version": 1, "made_by": __version__})
         atomic_write_text(partial / MARKER, text + "\n")
         yield
+    finally:
+        lock.release()
 
 
 @contextmanager
 def remove_without_landmarks(partial: Path) -> Iterator[None]:
-    """Remove the folder when the video turns out not to be one of a person."""
+    """Remove the folder when the fit fails before the person was found."""
     try:
         yield
     except Sd2Error:
         if not (partial / LANDMARKS / SIGHTINGS).exists():
             shutil.rmtree(partial, ignore_errors=True)
         raise
-
-
-def _lock(stream: IO[bytes]) -> None:
-    """Lock an open file against other processes; it is unlocked when closed, also by a kill."""
-    if sys.platform == "win32":
-        import msvcrt
-
-        msvcrt.locking(stream.fileno(), msvcrt.LK_NBLCK, 1)
-    else:
-        import fcntl
-
-        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)

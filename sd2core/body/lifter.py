@@ -15,7 +15,6 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.body.bundled_file import open_arrays
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.lifter_features import (
     RATE_HZ,
@@ -28,7 +27,7 @@ from sd2core.body.lifter_features import (
 )
 from sd2core.body.track import LANDMARKS, MIRRORED, PART_FRAMES, Landmarks, LandmarkTrack, parts
 from sd2core.errors import Sd2Error
-from sd2core.files.resources import resource_path
+from sd2core.files.resources import open_bundled_arrays, resource_path
 from sd2core.mesh.presence import runs
 from sd2core.timebase import Timebase
 
@@ -182,7 +181,7 @@ class Lifter:
         """
         path = resource_path("lifter.npz") if path is None else Path(path)
         command = "sd2 simulate train-lifter"
-        with open_arrays(path, FORMAT, VERSION, "a lifter", command) as (meta, data):
+        with open_bundled_arrays(path, FORMAT, VERSION, "a lifter", command) as (meta, data):
             arrays = {name: data[name].astype(np.float32) for name in meta["arrays"]}
             calibration = data["calibration"].astype(np.float32)
         network = Network(tuple(meta["dilations"]), arrays, meta.get("beyond_rates", False))

@@ -11,9 +11,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.body.bundled_file import open_arrays
 from sd2core.body.rotations import Floats, applied, product
-from sd2core.files.resources import resource_path
+from sd2core.files.resources import open_bundled_arrays, resource_path
 
 FORMAT = "sd2-body"
 VERSION = 2
@@ -222,7 +221,7 @@ def read_body_arrays(names: Sequence[str], path: Path | None = None) -> list[NDA
     """
     path = resource_path("body.npz") if path is None else Path(path)
     command = "sd2 simulate export-body"
-    with open_arrays(path, FORMAT, VERSION, "a body", command) as (_, data):
+    with open_bundled_arrays(path, FORMAT, VERSION, "a body", command) as (_, data):
         return [data[name] for name in names]
 
 

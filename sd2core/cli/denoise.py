@@ -42,7 +42,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _denoise(options: argparse.Namespace) -> None:
-    from sd2core.cli.info import describe_map, show
+    from sd2core.cli.info.description import describe_map, show
     from sd2core.cli.info.model import model_words
     from sd2core.cli.reading import check_map_output
     from sd2core.denoise.files import DEFAULT_NAME, describe_model, find_model, load_model

@@ -70,12 +70,12 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _import(options: argparse.Namespace) -> None:
-    from sd2core.cli.info import describe_parts, describe_recording, show
-    from sd2core.cli.reading import mesh_reading, refuse_in_vain
+    from sd2core.cli.info.description import describe_parts, describe_recording, show
+    from sd2core.cli.reading import mesh_reading, refuse_unused_mesh_options
     from sd2core.recording.recording import Recording
 
     # The window lays any mesh over the video by its focal length.
-    refuse_in_vain(options, options.out, options.mesh, but=("focal_px",))
+    refuse_unused_mesh_options(options, options.out, options.mesh, but=("focal_px",))
     recording = Recording(
         options.out,
         video=options.video,

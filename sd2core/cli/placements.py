@@ -74,7 +74,11 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _placements(options: argparse.Namespace) -> int:
-    from sd2core.cli.reading import check_output, load_mesh_as_told, recording_as_told
+    from sd2core.cli.reading import (
+        check_output,
+        load_mesh_from_options,
+        open_recording_from_options,
+    )
     from sd2core.placements.body_extent import BodyExtent
     from sd2core.placements.placements import write_placements
     from sd2core.recording.recording import is_recording
@@ -83,10 +87,10 @@ def _placements(options: argparse.Namespace) -> int:
         check_output(options.out, ".json")
     recording = None
     if is_recording(options.mesh):
-        recording = recording_as_told(options.mesh, options)
+        recording = open_recording_from_options(options.mesh, options)
     placements = _spec(options, recording)
     if recording is None:
-        mesh = load_mesh_as_told(options.mesh, options)
+        mesh = load_mesh_from_options(options.mesh, options)
     else:
         with progress_bar("Reading the mesh") as progress:
             mesh = recording.load_mesh(progress)
@@ -126,7 +130,7 @@ def _placements(options: argparse.Namespace) -> int:
 
 def _spec(options: argparse.Namespace, recording: Recording | None) -> Placements:
     """What is given, or what the recording plans."""
-    from sd2core.files.number_lists import interval_of, numbers_of
+    from sd2core.files.number_lists import parse_interval, parse_numbers
     from sd2core.placements.placements import PlacementCloud, PlacementGrid, read_placements
 
     typed = {
@@ -152,13 +156,13 @@ def _spec(options: argparse.Namespace, recording: Recording | None) -> Placement
         if options.seed is not None:
             raise Sd2Error("--seed is given without --cloud", "it for random places only")
         return PlacementGrid(
-            numbers_of(options.ranges), numbers_of(azimuths), numbers_of(elevations)
+            parse_numbers(options.ranges), parse_numbers(azimuths), parse_numbers(elevations)
         )
     return PlacementCloud(
         options.cloud,
-        interval_of(options.ranges),
-        interval_of(azimuths),
-        interval_of(elevations),
+        parse_interval(options.ranges),
+        parse_interval(azimuths),
+        parse_interval(elevations),
         options.seed or 0,
     )
 

@@ -59,7 +59,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _radar(options: argparse.Namespace) -> None:
-    from sd2core.cli.info import describe_map, limit_facts, show
+    from sd2core.cli.info.description import describe_map, limit_facts, show
     from sd2core.cli.reading import check_map_output
     from sd2core.fmcw import doppler_map, limits
     from sd2core.io.radar import holds_map, load_capture, load_recorded_map
@@ -98,7 +98,7 @@ def _radar(options: argparse.Namespace) -> None:
 
 def _write_recorded(recorded: RecordedMap, offset_s: float, options: argparse.Namespace) -> None:
     """Write a map that the radar made itself: there are no samples to choose anything for."""
-    from sd2core.cli.info import describe_map, show
+    from sd2core.cli.info.description import describe_map, show
 
     for name, given in (
         ("--bins", options.bins is not None),

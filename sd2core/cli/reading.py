@@ -36,11 +36,11 @@ def mesh_reading(options: argparse.Namespace) -> MeshReading:
     )
 
 
-def load_mesh_as_told(path: Path, options: argparse.Namespace) -> MeshSequence:
+def load_mesh_from_options(path: Path, options: argparse.Namespace) -> MeshSequence:
     """Load a mesh with ``--faces`` and what else is given on the command line."""
     from sd2core.io.mesh import load_mesh
 
-    refuse_in_vain(options, path, path)
+    refuse_unused_mesh_options(options, path, path)
     with progress_bar("Reading the mesh") as progress:
         return load_mesh(
             path, faces=options.faces, progress=progress, **mesh_reading(options).options()
@@ -54,23 +54,23 @@ def mesh_and_sensor(options: argparse.Namespace) -> tuple[MeshSequence, VirtualS
 
     sensor = VirtualSensor()
     if is_recording(options.mesh):
-        recording = recording_as_told(options.mesh, options)
+        recording = open_recording_from_options(options.mesh, options)
         sensor = recording.sensor
         with progress_bar("Reading the mesh") as progress:
             mesh = recording.load_mesh(progress)
     else:
-        mesh = load_mesh_as_told(options.mesh, options)
+        mesh = load_mesh_from_options(options.mesh, options)
     if options.sensor is not None:
         sensor = replace(sensor, position_m=options.sensor)
     return mesh, sensor
 
 
-def recording_as_told(path: Path, options: argparse.Namespace) -> Recording:
+def open_recording_from_options(path: Path, options: argparse.Namespace) -> Recording:
     """Open a recording; of its mesh, what the command line says holds before what is stored."""
     from sd2core.recording.recording import open_recording
 
     recording = open_recording(path)
-    refuse_in_vain(options, path, recording.mesh)
+    refuse_unused_mesh_options(options, path, recording.mesh)
     recording.mesh_reading = recording.mesh_reading.model_copy(
         update=mesh_reading(options).options()
     )
@@ -81,7 +81,7 @@ def recording_as_told(path: Path, options: argparse.Namespace) -> Recording:
     return recording
 
 
-def refuse_in_vain(
+def refuse_unused_mesh_options(
     options: argparse.Namespace, path: Path, mesh: Path | None, *, but: tuple[str, ...] = ()
 ) -> None:
     """Refuse options on how to read a mesh that would change nothing, ``but`` these."""

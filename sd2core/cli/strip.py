@@ -160,21 +160,25 @@ def _source(options: argparse.Namespace, stack: ExitStack) -> StripSource:
 
 
 def _recording(options: argparse.Namespace) -> Recording:
-    from sd2core.cli.reading import mesh_reading, recording_as_told, refuse_in_vain
+    from sd2core.cli.reading import (
+        mesh_reading,
+        open_recording_from_options,
+        refuse_unused_mesh_options,
+    )
     from sd2core.errors import Sd2Error
     from sd2core.io.kinds import kind_of
     from sd2core.recording.recording import Recording
 
     kinds = {kind_of(path): path for path in options.paths}
     if "recording" in kinds and len(options.paths) == 1:
-        return recording_as_told(kinds["recording"], options)
+        return open_recording_from_options(kinds["recording"], options)
     if kinds.keys() - {"video", "mesh"} or len(kinds) < len(options.paths):
         raise Sd2Error(
             f"A strip of {', '.join(map(str, options.paths))}",
             "a recording alone, or a video, a mesh, or one of each",
         )
     mesh = kinds.get("mesh")
-    refuse_in_vain(options, options.paths[0], mesh, but=("focal_px",))
+    refuse_unused_mesh_options(options, options.paths[0], mesh, but=("focal_px",))
     return Recording(
         Path(),
         video=kinds.get("video"),

@@ -196,7 +196,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _synth(options: argparse.Namespace) -> None:
-    from sd2core.cli.info import describe_map, show
+    from sd2core.cli.info.description import describe_map, show
     from sd2core.cli.reading import check_map_output, mesh_and_sensor
     from sd2core.doppler import Synthesizer
     from sd2core.mesh.decimation import decimate

@@ -9,7 +9,7 @@ from typing import Any
 
 from sd2core.datasets.recording_sources import labels_and_classes
 from sd2core.datasets.source import LazySource, Outline, Source, SourceKey, label_per_frame
-from sd2core.files.digests import remembered_digest
+from sd2core.files.digests import cached_digest
 from sd2core.io.radar import holds_map, load_recorded_map
 from sd2core.labels.files import read_labels as read_own
 from sd2core.labels.formats import read_labels
@@ -48,7 +48,7 @@ def map_source(path: Path, subject: str, label_file: Path | None = None) -> Lazy
 def _fingerprint(path: Path, label_file: Path | None) -> str:
     sums = hashlib.blake2b(digest_size=16)
     for one in (path, label_file):
-        sums.update(b"" if one is None else remembered_digest(one).encode())
+        sums.update(b"" if one is None else cached_digest(one).encode())
     return sums.hexdigest()
 
 

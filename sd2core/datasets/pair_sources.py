@@ -14,7 +14,7 @@ import numpy as np
 from sd2core.datasets.denoising import Denoising
 from sd2core.datasets.source import KINDS, LazySource, Outline, Source, SourceKey
 from sd2core.denoise.files import DEFAULT_NAME, find_model
-from sd2core.files.digests import remembered_digest
+from sd2core.files.digests import cached_digest
 from sd2core.labels.label_set import GESTURES
 from sd2core.maps import DopplerMap, MapKind
 from sd2core.pairs.store import open_takes
@@ -83,7 +83,7 @@ class _Store:
 
     def _fingerprint(self, take: dict[str, Any]) -> str:
         """Of the take's own rows: a store may grow."""
-        model = "" if self._model is None else remembered_digest(self._model)
+        model = "" if self._model is None else cached_digest(self._model)
         told = {name: value for name, value in take.items() if name not in ("start", "stop")}
         sums = hashlib.blake2b(
             json.dumps([told, self._header["kind"], self._kinds, model]).encode(), digest_size=16

@@ -29,7 +29,7 @@ from sd2core.datasets.source import (
 )
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
 from sd2core.errors import Sd2Error
-from sd2core.files.digests import remembered_digest
+from sd2core.files.digests import cached_digest
 from sd2core.files.paths import files_at
 from sd2core.fmcw.processing import doppler_map
 from sd2core.labels.spans import Labels
@@ -352,7 +352,7 @@ def _fingerprint(recording: Recording, key: SourceKey, making: Making) -> str:
         "simulation": None if making.simulation is None else making.simulation.as_json(),
         "kinds": making.kinds,
         "files": [
-            [remembered_digest(file) for file in files_at(path)]
+            [cached_digest(file) for file in files_at(path)]
             for path in (recording.mesh, recording.faces, recording.radar, model)
             if path is not None
         ],

@@ -82,7 +82,7 @@ class Digests:
         return entries
 
 
-def remembered_digest(path: Path) -> str:
+def cached_digest(path: Path) -> str:
     """Hash of a file or folder, kept in the user's cache folder until it changes.
 
     Empty where nothing is there. Where nothing can be written it is taken anew every time.

@@ -12,7 +12,7 @@ _AS_RANGE = 3
 """So many evenly spaced numbers are shorter as a range."""
 
 
-def numbers_of(text: str) -> tuple[float, ...]:
+def parse_numbers(text: str) -> tuple[float, ...]:
     """Parse numbers and ranges ``from:to:step``, which hold both ends, set apart by commas.
 
     Raises
@@ -35,7 +35,7 @@ def numbers_of(text: str) -> tuple[float, ...]:
     return tuple(found)
 
 
-def interval_of(text: str) -> tuple[float, float]:
+def parse_interval(text: str) -> tuple[float, float]:
     """Parse ``from:to``; a single number is both.
 
     Raises
@@ -52,14 +52,14 @@ def interval_of(text: str) -> tuple[float, float]:
     return (values[0], values[-1])
 
 
-def text_of(numbers: Sequence[float]) -> str:
-    """What :func:`numbers_of` reads; evenly spaced numbers as a range."""
+def format_numbers(numbers: Sequence[float]) -> str:
+    """What :func:`parse_numbers` reads; evenly spaced numbers as a range."""
     first, last = numbers[0], numbers[-1]
     step = (last - first) / (len(numbers) - 1) if len(numbers) > 1 else 0.0
     if len(numbers) >= _AS_RANGE and step:
         text = ":".join(map(_plain, (first, last, step)))
         try:
-            if numbers_of(text) == tuple(numbers):
+            if parse_numbers(text) == tuple(numbers):
                 return text
         except Sd2Error:  # a step that no longer leads to the end once it is rounded
             pass

@@ -8,7 +8,7 @@ from PySide6.QtCore import QObject, Signal
 
 from sd2app.sensor.placements import PlacementsModel
 from sd2core.errors import Sd2Error
-from sd2core.files.number_lists import interval_of, numbers_of, text_of
+from sd2core.files.number_lists import format_numbers, parse_interval, parse_numbers
 from sd2core.placements.placements import PlacementCloud, PlacementGrid, Placements
 
 Kind = Literal["none", "grid", "cloud"]
@@ -106,9 +106,9 @@ def _kind(plan: Placements) -> Kind:
 def _texts_of(plan: Placements) -> dict[Name, str]:
     if isinstance(plan, PlacementGrid):
         return {
-            "range": text_of(plan.ranges_m),
-            "azimuth": text_of(plan.azimuths_deg),
-            "elevation": text_of(plan.elevations_deg),
+            "range": format_numbers(plan.ranges_m),
+            "azimuth": format_numbers(plan.azimuths_deg),
+            "elevation": format_numbers(plan.elevations_deg),
         }
     return {
         "range": _interval_text(plan.range_m),
@@ -122,9 +122,9 @@ def _texts_of(plan: Placements) -> dict[Name, str]:
 def _plan_of(kind: Kind, texts: dict[Name, str]) -> Placements:
     around = (texts["range"], texts["azimuth"], texts["elevation"])
     if kind == "grid":
-        ranges_m, azimuths_deg, elevations_deg = map(numbers_of, around)
+        ranges_m, azimuths_deg, elevations_deg = map(parse_numbers, around)
         return PlacementGrid(ranges_m, azimuths_deg, elevations_deg)
-    range_m, azimuth_deg, elevation_deg = map(interval_of, around)
+    range_m, azimuth_deg, elevation_deg = map(parse_interval, around)
     count, seed = (_whole(name, texts[name]) for name in ("count", "seed"))
     return PlacementCloud(count, range_m, azimuth_deg, elevation_deg, seed)
 
@@ -137,5 +137,5 @@ def _whole(name: str, text: str) -> int:
 
 
 def _interval_text(interval: tuple[float, float]) -> str:
-    low, high = (text_of([edge]) for edge in interval)
+    low, high = (format_numbers([edge]) for edge in interval)
     return low if low == high else f"{low}:{high}"

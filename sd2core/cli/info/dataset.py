@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from sd2core.cli.info import Description, bins_in_words
+from sd2core.cli.info.description import Description, bins_in_words
 from sd2core.cli.output import counted
 from sd2core.datasets.card import describe_dataset
 from sd2core.datasets.card_text import duration_words, limits

@@ -9,7 +9,7 @@ from typing import Any
 from sd2core.classify.card import FORMAT as CLASSIFIER
 from sd2core.classify.card import ClassifierCard
 from sd2core.classify.files import describe_classifier
-from sd2core.cli.info import Description, bins_in_words
+from sd2core.cli.info.description import Description, bins_in_words
 from sd2core.denoise.card import ModelCard
 from sd2core.denoise.files import describe_model
 from sd2core.denoise.registry import MODELS, summary
@@ -54,7 +54,7 @@ def describe_card(path: Path, card: ModelCard) -> Description:
 
 
 def model_words(card: ModelCard) -> str:
-    """What it is, and what it learnt from."""
+    """Kind of a denoiser and the data it learnt from."""
     words = f"{card.model}, {summary(card.model)}" if card.model in MODELS else card.model
     source = "a simulated radar" if card.trained_on == "simulated" else "a real radar"
     return f"{words}; learnt from {source}"

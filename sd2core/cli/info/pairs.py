@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sd2core.cli.info import Description, bins_in_words
+from sd2core.cli.info.description import Description, bins_in_words
 from sd2core.pairs.store import PairSet
 
 

@@ -184,7 +184,7 @@ def plane_at(text: str) -> tuple[float, ...]:
 
 
 def _radar(options: argparse.Namespace) -> None:
-    from sd2core.cli.info import describe_capture, show
+    from sd2core.cli.info.description import describe_capture, show
     from sd2core.cli.reading import mesh_and_sensor
     from sd2core.fmcw import LinkBudget, Mirror, SignalOptions, WaveOptions
     from sd2core.io.radar import check_replaceable, write_capture

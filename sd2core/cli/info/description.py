@@ -1,0 +1,369 @@
+"""Descriptions of files: one content, as facts for people and as data for programs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from statistics import fmean
+from typing import TYPE_CHECKING, Any
+
+from sd2core.cli.output import print_facts, print_json, progress_bar
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from sd2core.io.radar import RadarCapture, RecordedMap
+    from sd2core.io.video import VideoReader
+    from sd2core.maps import DopplerMap
+    from sd2core.mesh.sequence import MeshSequence
+    from sd2core.radar_config import RadarConfig
+    from sd2core.recording.recording import Recording
+    from sd2core.sensor import VelocityAxis
+    from sd2core.timebase import Timebase
+
+FAINT = 0.01
+"""Share of a map's largest value below which values are not judged."""
+
+
+@dataclass
+class Description:
+    """Content of a file, for programs (``data``) and for people (``facts``)."""
+
+    title: str
+    data: dict[str, Any]
+    facts: dict[str, str]
+    notes: tuple[str, ...] = ()
+    parts: list[Description] = field(default_factory=list)
+
+
+def show(description: Description, *, as_json: bool) -> None:
+    """Print a description and its parts."""
+    if as_json:
+        print_json(description.data)
+        return
+    print_facts(description.title, description.facts)
+    for note in description.notes:
+        print(f"  note: {note}")
+    for part in description.parts:
+        print()
+        show(part, as_json=False)
+
+
+def describe_recording(recording: Recording, parts: list[Description]) -> Description:
+    """Describe a recording and its parts; missing files are named."""
+    missing = recording.missing()
+    x, y, z = recording.sensor.position_m
+    data = {
+        "kind": "recording",
+        "path": str(recording.folder),
+        "title": recording.title,
+        "simulated": recording.simulated,
+        "radar_offset_s": recording.radar_offset_s,
+        "camera": None if recording.camera is None else recording.camera.model_dump(mode="json"),
+        "sensor_position_m": [x, y, z],
+        "denoiser": None if recording.denoiser is None else str(recording.denoiser),
+        "bundled_denoiser": recording.bundled_denoiser,
+        "spans": [
+            {"start_s": span.start_s, "end_s": span.end_s, "label": span.label}
+            for span in recording.labelled.spans
+        ],
+        "missing": {role: str(path) for role, path in missing.items()},
+        "notes": list(recording.notes),
+    }
+    data |= {part.data["kind"]: part.data for part in parts}
+    facts = {
+        "title": recording.title + (" (simulated)" if recording.simulated else ""),
+        "camera": _camera(recording),
+        "sensor": f"at x {x:g}, y {y:g}, z {z:g} m",
+        "radar offset": f"{recording.radar_offset_s:g} s" if recording.radar else "",
+        "denoiser": _denoiser(recording),
+        "spans": _labels(recording),
+    }
+    notes = tuple(f"the {role} is not at {path}" for role, path in missing.items())
+    if missing:
+        notes += (f"find it with: sd2 relink {recording.folder} FOLDER",)
+    return Description(f"Recording {recording.folder}", data, facts, notes + recording.notes, parts)
+
+
+def describe_parts(recording: Recording) -> list[Description]:
+    """Open and describe each file of a recording, as far as it is there."""
+    missing = recording.missing()
+    parts: list[Description] = []
+    if recording.video is not None and "video" not in missing:
+        with recording.open_video() as video:
+            parts.append(describe_video(recording.video, video))
+    if recording.mesh is not None and not missing.keys() & {"mesh", "faces"}:
+        with progress_bar("Reading the mesh") as progress:
+            mesh = recording.load_mesh(progress)
+        parts.append(describe_mesh(recording.mesh, mesh))
+    if recording.radar is not None and "radar" not in missing:
+        parts.append(describe_radar(recording.radar))
+    return parts
+
+
+def describe_video(path: Path, video: VideoReader) -> Description:
+    """Describe a video."""
+    data = {
+        "kind": "video",
+        "path": str(path),
+        "width": video.width,
+        "height": video.height,
+        **_clock_data(video.timebase),
+        "notes": list(video.notes),
+    }
+    facts = {
+        "picture": f"{video.width} x {video.height} pixels",
+        "time": _clock(video.timebase),
+    }
+    return Description(f"Video {path}", data, facts, video.notes)
+
+
+def describe_mesh(path: Path, mesh: MeshSequence) -> Description:
+    """Describe a mesh by its first frame; a long one is not read whole."""
+    first = mesh.frame(0)
+    low, high = first.min(axis=0).tolist(), first.max(axis=0).tolist()
+    face_count = 0 if mesh.faces is None else len(mesh.faces)
+    data = {
+        "kind": "mesh",
+        "path": str(path),
+        "vertices": mesh.vertex_count,
+        "faces": face_count,
+        **_clock_data(mesh.timebase),
+        "frames_without_person": _absent(mesh.present),
+        "first_frame_min_m": low,
+        "first_frame_max_m": high,
+        "notes": list(mesh.notes),
+    }
+    if mesh.uncertainty is not None:
+        data["limbs"] = list(mesh.uncertainty.limbs)
+    facts = {
+        "surface": f"{mesh.vertex_count:,} vertices, "
+        + (f"{face_count:,} triangles" if face_count else "no triangles: a point cloud"),
+        "time": _clock(mesh.timebase),
+        "no person": _gaps(mesh.present, mesh.timebase),
+        "velocities": _known_to(mesh),
+        "first frame": ", ".join(
+            f"{axis} {a:.2f} to {b:.2f}" for axis, a, b in zip("xyz", low, high, strict=True)
+        )
+        + " m",
+    }
+    return Description(f"Mesh {path}", data, facts, mesh.notes)
+
+
+def describe_radar(path: Path) -> Description:
+    """Open a capture or a recorded map and describe it."""
+    from sd2core.io.radar import holds_map, load_capture, load_recorded_map
+
+    if holds_map(path):
+        return describe_recorded_map(path, load_recorded_map(path))
+    return describe_capture(path, load_capture(path))
+
+
+def describe_recorded_map(path: Path, recorded: RecordedMap) -> Description:
+    """Describe a recorded map and its labels."""
+    inside = describe_map(path, recorded.doppler)
+    spans = recorded.labels.spans
+    data = inside.data | {
+        "kind": "radar",
+        "simulated": False,
+        "gesture": recorded.gesture,
+        "labels": [
+            {"start_s": span.start_s, "end_s": span.end_s, "label": span.label} for span in spans
+        ],
+        "notes": list(recorded.notes),
+    }
+    labelled = ", ".join(f"{span.start_s:.3f} to {span.end_s:.3f} s" for span in spans)
+    facts = inside.facts | {"gesture": recorded.gesture, "labelled": labelled or "nowhere"}
+    return Description(f"Radar map {path}", data, facts, recorded.notes)
+
+
+def _denoiser(recording: Recording) -> str:
+    if recording.denoiser is not None:
+        return str(recording.denoiser)
+    if recording.bundled_denoiser is None:
+        return ""
+    return recording.bundled_denoiser or "none"
+
+
+def describe_capture(path: Path, capture: RadarCapture) -> Description:
+    """Describe a radar capture and what its radar can tell apart."""
+    from sd2core.fmcw import limits
+
+    config = capture.config
+    data = {
+        "kind": "radar",
+        "path": str(path),
+        "simulated": capture.simulated,
+        "radar": config.name,
+        "receivers": config.receivers,
+        "chirps_per_frame": config.chirps_per_frame,
+        "samples_per_chirp": config.samples_per_chirp,
+        **limits(config),
+        **_clock_data(capture.timebase),
+        "start_unix_s": capture.start_unix_s,
+        "notes": list(capture.notes),
+    }
+    facts = {
+        "radar": config.name + (" (simulated)" if capture.simulated else ""),
+        "samples": f"{config.samples_per_chirp} per chirp,"
+        f" {config.chirps_per_frame} chirps per frame, receivers: {config.receivers}",
+        "time": _clock(capture.timebase),
+        **limit_facts(config),
+    }
+    return Description(f"Radar capture {path}", data, facts, tuple(capture.notes))
+
+
+def describe_map(path: Path, doppler: DopplerMap) -> Description:
+    """Describe a Doppler map."""
+    data = {
+        "kind": "map",
+        "path": str(path),
+        "map_kind": doppler.kind,
+        "unit": doppler.unit,
+        "bins": doppler.axis.bins,
+        "v_max_mps": doppler.axis.v_max_mps,
+        "null_bins": list(doppler.null_bins),
+        "unseen_bins": list(doppler.unseen_bins),
+        **_clock_data(doppler.timebase),
+        "frames_without_person": _absent(doppler.present),
+        "uncertainty": None if doppler.uncertainty is None else _deviation(doppler),
+        "provenance": doppler.meta,
+    }
+    facts = {
+        "kind": doppler.kind,
+        "velocity": f"{doppler.axis.bins} bins of {doppler.axis.bin_width_mps:g} m/s over"
+        f" ±{doppler.axis.v_max_mps:g} m/s, approaching is positive",
+        "time": _clock(doppler.timebase),
+        "no person": _gaps(doppler.present, doppler.timebase),
+        "unit": doppler.unit,
+        "nulled bins": bins_in_words(doppler.axis, doppler.null_bins),
+        "known to": ""
+        if doppler.uncertainty is None
+        else f"±{_deviation(doppler):.0%} of a value (root mean square; the median of the cells"
+        " that are not faint)",
+        "unseen bins": bins_in_words(doppler.axis, doppler.unseen_bins),
+        **_synthesis_facts(doppler.meta),
+    }
+    notes = tuple(doppler.meta.get("notes", ()))
+    return Description(f"Doppler map {path}", data, facts, notes)
+
+
+def bins_in_words(axis: VelocityAxis, bins: tuple[int, ...]) -> str:
+    """Numbers of bins and the velocities that they cover."""
+    if not bins:
+        return ""
+    # Rounded: an edge at 0 may be computed as 1e-17.
+    edges_mps = [f"{round(edge, 9) + 0.0:g}" for edge in axis.edges_mps.tolist()]
+    firsts = [edges_mps[number] for number in bins if number - 1 not in bins]
+    ends = [edges_mps[number + 1] for number in bins if number + 1 not in bins]
+    spans = (f"{first} to {end}" for first, end in zip(firsts, ends, strict=True))
+    return f"{', '.join(map(str, bins))}: {', '.join(spans)} m/s"
+
+
+def _synthesis_facts(provenance: dict[str, Any]) -> dict[str, str]:
+    if "visible_share" not in provenance:
+        return {}
+    x, y, z = provenance["sensor"]["position_m"]
+    visible, beyond = provenance["visible_share"], provenance["beyond_share"]
+    worst = max(range(len(beyond)), key=beyond.__getitem__)
+    stride = provenance.get("mask_stride", 1)
+    shared = "" if stride == 1 else f", computed for one frame in {stride}"
+    plan = provenance.get("plan")
+    return {
+        "plan": ""
+        if plan is None
+        else f"{plan['text']}, off by {100 * provenance['plan_error_l1']:.2g} %",
+        "sensor": f"at x {x:g}, y {y:g}, z {z:g} m",
+        "visibility": f"{provenance['visibility']}: {fmean(visible):.1%} visible on average"
+        + shared,
+        "beyond axis": f"{fmean(beyond):.1%} of what is visible on average"
+        + (f", {beyond[worst]:.1%} in frame {worst}" if beyond[worst] > 0 else ""),
+    }
+
+
+def limit_facts(config: RadarConfig) -> dict[str, str]:
+    """Limits that follow from a radar's configuration, for people."""
+    return {
+        "wavelength λ": f"{config.wavelength_m * 1e3:.3f} mm",
+        "radar velocity": f"up to v_max ±{config.v_max_mps:.3f} m/s,"
+        f" in steps Δv of {config.velocity_resolution_mps:.3f} m/s",
+        "radar range": f"up to R_max {config.range_max_m:.2f} m,"
+        f" in steps ΔR of {config.range_resolution_m:.3f} m",
+    }
+
+
+def _camera(recording: Recording) -> str:
+    camera = recording.camera
+    if camera is None:
+        return ""
+    size = f" at {camera.width} x {camera.height}" if camera.width and camera.height else ""
+    source = f" ({camera.source})" if camera.source else ""
+    return f"focal length {camera.focal_px:.0f} pixels{size}{source}"
+
+
+def _known_to(mesh: MeshSequence) -> str:
+    """Accuracy of velocities along the camera's line of sight: best and worst limb."""
+    known = mesh.uncertainty
+    if known is None:
+        return ""
+    typical = (known.along_mps[mesh.presence.there] ** 2).mean(axis=0) ** 0.5
+    best, worst = int(typical.argmin()), int(typical.argmax())
+    words = "along the camera's line of sight known to"
+    if typical[best] == typical[worst]:
+        return f"{words} ±{typical[best]:.2f} m/s"
+    return (
+        f"{words} ±{typical[best]:.2f} m/s ({known.limbs[best]})"
+        f" to ±{typical[worst]:.2f} m/s ({known.limbs[worst]})"
+    )
+
+
+def _deviation(doppler: DopplerMap) -> float:
+    """Relative standard deviation of a map's values: the median of cells that are not faint."""
+    import numpy as np
+
+    assert doppler.uncertainty is not None
+    counted = doppler.values > FAINT * doppler.values.max(initial=0.0)
+    if not counted.any():
+        return 0.0
+    deviation = doppler.uncertainty.deviation(doppler.values)
+    return float(np.median(deviation[counted] / doppler.values[counted]))
+
+
+def _absent(present: NDArray[np.bool_] | None) -> int:
+    """Frames without a person."""
+    return 0 if present is None else int((~present).sum())
+
+
+def _gaps(present: NDArray[np.bool_] | None, timebase: Timebase) -> str:
+    """Share of a clip without a person and the first such time; empty without gaps."""
+    from sd2core.mesh.presence import gaps_in_words, runs
+
+    if present is None:
+        return ""
+    gaps = runs(~present)
+    first_s = timebase.time_of(gaps[0][0])
+    share = gaps_in_words(gaps, timebase.times_s, timebase.frame_duration_s)
+    return f"in {share}, first at {first_s:.2f} s"
+
+
+def _labels(recording: Recording) -> str:
+    counts: dict[str, int] = {}
+    for span in recording.labelled.spans:
+        counts[span.label] = counts.get(span.label, 0) + 1
+    return ", ".join(f"{count} x {label}" for label, count in counts.items())
+
+
+def _clock(timebase: Timebase) -> str:
+    return (
+        f"{len(timebase)} frames, {timebase.duration_s:.3f} s, {timebase.frames_per_s:.2f} frames/s"
+    )
+
+
+def _clock_data(timebase: Timebase) -> dict[str, float]:
+    return {
+        "frames": len(timebase),
+        "start_s": timebase.start_s,
+        "duration_s": timebase.duration_s,
+        "frames_per_s": timebase.frames_per_s,
+    }
