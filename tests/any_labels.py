@@ -7,7 +7,7 @@ from itertools import pairwise
 from hypothesis import strategies as st
 
 from sd2core.labels.label_set import GESTURES, Label, LabelSet
-from sd2core.labels.spans import ORIGINS, OVERLAPS, Labels, Span, Track
+from sd2core.labels.spans import ORIGINS, OVERLAPS, Labels, LabelTrack, Span
 
 # What check_name lets through: everything that can be shown, and the plain space.
 _SHOWN = st.characters(
@@ -66,7 +66,7 @@ def any_labels(
     """Tracks with and without overlaps, touching spans, notes of every kind, ids in any order."""
     tracks = draw(
         st.lists(
-            st.builds(Track, names, st.sampled_from(OVERLAPS)),
+            st.builds(LabelTrack, names, st.sampled_from(OVERLAPS)),
             min_size=1,
             max_size=3,
             unique_by=lambda track: track.name,

@@ -9,24 +9,25 @@ from itertools import combinations
 import numpy as np
 
 from sd2core.errors import Sd2Error
-from sd2core.labels import label_set_edits, span_fields, track_edits
+from sd2core.labels import field_edits
 from sd2core.labels.edits import (
     Edit,
-    carve,
     create,
     delete,
     duplicate,
+    duplicate_together,
     fill_gaps,
-    meet,
+    join_at,
     merge,
     move,
+    move_together,
     nudge,
-    nudge_edge,
+    nudge_together,
+    overwrite,
     resize,
     split,
 )
-from sd2core.labels.group_edits import duplicate_together, move_together, nudge_together
-from sd2core.labels.spans import ORIGINS, Labels, Span, Track
+from sd2core.labels.spans import ORIGINS, Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
 
 NAMES = ("left-to-right", "up-to-down", "background", "something else")
@@ -55,7 +56,7 @@ def imported(timebase: Timebase, seed: int, count: int = 12) -> Labels:
         Span(k + 1, "Imported", float(a), float(b), NAMES[k % 3], origin=ORIGINS[1 + k % 2])
         for k, (a, b) in enumerate(edges_s)
     ]
-    tracks = (Track("Gestures"), Track("Imported"), Track("Free", "free"))
+    tracks = (LabelTrack("Gestures"), LabelTrack("Imported"), LabelTrack("Free", "free"))
     return Labels(tracks, tuple(spans))
 
 
@@ -76,7 +77,7 @@ def random_edit(labels: Labels, timebase: Timebase, rng: random.Random) -> Edit:
     ids = [span.id for span in labels.spans]
     tracks = [track.name for track in labels.tracks]
     if not tracks:
-        return track_edits.add_track(labels, "Gestures")
+        return field_edits.add_track(labels, "Gestures")
     span_id = rng.choice(ids) if ids else 1
     some = rng.sample(ids, min(len(ids), rng.randint(1, 3)))
     track, label = rng.choice(tracks), rng.choice(NAMES)
@@ -91,7 +92,7 @@ def random_edit(labels: Labels, timebase: Timebase, rng: random.Random) -> Edit:
     choices: list[Callable[[], Edit]] = [
         lambda: create(labels, timebase, track, time_s(), time_s(), label),
         lambda: create(labels, timebase, track, near_s(), near_s(), label, author="B"),
-        lambda: carve(labels, timebase, track, near_s(), near_s(), label),
+        lambda: overwrite(labels, timebase, track, near_s(), near_s(), label),
         lambda: duplicate(labels, timebase, span_id, time_s(), rng.choice((None, track))),
         lambda: delete(labels, some),
         lambda: resize(labels, timebase, span_id, side, near_s()),
@@ -99,36 +100,35 @@ def random_edit(labels: Labels, timebase: Timebase, rng: random.Random) -> Edit:
         lambda: move(labels, timebase, span_id, near_s()),
         lambda: move(labels, timebase, span_id, time_s()),
         lambda: nudge(labels, timebase, span_id, rng.randint(-12, 12)),
-        lambda: nudge_edge(labels, timebase, span_id, side, rng.randint(-12, 12)),
         lambda: move_together(labels, timebase, some, span_id, near_s()),
         lambda: nudge_together(labels, timebase, some, rng.randint(-12, 12)),
         lambda: duplicate_together(labels, timebase, some, time_s()),
         lambda: split(labels, timebase, span_id, near_s()),
         lambda: merge(labels, some),
-        lambda: meet(labels, timebase, span_id, rng.choice(ids or [1]), near_s()),
+        lambda: join_at(labels, timebase, span_id, rng.choice(ids or [1]), near_s()),
         lambda: fill_gaps(labels, timebase, track, label, near_s(), near_s() + 0.5),
-        lambda: span_fields.relabel(labels, some, label),
-        lambda: span_fields.set_note(labels, some, rng.choice(("", "blurred", "sure?"))),
-        lambda: span_fields.set_confidence(labels, some, rng.choice((None, 0.5, 1.0))),
-        lambda: span_fields.set_author(labels, some, "C"),
-        lambda: span_fields.set_track(labels, some, track),
-        lambda: span_fields.accept(labels, timebase, some, track),
-        lambda: track_edits.set_overlap(labels, track, rng.choice(("exclusive", "free"))),
-        lambda: track_edits.move_track(labels, track, rng.randint(0, 2)),
-        lambda: track_edits.rename_track(labels, track, rng.choice(("Left", "Right", "Both"))),
-        lambda: label_set_edits.rename_label(labels, label, f"{label}'"),
-        lambda: label_set_edits.add_label(
-            labels, label_set_edits.new_label(labels.label_set), rng.choice((None, 0))
+        lambda: field_edits.relabel(labels, some, label),
+        lambda: field_edits.set_note(labels, some, rng.choice(("", "blurred", "sure?"))),
+        lambda: field_edits.set_confidence(labels, some, rng.choice((None, 0.5, 1.0))),
+        lambda: field_edits.set_author(labels, some, "C"),
+        lambda: field_edits.set_track(labels, some, track),
+        lambda: field_edits.accept(labels, timebase, some, track),
+        lambda: field_edits.set_overlap(labels, track, rng.choice(("exclusive", "free"))),
+        lambda: field_edits.move_track(labels, track, rng.randint(0, 2)),
+        lambda: field_edits.rename_track(labels, track, rng.choice(("Left", "Right", "Both"))),
+        lambda: field_edits.rename_label(labels, label, f"{label}'"),
+        lambda: field_edits.add_label(
+            labels, field_edits.new_label(labels.label_set), rng.choice((None, 0))
         ),
-        lambda: label_set_edits.remove_label(labels, label, rng.choice((None, NAMES[0]))),
-        lambda: label_set_edits.move_label(labels, label, rng.randint(0, 3)),
-        lambda: label_set_edits.set_colour(labels, label, rng.choice(("#0072b2", "#332288"))),
-        lambda: label_set_edits.set_key(labels, label, rng.choice(("", "1", "q", "Q"))),
+        lambda: field_edits.remove_label(labels, label, rng.choice((None, NAMES[0]))),
+        lambda: field_edits.move_label(labels, label, rng.randint(0, 3)),
+        lambda: field_edits.set_colour(labels, label, rng.choice(("#0072b2", "#332288"))),
+        lambda: field_edits.set_key(labels, label, rng.choice(("", "1", "q", "Q"))),
     ]
     if rng.random() < 0.01:
         choices = [
-            lambda: track_edits.remove_track(labels, track),
-            lambda: track_edits.add_track(labels, f"Track {rng.random()}", rng.choice(("free",))),
+            lambda: field_edits.remove_track(labels, track),
+            lambda: field_edits.add_track(labels, f"Track {rng.random()}", rng.choice(("free",))),
         ]
     try:
         return rng.choice(choices)()

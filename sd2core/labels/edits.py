@@ -1,35 +1,40 @@
-"""Edits of the times of spans: made, moved, shortened, cut, joined.
+"""Edits of the times of spans: create, move, resize, split, merge, overwrite.
 
-Every edit is a function of labels, frames and what is wanted, and returns an
-:class:`Edit`: the labels afterwards and the name of the step. Labels are never changed in
-place, so the ones before are the step back. Decision 30 has the reasons for the policy:
+Every edit is a function of labels, frames and its arguments, and returns an :class:`Edit`: the
+labels afterwards and the name of the step. Labels are never changed in place, so the labels
+before are the undo. Decision 30 has the reasons for these rules:
 
-- An edge that an edit sets is that of a frame, inside the recording, and what is left
-  always holds the time of at least one frame. Edges that an edit does not set stay where
-  they are, on a frame or not.
+- An edge that an edit sets is that of a frame, inside the recording, and every span keeps the
+  time of at least one frame. Edges that an edit does not set stay, on a frame or not.
 - On an exclusive track an edge stops at the neighbour (exactly there, where an import has
   put the neighbour's edge between frames), and so does a moved span. A new span is clipped
-  to the longest free part of what was wanted. Where no frame is free the edit is refused.
-  Nothing is pushed, and nothing shrinks that was not touched, but by :func:`carve`.
+  to the longest free part of the time asked for. Where no frame is free the edit is refused.
+  Only :func:`overwrite` shortens spans that were not named.
 - An edit that changes nothing returns the very labels that it was given.
 
-There is no history here: a step is the labels before and after, and whoever shows labels
-has a stack for such steps (``app/sd2app/session/undo.py``: ``_push(edit.name, assign, before,
-edit.labels)``, which also knows what is saved and drops what changed nothing).
+During a mouse drag, call the edit with the labels from before the drag and the present place:
+it can then stop at a neighbour and come back.
 
-While a hand drags, call the edit with the labels from before it took hold and the place
-where it is now: it can then stop at a neighbour and come back. When it lets go, that is one
-step.
+Edits of several spans together keep their order, and those that touch still touch: every edge
+goes to the nearest frame edge. They stop together where the first of them meets a neighbour that
+is not moved, or an end of the recording.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 from sd2core.errors import Sd2Error
-from sd2core.labels.free_time import Frames, clipped, free_parts, room_around, steps_free
+from sd2core.labels.free_time import (
+    Frames,
+    Stretch,
+    clip_to_free,
+    free_parts,
+    limits_of,
+    steps_free,
+)
 from sd2core.labels.spans import Labels, Span
 from sd2core.timebase import Timebase
 
@@ -38,16 +43,16 @@ Side = Literal["start", "end"]
 
 @dataclass(frozen=True)
 class Edit:
-    """What an edit comes to.
+    """Result of an edit.
 
     Parameters
     ----------
     name : str
-        Of the step, as a list of steps shows it: "Move span".
+        Name of the step in the history, such as "Move span".
     labels : Labels
-        Afterwards.
+        After the edit.
     ids : tuple of int
-        The spans that were made or changed: what one would have selected now.
+        Spans that were made or changed, to be selected next.
     """
 
     name: str
@@ -65,9 +70,9 @@ def create(
     *,
     author: str = "",
 ) -> Edit:
-    """Mark what is between two times, in any order, as far as there is room."""
+    """Create a span between two times, in either order, clipped to the free time of the track."""
     frames = Frames.of(timebase)
-    part = clipped(labels, track, frames.stretch(start_s, end_s), frames)
+    part = clip_to_free(labels, track, frames.stretch(start_s, end_s), frames)
     made = Span(labels.next_id, track, *part, label, author=author)
     return Edit("Create span", labels.with_spans([made]), (made.id,))
 
@@ -75,13 +80,13 @@ def create(
 def duplicate(
     labels: Labels, timebase: Timebase, span_id: int, start_s: float, track: str | None = None
 ) -> Edit:
-    """Make a copy of a span that begins elsewhere, or on another track, where there is room."""
+    """Copy a span to another start, or to another track, clipped to free time."""
     frames = Frames.of(timebase)
     span = labels.span(span_id)
     track = span.track if track is None else track
     # A recording has frames, so there is room.
     wanted = frames.placed(start_s, span.duration_s, frames.whole) or frames.whole
-    start_s, end_s = clipped(labels, track, wanted, frames)
+    start_s, end_s = clip_to_free(labels, track, wanted, frames)
     made = replace(span, id=labels.next_id, track=track, start_s=start_s, end_s=end_s)
     return Edit("Duplicate span", labels.with_spans([made]), (made.id,))
 
@@ -94,10 +99,10 @@ def delete(labels: Labels, ids: Iterable[int]) -> Edit:
 
 
 def resize(labels: Labels, timebase: Timebase, span_id: int, side: Side, time_s: float) -> Edit:
-    """Put one edge of a span at the frame edge nearest to a time, as far as it can go there."""
+    """Move one edge of a span to the frame edge nearest to a time, as far as it can go."""
     frames = Frames.of(timebase)
     span = labels.span(span_id)
-    low_s, high_s = room_around(labels, span, frames)
+    low_s, high_s = limits_of(labels, span, frames)
     wanted_s = frames.nearest(time_s)
     if side == "start":
         latest_s = float(frames.times_s[max(frames.last_before(span.end_s), 0)])
@@ -110,45 +115,36 @@ def resize(labels: Labels, timebase: Timebase, span_id: int, side: Side, time_s:
 
 
 def move(labels: Labels, timebase: Timebase, span_id: int, start_s: float) -> Edit:
-    """Put a span so that it begins at a time, keeping its duration; it stops at neighbours."""
+    """Move a span to begin at a time, keeping its duration; it stops at neighbours."""
     frames = Frames.of(timebase)
     span = labels.span(span_id)
-    place = frames.placed(start_s, span.duration_s, room_around(labels, span, frames))
+    place = frames.placed(start_s, span.duration_s, limits_of(labels, span, frames))
     changed = _timed(span, *(place or (span.start_s, span.end_s)), frames)
     return Edit("Move span", labels.with_spans([changed]), (span_id,))
 
 
 def nudge(labels: Labels, timebase: Timebase, span_id: int, count: int) -> Edit:
-    """Move a span by so many frames, keeping how many it holds; it stops at neighbours.
+    """Move a span by some frames, keeping their number; it stops at neighbours.
 
     Where frames are not evenly spaced its duration changes, and a step back restores it. A
     span between frames goes to them with the first step.
     """
     frames = Frames.of(timebase)
     span = labels.span(span_id)
-    room = room_around(labels, span, frames)
-    count = steps_free(frames, span, room, count)
+    limits = limits_of(labels, span, frames)
+    count = steps_free(frames, span, limits, count)
     if count == 0:
         return Edit("Nudge span", labels, (span_id,))
     start_s, end_s = (frames.stepped(time_s, count) for time_s in (span.start_s, span.end_s))
     if not frames.held(start_s, end_s):  # one that lay between two frames
         start_s, end_s = frames.stretch(start_s, start_s)
-        end_s = min(end_s, room[1])
+        end_s = min(end_s, limits[1])
     changed = _timed(span, start_s, end_s, frames)
     return Edit("Nudge span", labels.with_spans([changed]), (span_id,))
 
 
-def nudge_edge(labels: Labels, timebase: Timebase, span_id: int, side: Side, count: int) -> Edit:
-    """Move one edge of a span by so many frames, as far as it can go."""
-    span = labels.span(span_id)
-    from_s = span.start_s if side == "start" else span.end_s
-    if count == 0:
-        return Edit(f"Move {side} of span", labels, (span_id,))
-    return resize(labels, timebase, span_id, side, Frames.of(timebase).stepped(from_s, count))
-
-
 def split(labels: Labels, timebase: Timebase, span_id: int, time_s: float) -> Edit:
-    """Cut a span in two at the frame nearest to a time; the first part keeps the id."""
+    """Split a span at the frame nearest to a time; the first part keeps the id."""
     frames = Frames.of(timebase)
     span = labels.span(span_id)
     if not span.start_s <= time_s <= span.end_s:
@@ -163,10 +159,10 @@ def split(labels: Labels, timebase: Timebase, span_id: int, time_s: float) -> Ed
 
 
 def merge(labels: Labels, ids: Sequence[int]) -> Edit:
-    """Join spans of one track into one, from the first start to the last end.
+    """Merge spans of one track into one, from the first start to the last end.
 
-    It is the earliest of them that grows: id and label are its own. Notes and authors that
-    differ are joined, and the lowest confidence that is given holds.
+    The earliest of them keeps its id and label. Notes and authors that differ are joined, and the
+    lowest confidence given holds.
 
     Raises
     ------
@@ -192,8 +188,8 @@ def merge(labels: Labels, ids: Sequence[int]) -> Edit:
     return Edit("Merge spans", labels.with_spans([merged], without=gone), (merged.id,))
 
 
-def meet(labels: Labels, timebase: Timebase, one_id: int, other_id: int, time_s: float) -> Edit:
-    """Let two neighbours on a track meet at the frame nearest to a time: no gap, no overlap."""
+def join_at(labels: Labels, timebase: Timebase, one_id: int, other_id: int, time_s: float) -> Edit:
+    """Make two neighbours on a track meet at the frame nearest to a time: no gap, no overlap."""
     frames = Frames.of(timebase)
     left, right = sorted(
         (labels.span(one_id), labels.span(other_id)), key=lambda one: (one.start_s, one.end_s)
@@ -223,9 +219,9 @@ def fill_gaps(
     *,
     author: str = "",
 ) -> Edit:
-    """Make a span in every gap of a track that holds a frame, e.g. of background.
+    """Create a span in every gap of a track that holds a frame, e.g. of background.
 
-    Gaps before the first and after the last span count; ``start_s`` and ``end_s`` narrow it
+    Gaps before the first and after the last span count; ``start_s`` and ``end_s`` limit it
     to a part of the recording.
     """
     frames = Frames.of(timebase)
@@ -239,7 +235,7 @@ def fill_gaps(
     return Edit("Fill gaps", labels.with_spans(made), tuple(span.id for span in made))
 
 
-def carve(
+def overwrite(
     labels: Labels,
     timebase: Timebase,
     track: str,
@@ -249,9 +245,9 @@ def carve(
     *,
     author: str = "",
 ) -> Edit:
-    """Make a span between two times, cutting away what others on the track hold of it.
+    """Create a span between two times, cutting away other spans of the track there.
 
-    A span around it is cut in two; what is left of a span without a single frame goes.
+    A span around it is split; parts without a single frame are deleted.
     """
     frames = Frames.of(timebase)
     labels.track(track)
@@ -266,7 +262,7 @@ def carve(
         for count, (low_s, high_s) in enumerate(side for side in sides if frames.held(*side)):
             put.append(replace(span, id=free_id if count else span.id, start_s=low_s, end_s=high_s))
             free_id += count
-    return Edit("Carve span", labels.with_spans(put, without=gone), (made.id,))
+    return Edit("Create span over others", labels.with_spans(put, without=gone), (made.id,))
 
 
 def _timed(span: Span, start_s: float, end_s: float, frames: Frames) -> Span:
@@ -277,3 +273,101 @@ def _timed(span: Span, start_s: float, end_s: float, frames: Frames) -> Span:
             "Move or delete the spans beside it",
         )
     return replace(span, start_s=start_s, end_s=end_s)
+
+
+def move_together(
+    labels: Labels, timebase: Timebase, ids: Collection[int], lead_id: int, start_s: float
+) -> Edit:
+    """Move spans so that one of them, the dragged one, begins at a time."""
+    frames = Frames.of(timebase)
+    chosen = _chosen(labels, {*ids, lead_id})
+    lead = labels.span(lead_id)
+    limits = _limits_of_all(labels, chosen, frames)
+    earliest_s = max(low_s - span.start_s for span, (low_s, _) in zip(chosen, limits, strict=True))
+    latest_s = min(high_s - span.end_s for span, (_, high_s) in zip(chosen, limits, strict=True))
+    by_s = frames.nearest(start_s) - lead.start_s
+    # Whoever lies outside (an import) is not in the way of the others.
+    by_s = min(max(by_s, min(earliest_s, 0.0)), max(latest_s, 0.0))
+    moved = []
+    for span, (low_s, high_s) in zip(chosen, limits, strict=True):
+        first_s, last_s = (frames.nearest(edge + by_s) for edge in (span.start_s, span.end_s))
+        moved.append(_put(span, max(first_s, low_s), min(last_s, high_s), frames))
+    if by_s == 0.0:
+        moved = chosen
+    return Edit(_name("Move", moved), labels.with_spans(moved), tuple(one.id for one in moved))
+
+
+def nudge_together(labels: Labels, timebase: Timebase, ids: Collection[int], count: int) -> Edit:
+    """Move spans by some frames, each keeping their number."""
+    frames = Frames.of(timebase)
+    chosen = _chosen(labels, ids)
+    limits = _limits_of_all(labels, chosen, frames)
+    free = [
+        steps_free(frames, span, limit, count) for span, limit in zip(chosen, limits, strict=True)
+    ]
+    count = min(free, key=abs)
+    moved = chosen
+    if count:
+        moved = []
+        for span in chosen:
+            start_s, end_s = frames.stepped(span.start_s, count), frames.stepped(span.end_s, count)
+            moved.append(_put(span, start_s, end_s, frames))
+    return Edit(_name("Nudge", moved), labels.with_spans(moved), tuple(one.id for one in moved))
+
+
+def duplicate_together(
+    labels: Labels, timebase: Timebase, ids: Collection[int], start_s: float
+) -> Edit:
+    """Copy spans so that the first copy begins at a time; each is clipped to free time."""
+    chosen = _chosen(labels, ids)
+    after = labels
+    made: list[int] = []
+    for span in chosen:
+        place_s = start_s + span.start_s - chosen[0].start_s
+        edit = duplicate(after, timebase, span.id, place_s)
+        after = edit.labels
+        made += edit.ids
+    return Edit(_name("Duplicate", chosen), after, tuple(made))
+
+
+def _chosen(labels: Labels, ids: Collection[int]) -> list[Span]:
+    wanted = set(ids)
+    chosen = [span for span in labels.spans if span.id in wanted]
+    if len(chosen) < max(len(wanted), 1):
+        raise Sd2Error(f"{len(chosen)} of {len(wanted)} spans are there", "spans that exist")
+    return chosen
+
+
+def _limits_of_all(labels: Labels, chosen: Sequence[Span], frames: Frames) -> list[Stretch]:
+    """Limits of each span between spans that are not moved, in one pass for thousands."""
+    low_s, high_s = frames.whole
+    moving = {span.id for span in chosen}
+    exclusive = {track.name for track in labels.tracks if track.overlap == "exclusive"}
+    lows, highs = {}, {}
+    wall = dict.fromkeys(exclusive, low_s)
+    for span in labels.spans:
+        if span.id in moving:
+            lows[span.id] = wall.get(span.track, low_s)
+        elif span.track in exclusive:
+            wall[span.track] = max(wall[span.track], span.end_s)
+    wall = dict.fromkeys(exclusive, high_s)
+    for span in reversed(labels.spans):
+        if span.id in moving:
+            highs[span.id] = wall.get(span.track, high_s)
+        elif span.track in exclusive:
+            wall[span.track] = min(wall[span.track], span.start_s)
+    return [(lows[span.id], highs[span.id]) for span in chosen]
+
+
+def _put(span: Span, start_s: float, end_s: float, frames: Frames) -> Span:
+    if not frames.held(start_s, end_s):
+        raise Sd2Error(
+            f"{span.words()} would hold no frame there",
+            "a place where each of the spans holds one",
+            "Move it by itself",
+        )
+    return replace(span, start_s=start_s, end_s=end_s)
+
+
+def _name(verb: str, spans: Sequence[Span]) -> str:
+    return f"{verb} {len(spans)} spans" if len(spans) > 1 else f"{verb} span"

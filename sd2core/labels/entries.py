@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, NonNegativeInt, ValidationError
 
 from sd2core.labels.label_set import Label, LabelSet
-from sd2core.labels.spans import Labels, Origin, Overlap, Span, Track
+from sd2core.labels.spans import Labels, LabelTrack, Origin, Overlap, Span
 
 
 class Entry(BaseModel):
@@ -38,7 +38,7 @@ class LabelSetEntry(Entry):
 
 
 class TrackEntry(Entry):
-    """A :class:`Track`."""
+    """A :class:`LabelTrack`."""
 
     name: str
     overlap: Overlap = "exclusive"
@@ -72,7 +72,7 @@ class LabelsEntry(Entry):
 
     def made(self) -> Labels:
         """The labels themselves."""
-        tracks = tuple(Track(**dict(entry)) for entry in self.tracks)
+        tracks = tuple(LabelTrack(**dict(entry)) for entry in self.tracks)
         return Labels(tracks, tuple(entry.made() for entry in self.spans), self.label_set.made())
 
 
@@ -93,7 +93,7 @@ def span_entry(span: Span, frames: tuple[int, int] | None = None) -> dict[str, A
     return entry
 
 
-def track_entries(tracks: tuple[Track, ...]) -> list[dict[str, Any]]:
+def track_entries(tracks: tuple[LabelTrack, ...]) -> list[dict[str, Any]]:
     """What is written of tracks."""
     return [{"name": track.name, "overlap": track.overlap} for track in tracks]
 

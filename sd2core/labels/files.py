@@ -28,7 +28,7 @@ from sd2core.labels.entries import (
     track_entries,
 )
 from sd2core.labels.label_set import LONGEST_NAME, LabelSet
-from sd2core.labels.spans import Labels, Span, Track
+from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
 
 FILE_NAME = "labels.json"
@@ -163,7 +163,7 @@ def labels_of(spans: Iterable[InlineSpan], track: str = "Gestures") -> Labels:
         Span(k, track, one.start_s, one.end_s, _one_line(one.label), origin="import")
         for k, one in enumerate(ordered, start=1)
     ]
-    return Labels((Track(track, "exclusive" if apart else "free"),), tuple(made))
+    return Labels((LabelTrack(track, "exclusive" if apart else "free"),), tuple(made))
 
 
 def _one_line(label: str) -> str:

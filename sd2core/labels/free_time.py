@@ -1,10 +1,11 @@
-"""Where the edges of a span may be: at frames, inside the recording, not past a neighbour."""
+"""Frame edges and free time: the places that edges of spans can take or snap to."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Collection
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,14 +20,14 @@ Stretch = tuple[float, float]
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """The places where frames begin and end.
+    """Edges of the frames of a recording.
 
     Parameters
     ----------
     times_s : ndarray, shape (T,)
-        Where frames begin.
+        Starts of the frames.
     edges_s : ndarray, shape (T + 1,)
-        The same and the end of the last one.
+        The same and the end of the last frame.
     """
 
     times_s: NDArray[np.float64]
@@ -34,16 +35,16 @@ class Frames:
 
     @classmethod
     def of(cls, timebase: Timebase) -> Frames:
-        """The frames of a recording."""
+        """Return the edges of the frames of a recording."""
         return cls(timebase.times_s, np.append(timebase.times_s, timebase.end_s))
 
     @property
     def whole(self) -> Stretch:
-        """From the start of the recording to its end."""
+        """Start and end of the recording."""
         return float(self.edges_s[0]), float(self.edges_s[-1])
 
     def nearest(self, time_s: float) -> float:
-        """The edge closest to a time (the earlier one on a tie)."""
+        """Return the edge closest to a time (the earlier one on a tie)."""
         if not math.isfinite(time_s):
             raise Sd2Error(f"A span was to begin or end at {time_s} s", "a finite time in seconds")
         after = int(np.searchsorted(self.edges_s, time_s))
@@ -51,7 +52,10 @@ class Frames:
         return float(near[np.argmin(np.abs(near - time_s))])
 
     def stepped(self, time_s: float, frames: int) -> float:
-        """So many edges later, or earlier, held at both ends; the first step goes to an edge."""
+        """Return the time some edges later or earlier, inside the recording.
+
+        A time between two edges goes to an edge with the first step.
+        """
         if frames > 0:
             index = int(np.searchsorted(self.edges_s, time_s, "right")) + frames - 1
         else:
@@ -59,15 +63,15 @@ class Frames:
         return float(self.edges_s[min(max(index, 0), len(self.edges_s) - 1)])
 
     def first_from(self, start_s: float) -> int:
-        """The first frame that begins at ``start_s`` or later; T where there is none."""
+        """Return the first frame that begins at ``start_s`` or later; T where there is none."""
         return int(np.searchsorted(self.times_s, start_s))
 
     def last_before(self, end_s: float) -> int:
-        """The last frame that begins before ``end_s``; -1 where there is none."""
+        """Return the last frame that begins before ``end_s``; -1 where there is none."""
         return int(np.searchsorted(self.times_s, end_s)) - 1
 
     def held(self, start_s: float, end_s: float) -> int:
-        """How many frames begin in ``[start_s, end_s)``."""
+        """Count the frames that begin in ``[start_s, end_s)``."""
         return max(self.last_before(end_s) - self.first_from(start_s) + 1, 0)
 
     def stretch(self, one_s: float, other_s: float) -> Stretch:
@@ -81,10 +85,9 @@ class Frames:
         return float(self.edges_s[first]), float(self.edges_s[first + 1])
 
     def placed(self, start_s: float, duration_s: float, room: Stretch) -> Stretch | None:
-        """A stretch of about this start and duration that stops at the walls of its room.
+        """Place a stretch of a given start and duration inside limits.
 
-        It keeps its duration where frames and walls allow it. None where the room holds
-        no frame.
+        It keeps its duration where frames and limits allow it. None where the limits hold no frame.
         """
         low_s, high_s = room
         if not self.held(low_s, high_s):
@@ -101,8 +104,8 @@ class Frames:
         return float(start_s), float(end_s)
 
 
-def room_around(labels: Labels, span: Span, frames: Frames) -> Stretch:
-    """How far a span can reach: on an exclusive track to its neighbours."""
+def limits_of(labels: Labels, span: Span, frames: Frames) -> Stretch:
+    """Return the times between which a span can be moved: on an exclusive track, its neighbours."""
     low_s, high_s = frames.whole
     if labels.track(span.track).overlap == "exclusive":
         for other in labels.spans:
@@ -117,7 +120,7 @@ def room_around(labels: Labels, span: Span, frames: Frames) -> Stretch:
 
 
 def steps_free(frames: Frames, span: Span, room: Stretch, count: int) -> int:
-    """How many of so many frames a span can be moved by before it meets a wall of its room."""
+    """Limit a move by ``count`` frames to those that a span can make inside its limits."""
     low_s, high_s = room
     if count < 0:
         wall = int(frames.edges_s.searchsorted(low_s))
@@ -131,7 +134,7 @@ def steps_free(frames: Frames, span: Span, room: Stretch, count: int) -> int:
 def free_parts(
     labels: Labels, track: str, wanted: Stretch, ignore: Collection[int] = ()
 ) -> list[Stretch]:
-    """What no span of a track holds of a stretch, in order."""
+    """Return the parts of a stretch that no span of a track covers, in order."""
     parts = []
     low_s, high_s = wanted
     for span in labels.spans:
@@ -146,10 +149,10 @@ def free_parts(
     return parts
 
 
-def clipped(
+def clip_to_free(
     labels: Labels, track: str, wanted: Stretch, frames: Frames, ignore: Collection[int] = ()
 ) -> Stretch:
-    """The longest part of a stretch that a track has room for; all of it where spans may overlap.
+    """Return the longest free part of a stretch; all of it where spans may overlap.
 
     Raises
     ------
@@ -166,3 +169,69 @@ def clipped(
             "Shorten or delete the span there, or take another track",
         )
     return max(parts, key=lambda part: part[1] - part[0])
+
+
+@dataclass(frozen=True)
+class Snap:
+    """Time that a dragged edge snaps to; ``span_id`` is the span whose edge it is."""
+
+    time_s: float
+    at: Literal["frame", "span", "suggestion"]
+    span_id: int | None = None
+
+
+def snap(
+    labels: Labels,
+    timebase: Timebase,
+    time_s: float,
+    within_s: float,
+    *,
+    ignore: Collection[int] = (),
+) -> Snap:
+    """Snap a time to the nearest edge of a span within a distance, else to the nearest frame edge.
+
+    Frames are always near: were they to compete with spans, spans would hardly ever win. Of edges
+    equally near, a span's goes before a suggestion's, then the earlier one.
+
+    Parameters
+    ----------
+    time_s : float
+        Time under the mouse.
+    within_s : float
+        Distance from which a span attracts, some pixels of the time axis; 0: only exact hits.
+    ignore : collection of int
+        Ids of spans that do not attract, such as those being dragged.
+    """
+    nearest = Frames.of(timebase).nearest(time_s)
+    best: tuple[tuple[float, bool, float], Snap] | None = None
+    for span in labels.spans:
+        if span.start_s > time_s + within_s:
+            break
+        if span.end_s < time_s - within_s or span.id in ignore:
+            continue
+        suggested = span.origin == "suggestion"
+        for edge_s in (span.start_s, span.end_s):
+            rank = (abs(edge_s - time_s), suggested, edge_s)
+            if rank[0] <= within_s and (best is None or rank < best[0]):
+                best = rank, Snap(edge_s, "suggestion" if suggested else "span", span.id)
+    return Snap(nearest, "frame") if best is None else best[1]
+
+
+LONGEST_REACTION_S = 1.0
+
+
+def seen_at(
+    labels: Labels, timebase: Timebase, track: str, now_s: float, reaction_s: float
+) -> float:
+    """Return when the event that a key marks was seen: the time of a frame.
+
+    A key is pressed after the event was seen. The time is that of the frame on screen
+    ``reaction_s`` earlier; not before the recording, nor, on an exclusive track, before the end of
+    the span before, and never later than ``now_s``, the frame on screen.
+    """
+    frame = timebase.frame_at(now_s - reaction_s)
+    if labels.track(track).overlap == "exclusive":
+        ends_s = [one.end_s for one in labels.of_track(track) if one.end_s <= now_s]
+        # An import's edge may be between two frames.
+        frame = max(frame, Frames.of(timebase).first_from(max(ends_s))) if ends_s else frame
+    return min(timebase.time_of(frame), now_s)

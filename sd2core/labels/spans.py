@@ -29,7 +29,7 @@ class Span:
     id : int
         At least 1; unique within the labels of a recording, and kept by edits.
     track : str
-        Name of a :class:`Track`.
+        Name of a :class:`LabelTrack`.
     start_s, end_s : float
         On the clock of the recording; ``start_s < end_s``.
     label : str
@@ -84,7 +84,7 @@ class Span:
 
 
 @dataclass(frozen=True)
-class Track:
+class LabelTrack:
     """A row of spans.
 
     Parameters
@@ -112,7 +112,7 @@ class Labels:
 
     Parameters
     ----------
-    tracks : tuple of Track
+    tracks : tuple of LabelTrack
         From top to bottom; names differ.
     spans : tuple of Span
         Kept in the order of start, end and id. Each is on one of the tracks, ids differ,
@@ -125,7 +125,7 @@ class Labels:
         When any of this does not hold; the message names the spans.
     """
 
-    tracks: tuple[Track, ...] = (Track("Gestures"),)
+    tracks: tuple[LabelTrack, ...] = (LabelTrack("Gestures"),)
     spans: tuple[Span, ...] = ()
     label_set: LabelSet = field(default=GESTURES)
 
@@ -181,7 +181,7 @@ class Labels:
             self.span(missing)
         return found
 
-    def track(self, name: str) -> Track:
+    def track(self, name: str) -> LabelTrack:
         """The track of that name; it must exist."""
         for track in self.tracks:
             if track.name == name:

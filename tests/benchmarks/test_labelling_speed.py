@@ -18,9 +18,9 @@ from labelled import even, many_spans
 
 from sd2core.labels.edits import create, delete, move, nudge, resize, split
 from sd2core.labels.files import read_labels, write_labels
+from sd2core.labels.free_time import snap
 from sd2core.labels.journal import Journal
 from sd2core.labels.recovery import RecoveryPlace
-from sd2core.labels.snapping import snap
 from sd2core.labels.spans import Labels
 
 SPANS = 10_000

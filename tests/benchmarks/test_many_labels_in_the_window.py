@@ -27,7 +27,7 @@ from PySide6.QtWidgets import QApplication
 from sd2core.io.mesh import save_mesh
 from sd2core.labels.files import write_labels
 from sd2core.labels.label_set import GESTURES
-from sd2core.labels.spans import Labels, Span, Track
+from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.recording.recording import Recording
 from sd2core.timebase import Timebase
@@ -54,7 +54,7 @@ def ten_thousand() -> Labels:
         Span(number, track, base.time_of(a), base.time_of(b), NAMES[number % len(NAMES)])
         for number, (track, a, b) in enumerate(places, start=1)
     )
-    return Labels((Track("Gestures"), Track("Hands", "free")), tuple(spans))
+    return Labels((LabelTrack("Gestures"), LabelTrack("Hands", "free")), tuple(spans))
 
 
 @pytest.fixture(scope="module")

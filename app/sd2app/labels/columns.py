@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from sd2core.errors import Sd2Error
-from sd2core.labels import edits, span_fields
+from sd2core.labels import edits, field_edits
 from sd2core.labels.edits import Edit, Side
 from sd2core.labels.spans import Labels, Span
 from sd2core.labels.typed_times import typed_duration_end, typed_end, typed_start
@@ -95,19 +95,19 @@ def _frames(span: Span, timebase: Timebase) -> str:
 
 
 def _label(text: str, spans: Sequence[Span]) -> Change:
-    return lambda labels, _: span_fields.relabel(labels, [one.id for one in spans], text)
+    return lambda labels, _: field_edits.relabel(labels, [one.id for one in spans], text)
 
 
 def _track(text: str, spans: Sequence[Span]) -> Change:
-    return lambda labels, _: span_fields.set_track(labels, [one.id for one in spans], text)
+    return lambda labels, _: field_edits.set_track(labels, [one.id for one in spans], text)
 
 
 def _note(text: str, spans: Sequence[Span]) -> Change:
-    return lambda labels, _: span_fields.set_note(labels, [spans[0].id], text.strip())
+    return lambda labels, _: field_edits.set_note(labels, [spans[0].id], text.strip())
 
 
 def _author(text: str, spans: Sequence[Span]) -> Change:
-    return lambda labels, _: span_fields.set_author(labels, [spans[0].id], text.strip())
+    return lambda labels, _: field_edits.set_author(labels, [spans[0].id], text.strip())
 
 
 def _confidence(text: str, spans: Sequence[Span]) -> Change:
@@ -120,7 +120,7 @@ def _confidence(text: str, spans: Sequence[Span]) -> Change:
             raise Sd2Error(
                 f"{text[:40]!r} was typed as a confidence", "a number from 0 to 1, or nothing"
             ) from None
-        return span_fields.set_confidence(labels, [spans[0].id], confidence)
+        return field_edits.set_confidence(labels, [spans[0].id], confidence)
 
     return change
 

@@ -11,9 +11,8 @@ from sd2app.labels.model import LabelsModel
 from sd2app.session.playback import PlaybackModel
 from sd2core.errors import Sd2Error
 from sd2core.labels import edits
-from sd2core.labels.edits import Edit, Side
-from sd2core.labels.group_edits import move_together
-from sd2core.labels.snapping import snap
+from sd2core.labels.edits import Edit, Side, move_together
+from sd2core.labels.free_time import snap
 from sd2core.labels.spans import Labels
 
 
@@ -82,7 +81,7 @@ class LabelDragging(QObject):
     ) -> None:
         """The hand draws a span from one time to another; ``cutting`` what is in its way."""
         one_s, other_s = (self._snapped(time_s, within_s) for time_s in (from_s, to_s))
-        label, make = self._labels.label, edits.carve if cutting else edits.create
+        label, make = self._labels.label, edits.overwrite if cutting else edits.create
         self._drag(lambda labels, base: make(labels, base, track, one_s, other_s, label))
 
     def end_drag(self) -> None:

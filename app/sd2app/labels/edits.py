@@ -13,10 +13,9 @@ from sd2app.labels.model import LabelsModel
 from sd2app.session.document import DocumentModel
 from sd2app.session.playback import PlaybackModel
 from sd2core.errors import Sd2Error
-from sd2core.labels import edits, span_fields
+from sd2core.labels import edits, field_edits
 from sd2core.labels.comparison import changed_stretch
-from sd2core.labels.edits import Edit, Side
-from sd2core.labels.group_edits import duplicate_together, nudge_together
+from sd2core.labels.edits import Edit, Side, duplicate_together, nudge_together
 from sd2core.labels.spans import Labels, Span
 from sd2core.timebase import Timebase
 
@@ -81,7 +80,7 @@ class LabelEdits(QObject):
         """Give the selected spans another label."""
         self._labels.set_label(label)
         ids = self._ids()
-        self.apply(lambda labels, base: span_fields.relabel(labels, ids, label))
+        self.apply(lambda labels, base: field_edits.relabel(labels, ids, label))
 
     def edge_here(self, side: Side) -> None:
         """Put an edge of the selected span at the frame on screen."""
@@ -132,7 +131,7 @@ class LabelEdits(QObject):
         """Let the two selected neighbours meet at the frame on screen."""
         ids, now_s = self._ids(), self._now_s
         if len(ids) == 2:
-            self.apply(lambda labels, base: edits.meet(labels, base, ids[0], ids[1], now_s))
+            self.apply(lambda labels, base: edits.join_at(labels, base, ids[0], ids[1], now_s))
 
     def fill_gaps(self) -> None:
         """Make a span of background in every gap of the track."""

@@ -11,9 +11,9 @@ from PySide6.QtWidgets import QColorDialog, QFileDialog, QWidget
 from sd2app.labels.columns import Change
 from sd2app.labels.model import LabelsModel
 from sd2core.errors import Sd2Error
+from sd2core.labels.field_edits import set_label_set
 from sd2core.labels.files import read_label_set, write_label_set
 from sd2core.labels.label_set import GESTURES, LabelSet
-from sd2core.labels.label_set_edits import set_label_set
 
 _FILES = "Label set (*.json);;All files (*)"
 

@@ -15,8 +15,7 @@ from sd2app.shell.keys.bindings import KeyBindings
 from sd2app.widgets.icons import swatch_icon
 from sd2app.widgets.key_text import canonical, native
 from sd2core.labels.colours import OFFERED, Alike, alike
-from sd2core.labels.label_set import Label, LabelSet
-from sd2core.labels.label_set_edits import (
+from sd2core.labels.field_edits import (
     CLASSES,
     add_label,
     move_label,
@@ -28,6 +27,7 @@ from sd2core.labels.label_set_edits import (
     set_key,
     set_label_set,
 )
+from sd2core.labels.label_set import Label, LabelSet
 
 Index = QModelIndex | QPersistentModelIndex
 

@@ -9,7 +9,7 @@ from sd2app.labels.model import LabelsModel, Mark
 from sd2app.labels.reaction import ReactionModel
 from sd2app.session.playback import PlaybackModel
 from sd2core.labels import edits
-from sd2core.labels.reaction import seen_at
+from sd2core.labels.free_time import seen_at
 
 
 class LabelMarking(QObject):
@@ -71,7 +71,7 @@ class LabelMarking(QObject):
 
     def _end(self, mark: Mark, seen_s: float, *, cutting: bool = False) -> None:
         self._labels.set_marks(one for one in self._labels.marks if one != mark)
-        make = edits.carve if cutting else edits.create
+        make = edits.overwrite if cutting else edits.create
         # A reaction does not end what had not begun; going back and ending it there does.
         went_back = self._playback.time_s < mark.start_s
         end_s = seen_s if went_back else max(mark.start_s, seen_s)

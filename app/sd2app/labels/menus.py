@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QMenu
 
 from sd2app.labels.model import LabelsModel
 from sd2app.labels.reaction import OFFERED_MS, ReactionModel
-from sd2core.labels.spans import Track
+from sd2core.labels.spans import LabelTrack
 
 
 class TrackMenu:
@@ -19,7 +19,7 @@ class TrackMenu:
         self._menu, self._labels = menu, labels
         self._group = QActionGroup(menu)
         self._first = menu.addSeparator()
-        self._shown: tuple[Track, ...] = ()
+        self._shown: tuple[LabelTrack, ...] = ()
         labels.changed.connect(self._follow)
         labels.selection_changed.connect(self._check)
         self._follow()
@@ -35,7 +35,7 @@ class TrackMenu:
             self._menu.insertActions(self._first, [self._made(track) for track in tracks])
         self._check()
 
-    def _made(self, track: Track) -> QAction:
+    def _made(self, track: LabelTrack) -> QAction:
         # An ampersand would underline what comes after it.
         action = QAction(track.name.replace("&", "&&"), self._menu)
         action.setCheckable(True)

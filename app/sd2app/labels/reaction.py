@@ -5,7 +5,7 @@ from __future__ import annotations
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.settings import Settings
-from sd2core.labels.reaction import LONGEST_REACTION_S
+from sd2core.labels.free_time import LONGEST_REACTION_S
 
 LONGEST_MS = round(1000 * LONGEST_REACTION_S)
 OFFERED_MS = (0, 100, 150, 200, 250, 300, 400)

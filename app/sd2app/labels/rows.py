@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from sd2app.labels.arrays import SpanArrays
 from sd2app.labels.model import Mark
-from sd2core.labels.spans import Track
+from sd2core.labels.spans import LabelTrack
 
 ROW_PX = 24.0
 """Of a track whose spans do not overlap."""
@@ -51,7 +51,9 @@ class LabelRows:
     mark_lanes: tuple[int, ...]
 
     @classmethod
-    def of(cls, tracks: Sequence[Track], arrays: SpanArrays, marks: Sequence[Mark]) -> LabelRows:
+    def of(
+        cls, tracks: Sequence[LabelTrack], arrays: SpanArrays, marks: Sequence[Mark]
+    ) -> LabelRows:
         """A track is as high as it needs to be for its lanes, up to a limit."""
         counts = list(arrays.lanes_of_track)
         numbers = {track.name: number for number, track in enumerate(tracks)}

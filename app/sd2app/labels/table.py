@@ -18,7 +18,7 @@ from sd2app.session.playback import PlaybackModel
 from sd2app.session.time_window import VisibleSpanModel
 from sd2app.settings import Settings
 from sd2app.widgets.cell_table import CellTable
-from sd2core.labels import span_fields
+from sd2core.labels import field_edits
 
 _PADDING_PX = 12
 _HIDDEN = "span_table/hidden"
@@ -202,7 +202,7 @@ class SpanTable(CellTable):
 
     def _put_on_track(self, track: str) -> None:
         ids = [span.id for span in self._labels.selected]
-        self._edits.apply(lambda labels, _: span_fields.set_track(labels, ids, track))
+        self._edits.apply(lambda labels, _: field_edits.set_track(labels, ids, track))
 
 
 def _called(run: Callable[[str], object], choice: str) -> Callable[..., object]:

@@ -6,7 +6,7 @@ from typing import Literal
 
 from sd2app.labels.edits import LabelEdits
 from sd2app.labels.model import LabelsModel
-from sd2core.labels import span_fields, track_edits
+from sd2core.labels import field_edits
 from sd2core.labels.spans import Overlap
 
 
@@ -37,7 +37,7 @@ class LabelTracks:
 
     def add(self, name: str, overlap: Overlap) -> bool:
         """Add a track, and let new spans come there; False where it was refused."""
-        done = self._edits.apply(lambda labels, _: track_edits.add_track(labels, name, overlap))
+        done = self._edits.apply(lambda labels, _: field_edits.add_track(labels, name, overlap))
         if done:
             self._labels.set_track(name)
         return done
@@ -45,7 +45,7 @@ class LabelTracks:
     def rename(self, name: str) -> bool:
         """Give the track another name; False where it was refused."""
         old = self._labels.track
-        done = self._edits.apply(lambda labels, _: track_edits.rename_track(labels, old, name))
+        done = self._edits.apply(lambda labels, _: field_edits.rename_track(labels, old, name))
         if done:
             self._labels.set_track(name)
         return done
@@ -53,19 +53,19 @@ class LabelTracks:
     def remove(self) -> bool:
         """Remove the track with its spans; False where it was refused."""
         gone = self._labels.track
-        return self._edits.apply(lambda labels, _: track_edits.remove_track(labels, gone))
+        return self._edits.apply(lambda labels, _: field_edits.remove_track(labels, gone))
 
     def move(self, towards: Literal[-1, 1]) -> None:
         """Put the track above the one before it, or below the one after."""
         track, place = self._labels.track, self._place + towards
         if 0 <= place < len(self._names):
-            self._edits.apply(lambda labels, _: track_edits.move_track(labels, track, place))
+            self._edits.apply(lambda labels, _: field_edits.move_track(labels, track, place))
 
     def toggle_overlap(self) -> None:
         """Let spans of the track overlap, or no longer."""
         track = self._labels.track
         overlap: Overlap = "exclusive" if self.free else "free"
-        self._edits.apply(lambda labels, _: track_edits.set_overlap(labels, track, overlap))
+        self._edits.apply(lambda labels, _: field_edits.set_overlap(labels, track, overlap))
 
     def put_spans(self, towards: Literal[-1, 1]) -> None:
         """Put the selected spans on the track below theirs, or above."""
@@ -73,7 +73,7 @@ class LabelTracks:
         place = names.index(chosen[0].track) + towards if chosen else -1
         if 0 <= place < len(names):
             ids = [span.id for span in chosen]
-            self._edits.apply(lambda labels, _: span_fields.set_track(labels, ids, names[place]))
+            self._edits.apply(lambda labels, _: field_edits.set_track(labels, ids, names[place]))
             self._labels.set_track(self._labels.selected[0].track)
 
     @property

@@ -13,9 +13,9 @@ from sd2app.session.playback import PlaybackModel
 from sd2app.session.tracks import TrackModel
 from sd2app.suggestions.finders import Found, SpanFinder, Threshold
 from sd2core.labels.edits import Edit
+from sd2core.labels.field_edits import offer, pending, reject, take
 from sd2core.labels.spans import Labels, Span
 from sd2core.labels.suggest import LABEL, TRACK
-from sd2core.labels.suggestion_edits import offer, pending, take, turn_down
 from sd2core.timebase import Timebase
 
 Apply = Callable[[Callable[[Labels, Timebase], Edit]], bool]
@@ -232,7 +232,7 @@ class SuggestionsModel(QObject):
         if not spans:
             return
         ids = [span.id for span in spans]
-        if self._apply(lambda labels, base: turn_down(labels, ids)):
+        if self._apply(lambda labels, base: reject(labels, ids)):
             self._declined = (*self._declined, *spans)
             self._go_on(spans[-1].start_s)
 

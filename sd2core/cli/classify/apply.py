@@ -76,7 +76,7 @@ def _apply(options: argparse.Namespace) -> None:
     from sd2core.classify.spans import SpanOptions, predicted_spans
     from sd2core.cli.reading import check_output
     from sd2core.denoise.resample_to_model import check_bins
-    from sd2core.labels.spans import Labels, Track
+    from sd2core.labels.spans import Labels, LabelTrack
     from sd2core.labels.suggest import TRACK
 
     if options.out is not None:
@@ -95,7 +95,7 @@ def _apply(options: argparse.Namespace) -> None:
     )
     lost: list[str] = []
     if options.out is not None:
-        lost = write(options.out, Labels((Track(TRACK),), spans), clock)
+        lost = write(options.out, Labels((LabelTrack(TRACK),), spans), clock)
     if options.probabilities is not None:
         _write_probabilities(options.probabilities, probabilities, doppler.times_s, card.classes)
     if options.json:

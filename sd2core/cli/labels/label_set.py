@@ -62,7 +62,7 @@ def add_set(kinds: argparse._SubParsersAction) -> None:
 
 def _set(options: argparse.Namespace) -> None:
     from sd2core.labels import files
-    from sd2core.labels.label_set_edits import set_label_set
+    from sd2core.labels.field_edits import set_label_set
 
     if (options.use is None) != (options.out is None):
         raise Sd2Error("One of --use and --out is given", "both of them, or none")

@@ -67,7 +67,7 @@ def add_suggest(kinds: argparse._SubParsersAction) -> None:
 
 
 def _suggest(options: argparse.Namespace) -> None:
-    from sd2core.labels.spans import Labels, Track
+    from sd2core.labels.spans import Labels, LabelTrack
     from sd2core.labels.suggest import TRACK, SuggestOptions, motion_energy_db, suggest_spans
 
     if options.out is not None:
@@ -85,7 +85,7 @@ def _suggest(options: argparse.Namespace) -> None:
     loudest_db = float(max((value for value in energy_db.tolist() if value == value), default=0.0))
     lost: list[str] = []
     if options.out is not None:
-        lost = write(options.out, Labels((Track(TRACK),), spans), clock)
+        lost = write(options.out, Labels((LabelTrack(TRACK),), spans), clock)
     if options.json:
         print_json(
             {

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.labels.label_set import LONGEST_NAME, Label, LabelSet
-from sd2core.labels.spans import Labels, Span, Track
+from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import runs
 from sd2core.sensor import VelocityAxis
@@ -172,7 +172,7 @@ def _labels(marks: NDArray[np.bool_], timebase: Timebase, gesture: str) -> Label
         for number, (start, stop) in enumerate(runs(marks), start=1)
     )
     label_set = LabelSet(TRACK, (Label(gesture, _COLOUR, gesture_class=gesture),))
-    return Labels((Track(TRACK),), spans, label_set)
+    return Labels((LabelTrack(TRACK),), spans, label_set)
 
 
 def _clock(counts: NDArray[np.int64] | None, frames: int) -> tuple[Timebase, tuple[str, ...]]:

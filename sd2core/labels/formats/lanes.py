@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
-from sd2core.labels.spans import Labels, Overlap, Span, Track
+from sd2core.labels.spans import Labels, LabelTrack, Overlap, Span
 
 _ROW = re.compile(r"(.+) \[overlap (\d+)\]")
 
@@ -25,7 +25,7 @@ class Lane:
     """Spans that do not overlap, in order, and what their row is called in a file."""
 
     name: str
-    track: Track
+    track: LabelTrack
     spans: tuple[Span, ...]
 
 

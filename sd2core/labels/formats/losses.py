@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from sd2core.labels.label_set import GESTURES
-from sd2core.labels.spans import Labels, Span, Track
+from sd2core.labels.spans import Labels, LabelTrack, Span
 
 Aspect = Literal[
     "tracks", "overlap", "empty tracks", "ids", "notes", "authors", "confidence", "origin",
@@ -94,7 +94,7 @@ def losses_by_format(labels: Labels, file_format: LabelFormat) -> list[Loss]:
     if names != {DEFAULT_TRACK}:
         become = f"{len(names)} tracks become one" if len(names) > 1 else "its name is left out"
         leave_out("tracks", len(names), f"{title} keeps no tracks: {become}")
-    if "tracks" in file_format.keeps and labels.tracks != (Track(DEFAULT_TRACK),):
+    if "tracks" in file_format.keeps and labels.tracks != (LabelTrack(DEFAULT_TRACK),):
         empty = sum(not labels.of_track(track.name) for track in labels.tracks)
         words = f"{title} keeps no tracks without spans: {_of(empty, 'track')} left out"
         leave_out("empty tracks", empty, words)

@@ -9,7 +9,7 @@ from pathlib import Path
 from sd2core.errors import Sd2Error
 from sd2core.labels.formats.losses import DEFAULT_TRACK
 from sd2core.labels.label_set import GESTURES, LONGEST_NAME, LabelSet
-from sd2core.labels.spans import ORIGINS, Labels, Origin, Overlap, Span, Track
+from sd2core.labels.spans import ORIGINS, Labels, LabelTrack, Origin, Overlap, Span
 from sd2core.timebase import Timebase
 
 UNNAMED = "unnamed"
@@ -77,7 +77,7 @@ def assemble(
         overlaps[DEFAULT_TRACK] = None
     crowded = _with_overlap(spans)
     made = tuple(
-        Track(name, "free" if name in crowded else overlap or "exclusive")
+        LabelTrack(name, "free" if name in crowded else overlap or "exclusive")
         for name, overlap in overlaps.items()
     )
     return Labels(made, spans, label_set)

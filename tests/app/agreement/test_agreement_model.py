@@ -12,7 +12,7 @@ from sd2app.labels.model import LabelsModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.time_window import VisibleSpanModel
 from sd2core.labels.formats import write_labels
-from sd2core.labels.spans import Labels, Span, Track
+from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
 
 FRAMES = Timebase.regular(100, 10.0)
@@ -20,7 +20,7 @@ FRAMES = Timebase.regular(100, 10.0)
 
 def of(*spans: tuple[float, float, str], track: str = "Gestures") -> Labels:
     made = [Span(k, track, *span) for k, span in enumerate(spans, start=1)]
-    return Labels((Track(track),), tuple(made))
+    return Labels((LabelTrack(track),), tuple(made))
 
 
 MINE = of((1.0, 2.0, "wave"), (4.0, 5.0, "up-to-down"))

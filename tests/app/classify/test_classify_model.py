@@ -17,7 +17,7 @@ from sd2app.session.tracks import TrackModel
 from sd2app.settings import Settings
 from sd2core.errors import Sd2Error
 from sd2core.labels.label_set import Label, LabelSet
-from sd2core.labels.spans import Labels, Track
+from sd2core.labels.spans import Labels, LabelTrack
 from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
@@ -149,7 +149,7 @@ def test_a_class_is_called_by_its_label_where_there_is_one(set_up):
             Label("down", "#112233", "", "vertical"),
         ),
     )
-    set_up.labels.open(Labels((Track("Gestures"),), (), offered))
+    set_up.labels.open(Labels((LabelTrack("Gestures"),), (), offered))
     assert model.label_of("horizontal") == "wave"
     assert model.label_of("vertical") == "vertical"
     assert model.label_of("background") == "background"

@@ -10,16 +10,16 @@ import pytest
 from sd2app.labels.export_model import LabelExportModel, Written
 from sd2app.labels.import_model import LabelImportModel, is_label_file
 from sd2core.labels.formats import read_labels, write_labels
-from sd2core.labels.spans import Labels, Span, Track
+from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
 
 FRAMES = Timebase.regular(100, 10.0)
-HERE = Labels((Track("Gestures"),), (Span(7, "Gestures", 1.0, 2.0, "up-to-down", note="n"),))
+HERE = Labels((LabelTrack("Gestures"),), (Span(7, "Gestures", 1.0, 2.0, "up-to-down", note="n"),))
 
 
 def of(*spans: tuple[float, float, str]) -> Labels:
     made = [Span(k, "Ben", *span) for k, span in enumerate(spans, start=1)]
-    return Labels((Track("Ben"),), tuple(made))
+    return Labels((LabelTrack("Ben"),), tuple(made))
 
 
 @pytest.fixture

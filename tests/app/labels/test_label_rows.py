@@ -5,9 +5,9 @@ from __future__ import annotations
 from sd2app.labels.arrays import SpanArrays
 from sd2app.labels.model import Mark
 from sd2app.labels.rows import ROW_PX, LabelRows
-from sd2core.labels.spans import Labels, Span, Track
+from sd2core.labels.spans import Labels, LabelTrack, Span
 
-TRACKS = (Track("One"), Track("Many", "free"), Track("Last"))
+TRACKS = (LabelTrack("One"), LabelTrack("Many", "free"), LabelTrack("Last"))
 
 
 def rows_of(labels: Labels, *marks: Mark) -> LabelRows:

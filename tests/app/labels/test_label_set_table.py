@@ -19,7 +19,7 @@ from sd2app.settings import Settings
 from sd2app.shell.keys.bindings import KeyBindings
 from sd2core.errors import Sd2Error
 from sd2core.labels.label_set import GESTURES
-from sd2core.labels.spans import Labels, Span, Track
+from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
 
 
@@ -36,7 +36,7 @@ class Edited:
         self.model = LabelSetModel(self.labels, keys, self.apply)
         self.labels.open(
             Labels(
-                (Track("Gestures"),),
+                (LabelTrack("Gestures"),),
                 (
                     Span(1, "Gestures", 1.0, 2.0, "up-to-down"),
                     Span(2, "Gestures", 3.0, 4.0, "up-to-down"),

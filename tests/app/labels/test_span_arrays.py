@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sd2app.labels.arrays import SpanArrays
-from sd2core.labels.spans import Labels, Span, Track
+from sd2core.labels.spans import Labels, LabelTrack, Span
 
-TRACKS = (Track("Left", "free"), Track("Right", "free"))
+TRACKS = (LabelTrack("Left", "free"), LabelTrack("Right", "free"))
 NAMES = ("left-to-right", "up-to-down", "nobody's")
 
 placed = st.tuples(

@@ -14,7 +14,7 @@ from sd2app.labels.model import LabelsModel
 from sd2app.labels.table_model import SpanFilter, SpanTableModel
 from sd2app.session.playback import PlaybackModel
 from sd2core.errors import Sd2Error
-from sd2core.labels.spans import Labels, Span, Track
+from sd2core.labels.spans import Labels, LabelTrack, Span
 
 AT = {column.id: place for place, column in enumerate(COLUMNS)}
 FALLING = Qt.SortOrder.DescendingOrder
@@ -57,7 +57,7 @@ def table():
     made = Table()
     made.labels.open(
         Labels(
-            (Track("Gestures"), Track("Free", "free")),
+            (LabelTrack("Gestures"), LabelTrack("Free", "free")),
             (
                 Span(1, "Gestures", 1.0, 2.0, "left-to-right", note="quick"),
                 Span(2, "Gestures", 3.0, 5.0, "up-to-down", author="Anna"),

@@ -14,7 +14,7 @@ from sd2app.session.playback import PlaybackModel
 from sd2app.session.tracks import TrackModel
 from sd2app.suggestions.finders import Found, MotionFinder, Threshold
 from sd2app.suggestions.model import SuggestionsModel
-from sd2core.labels.spans import Labels, Span, Track
+from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
@@ -60,7 +60,7 @@ def set_up(qtbot):
     session = SimpleNamespace(refusal="", keep=lambda *_: None)
     labels, playback = LabelsModel(), PlaybackModel()
     playback.set_timebase(Timebase.regular(600, RATE))
-    labels.open(Labels((Track("Gestures"),), (Span(1, "Gestures", 20.0, 21.0, "up-to-down"),)))
+    labels.open(Labels((LabelTrack("Gestures"),), (Span(1, "Gestures", 20.0, 21.0, "up-to-down"),)))
     real = TrackModel("Real")
     real.set_map(moving((100, 130, 100.0), (200, 230, 20.0), (300, 330, 100.0), (400, 420, 100.0)))
     edits = LabelEdits(document, labels, playback, session)
@@ -199,7 +199,7 @@ def test_without_a_map_there_is_nothing_to_look_in(set_up) -> None:
 
 def test_suggestions_of_a_file_are_to_be_decided_on_without_looking(set_up) -> None:
     offered = Span(5, "Gestures", 3.0, 4.0, "background", confidence=0.5, origin="suggestion")
-    set_up.labels.open(Labels((Track("Gestures"),), (offered,)))
+    set_up.labels.open(Labels((LabelTrack("Gestures"),), (offered,)))
     seen = []
     set_up.model.changed.connect(lambda: seen.append(set_up.model.active))
     set_up.model.open()

@@ -23,7 +23,7 @@ from sd2core.classify.data import (
 from sd2core.classify.splitting import fold, movements, split_clips
 from sd2core.errors import Sd2Error
 from sd2core.labels.label_set import Label, LabelSet
-from sd2core.labels.spans import Labels, Span, Track
+from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.pairs.store import PairSet, Take
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
@@ -85,7 +85,7 @@ def labels(*spans: tuple[str, float, float], origin="person", classes=True) -> L
         ),
     )
     return Labels(
-        (Track("one", "free"),),
+        (LabelTrack("one", "free"),),
         tuple(
             Span(number, "one", start_s, end_s, name, origin=origin)
             for number, (name, start_s, end_s) in enumerate(spans, start=1)

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from sd2core.classify.spans import SpanOptions, predicted_spans
 from sd2core.errors import Sd2Error
+from sd2core.labels.field_edits import offer
 from sd2core.labels.spans import Labels
 from sd2core.labels.suggest import TRACK
-from sd2core.labels.suggestion_edits import offer
 from sd2core.timebase import Timebase
 
 CLASSES = ("background", "horizontal", "vertical")

@@ -12,7 +12,7 @@ from cli_outcome import Sd2
 from sd2core.labels import files
 from sd2core.labels.formats import FORMATS, read_labels
 from sd2core.labels.label_set import Label, LabelSet
-from sd2core.labels.spans import Labels, Span, Track
+from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.maps import DopplerMap
 from sd2core.recording.recording import Recording
 from sd2core.sensor import VelocityAxis
@@ -24,7 +24,7 @@ def written(path: Path, *spans: tuple[float, float, str]) -> Path:
         Span(number, "Gestures", start_s, end_s, label, note=f"n{number}")
         for number, (start_s, end_s, label) in enumerate(spans, start=1)
     ]
-    files.write_labels(path, Labels((Track("Gestures"),), tuple(made)))
+    files.write_labels(path, Labels((LabelTrack("Gestures"),), tuple(made)))
     return path
 
 

@@ -27,7 +27,7 @@ from sd2core.errors import Sd2Error
 from sd2core.fmcw.processing import doppler_map
 from sd2core.labels.files import write_labels
 from sd2core.labels.label_set import Label, LabelSet
-from sd2core.labels.spans import Labels, Span, Track
+from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.pairs.store import read_pairs
 from sd2core.placements.body_extent import BodyExtent
 from sd2core.placements.placements import PlacementGrid
@@ -119,7 +119,7 @@ def test_a_tolerance_chooses_a_plan_and_says_so(
 def test_suggestions_are_no_labels_and_classes_come_from_the_label_set(tmp_path: Path) -> None:
     one = recording(tmp_path / "anna.sd2", radar=False)
     one.labels = Labels(
-        (Track("Gestures"),),
+        (LabelTrack("Gestures"),),
         (
             Span(1, "Gestures", 0.5, 1.0, "swing"),
             Span(2, "Gestures", 2.0, 2.5, "swing", origin="suggestion"),
@@ -168,7 +168,7 @@ def test_people_of_two_stores_are_different_people(tmp_path: Path) -> None:
 def test_a_map_is_labelled_by_a_file(tmp_path: Path) -> None:
     one = recording(tmp_path / "anna.sd2", radar=False)
     Synthesizer(one.load_mesh(), PRESETS["paper"]).map(one.sensor).save(tmp_path / "map.npz")
-    labels = Labels((Track("Gestures"),), (Span(1, "Gestures", 1.0, 2.0, "swing"),), SWINGS)
+    labels = Labels((LabelTrack("Gestures"),), (Span(1, "Gestures", 1.0, 2.0, "swing"),), SWINGS)
     write_labels(tmp_path / "labels.json", labels)
     (source,) = made(tmp_path / "map.npz", label_files=[tmp_path / "labels.json"])
     assert source.labels == ("background", "swing")

@@ -8,13 +8,13 @@ import pytest
 from sd2core.errors import Sd2Error
 from sd2core.figures.maps import Levels, MapRow, draw_maps, save_maps
 from sd2core.figures.spans import lanes_of
-from sd2core.labels.spans import Labels, Span, Track
+from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 
 LABELS = Labels(
-    (Track("Hands"), Track("Both & one", "free"), Track("Empty")),
+    (LabelTrack("Hands"), LabelTrack("Both & one", "free"), LabelTrack("Empty")),
     (
         Span(1, "Hands", 1.0, 4.0, "up-to-down"),
         Span(2, "Both & one", 2.0, 3.0, "a $\\odd name$"),
@@ -95,7 +95,7 @@ def test_spans_too_narrow_to_tell_apart_are_plain_and_leave_the_maps_alone(row) 
     crowd = tuple(
         Span(k + 1, "Hands", k * 0.01, k * 0.01 + 0.005, "up-to-down") for k in range(900)
     )
-    labels = Labels((Track("Hands"),), (*crowd, Span(999, "Hands", 9.2, 9.8, "down-to-up")))
+    labels = Labels((LabelTrack("Hands"),), (*crowd, Span(999, "Hands", 9.2, 9.8, "down-to-up")))
     figure = draw_maps([row], Levels(), start_s=0.0, end_s=10.0, labels=labels)
     maps, lanes = figure.axes[:2]
     assert [len(one.get_segments()) for one in maps.collections[-2:]] == [1, 1]

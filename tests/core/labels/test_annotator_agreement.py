@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from sd2core.errors import Sd2Error
 from sd2core.labels.agreement import Kappa, agreement, frame_agreement
 from sd2core.labels.matching import match_spans
-from sd2core.labels.spans import Labels, Span, Track
+from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
 
 CLOCK = Timebase.regular(100, 10.0)
-FREE = (Track("T", "free"), Track("U", "free"))
+FREE = (LabelTrack("T", "free"), LabelTrack("U", "free"))
 
 
 def span(number: int, start_s: float, end_s: float, label: str = "x", track: str = "T") -> Span:
@@ -226,7 +226,7 @@ def test_one_track_alone_may_be_compared() -> None:
     assert agreement(a, b, CLOCK, track="T").frames.overall.value == 1.0
     assert agreement(a, b, CLOCK).frames.overall.value != 1.0
     with pytest.raises(Sd2Error, match="The second labels have no track 'T'"):
-        agreement(a, Labels((Track("V"),)), CLOCK, track="T")
+        agreement(a, Labels((LabelTrack("V"),)), CLOCK, track="T")
 
 
 @pytest.mark.parametrize("min_iou", [0.0, -0.5, 1.01, float("nan")])

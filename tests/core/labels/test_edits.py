@@ -11,20 +11,19 @@ from hypothesis import strategies as st
 from sd2core.errors import Sd2Error
 from sd2core.labels.edits import (
     Edit,
-    carve,
     create,
     delete,
     duplicate,
     fill_gaps,
-    meet,
+    join_at,
     merge,
     move,
     nudge,
-    nudge_edge,
+    overwrite,
     resize,
     split,
 )
-from sd2core.labels.spans import Labels, Span, Track
+from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
 
 FRAMES = Timebase.regular(100, 10.0)  # 0 to 10 s
@@ -34,7 +33,7 @@ JUMPY = Timebase([0.0, 0.1, 0.2, 1.0, 1.1, 3.0, 3.1, 3.2])  # until 3.3 s
 def labels_of(*stretches: tuple[float, float], overlap: str = "exclusive") -> Labels:
     """Spans 1, 2, … on one track."""
     spans = [Span(k + 1, "Gestures", a, b, f"label {k + 1}") for k, (a, b) in enumerate(stretches)]
-    return Labels((Track("Gestures", overlap), Track("Other")), tuple(spans))  # type: ignore[arg-type]
+    return Labels((LabelTrack("Gestures", overlap), LabelTrack("Other")), tuple(spans))  # type: ignore[arg-type]
 
 
 def times(edit: Edit | Labels, track: str = "Gestures") -> list[tuple[float, float]]:
@@ -116,12 +115,6 @@ class TestResize:
         labels = labels_of((0.0, 1.0))
         assert times(resize(labels, JUMPY, 1, "end", 2.2)) == [(0.0, 3.0)]
         assert times(resize(labels, JUMPY, 1, "start", 0.7)) == [(0.2, 1.0)]
-
-    def test_by_frames(self) -> None:
-        assert times(nudge_edge(TWO, FRAMES, 1, "end", 3))[0] == (1.0, 2.3)
-        assert times(nudge_edge(TWO, FRAMES, 1, "start", -3))[0] == (0.7, 2.0)
-        assert times(nudge_edge(TWO, FRAMES, 1, "end", 99))[0] == (1.0, 3.0)
-        assert nudge_edge(TWO, FRAMES, 1, "end", 0).labels is TWO
 
 
 class TestMove:
@@ -221,40 +214,43 @@ class TestMerge:
 
 class TestMeet:
     def test_a_gap_is_closed_where_one_points(self) -> None:
-        assert times(meet(TWO, FRAMES, 2, 1, 2.44)) == [(1.0, 2.4), (2.4, 4.0)]
+        assert times(join_at(TWO, FRAMES, 2, 1, 2.44)) == [(1.0, 2.4), (2.4, 4.0)]
 
     def test_each_keeps_a_frame(self) -> None:
-        assert times(meet(TWO, FRAMES, 1, 2, 0.0)) == [(1.0, 1.1), (1.1, 4.0)]
-        assert times(meet(TWO, FRAMES, 1, 2, 9.0)) == [(1.0, 3.9), (3.9, 4.0)]
+        assert times(join_at(TWO, FRAMES, 1, 2, 0.0)) == [(1.0, 1.1), (1.1, 4.0)]
+        assert times(join_at(TWO, FRAMES, 1, 2, 9.0)) == [(1.0, 3.9), (3.9, 4.0)]
 
     def test_an_overlap_is_cut(self) -> None:
         free = labels_of((1.0, 3.0), (2.0, 4.0), overlap="free")
-        assert times(meet(free, FRAMES, 1, 2, 2.5)) == [(1.0, 2.5), (2.5, 4.0)]
+        assert times(join_at(free, FRAMES, 1, 2, 2.5)) == [(1.0, 2.5), (2.5, 4.0)]
 
     def test_only_neighbours(self) -> None:
         three = labels_of((1.0, 2.0), (3.0, 4.0), (5.0, 6.0))
         with pytest.raises(Sd2Error, match="two neighbours on one track"):
-            meet(three, FRAMES, 1, 3, 2.5)
+            join_at(three, FRAMES, 1, 3, 2.5)
         with pytest.raises(Sd2Error, match="two neighbours"):
-            meet(three, FRAMES, 1, 1, 2.5)
+            join_at(three, FRAMES, 1, 1, 2.5)
 
 
-class TestCarve:
+class TestOverwrite:
     def test_cuts_trims_and_covers(self) -> None:
         labels = labels_of((0.0, 1.0), (1.0, 1.3), (1.3, 2.0))
-        carved = carve(labels, FRAMES, "Gestures", 0.5, 1.5, "up")
-        assert times(carved) == [(0.0, 0.5), (0.5, 1.5), (1.5, 2.0)]
-        assert [span.label for span in carved.labels.spans] == ["label 1", "up", "label 3"]
+        done = overwrite(labels, FRAMES, "Gestures", 0.5, 1.5, "up")
+        assert times(done) == [(0.0, 0.5), (0.5, 1.5), (1.5, 2.0)]
+        assert [span.label for span in done.labels.spans] == ["label 1", "up", "label 3"]
 
     def test_a_span_around_it_becomes_two(self) -> None:
-        carved = carve(TWO, FRAMES, "Gestures", 1.4, 1.6, "up")
-        assert times(carved) == [(1.0, 1.4), (1.4, 1.6), (1.6, 2.0), (3.0, 4.0)]
-        assert [span.label for span in carved.labels.spans][:3] == ["label 1", "up", "label 1"]
-        assert carved.labels.span(carved.ids[0]).label == "up"
+        done = overwrite(TWO, FRAMES, "Gestures", 1.4, 1.6, "up")
+        assert times(done) == [(1.0, 1.4), (1.4, 1.6), (1.6, 2.0), (3.0, 4.0)]
+        assert [span.label for span in done.labels.spans][:3] == ["label 1", "up", "label 1"]
+        assert done.labels.span(done.ids[0]).label == "up"
 
     def test_less_than_a_frame_is_not_left(self) -> None:
         labels = labels_of((1.02, 1.58))
-        assert times(carve(labels, FRAMES, "Gestures", 1.1, 1.5, "up")) == [(1.1, 1.5), (1.5, 1.58)]
+        assert times(overwrite(labels, FRAMES, "Gestures", 1.1, 1.5, "up")) == [
+            (1.1, 1.5),
+            (1.5, 1.58),
+        ]
 
 
 class TestFillGaps:

@@ -10,13 +10,19 @@ from hypothesis import strategies as st
 from labelled import many_spans
 
 from sd2core.errors import Sd2Error
-from sd2core.labels.edits import Edit, move, nudge
-from sd2core.labels.group_edits import duplicate_together, move_together, nudge_together
-from sd2core.labels.spans import Labels, Span, Track
+from sd2core.labels.edits import (
+    Edit,
+    duplicate_together,
+    move,
+    move_together,
+    nudge,
+    nudge_together,
+)
+from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
 
 FRAMES = Timebase.regular(100, 10.0)  # 0 to 10 s
-TRACKS = (Track("Gestures"), Track("Free", "free"))
+TRACKS = (LabelTrack("Gestures"), LabelTrack("Free", "free"))
 
 
 def labels_of(*stretches: tuple[float, float]) -> Labels:

@@ -13,11 +13,11 @@ from sd2core.labels.formats import FORMATS, read_labels, would_lose, write_label
 from sd2core.labels.free_time import Frames
 from sd2core.labels.import_labels import Incoming, free_name, take_in
 from sd2core.labels.label_set import GESTURES, Label, LabelSet
-from sd2core.labels.spans import Labels, Span, Track
+from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
 
 FRAMES = Timebase.regular(100, 10.0)
-HERE = Labels((Track("Gestures"),), (Span(7, "Gestures", 1.0, 2.0, "up-to-down"),))
+HERE = Labels((LabelTrack("Gestures"),), (Span(7, "Gestures", 1.0, 2.0, "up-to-down"),))
 moderate = settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow])
 
 
@@ -26,7 +26,7 @@ def file_of(*spans: tuple[float, float, str], label_set: LabelSet = GESTURES) ->
         Span(number, "Gestures", start_s, end_s, label, origin="import")
         for number, (start_s, end_s, label) in enumerate(spans, start=1)
     )
-    return Labels((Track("Gestures"),), made, label_set)
+    return Labels((LabelTrack("Gestures"),), made, label_set)
 
 
 def test_what_lies_beyond_the_recording_is_cut_or_left_out() -> None:
@@ -114,7 +114,7 @@ def test_an_empty_file_is_not_added() -> None:
 def test_names_stay_within_what_a_name_may_be() -> None:
     long = "x" * 200
     name = free_name(long, "y" * 300 + "\n", {long})
-    assert Track(name).name != long
+    assert LabelTrack(name).name != long
 
 
 @pytest.mark.parametrize("name", [one.name for one in FORMATS])

@@ -9,7 +9,7 @@ import pytest
 from labelled import even, imported, random_edit
 
 from sd2core.labels.comparison import Comparison, changed_stretch, compare
-from sd2core.labels.spans import Labels, Span, Track
+from sd2core.labels.spans import Labels, LabelTrack, Span
 
 START = imported(even(), 7)
 
@@ -34,7 +34,7 @@ def test_no_difference_means_equal(seed: int) -> None:
 
 
 def test_words() -> None:
-    assert str(compare(Labels(), replace(Labels(), tracks=(Track("Left"),)))) == "other tracks"
+    assert str(compare(Labels(), replace(Labels(), tracks=(LabelTrack("Left"),)))) == "other tracks"
     assert str(Comparison(0, 1, 0, False, True)) == "1 span changed, another label set"
     assert str(Comparison(0, 0, 12_345, False, False)) == "12,345 spans removed"
     assert str(compare(START, START)) == ""

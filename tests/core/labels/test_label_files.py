@@ -25,7 +25,7 @@ from sd2core.labels.files import (
     write_labels,
 )
 from sd2core.labels.label_set import GESTURES, Label, LabelSet
-from sd2core.labels.spans import ORIGINS, Labels, Span, Track
+from sd2core.labels.spans import ORIGINS, Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
 
 names = st.text(st.characters(codec="utf-8", exclude_categories=["C", "Z"]), min_size=1, max_size=9)
@@ -34,7 +34,9 @@ notes = st.text(st.characters(codec="utf-8"), max_size=12)
 
 @st.composite
 def any_labels(draw: st.DrawFn) -> Labels:
-    tracks = tuple(Track(name, "free") for name in draw(st.lists(names, max_size=3, unique=True)))
+    tracks = tuple(
+        LabelTrack(name, "free") for name in draw(st.lists(names, max_size=3, unique=True))
+    )
     spans = []
     for k in range(draw(st.integers(0, 6)) if tracks else 0):
         start_s = draw(st.floats(-1e6, 1e6))
@@ -128,7 +130,7 @@ def test_the_example_of_the_documentation_is_read(tmp_path: Path) -> None:
     read = read_labels(tmp_path / FILE_NAME)
     assert read.recording == tmp_path
     span = Span(1, "Gestures", 1.6, 2.8, "left-to-right", author="B")
-    assert read.labels == Labels((Track("Gestures"),), (span,), read.labels.label_set)
+    assert read.labels == Labels((LabelTrack("Gestures"),), (span,), read.labels.label_set)
     assert Timebase.regular(90, 30.0).frames_between(span.start_s, span.end_s) == (48, 84)
 
 
@@ -234,7 +236,7 @@ class TestOfRecordings:
         assert [(one.start_s, one.end_s, one.label) for one in labels.spans] == [
             (one.start_s, one.end_s, one.label) for one in spans
         ]
-        assert labels.tracks == (Track("Gestures"),)
+        assert labels.tracks == (LabelTrack("Gestures"),)
         assert {one.origin for one in labels.spans} == {"import"}
         assert all(labels.label_set.find(one.label) for one in labels.spans)
 
@@ -243,7 +245,7 @@ class TestOfRecordings:
             InlineSpan(start_s=a, end_s=b, label="x") for a, b in ((5, 6), (0, 9), (1, 2), (3, 4))
         ]
         labels = labels_of(inline)
-        assert labels.tracks == (Track("Gestures", "free"),)
+        assert labels.tracks == (LabelTrack("Gestures", "free"),)
         assert [(one.id, one.start_s) for one in labels.spans] == [(1, 0), (2, 1), (3, 3), (4, 5)]
 
     @pytest.mark.parametrize(

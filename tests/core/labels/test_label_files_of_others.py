@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from sd2core.labels.formats import FORMATS, read_labels, write_labels
 from sd2core.labels.formats.elan import edges_ms
 from sd2core.labels.formats.lanes import lanes_of, track_of
-from sd2core.labels.spans import Labels, Span, Track
+from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
 
 TIMEBASE = Timebase.regular(30, 10.0)
@@ -25,7 +25,7 @@ few = settings(
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
 )
 OVERLAPPING = Labels(
-    (Track("Gestures"), Track("Hände", "free")),
+    (LabelTrack("Gestures"), LabelTrack("Hände", "free")),
     (
         Span(1, "Gestures", 0.5, 1.5, 'say "so"'),
         Span(2, "Hände", 1.0, 2.0, "wave"),
@@ -137,7 +137,9 @@ def test_one_observation_of_a_table(tmp_path: Path) -> None:
 
 def test_overlaps_of_a_table_make_a_free_track(tmp_path: Path) -> None:
     content = "label,start_s,end_s\na,0,2\nb,1,3\n"
-    assert read_labels(written(tmp_path, "x.csv", content)).tracks == (Track("Gestures", "free"),)
+    assert read_labels(written(tmp_path, "x.csv", content)).tracks == (
+        LabelTrack("Gestures", "free"),
+    )
 
 
 # Audacity.
@@ -264,7 +266,7 @@ FOREIGN_EAF = """<?xml version="1.0" encoding="UTF-8"?>
 
 def test_elan_files_of_others(tmp_path: Path) -> None:
     labels = read_labels(written(tmp_path, "x.eaf", FOREIGN_EAF))
-    assert labels.tracks == (Track("Right hand"),)
+    assert labels.tracks == (LabelTrack("Right hand"),)
     assert labels.spans == (
         Span(*(5, "Right hand", 0.75, 1.15, "HOUSE", "English: a house", "Ada", None, "import")),
     )
@@ -374,7 +376,7 @@ def test_boris_projects_of_others(tmp_path: Path) -> None:
     }
     path = written(tmp_path, "x.boris", json.dumps(project))
     labels = read_labels(path, TIMEBASE, observation="one")
-    assert labels.tracks == (Track("Ada"), Track("No focal subject"))
+    assert labels.tracks == (LabelTrack("Ada"), LabelTrack("No focal subject"))
     assert extents(labels) == [
         ("Ada", "wave", 0.5, 1.5),
         ("No focal subject", "tap", 1.0, pytest.approx(1.1)),

@@ -18,7 +18,7 @@ from sd2core.labels.formats import (
     write_labels,
 )
 from sd2core.labels.label_set import GESTURES, Label, LabelSet
-from sd2core.labels.spans import Labels, Span, Track
+from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
 
 TIMEBASE = Timebase.regular(300, 30.0)
@@ -68,13 +68,13 @@ def surviving(labels: Labels, keeps: frozenset[Aspect]) -> Labels:
         )
         for number, span in enumerate(labels.spans, start=1)
     ]
-    tracks = labels.tracks if "tracks" in keeps else (Track("Gestures"),)
+    tracks = labels.tracks if "tracks" in keeps else (LabelTrack("Gestures"),)
     if "empty tracks" not in keeps:
         used = {span.track for span in spans}
-        tracks = tuple(track for track in tracks if track.name in used) or (Track("Gestures"),)
+        tracks = tuple(track for track in tracks if track.name in used) or (LabelTrack("Gestures"),)
     if "overlap" not in keeps:
         tracks = tuple(
-            Track(
+            LabelTrack(
                 track.name,
                 "free" if crowded([s for s in spans if s.track == track.name]) else "exclusive",
             )
@@ -148,7 +148,7 @@ def test_an_old_file_outlives_an_interrupted_save(
 
 
 RICH = Labels(
-    (Track("Gestures"), Track("Left hand", "free"), Track("Empty")),
+    (LabelTrack("Gestures"), LabelTrack("Left hand", "free"), LabelTrack("Empty")),
     (
         Span(4, "Gestures", 1.0, 2.0, "left-to-right", "blurred", "Ada", 0.5),
         Span(9, "Left hand", 1.5, 2.5, "wave", "", "Ada", None, "suggestion"),

@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
-from sd2core.labels.label_set import GESTURES, Label, LabelSet
-from sd2core.labels.label_set_edits import (
+from sd2core.labels.field_edits import (
     add_label,
     move_label,
     new_label,
@@ -21,10 +20,11 @@ from sd2core.labels.label_set_edits import (
     set_key,
     set_label_set,
 )
-from sd2core.labels.spans import Labels, Span, Track
+from sd2core.labels.label_set import GESTURES, Label, LabelSet
+from sd2core.labels.spans import Labels, LabelTrack, Span
 
 LABELS = Labels(
-    (Track("Gestures"),),
+    (LabelTrack("Gestures"),),
     (
         Span(1, "Gestures", 1.0, 2.0, "up-to-down"),
         Span(2, "Gestures", 2.0, 2.5, "down-to-up"),

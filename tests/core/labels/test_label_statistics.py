@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sd2core.labels.label_set import GESTURES
-from sd2core.labels.spans import Labels, Span, Track
+from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.labels.statistics import (
     HEADINGS,
     label_statistics,
@@ -19,7 +19,7 @@ from sd2core.labels.statistics import (
     statistics_text,
 )
 
-FREE = (Track("Free", "free"),)
+FREE = (LabelTrack("Free", "free"),)
 EXTENT_S = (0.0, 10.0)
 
 

@@ -7,12 +7,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from labelled import uneven
 
-from sd2core.labels.reaction import seen_at
-from sd2core.labels.spans import Labels, Span, Track
+from sd2core.labels.free_time import seen_at
+from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
 
 FRAMES = Timebase.regular(100, 10.0)
-TRACKS = (Track("One"), Track("Many", "free"))
+TRACKS = (LabelTrack("One"), LabelTrack("Many", "free"))
 LABELS = Labels(
     TRACKS, tuple(Span(k, name, 2.0, 3.0, "x") for k, name in ((1, "One"), (2, "Many")))
 )

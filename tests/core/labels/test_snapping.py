@@ -6,13 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from labelled import imported, uneven
 
-from sd2core.labels.snapping import Snap, snap
-from sd2core.labels.spans import Labels, Span, Track
+from sd2core.labels.free_time import Snap, snap
+from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
 
 FRAMES = Timebase.regular(100, 10.0)
 LABELS = Labels(
-    (Track("Gestures"), Track("Suggested")),
+    (LabelTrack("Gestures"), LabelTrack("Suggested")),
     (
         Span(1, "Gestures", 1.0, 2.0, "up"),
         Span(2, "Suggested", 1.96, 3.0, "up", origin="suggestion"),
@@ -34,7 +34,7 @@ def test_spans_in_the_hand_do_not_attract() -> None:
 
 def test_on_a_tie_a_span_goes_before_a_suggestion() -> None:
     labels = Labels(
-        (Track("Gestures"), Track("Suggested")),
+        (LabelTrack("Gestures"), LabelTrack("Suggested")),
         (
             Span(1, "Suggested", 1.0, 2.0, "up", origin="suggestion"),
             Span(2, "Gestures", 2.0, 3.0, "up"),

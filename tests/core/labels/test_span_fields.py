@@ -9,28 +9,26 @@ import pytest
 
 from sd2core.errors import Sd2Error
 from sd2core.labels.edits import Edit
-from sd2core.labels.span_fields import (
+from sd2core.labels.field_edits import (
     accept,
+    add_track,
+    move_track,
     reject,
     relabel,
+    remove_track,
+    rename_track,
     set_author,
     set_confidence,
     set_note,
+    set_overlap,
     set_track,
 )
-from sd2core.labels.spans import Labels, Span, Track
-from sd2core.labels.track_edits import (
-    add_track,
-    move_track,
-    remove_track,
-    rename_track,
-    set_overlap,
-)
+from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
 
 FRAMES = Timebase.regular(100, 10.0)
 LABELS = Labels(
-    (Track("Gestures"), Track("Suggested", "free")),
+    (LabelTrack("Gestures"), LabelTrack("Suggested", "free")),
     (
         Span(1, "Gestures", 1.037, 2.0, "up-to-down"),
         Span(2, "Suggested", 1.5, 2.5, "down-to-up", confidence=0.7, origin="suggestion"),
@@ -68,8 +66,8 @@ def test_bad_values_are_refused() -> None:
 
 class TestSuggestions:
     def test_accepted_it_is_a_persons(self) -> None:
-        edit = accept(LABELS, FRAMES, [2], author="B")
-        assert edit.labels.span(2) == replace(LABELS.span(2), origin="person", author="B")
+        edit = accept(LABELS, FRAMES, [2])
+        assert edit.labels.span(2) == replace(LABELS.span(2), origin="person")
         assert edit.name == "Accept suggestion"
 
     def test_on_another_track_it_takes_the_free_part(self) -> None:
@@ -93,14 +91,18 @@ class TestTracks:
     def test_added_below_or_in_between(self) -> None:
         assert [t.name for t in add_track(LABELS, "C").labels.tracks][-1] == "C"
         added = add_track(LABELS, "C", "free", 1).labels.tracks
-        assert added == (Track("Gestures"), Track("C", "free"), Track("Suggested", "free"))
+        assert added == (
+            LabelTrack("Gestures"),
+            LabelTrack("C", "free"),
+            LabelTrack("Suggested", "free"),
+        )
         with pytest.raises(Sd2Error, match="a name of its own"):
             add_track(LABELS, "Gestures")
 
     def test_renamed_with_its_spans(self) -> None:
         after = rename_track(LABELS, "Suggested", "Model").labels
         assert [span.track for span in after.spans] == ["Gestures", "Model", "Model"]
-        assert after.tracks[1] == Track("Model", "free")
+        assert after.tracks[1] == LabelTrack("Model", "free")
         assert rename_track(after, "Model", "Suggested").labels == LABELS
         with pytest.raises(Sd2Error, match="a name of its own"):
             rename_track(LABELS, "Suggested", "Gestures")
@@ -109,7 +111,7 @@ class TestTracks:
         edit = remove_track(LABELS, "Suggested")
         assert edit.name == "Remove track with 2 spans"
         assert [span.id for span in edit.labels.spans] == [1]
-        assert edit.labels.tracks == (Track("Gestures"),)
+        assert edit.labels.tracks == (LabelTrack("Gestures"),)
 
     def test_put_in_another_order(self) -> None:
         after = move_track(LABELS, "Suggested", 0).labels

@@ -17,7 +17,7 @@ from sd2core.doppler import Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.files.resources import resource_path
 from sd2core.io.radar.kkt import load_kkt
-from sd2core.labels.spans import Labels, Span, Track
+from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.labels.suggest import (
     SURE_DB,
     TRACK,
@@ -90,7 +90,7 @@ def test_spans_are_suggestions_with_a_reason() -> None:
         assert (span.origin, span.label, span.track) == ("suggestion", "swipe", "Found")
         assert span.note == "up to 13 dB over the quiet level"
     assert {span.track for span in suggest_spans(doppler)} == {TRACK}
-    Labels((Track("Found"),), spans)
+    Labels((LabelTrack("Found"),), spans)
 
 
 @given(st.floats(6.4, 1e4))
@@ -154,7 +154,7 @@ def test_any_map_gives_spans_that_a_track_can_hold(values, data) -> None:
     present = data.draw(hnp.arrays(np.bool_, frames))
     doppler = doppler_map(values, 5.0 + np.cumsum(steps), present=present)
     spans = suggest_spans(doppler)
-    Labels((Track(TRACK),), spans)  # apart from each other
+    Labels((LabelTrack(TRACK),), spans)  # apart from each other
     for span in spans:
         assert span.confidence is not None
         assert doppler.times_s[0] <= span.start_s < span.end_s <= doppler.timebase.end_s + 1e-9

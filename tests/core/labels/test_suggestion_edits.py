@@ -7,14 +7,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
-from sd2core.labels.spans import Labels, Span, Track
+from sd2core.labels.field_edits import offer, pending, reject, take
+from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.labels.suggest import TRACK
-from sd2core.labels.suggestion_edits import offer, pending, take, turn_down
 from sd2core.timebase import Timebase
 
 FRAMES = Timebase.regular(100, 10.0)
 MINE = Span(4, "Gestures", 5.0, 6.0, "up-to-down")
-HERE = Labels((Track("Gestures"),), (MINE,))
+HERE = Labels((LabelTrack("Gestures"),), (MINE,))
 
 
 def of_map(*times_s: tuple[float, float]) -> list[Span]:
@@ -31,7 +31,7 @@ def times(spans) -> list[tuple[float, float]]:
 def test_they_stand_on_frames_of_their_own_track() -> None:
     done = offer(HERE, FRAMES, of_map((1.03, 2.06), (9.5, 11.0)))
     assert done.name == "Suggest 2 spans"
-    assert done.labels.tracks == (Track("Gestures"), Track(TRACK, "free"))
+    assert done.labels.tracks == (LabelTrack("Gestures"), LabelTrack(TRACK, "free"))
     assert times(pending(done.labels)) == [(1.0, 2.1), (9.5, 10.0)]
     assert done.ids == (5, 6)
     assert done.labels.span(4) == MINE
@@ -50,7 +50,7 @@ def test_nothing_found_leaves_no_track_behind() -> None:
     some = offer(HERE, FRAMES, of_map((1.0, 2.0))).labels
     assert offer(some, FRAMES, []).labels == HERE
     assert offer(HERE, FRAMES, []).labels is HERE
-    assert turn_down(some, [5]).labels == HERE
+    assert reject(some, [5]).labels == HERE
 
 
 def test_a_person_takes_them_with_a_label() -> None:
@@ -60,7 +60,7 @@ def test_a_person_takes_them_with_a_label() -> None:
     taken = one.labels.span(5)
     assert (taken.track, taken.label, taken.origin) == ("Gestures", "down-to-up", "person")
     last = take(one.labels, FRAMES, [6], "Gestures", "down-to-up")
-    assert last.labels.tracks == (Track("Gestures"),)
+    assert last.labels.tracks == (LabelTrack("Gestures"),)
 
 
 def test_a_label_of_the_set_may_stay() -> None:
@@ -78,7 +78,7 @@ def test_without_room_it_stays_a_suggestion() -> None:
     with pytest.raises(Sd2Error, match="every frame has a span"):
         take(done.labels, FRAMES, [6], "Gestures", "up-to-down")
     with pytest.raises(Sd2Error, match="a suggestion"):
-        turn_down(done.labels, [4])
+        reject(done.labels, [4])
 
 
 @given(
@@ -93,7 +93,7 @@ def test_whatever_is_turned_down_stays_away(found_s, data) -> None:
     offered = offer(HERE, FRAMES, found)
     gone = data.draw(st.lists(st.sampled_from(offered.ids), unique=True)) if offered.ids else []
     declined = [offered.labels.span(one) for one in gone]
-    left = turn_down(offered.labels, gone).labels
+    left = reject(offered.labels, gone).labels
     assert set(pending(left)) == set(pending(offered.labels)) - set(declined)
     again = offer(left, FRAMES, [offered.labels.span(one) for one in offered.ids], declined)
     kept = {(span.start_s, span.end_s) for span in pending(again.labels)}

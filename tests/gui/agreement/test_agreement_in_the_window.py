@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QFileDialog, QToolButton
 from sd2app.agreement.panel import AgreementPanel
 from sd2app.agreement.timeline import OtherTimeline
 from sd2core.labels.formats import write_labels
-from sd2core.labels.spans import Labels, Span, Track
+from sd2core.labels.spans import Labels, LabelTrack, Span
 
 CONTROL, SHIFT = Qt.KeyboardModifier.ControlModifier, Qt.KeyboardModifier.ShiftModifier
 LEFT = Qt.MouseButton.LeftButton
@@ -20,7 +20,7 @@ def compared(window, qtbot, monkeypatch, tmp_path):
     """Mine: "there" 0.2 to 0.8 s, "back" 1 to 2 s. Ben's: "there" the same, "back" from 1.5 s."""
     spans = (Span(1, "Ben", 0.2, 0.8, "there"), Span(2, "Ben", 1.5, 2.0, "back"))
     path = tmp_path / "ben.eaf"
-    write_labels(path, Labels((Track("Ben"),), spans), window.context.playback.timebase)
+    write_labels(path, Labels((LabelTrack("Ben"),), spans), window.context.playback.timebase)
     monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(path), ""))
     qtbot.keyClick(window, Qt.Key.Key_K, CONTROL)
     model = window.context.agreement

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QComboBox, QFileDialog, QPushButton
 from sd2app.labels.export_dialog import LabelExportDialog
 from sd2app.labels.import_dialog import LabelImportDialog
 from sd2core.labels.formats import FORMATS, read_labels, write_labels
-from sd2core.labels.spans import Labels, Span, Track
+from sd2core.labels.spans import Labels, LabelTrack, Span
 
 CONTROL, SHIFT = Qt.KeyboardModifier.ControlModifier, Qt.KeyboardModifier.ShiftModifier
 NONE, LEFT = Qt.KeyboardModifier.NoModifier, Qt.MouseButton.LeftButton
@@ -24,7 +24,7 @@ def theirs(window, tmp_path) -> Path:
     """Ben's file: one span within, one that ends after the recording (2 s)."""
     spans = (Span(1, "Ben", 0.5, 1.0, "wave"), Span(2, "Ben", 1.5, 2.5, "up-to-down"))
     path = tmp_path / "ben.eaf"
-    write_labels(path, Labels((Track("Ben"),), spans), window.context.playback.timebase)
+    write_labels(path, Labels((LabelTrack("Ben"),), spans), window.context.playback.timebase)
     return path
 
 

@@ -153,7 +153,7 @@ def test_a_span_that_is_drawn_with_shift_cuts_the_others(labelled) -> None:
     labelled.context.labels.set_label("up-to-down")
     pull(timeline(labelled), at(labelled, 0.4), at(labelled, 1.2), SHIFT)
     assert spans(labelled) == [("there", 6, 12), ("up-to-down", 12, 36), ("back", 36, 60)]
-    assert steps(labelled) == ["Carve span"]
+    assert steps(labelled) == ["Create span over others"]
 
 
 def test_a_mark_that_cuts_the_others(labelled) -> None:

@@ -13,7 +13,7 @@ from sd2app.labels.columns import Change
 from sd2app.labels.model import LabelsModel
 from sd2app.shell.keys.bindings import KeyBindings
 from sd2app.widgets.key_text import canonical, native
-from sd2core.labels.label_set_edits import set_key
+from sd2core.labels.field_edits import set_key
 
 Index = QModelIndex | QPersistentModelIndex
 

@@ -1,0 +1,340 @@
+"""Edits of everything but times: fields of spans, suggestions, tracks and the label set."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from itertools import count
+from typing import Any
+
+import numpy as np
+
+from sd2core.errors import Sd2Error
+from sd2core.labels.colours import OFFERED
+from sd2core.labels.edits import Edit
+from sd2core.labels.free_time import Frames, clip_to_free
+from sd2core.labels.label_set import Label, LabelSet
+from sd2core.labels.matching import iou_of
+from sd2core.labels.spans import Labels, LabelTrack, Overlap, Span
+from sd2core.labels.suggest import LABEL, TRACK
+from sd2core.timebase import Timebase
+
+
+def relabel(labels: Labels, ids: Iterable[int], label: str) -> Edit:
+    """Give spans another label."""
+    return _with(labels, ids, "Change label", label=label)
+
+
+def set_note(labels: Labels, ids: Iterable[int], note: str) -> Edit:
+    """Set the note of spans; an empty one removes it."""
+    return _with(labels, ids, "Change note", note=note)
+
+
+def set_author(labels: Labels, ids: Iterable[int], author: str) -> Edit:
+    """Set the author of spans."""
+    return _with(labels, ids, "Change author", author=author)
+
+
+def set_confidence(labels: Labels, ids: Iterable[int], confidence: float | None) -> Edit:
+    """Set the confidence of spans, 0 to 1 or None for unknown."""
+    return _with(labels, ids, "Change confidence", confidence=confidence)
+
+
+def set_track(labels: Labels, ids: Iterable[int], track: str) -> Edit:
+    """Put spans on another track, at the times they have.
+
+    Raises
+    ------
+    Sd2Error
+        When they would overlap on an exclusive track; the message names both spans.
+    """
+    labels.track(track)
+    return _with(labels, ids, "Change track", track=track)
+
+
+def accept(
+    labels: Labels, timebase: Timebase, ids: Iterable[int], track: str | None = None
+) -> Edit:
+    """Accept suggestions as spans of the user, on another track if one is named.
+
+    There they are clipped like new spans to the longest free part, in the order of time.
+
+    Raises
+    ------
+    Sd2Error
+        When one is no suggestion, or no frame of it is free; none is accepted then.
+    """
+    frames, after = Frames.of(timebase), labels
+    chosen = _suggestions(labels, ids)
+    for span in chosen:
+        place: dict[str, Any] = {}
+        if track is not None and track != span.track:
+            part = clip_to_free(after, track, (span.start_s, span.end_s), frames)
+            place = {"track": track, "start_s": part[0], "end_s": part[1]}
+        taken = replace(span, origin="person", **place)
+        after = after.with_spans([taken])
+    return Edit(_name("Accept", len(chosen)), after, tuple(one.id for one in chosen))
+
+
+def _with(labels: Labels, ids: Iterable[int], name: str, **fields: Any) -> Edit:
+    changed = [replace(span, **fields) for span in labels.these(ids)]
+    return Edit(name, labels.with_spans(changed), tuple(span.id for span in changed))
+
+
+def _suggestions(labels: Labels, ids: Iterable[int]) -> list[Span]:
+    chosen = labels.these(ids)
+    for span in chosen:
+        if span.origin != "suggestion":
+            raise Sd2Error(f"{span.words()} is of origin {span.origin!r}", "a suggestion")
+    return chosen
+
+
+def _name(verb: str, count: int) -> str:
+    return f"{verb} suggestion" if count == 1 else f"{verb} {count} suggestions"
+
+
+SAME_IOU = 0.5
+"""Overlap (IoU) from which a suggestion is taken for a rejected or a labelled span."""
+
+
+def pending(labels: Labels) -> tuple[Span, ...]:
+    """Return the suggestions that are neither accepted nor rejected, in order."""
+    return tuple(span for span in labels.spans if span.origin == "suggestion")
+
+
+def offer(
+    labels: Labels, timebase: Timebase, found: Sequence[Span], declined: Sequence[Span] = ()
+) -> Edit:
+    """Put suggestions on a track of their own, in place of earlier ones.
+
+    Spans that were rejected or are labelled already are not suggested again.
+
+    Parameters
+    ----------
+    found : sequence of Span
+        Suggestions of a map; their edges are put on frames of the recording.
+    declined : sequence of Span
+        Suggestions rejected before.
+    """
+    kept = [one for one in labels.spans if one.origin != "suggestion" or one.track != TRACK]
+    known = [*declined, *(one for one in kept if one.origin != "suggestion")]
+    again = np.asarray((iou_of(found, known) >= SAME_IOU).any(axis=1))
+    frames, first = Frames.of(timebase), labels.next_id
+    made: list[Span] = []
+    for span in (one for one, before in zip(found, again, strict=True) if not before):
+        start_s, end_s = frames.stretch(span.start_s, span.end_s)
+        made.append(replace(span, id=first + len(made), track=TRACK, start_s=start_s, end_s=end_s))
+    tracks = labels.tracks
+    if TRACK not in {track.name for track in tracks}:
+        tracks = (*tracks, LabelTrack(TRACK, "free"))
+    after = _tidied(replace(labels, tracks=tracks, spans=(*kept, *made)))
+    name = f"Suggest {len(made)} span{'s' * (len(made) != 1)}"
+    return Edit(name, labels if after == labels else after, tuple(span.id for span in made))
+
+
+def take(
+    labels: Labels,
+    timebase: Timebase,
+    ids: Iterable[int],
+    track: str,
+    label: str,
+    *,
+    keep_known: bool = False,
+) -> Edit:
+    """Accept suggestions on a track and with a label.
+
+    Those for which the track has no free time stay suggestions.
+
+    Parameters
+    ----------
+    keep_known : bool
+        Keep the label of suggestions that name a gesture or a label of the set.
+
+    Raises
+    ------
+    Sd2Error
+        When one is no suggestion, or none has free time.
+    """
+    after, done, refusal = labels, [], None
+    for one in ids:
+        span = labels.span(one)
+        try:
+            after = accept(after, timebase, [one], track).labels
+        except Sd2Error as error:
+            refusal = refusal or error
+            continue
+        done.append(one)
+        known = span.label != LABEL or labels.label_set.find(span.label) is not None
+        if not (keep_known and known):
+            after = relabel(after, [one], label).labels
+    if refusal is not None and not done:
+        raise refusal
+    return Edit(_name("Accept", len(done)), _tidied(after), tuple(done))
+
+
+def reject(labels: Labels, ids: Iterable[int]) -> Edit:
+    """Delete suggestions, and nothing else by mistake."""
+    gone = {span.id for span in _suggestions(labels, ids)}
+    return Edit(_name("Reject", len(gone)), _tidied(labels.with_spans(without=gone)))
+
+
+def _tidied(labels: Labels) -> Labels:
+    """Remove the track of suggestions where it is empty."""
+    if labels.of_track(TRACK):
+        return labels
+    return replace(labels, tracks=tuple(one for one in labels.tracks if one.name != TRACK))
+
+
+def add_track(
+    labels: Labels, name: str, overlap: Overlap = "exclusive", place: int | None = None
+) -> Edit:
+    """Add a track, below the others or at a place among them (0: at the top)."""
+    tracks = list(labels.tracks)
+    tracks.insert(len(tracks) if place is None else place, LabelTrack(name, overlap))
+    return _edit("Add track", labels, replace(labels, tracks=tuple(tracks)))
+
+
+def rename_track(labels: Labels, old: str, new: str) -> Edit:
+    """Rename a track; its spans stay on it."""
+    tracks = _with_track(labels, old, replace(labels.track(old), name=new))
+    spans = tuple(replace(span, track=new) if span.track == old else span for span in labels.spans)
+    return _edit("Rename track", labels, replace(labels, tracks=tracks, spans=spans))
+
+
+def remove_track(labels: Labels, name: str) -> Edit:
+    """Remove a track with the spans on it; the name of the step says how many."""
+    gone = labels.track(name)
+    spans = tuple(span for span in labels.spans if span.track != name)
+    count = len(labels.spans) - len(spans)
+    text = f"Remove track with {count} span{'s' * (count != 1)}" if count else "Remove track"
+    tracks = tuple(track for track in labels.tracks if track != gone)
+    return _edit(text, labels, replace(labels, tracks=tracks, spans=spans))
+
+
+def move_track(labels: Labels, name: str, place: int) -> Edit:
+    """Move a track to a place among the others; 0 is the top."""
+    moved = labels.track(name)
+    tracks = [track for track in labels.tracks if track != moved]
+    tracks.insert(place, moved)
+    return _edit("Move track", labels, replace(labels, tracks=tuple(tracks)))
+
+
+def set_overlap(labels: Labels, name: str, overlap: Overlap) -> Edit:
+    """Allow or forbid that spans of a track overlap.
+
+    Raises
+    ------
+    Sd2Error
+        When spans overlap on a track that forbids it; the message names two of them.
+    """
+    tracks = _with_track(labels, name, replace(labels.track(name), overlap=overlap))
+    return _edit("Change overlaps of track", labels, replace(labels, tracks=tracks))
+
+
+def _edit(name: str, before: Labels, after: Labels) -> Edit:
+    return Edit(name, before if after == before else after)
+
+
+def _with_track(labels: Labels, name: str, track: LabelTrack) -> tuple[LabelTrack, ...]:
+    return tuple(track if one.name == name else one for one in labels.tracks)
+
+
+CLASSES = ("horizontal", "vertical", "background")
+"""Classes that the default classifier tells apart."""
+
+
+def set_label_set(labels: Labels, label_set: LabelSet) -> Edit:
+    """Use another label set; spans keep their labels, also those it does not have."""
+    return _edit("Change label set", labels, replace(labels, label_set=label_set))
+
+
+def new_label(label_set: LabelSet) -> Label:
+    """Make a label with a name, a colour and a digit that the set does not use yet."""
+    names = {one.name for one in label_set.labels}
+    keys = {one.key for one in label_set.labels}
+    colours = [one.colour for one in label_set.labels]
+    return Label(
+        next(name for number in count(1) if (name := f"label {number}") not in names),
+        min((colour for _, colour in OFFERED), key=colours.count),
+        next((digit for digit in "123456789" if digit not in keys), ""),
+    )
+
+
+def add_label(labels: Labels, label: Label, place: int | None = None) -> Edit:
+    """Add a label, after the others or at a place among them (0: first)."""
+    offered = list(labels.label_set.labels)
+    offered.insert(len(offered) if place is None else place, label)
+    return _edit("Add label", labels, _with_set(labels, offered))
+
+
+def rename_label(labels: Labels, old: str, new: str) -> Edit:
+    """Rename a label, in the set and on its spans."""
+    changed = _with_label(labels, old, name=new)
+    spans = tuple(replace(span, label=new) if span.label == old else span for span in labels.spans)
+    return _edit("Rename label", labels, replace(changed, spans=spans))
+
+
+def set_colour(labels: Labels, name: str, colour: str) -> Edit:
+    """Set the colour of a label, ``#rrggbb``."""
+    return _edit("Change colour of label", labels, _with_label(labels, name, colour=colour))
+
+
+def set_key(labels: Labels, name: str, key: str) -> Edit:
+    """Set the key of a label; an empty one removes it."""
+    return _edit("Change key of label", labels, _with_label(labels, name, key=key))
+
+
+def set_class(labels: Labels, name: str, gesture_class: str) -> Edit:
+    """Set the class that the classifier learns for a label; none with an empty one."""
+    changed = _with_label(labels, name, gesture_class=gesture_class)
+    return _edit("Change class of label", labels, changed)
+
+
+def move_label(labels: Labels, name: str, place: int) -> Edit:
+    """Move a label to a place in the set; 0 is the first."""
+    moved = _known(labels, name)
+    offered = [one for one in labels.label_set.labels if one != moved]
+    offered.insert(place, moved)
+    return _edit("Move label", labels, _with_set(labels, offered))
+
+
+def remove_label(labels: Labels, name: str, instead: str | None = None) -> Edit:
+    """Remove a label from the set; its spans keep it, or get another label of the set instead.
+
+    The name of the step says which.
+    """
+    gone = _known(labels, name)
+    offered = [one for one in labels.label_set.labels if one != gone]
+    spans, text = labels.spans, "Remove label"
+    having = sum(span.label == name for span in spans)
+    if having:
+        whose = "1 span" if having == 1 else f"{having} spans"
+        text += f", {whose} keep{'s' * (having == 1)} it"
+    if having and instead is not None:
+        if instead == name:
+            raise Sd2Error(f"Spans of {name!r} were to get that label itself", "another label")
+        _known(labels, instead)
+        spans = tuple(replace(one, label=instead) if one.label == name else one for one in spans)
+        text = f"Remove label, {whose} become {instead}"
+    return _edit(text, labels, replace(_with_set(labels, offered), spans=spans))
+
+
+def _known(labels: Labels, name: str) -> Label:
+    found = labels.label_set.find(name)
+    if found is None:
+        raise Sd2Error(
+            f"The set {labels.label_set.name!r} has no label {name!r}",
+            f"one of {', '.join(one.name for one in labels.label_set.labels)}",
+        )
+    return found
+
+
+def _with_label(labels: Labels, which: str, **fields: str) -> Labels:
+    known = _known(labels, which)
+    changed = replace(known, **fields)
+    offered = [changed if one == known else one for one in labels.label_set.labels]
+    return _with_set(labels, offered)
+
+
+def _with_set(labels: Labels, offered: list[Label]) -> Labels:
+    return replace(labels, label_set=replace(labels.label_set, labels=tuple(offered)))
