@@ -69,10 +69,8 @@ class DopplerMap:
     ----------
     values : float32 array, shape (bins, frames)
         Not negative; velocity ascending, positive when approaching.
-    axis : VelocityAxis
     timebase : Timebase
         One time per frame.
-    kind : MapKind
     unit : str
         What a value of 1 means, e.g. ``"share of vertices"`` or ``"power"``.
     null_bins : tuple of int
@@ -247,7 +245,6 @@ def peak_velocity_mps(
     Parameters
     ----------
     energies : float array, shape (frames, bins)
-    axis : VelocityAxis
     floor : float
         A frame that does not exceed it counts as empty.
     """

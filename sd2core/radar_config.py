@@ -22,9 +22,6 @@ class RadarConfig:
     ----------
     start_frequency_hz, end_frequency_hz : float
         Swept while the samples of one chirp are taken.
-    samples_per_chirp, chirps_per_frame, receivers : int
-    chirp_repetition_s, frame_repetition_s : float
-    sample_rate_hz : float
     adc_bits : int
         Resolution of the converter.
     name : str

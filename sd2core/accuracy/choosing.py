@@ -52,8 +52,6 @@ def choose(
 
     Parameters
     ----------
-    mesh : MeshSequence
-    sensor : VirtualSensor
     tolerance : float
         Relative L1 of the map after smoothing against the reference plan in double
         precision, on frames that were not used to choose.

@@ -23,11 +23,8 @@ def in_turns(
 
     Parameters
     ----------
-    plans : sequence of AccuracyPlan
-    repeats : int
     milliseconds : callable
         Per frame, on one thread and on all cores.
-    progress : Progress
     """
     spent = np.empty((repeats, 2, len(plans)))
     for turn in range(repeats):

@@ -36,7 +36,6 @@ def errors(
     ----------
     raw, reference_raw, smooth, reference_smooth : float64 arrays, shape (bins, n)
         Not negative.
-    axis : VelocityAxis
 
     Returns
     -------

@@ -33,8 +33,6 @@ def measure(
 
     Parameters
     ----------
-    mesh : MeshSequence
-    sensor : VirtualSensor
     options : SynthesisOptions
         For what a plan does not choose; the paper's by default.
     family : {"histogram", "fmcw"}

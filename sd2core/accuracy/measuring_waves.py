@@ -46,11 +46,8 @@ class WaveTrial:
     ----------
     mesh : MeshSequence
         With faces.
-    sensor : VirtualSensor
     options : SynthesisOptions
         Of which the axis and the smoothing along velocity are used.
-    frames : tuple of int
-    config : RadarConfig
     wave : WaveOptions
         What a plan does not choose: surface, antennas, mirror.
     """

@@ -49,7 +49,6 @@ class PlacedPlan:
 
     Parameters
     ----------
-    plan : AccuracyPlan
     error_l1 : float
         The largest on the places that were checked; 0 for the most accurate plan, against
         which errors are measured.
@@ -88,14 +87,12 @@ def choose_for_places(
 
     Parameters
     ----------
-    mesh : MeshSequence
     places : sequence of VirtualSensor
         A few, see :func:`spread`.
     frames : int
         Of all maps that are to be made, together.
     tolerance : float
         As :func:`~sd2core.accuracy.choosing.choose` has it.
-    options : SynthesisOptions
     progress : Progress
         May raise Cancelled.
 

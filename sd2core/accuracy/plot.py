@@ -22,7 +22,6 @@ def plot_trade(measurement: Measurement, choice: Choice | None = None) -> Figure
 
     Parameters
     ----------
-    measurement : Measurement
     choice : Choice, optional
         Marked, with its tolerance as a line.
     """

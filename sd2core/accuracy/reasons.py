@@ -98,7 +98,6 @@ def reasons_for(
     change : mapping
         Relative L1 after smoothing of what was tried: of plans that differ from
         ``base`` in one rung, and of frame rates.
-    facts : SceneFacts
     v_max_mps : float
         End of the axis.
     """

@@ -127,7 +127,6 @@ class Measurement:
         Cheapest first.
     scene : str
         Fingerprint of mesh, sensor and options.
-    machine : Machine
     frames : tuple of int
         Frames of the clip that were sampled.
     source : str
@@ -198,7 +197,6 @@ class Choice:
 
     Parameters
     ----------
-    plan : AccuracyPlan
     holds : bool
         Whether tolerance or budget is held; otherwise the plan is the best that
         can be had.
@@ -207,7 +205,6 @@ class Choice:
     cost_ms : float
         Milliseconds per frame when all cores share the work: a forecast from the
         processor time of its parts, measured while choosing.
-    reasons : tuple of Reason
     tolerance : float or None
         Relative L1 after smoothing that was asked for.
     budget_ms : float or None

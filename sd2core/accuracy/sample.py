@@ -97,7 +97,6 @@ def take_sample(mesh: MeshSequence, options: SynthesisOptions, runs: int = 6) ->
 
     Parameters
     ----------
-    mesh : MeshSequence
     options : SynthesisOptions
         Of which the smoothing of the vertices' paths matters: it looks far.
     runs : int

@@ -26,7 +26,6 @@ class Survey:
 
     Parameters
     ----------
-    trial : Trial
     base : AccuracyPlan
         Every rung at its top but the frame rate, which would make all others dear.
     change : dict of AccuracyPlan to float
@@ -37,7 +36,6 @@ class Survey:
         Milliseconds of processor time per frame for visibility, and for counting.
     cost_share : dict of float to float
         What a share of the vertices costs, of what all of them cost.
-    facts : SceneFacts
     """
 
     trial: Trial
@@ -93,8 +91,6 @@ def survey_scene(
 
     Parameters
     ----------
-    mesh : MeshSequence
-    sensor : VirtualSensor
     options : SynthesisOptions
         For what a plan does not choose.
     progress : Progress

@@ -21,7 +21,6 @@ def synthesizer_for(
 
     Parameters
     ----------
-    plan : AccuracyPlan
     mesh : MeshSequence
         The full one.
     options : SynthesisOptions

@@ -52,11 +52,8 @@ class Trial:
 
     Parameters
     ----------
-    mesh : MeshSequence
-    sensor : VirtualSensor
     options : SynthesisOptions
         What a plan does not choose.
-    sample : Sample
     """
 
     def __init__(

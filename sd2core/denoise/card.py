@@ -29,11 +29,8 @@ class ModelCard:
         A name of :data:`sd2core.denoise.registry.MODELS` or ``FILTERS``.
     options : mapping
         What it was built with.
-    scaling : Scaling
-    axis : VelocityAxis
     null_bins : tuple of int
         Bins that are zero on purpose, in what it gets and in what it answers.
-    frame_rate_hz : float
     trained_on : {"simulated", "real"}
     unit : str
         What a value of 1 means in what it answers.

@@ -27,7 +27,6 @@ def save_model(path: Path, trained: TrainedDenoiser) -> ModelCard:
     ----------
     path : Path
         Ends in ``.safetensors``.
-    trained : TrainedDenoiser
 
     Returns
     -------

@@ -64,7 +64,6 @@ class MedianDenoiser(_Neighbourhood):
 
     Parameters
     ----------
-    bins : int
     frames, width : int
         Odd.
     """
@@ -87,7 +86,6 @@ class WienerDenoiser(_Neighbourhood):
 
     Parameters
     ----------
-    bins : int
     frames, width : int
         Extent of the filter; width is odd.
     """

@@ -35,7 +35,6 @@ class TrainedDenoiser:
     ----------
     network : Denoiser
         Put into evaluation mode.
-    card : ModelCard
     """
 
     def __init__(self, network: Denoiser, card: ModelCard) -> None:
@@ -126,7 +125,6 @@ class TrainedDenoiser:
         ----------
         energies : float32 array, shape (frames, bins)
             Not negative, in the unit of the synthetic maps that the model knows.
-        progress : callable
 
         Returns
         -------
@@ -231,10 +229,6 @@ class LiveDenoiser:
     A causal model answers as it does for the whole map. A model of fixed windows sees
     the last frames only and answers for the newest, at the window's border, where it
     knows less than in the middle: it differs from its answer for the whole map.
-
-    Parameters
-    ----------
-    trained : TrainedDenoiser
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""A map of any length denoised as a whole, without being in memory as a whole."""
+"""Denoising of maps that do not fit into memory."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from sd2core.denoise.live import CHUNK, TrainedDenoiser
 from sd2core.pairs.segments import OVERLAP
 
 Read = Callable[[int, int], NDArray[np.float32]]
-"""Energies of frames from one to another (exclusive), (n, bins)."""
+"""Returns the energies of frames from one to another (exclusive), (n, bins)."""
 
 Write = Callable[[int, NDArray[np.float32]], None]
 """Takes the first frame, and its denoised energies and those of the next ones, (n, bins)."""
@@ -27,19 +27,16 @@ def denoise_long(
     read: Read,
     write: Write,
 ) -> None:
-    """What :meth:`TrainedDenoiser.denoise` gives, block by block.
+    """Denoise a long map block by block, with the result of :meth:`TrainedDenoiser.denoise`.
 
-    A causal model goes on with the state that it had; one of fixed windows is shown the
-    windows that it would be shown in the whole map. So both give what they would there, to
-    the rounding of single precision.
+    A causal model continues from its last state; one of fixed windows gets the windows that it
+    would get in the whole map. So results are equal to the rounding of single precision.
 
     Parameters
     ----------
-    trained : TrainedDenoiser
     runs : list of (int, int)
         Frames that are clips of their own, from :func:`matching.clips`.
     times_s : float64 array, shape (T,)
-    read : callable
     write : callable
         Called for the frames of all runs, in their order.
     """
@@ -54,14 +51,14 @@ def denoise_long(
 
 
 def _from(start: int, read: Read) -> Read:
-    """The same with frames counted from ``start``."""
+    """Reader with frames counted from ``start``."""
     return lambda low, high: read(start + low, start + high)
 
 
 def _at_rate(
     trained: TrainedDenoiser, start: int, times_s: NDArray[np.float64], read: Read, write: Write
 ) -> None:
-    """One run at another rate or with uneven frames, as :func:`matching.at_rate` does it."""
+    """Denoise one run of another or uneven frame rate, as :func:`matching.at_rate` does."""
     even_s = matching.even_times(times_s, trained.card.frame_rate_hz)
 
     def between(low: int, high: int) -> NDArray[np.float32]:
@@ -87,7 +84,7 @@ def _at_rate(
 def _blocks(
     trained: TrainedDenoiser, count: int, read: Read
 ) -> Iterator[tuple[int, NDArray[np.float32]]]:
-    """Answers to so many frames at the model's rate, block by block, with their first frame."""
+    """Denoise frames at the model's rate block by block; yields first frames and results."""
     window = trained.network.window
     if window is None:
         live = trained.live()

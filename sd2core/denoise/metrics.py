@@ -41,7 +41,6 @@ class VelocityError:
         Standard deviation of |e|.
     bias_mps : float
         Mean of e.
-    rmse_mps : float
     correlation : float
         Of estimate and target (Pearson); NaN where one of them does not vary.
     frames : int

@@ -1,4 +1,4 @@
-"""What every denoiser is: compressed synthetic values in, compressed radar values out."""
+"""Base class of denoiser networks: compressed synthetic values in, compressed radar values out."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import Any
 from torch import Tensor, nn
 
 State = Any
-"""What a causal model remembers of the frames before."""
+"""Internal state of a causal model after the frames so far."""
 
 
 class Denoiser(nn.Module):
-    """Base of all models.
+    """Base class of all denoiser networks.
 
     A causal subclass implements :meth:`chunk` and :meth:`initial_state`, another one
     :meth:`forward`.
@@ -25,11 +25,11 @@ class Denoiser(nn.Module):
     Attributes
     ----------
     causal : bool
-        Whether a frame depends on itself and earlier frames only.
+        True if a frame depends on itself and earlier frames only.
     window : int or None
         Frames that it looks at together; None for any length.
     longest : int
-        Frames that are worked out at once when it is used; longer clips in pieces.
+        Frames that are computed at once in use; longer clips in pieces.
     """
 
     causal: bool = True
@@ -41,15 +41,15 @@ class Denoiser(nn.Module):
         self.bins = bins
 
     def forward(self, values: Tensor) -> Tensor:
-        """(batch, frames, bins) to the same shape."""
+        """Denoise (batch, frames, bins)."""
         return self.chunk(values, self.initial_state(len(values)))[0]
 
     def chunk(self, values: Tensor, state: State) -> tuple[Tensor, State]:
-        """Go on with the next frames (batch, frames, bins); the state for those after."""
+        """Denoise the next frames (batch, frames, bins); also returns the state after them."""
         raise NotImplementedError(f"{type(self).__name__} looks at {self.window} frames together")
 
     def step(self, frame: Tensor, state: State) -> tuple[Tensor, State]:
-        """Go on with one frame (batch, bins)."""
+        """Denoise the next frame (batch, bins)."""
         answer, state = self.chunk(frame[:, None], state)
         return answer[:, 0], state
 
@@ -63,5 +63,5 @@ class Denoiser(nn.Module):
 
 
 def parameter_count(model: nn.Module) -> int:
-    """Numbers that are learnt."""
+    """Number of learned parameters."""
     return sum(parameter.numel() for parameter in model.parameters())

@@ -1,4 +1,4 @@
-"""The models by name, with options that make them comparable."""
+"""Table of the denoiser networks by name, with options that make them comparable."""
 
 from __future__ import annotations
 
@@ -39,19 +39,19 @@ _S4 = {
 
 _ENTRIES: dict[str, _Entry] = {
     "s4": _Entry(
-        "state_space.S4Denoiser",
+        "causal_models.S4Denoiser",
         "structured state space, HiPPO-LegS (the paper's model)",
         {**_S4, "bidirectional": False},
         {"kernel": "legs"},
     ),
     "s4d": _Entry(
-        "state_space.S4Denoiser",
+        "causal_models.S4Denoiser",
         "structured state space, diagonal",
         {**_S4, "bidirectional": False},
         {"kernel": "diagonal"},
     ),
     "s4-serial": _Entry(
-        "state_space.SerialS4Denoiser",
+        "causal_models.SerialS4Denoiser",
         "the paper's literal form: all cells one after another, one channel; slow",
         # A sample is a bin, not a frame.
         {**_S4, "dt_min": 1e-3, "dt_max": 1e-1},
@@ -59,18 +59,18 @@ _ENTRIES: dict[str, _Entry] = {
         {"channels": 4},
     ),
     "gru": _Entry(
-        "recurrent.GruDenoiser",
+        "causal_models.GruDenoiser",
         "gated recurrent network",
         {"channels": 144, "depth": 2, "dropout": 0.0},
     ),
     "unet": _Entry(
-        "unet.UNetDenoiser",
+        "window_models.UNetDenoiser",
         "2D U-Net over windows of 72 frames",
         {"channels": 12, "depth": 3, "dropout": 0.0},
         same_time={"channels": 5},
     ),
     "swin": _Entry(
-        "swin.SwinDenoiser",
+        "window_models.SwinDenoiser",
         "Swin transformer over windows of 72 frames",
         {"channels": 48, "depth": 2, "dropout": 0.0},
         same_time={"channels": 16},
@@ -87,23 +87,22 @@ _ENTRIES: dict[str, _Entry] = {
 }
 
 FILTERS = ("none", "median", "wiener")
-"""What needs no training, only :func:`fit_filter`."""
+"""Denoisers that are fitted by :func:`fit_filter` instead of trained."""
 
 MODELS = tuple(name for name in _ENTRIES if name not in FILTERS)
-"""What is trained."""
+"""Networks that are trained."""
 
 _LARGEST = 4096
 """No option is a larger number: a damaged file must not ask for all the memory."""
 
 
 def options(name: str, match: Match = "parameters") -> dict[str, Any]:
-    """Options of a model with their defaults.
+    """Default options of a model.
 
     Parameters
     ----------
-    name : str
     match : {"parameters", "time"}
-        In what it is to be comparable to the S4.
+        Comparable to the S4 in the number of parameters, or in the time of a training step.
 
     Raises
     ------
@@ -115,12 +114,12 @@ def options(name: str, match: Match = "parameters") -> dict[str, Any]:
 
 
 def summary(name: str) -> str:
-    """What a model is, in a few words."""
+    """Short description of a model."""
     return _entry(name).summary
 
 
 def build(name: str, bins: int = 32, **given: Any) -> Denoiser:
-    """A model with fresh weights.
+    """Create a model with fresh weights.
 
     Parameters
     ----------
@@ -151,11 +150,10 @@ def fit_filter(
     targets: Sequence[NDArray[np.float32]],
     null_bins: Sequence[int] = (),
 ) -> tuple[Denoiser, dict[str, Any]]:
-    """One of :data:`FILTERS`, fitted, and its options.
+    """Fit one of :data:`FILTERS`; returns it and its options.
 
     Parameters
     ----------
-    name : str
     inputs, targets : sequence of float32 arrays, shape (frames, bins)
         Compressed values of the takes to learn from.
     null_bins : sequence of int

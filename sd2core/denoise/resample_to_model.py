@@ -111,7 +111,6 @@ def stretches(doppler: DopplerMap, frame_rate_hz: float) -> list[tuple[int, int]
 
     Parameters
     ----------
-    doppler : DopplerMap
     frame_rate_hz : float
         Of the model that is to be asked about them.
     """
@@ -163,7 +162,6 @@ def at_rate(
         Takes and gives (frames, bins).
     values : float32 array, shape (frames, bins)
     times_s : float64 array, shape (frames,)
-    frame_rate_hz : float
     """
     even_s = even_times(times_s, frame_rate_hz)
     return interpolated(work(interpolated(values, times_s, even_s)), even_s, times_s)

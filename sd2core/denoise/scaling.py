@@ -63,7 +63,6 @@ class Compression:
             Energies to learn from.
         null_bins : sequence of int
             Bins that are always zero and do not count.
-        exponent : float
 
         Raises
         ------

@@ -55,7 +55,6 @@ def read_header(path: Path, expected: str) -> tuple[dict[str, Any], Shapes]:
 
     Parameters
     ----------
-    path : Path
     expected : str
         What the file should be, for messages.
 
@@ -118,13 +117,10 @@ def read_weights(path: Path, network: nn.Module, name: str, shapes: Shapes, expe
 
     Parameters
     ----------
-    path : Path
-    network : Module
     name : str
         What the file calls its model.
     shapes : mapping
         As :func:`read_header` found them.
-    expected : str
 
     Raises
     ------

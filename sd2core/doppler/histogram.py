@@ -65,11 +65,8 @@ class Counting:
 
     Parameters
     ----------
-    bins : int
-    v_max_mps : float
     beyond : int
         DROP, WRAP or CLIP.
-    range_exponent, reference_range_m : float
     """
 
     bins: int

@@ -22,7 +22,6 @@ class FineAxis:
 
     Parameters
     ----------
-    counting : Counting
     room_bins : int
         Bins added at each end; none where velocities fold back.
     """
@@ -88,14 +87,11 @@ def fine_histograms(
 
     Parameters
     ----------
-    frames : Frames
     sensor : float64 array, shape (3,)
         In the frame of the positions.
-    axis : FineAxis
     weights : float32 array, shape (n, V)
         What each vertex counts; 0 where it is not seen.
     vertex_limb : uint8 array, shape (V,)
-    limbs : int
 
     Returns
     -------

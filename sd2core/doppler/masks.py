@@ -53,7 +53,6 @@ class VisibilityMasks:
 
     Parameters
     ----------
-    prepared : PreparedMesh
     counting : Counting
         Decides which vertices cannot change the map.
     """

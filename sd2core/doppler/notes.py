@@ -18,8 +18,6 @@ def map_notes(prepared: PreparedMesh, sensor: VirtualSensor, start: int, stop: i
 
     Parameters
     ----------
-    prepared : PreparedMesh
-    sensor : VirtualSensor
     start, stop : int
         Frames of the map, half-open.
 

@@ -167,7 +167,6 @@ def chosen_options(
 
     Parameters
     ----------
-    preset : str
     bins, v_max_mps : optional
         Of the velocity axis. On another axis the same velocities are nulled, unless
         ``null_bins`` is given.

@@ -73,10 +73,8 @@ def run_jobs(
 
     Parameters
     ----------
-    jobs : sequence of callable
     total : int
         What they add up to.
-    progress : Progress
     threads : int, optional
         How many jobs may run at once; by default as many as there are cores. 1 runs
         them one after the other in the calling thread.

@@ -82,8 +82,6 @@ class Block:
 
     Parameters
     ----------
-    index, start, stop : int
-    frames : Frames
     first_knot : int
         Number, in the whole clip, of the first knot in ``frames.positions``.
     """
@@ -98,12 +96,6 @@ class Block:
 @dataclass(eq=False)
 class PreparedMesh:
     """A mesh as the kernels take it, block by block.
-
-    Parameters
-    ----------
-    mesh : MeshSequence
-    options : SynthesisOptions
-    budget : ByteBudget
 
     Attributes
     ----------
@@ -351,7 +343,6 @@ def near_points(block: Block, rows: slice) -> tuple[NDArray[np.float32], NDArray
 
     Parameters
     ----------
-    block : Block
     rows : slice
         Frames within the block.
 

@@ -46,7 +46,6 @@ class Synthesizer:
 
     Parameters
     ----------
-    mesh : MeshSequence
     preset : str or SynthesisOptions
         Name of a preset, or options of one's own.
     memory_budget_bytes : int
@@ -155,10 +154,8 @@ class Synthesizer:
 
         Parameters
         ----------
-        sensor : VirtualSensor
         visibility : {"none", "facing", "depth", "exact", "frozen"}, optional
             Otherwise that of the options.
-        frames : tuple of int, optional
         progress : Progress
             Called with frames done; may raise Cancelled.
 

@@ -48,7 +48,6 @@ def velocities(
     frame_count : int
         Length of the recording, where the zero padding begins.
     sensor : float64 array, shape (3,)
-    frames_per_s : float
     presence : Presence, optional
         Of all frames of the recording. Every stretch with a person in it is treated as
         a recording of its own.

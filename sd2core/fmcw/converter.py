@@ -50,8 +50,6 @@ def digitise(
         Largest magnitude in it.
     power : float
         Mean square of the moving scene's part, over the frames that have one.
-    config : RadarConfig
-    options : SignalOptions
     samples : uint16 array
         Result, of the same shape.
     go_on : callable

@@ -44,8 +44,6 @@ class RangeDoppler:
         Velocity ascending, positive when approaching.
     range_m : float64 array, shape (gates,)
         Centre of every gate.
-    axis : VelocityAxis
-    time_s : float
     """
 
     values: NDArray[np.float32]
@@ -76,7 +74,6 @@ def doppler_map(
 
     Parameters
     ----------
-    capture : RadarCapture
     axis : VelocityAxis or None
         Where to show the power. None takes ``bins`` and ``v_max_mps``, and for
         each of these that is None the radar's own: one bin per chirp, v_max.
@@ -84,7 +81,6 @@ def doppler_map(
         Short for ``axis=VelocityAxis(bins, v_max_mps)``.
     clutter, clutter_window_s, range_m, window
         See :class:`ProcessingOptions`.
-    progress : Progress
 
     Returns
     -------

@@ -55,7 +55,6 @@ def point_scatterers(
     ----------
     position_m, velocity_mps : array_like, shape (n, 3)
     area_m2 : array_like, shape (n,) or a number
-    sensor : VirtualSensor
     """
     position = np.atleast_2d(np.asarray(position_m, dtype=np.float64))
     velocity = np.broadcast_to(np.asarray(velocity_mps, dtype=np.float64), position.shape)

@@ -47,13 +47,11 @@ def simulate_capture(
     ----------
     mesh : MeshSequence
         With faces.
-    config : RadarConfig
     sensor : VirtualSensor
         At the camera by default.
     visibility : bool array, shape (T, F), or "facing"
         Per mesh frame, the facets that nothing hides from the sensor;
         ``facing`` takes all whose normal points towards it.
-    options : SignalOptions
     progress : Progress
         Counts radar frames.
 

@@ -49,7 +49,6 @@ def simulate_radar(
     ----------
     mesh : MeshSequence
         With faces.
-    config : RadarConfig
     sensor : VirtualSensor
         At the camera by default.
     visibility : bool array, shape (T, F), "facing" or "exact"

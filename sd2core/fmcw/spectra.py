@@ -42,14 +42,12 @@ def frame_spectra(
     ----------
     mesh : MeshSequence
         With faces.
-    config : RadarConfig
     times_s : array_like, shape (n,)
         Middles of the frames.
     sensor : VirtualSensor
         At the camera by default.
     visibility : bool array, shape (T, F), or "facing"
         Per mesh frame; only those nearest to the times are read.
-    wave : WaveOptions
     axis : VelocityAxis or None
         The 32 bins over ±2 m/s by default.
     processing : ProcessingOptions

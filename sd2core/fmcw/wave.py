@@ -29,12 +29,10 @@ class WaveScene:
     ----------
     mesh : MeshSequence
         Must have faces.
-    config : RadarConfig
     sensor : VirtualSensor
         Transmitter and boresight.
     visibility : bool array, shape (T, F), "facing" or "exact"
         See :class:`~sd2core.fmcw.scene.MeshScene`.
-    wave : WaveOptions
     seed : int
         Of the random phases of a rough surface.
     """

@@ -19,8 +19,8 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from sd2core.denoise.causal_models import GruDenoiser
 from sd2core.denoise.metrics import map_error, mean_velocity_error, peak_error, stands_out
-from sd2core.denoise.recurrent import GruDenoiser
 from sd2core.denoise.scaling import Compression, Scaling
 from sd2core.pairs.segments import cut, segment_starts
 from sd2core.pairs.store import PairSet, read_pairs

@@ -10,7 +10,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from sd2core.denoise.ssm import legs_state_matrix
+from sd2core.denoise.s4_kernel import legs_state_matrix
 
 
 def leaf(values: Tensor) -> nn.Parameter:

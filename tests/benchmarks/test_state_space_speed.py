@@ -18,9 +18,8 @@ from published_kernels import PublishedDiagonal, PublishedLayer, PublishedLegs
 from timing import best_s
 from torch import Tensor, nn
 
-from sd2core.denoise.convolution import by_product, by_transform
-from sd2core.denoise.s4 import S4Layer
-from sd2core.denoise.state_space_layer import StateSpace
+from sd2core.denoise.s4_functions import by_product, by_transform
+from sd2core.denoise.s4_layer import S4Layer, StateSpace
 
 CHANNELS, STATE_SIZE = 128, 64
 PUBLISHED = {"legs": PublishedLegs, "diagonal": PublishedDiagonal}

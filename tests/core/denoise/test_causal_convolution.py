@@ -7,8 +7,13 @@ import pytest
 import torch
 from torch import Tensor
 
-from sd2core.denoise.channels import mix_gated, normalise
-from sd2core.denoise.convolution import by_product, by_transform, causal_convolution
+from sd2core.denoise.s4_functions import (
+    by_product,
+    by_transform,
+    causal_convolution,
+    mix_gated,
+    normalise,
+)
 
 Way = Callable[[Tensor, Tensor], Tensor]
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from sd2core.denoise.model import Denoiser, parameter_count
 from sd2core.denoise.registry import FILTERS, MODELS, build, options, summary
-from sd2core.denoise.swin import WINDOW, WindowBlock
+from sd2core.denoise.window_models import WINDOW, WindowBlock
 from sd2core.errors import Sd2Error
 
 TRAINED = [name for name in SMALL if name not in FILTERS]

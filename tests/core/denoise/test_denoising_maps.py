@@ -12,11 +12,11 @@ from denoisers import CAUSAL, SMALL, WINDOWED, energies, synthetic_map, trained
 
 from sd2core.denoise import live
 from sd2core.denoise import resample_to_model as matching
+from sd2core.denoise.causal_models import SerialS4Denoiser
 from sd2core.denoise.files import load_model, save_model
 from sd2core.denoise.live import TrainedDenoiser
 from sd2core.denoise.model import Denoiser
 from sd2core.denoise.registry import build
-from sd2core.denoise.state_space import SerialS4Denoiser
 from sd2core.errors import Sd2Error
 from sd2core.maps import CellUncertainty, DopplerMap
 from sd2core.progress import Cancelled

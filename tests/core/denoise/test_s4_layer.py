@@ -9,10 +9,9 @@ import pytest
 import torch
 from torch import Tensor
 
-from sd2core.denoise.convolution import causal_convolution
-from sd2core.denoise.s4 import S4Layer
-from sd2core.denoise.ssm import legs_kernel
-from sd2core.denoise.state_space_layer import SLOWEST_DECAY, Kernel, StateSpace
+from sd2core.denoise.s4_functions import causal_convolution
+from sd2core.denoise.s4_kernel import legs_kernel
+from sd2core.denoise.s4_layer import SLOWEST_DECAY, Kernel, S4Layer, StateSpace
 from sd2core.errors import Sd2Error
 
 KERNELS = ("legs", "diagonal")

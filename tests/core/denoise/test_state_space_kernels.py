@@ -9,13 +9,14 @@ from dense_kernels import dense_diagonal_kernel, dense_legs_kernel, hippo_legs
 from numpy.typing import NDArray
 from torch import Tensor
 
-from sd2core.denoise.hippo import legs_matrices, legs_normal_form
-from sd2core.denoise.ssm import (
+from sd2core.denoise.s4_kernel import (
     StateMatrix,
     diagonal_kernel,
     legs_kernel,
+    legs_matrices,
+    legs_nplr,
     legs_state_matrix,
-    low_rank_kernel,
+    nplr_kernel,
 )
 from sd2core.errors import Sd2Error
 
@@ -99,7 +100,7 @@ def test_small_steps_give_legendre_polynomials() -> None:
 
 @pytest.mark.parametrize("state_size", [2, 4, 64, 256])
 def test_normal_form_is_hippo_legs(state_size: int) -> None:
-    form = legs_normal_form(state_size)
+    form = legs_nplr(state_size)
     A, B = (values.astype(np.float64) for values in hippo_legs(state_size))
     given_A, given_B = legs_matrices(state_size)
     np.testing.assert_allclose(given_A, A, rtol=1e-15)
@@ -164,7 +165,7 @@ def test_derivatives_of_the_low_rank_kernel(length: int) -> None:
     inputs = [values.clone().requires_grad_() for values in (poles, low_rank, B, C, dt)]
 
     def made(poles: Tensor, low_rank: Tensor, B: Tensor, C: Tensor, dt: Tensor) -> Tensor:
-        return low_rank_kernel(StateMatrix(poles, low_rank, B), C, dt, length)
+        return nplr_kernel(StateMatrix(poles, low_rank, B), C, dt, length)
 
     assert torch.autograd.gradcheck(made, inputs)
     C = torch.randn(2, 6, dtype=torch.float64, requires_grad=True)
@@ -189,7 +190,7 @@ def test_a_pole_that_forgets_at_once_has_derivatives() -> None:
     dt = torch.ones(1, dtype=torch.float64)
 
     def made(poles: Tensor, low_rank: Tensor) -> Tensor:
-        return low_rank_kernel(StateMatrix(poles, low_rank, ones), ones, dt, 6)
+        return nplr_kernel(StateMatrix(poles, low_rank, ones), ones, dt, 6)
 
     assert torch.autograd.gradcheck(made, (poles, low_rank))
 

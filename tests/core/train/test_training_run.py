@@ -332,7 +332,7 @@ class TestFailure:
     def test_what_diverges_is_said(
         self, pairs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        from sd2core.denoise.recurrent import GruDenoiser
+        from sd2core.denoise.causal_models import GruDenoiser
 
         monkeypatch.setattr(
             GruDenoiser,

@@ -1,22 +1,117 @@
 """Convolution kernels of structured state spaces, exact for every step size and length.
 
-Sources: A. Gu, K. Goel, C. Ré, "Efficiently modeling long sequences with structured state
-spaces" (2022), "S4"; A. Gu, A. Gupta, K. Goel, C. Ré, "On the parameterization and
-initialization of diagonal state space models" (2022), "S4D".
+Sources: A. Gu, T. Dao, S. Ermon, A. Rudra, C. Ré, "HiPPO: Recurrent memory with optimal
+polynomial projections" (2020), theorem 2 and appendix D.3; A. Gu, K. Goel, C. Ré, "Efficiently
+modeling long sequences with structured state spaces" (2022), equation 2 and theorem 1, "S4";
+A. Gu, A. Gupta, K. Goel, C. Ré, "On the parameterization and initialization of diagonal state
+space models" (2022), "S4D".
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
-from sd2core.denoise.feedback import circle, close_loop
-from sd2core.denoise.hippo import legs_normal_form
-from sd2core.denoise.power_sums import power_sums
-from sd2core.denoise.s4_autograd import low_rank_terms
+from sd2core.denoise.s4_functions import (
+    damping_circle,
+    nplr_terms,
+    vandermonde_product,
+    woodbury_quotient,
+)
 from sd2core.errors import Sd2Error
+
+
+def legs_matrices(state_size: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """HiPPO-LegS in its own (dense, real) basis: x′ = A x + B u.
+
+    A[n, k] = −√((2n + 1)(2k + 1)) below the diagonal, −(n + 1) on it and 0 above, and
+    B[n] = √(2n + 1). The SD² paper prints A without its minus sign; that system has eigenvalues
+    1 … N instead of −1 … −N, and its kernel grows past 1e48.
+
+    Returns
+    -------
+    A : (N, N) float64
+    B : (N,) float64
+    """
+    order = np.arange(state_size)
+    root = np.sqrt(2 * order + 1.0)
+    matrix = -np.tril(root[:, None] * root[None, :], -1) - np.diag(order + 1.0)
+    return matrix, root
+
+
+@dataclass(frozen=True, eq=False)
+class NPLR:
+    """Normal-plus-low-rank form A = V (Λ − p pᵀ) V*, one of each conjugate pair of Λ kept.
+
+    Attributes
+    ----------
+    poles : (N/2,) complex128
+        Λ: every real part is −1/2, imaginary parts positive and ascending.
+    low_rank : (N/2,) float64
+        p = V* P with P[n] = √(n + 1/2). The phases of V are chosen so that it is real and
+        positive, which makes the form unique.
+    inputs : (N/2,) complex128
+        V* B, which is √2 p.
+    basis : (N, N/2) complex128
+        The columns of V that belong to `poles`; orthonormal.
+    """
+
+    poles: NDArray[np.complex128]
+    low_rank: NDArray[np.float64]
+    inputs: NDArray[np.complex128]
+    basis: NDArray[np.complex128]
+
+
+@lru_cache(maxsize=16)
+def legs_nplr(state_size: int) -> NPLR:
+    """HiPPO-LegS of an even size N as a normal matrix less one of rank one, in double precision.
+
+    A + P Pᵀ is −1/2 plus a skew-symmetric matrix, so the basis that diagonalises it is unitary
+    and loses nothing, while A itself has eigenvectors too ill-conditioned for any use.
+    """
+    if state_size < 2 or state_size % 2:
+        raise Sd2Error(
+            found=f"a state of size {state_size}",
+            expected="an even size of 2 or more: the poles come in conjugate pairs",
+            remedy="Take the next even size.",
+        )
+    matrix, inputs = legs_matrices(state_size)
+    low_rank = np.sqrt(np.arange(state_size) + 0.5)
+    skew = matrix + np.outer(low_rank, low_rank) + 0.5 * np.eye(state_size)
+    skew = 0.5 * (skew - skew.T)
+    frequencies, vectors = np.linalg.eigh(-1j * skew)
+    kept = slice(state_size // 2, None)
+    vectors = _orthonormal_with_conjugates(vectors[:, kept])
+    projected = vectors.conj().T @ low_rank
+    basis = vectors * (projected / np.abs(projected))
+    form = NPLR(
+        poles=-0.5 + 1j * frequencies[kept],
+        low_rank=np.abs(projected),
+        inputs=basis.conj().T @ inputs,
+        basis=basis,
+    )
+    for values in (form.poles, form.low_rank, form.inputs, form.basis):
+        values.flags.writeable = False
+    return form
+
+
+def _orthonormal_with_conjugates(vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Half of a unitary basis whose other half is its conjugate, to the last digit.
+
+    `eigh` knows nothing of conjugates: at N = 256 the slowest vector and its conjugate are
+    orthogonal to 1e-12 only. √2 times real and imaginary parts should be an orthogonal matrix;
+    one Newton step towards the nearest squares the error.
+    """
+    real = np.sqrt(2.0) * np.hstack((vectors.real, vectors.imag))
+    real = real @ (1.5 * np.eye(len(real)) - 0.5 * real.T @ real)
+    half = vectors.shape[1]
+    return (real[:, :half] + 1j * real[:, half:]) / np.sqrt(2.0)
 
 
 class StateMatrix(NamedTuple):
@@ -38,8 +133,8 @@ class StateMatrix(NamedTuple):
 
 
 def legs_state_matrix(state_size: int, device: torch.device | str | None = None) -> StateMatrix:
-    """HiPPO-LegS, complex128."""
-    form = legs_normal_form(state_size)
+    """Normal-plus-low-rank form of HiPPO-LegS as complex128 tensors."""
+    form = legs_nplr(state_size)
     return StateMatrix(
         torch.tensor(form.poles, device=device),
         torch.tensor(form.low_rank, device=device),
@@ -66,10 +161,8 @@ def legs_kernel(
         In the dense basis of A and B above. N is even.
     dt : (H,) or () float
         Δ, above 0.
-    length : int
     matrix : StateMatrix, optional
-        What takes the place of HiPPO-LegS, in the basis V of its normal form, where C is C V;
-        the layer gives what it has learned.
+        Learned matrix in place of HiPPO-LegS, in the basis V of its normal form, where C is C V.
 
     Returns
     -------
@@ -77,17 +170,17 @@ def legs_kernel(
     """
     if matrix is None:
         matrix = legs_state_matrix(C.shape[-1], C.device)
-    return _low_rank_kernel(matrix, to_normal_basis(C), dt, length, C.dtype)
+    return _nplr_kernel(matrix, to_normal_basis(C), dt, length, C.dtype)
 
 
 def to_normal_basis(C: Tensor) -> Tensor:
-    """C V: (…, N) real, in the dense basis → (…, N/2) complex128."""
-    form = legs_normal_form(C.shape[-1])
+    """Change C from the dense basis to the normal one, C V: (…, N) real → (…, N/2) complex128."""
+    form = legs_nplr(C.shape[-1])
     basis = torch.view_as_real(torch.tensor(form.basis, device=C.device)).flatten(1)  # (N, N)
     return torch.view_as_complex((C.double() @ basis).unflatten(-1, (-1, 2)))
 
 
-def low_rank_kernel(matrix: StateMatrix, C: Tensor, dt: Tensor | float, length: int) -> Tensor:
+def nplr_kernel(matrix: StateMatrix, C: Tensor, dt: Tensor | float, length: int) -> Tensor:
     """Kernel of any normal matrix less one of rank one, discretised bilinearly.
 
     With z for the shift by one frame and R = (1 − Δ/2 Λ − z (1 + Δ/2 Λ))⁻¹ (Gu et al. 2022,
@@ -99,12 +192,11 @@ def low_rank_kernel(matrix: StateMatrix, C: Tensor, dt: Tensor | float, length: 
 
     R is diagonal, so a … d are sums of powers of (1 + Δ/2 λ) / (1 − Δ/2 λ). S4 evaluates the
     quotient at the roots of unity, which gives a kernel that wraps around and must be cured with
-    C (I − Āᴸ); here the four series are divided as series (`close_loop`), and no node, no Āᴸ and
-    no wrapped kernel occurs. All of it is in double precision.
+    C (I − Āᴸ); here the four series are divided as series (`woodbury_quotient`), and no node,
+    no Āᴸ and no wrapped kernel occurs. All of it is in double precision.
 
     Parameters
     ----------
-    matrix : StateMatrix
     C : (…, N/2) complex64 or complex128
         In the basis of `matrix`.
     dt : (…) float
@@ -113,10 +205,10 @@ def low_rank_kernel(matrix: StateMatrix, C: Tensor, dt: Tensor | float, length: 
     -------
     (…, length) float32 or float64, by the type of C.
     """
-    return _low_rank_kernel(matrix, C, dt, length, C.real.dtype)
+    return _nplr_kernel(matrix, C, dt, length, C.real.dtype)
 
 
-def _low_rank_kernel(
+def _nplr_kernel(
     matrix: StateMatrix, C: Tensor, dt: Tensor | float, length: int, precision: torch.dtype
 ) -> Tensor:
     check_length(length)
@@ -128,16 +220,16 @@ def _low_rank_kernel(
     def rows(values: Tensor, precision: torch.dtype) -> Tensor:
         return values.to(precision).expand(shape).reshape(-1, states)
 
-    ratios, weights = low_rank_terms(
+    ratios, weights = nplr_terms(
         rows(matrix.poles, torch.complex128),
         rows(matrix.low_rank, torch.float64),
         rows(matrix.inputs, torch.complex128),
         rows(C, torch.complex128),
         dt.expand(*shape[:-1], 1).reshape(-1, 1),
     )
-    points, radius = circle(length, precision)
-    series = power_sums(radius * ratios, weights, length)
-    kernel = close_loop(series, points, radius)
+    points, radius = damping_circle(length, precision)
+    series = vandermonde_product(radius * ratios, weights, length)
+    kernel = woodbury_quotient(series, points, radius)
     return kernel.to(precision).reshape(*shape[:-1], length)
 
 
@@ -152,7 +244,6 @@ def diagonal_kernel(A: Tensor, B: Tensor, C: Tensor, dt: Tensor | float, length:
     A, B, C : (H, N/2) or (N/2,) complex64 or complex128
         One of each conjugate pair, hence the 2 Re. Re A ≤ 0.
     dt : (H,) or () float
-    length : int
 
     Returns
     -------
@@ -165,12 +256,12 @@ def diagonal_kernel(A: Tensor, B: Tensor, C: Tensor, dt: Tensor | float, length:
     weights = (C.to(torch.complex128) * B) * (dt * held)
     poles = grown.expand(weights.shape)
     states = weights.shape[-1]
-    kernel = power_sums(poles.reshape(-1, states), weights.reshape(-1, 1, states), length)
+    kernel = vandermonde_product(poles.reshape(-1, states), weights.reshape(-1, 1, states), length)
     return kernel.to(precision).reshape(*weights.shape[:-1], length)
 
 
 def held_exponential(exponent: Tensor) -> tuple[Tensor, Tensor]:
-    """exp(x), and (exp(x) − 1) / x, which is 1 at x = 0; complex128.
+    """Compute exp(x), and (exp(x) − 1) / x, which is 1 at x = 0; complex128.
 
     Below 0.01 the quotient cancels and its series takes over; above, two digits are lost at most.
     """
@@ -183,7 +274,7 @@ def held_exponential(exponent: Tensor) -> tuple[Tensor, Tensor]:
 
 
 def check_length(length: int) -> None:
-    """Refuse what is no length."""
+    """Refuse a length below 1."""
     if length < 1:
         raise Sd2Error(
             found=f"a kernel of length {length}",

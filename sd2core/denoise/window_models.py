@@ -1,9 +1,4 @@
-"""A small transformer with shifted windows over velocity and time.
-
-Z. Liu et al., "Swin Transformer: Hierarchical Vision Transformer using Shifted Windows",
-ICCV 2021, turned from a classifier into a U: the coarse level is brought back to the fine
-one, with a bridge beside it (as in H. Cao et al., "Swin-Unet", 2021).
-"""
+"""Networks over windows of 72 frames: U-Net and Swin transformer."""
 
 from __future__ import annotations
 
@@ -11,7 +6,88 @@ import torch
 from torch import Tensor, nn
 
 from sd2core.denoise.model import Denoiser
-from sd2core.denoise.unet import padded
+
+_KERNEL = 3
+
+
+class UNetDenoiser(Denoiser):
+    """U-Net over velocity and time (O. Ronneberger et al., MICCAI 2015).
+
+    Two convolutions per level, down by 2 in time and velocity, and back with skip connections.
+
+    Normalised by statistics of the training data (batch normalisation), not of the
+    clip: how strong a frame is must not get lost.
+
+    Parameters
+    ----------
+    channels : int
+        Width of the first level; each level below is twice as wide.
+    depth : int
+        Levels below the first.
+    dropout : float
+        At the lowest level.
+    """
+
+    causal = False
+    window = 72
+
+    def __init__(
+        self,
+        bins: int,
+        *,
+        channels: int = 12,
+        depth: int = 3,
+        dropout: float = 0.0,
+    ) -> None:
+        super().__init__(bins)
+        self._step = 2**depth
+        widths = [channels * 2**level for level in range(depth + 1)]
+        self.down = nn.ModuleList(
+            _two_convolutions(before, after)
+            for before, after in zip([1, *widths[:-1]], widths, strict=True)
+        )
+        self.shrink = nn.MaxPool2d(2)
+        self.dropout = nn.Dropout(dropout)
+        self.grow = nn.ModuleList(
+            nn.ConvTranspose2d(2 * width, width, 2, stride=2) for width in widths[:-1]
+        )
+        self.up = nn.ModuleList(_two_convolutions(2 * width, width) for width in widths[:-1])
+        self.head = nn.Conv2d(channels, 1, 1)
+        # Convolutions of few channels are half as long again in the other order.
+        self.to(memory_format=torch.channels_last)
+
+    def forward(self, values: Tensor) -> Tensor:
+        """Denoise (batch, frames, bins) of any number of frames; it learns from 72."""
+        frames, bins = values.shape[1:]
+        picture = padded(values[:, None], self._step, self._step)  # (B, 1, L', bins')
+        picture = picture.contiguous(memory_format=torch.channels_last)
+        bridges = []
+        for level, convolutions in enumerate(self.down):
+            picture = convolutions(picture if level == 0 else self.shrink(picture))
+            bridges.append(picture)
+        picture = self.dropout(bridges.pop())
+        for level in reversed(range(len(bridges))):
+            picture = torch.cat([bridges[level], self.grow[level](picture)], 1)
+            picture = self.up[level](picture)
+        return self.head(picture)[:, 0, :frames, :bins]
+
+
+def padded(picture: Tensor, frames_step: int, bins_step: int) -> Tensor:
+    """Pad with zeros after the last frame and above the last bin, up to multiples of the steps."""
+    frames, bins = picture.shape[-2:]
+    return nn.functional.pad(picture, (0, -bins % bins_step, 0, -frames % frames_step))
+
+
+def _two_convolutions(before: int, after: int) -> nn.Sequential:
+    layers: list[nn.Module] = []
+    for inward in (before, after):
+        layers += [
+            nn.Conv2d(inward, after, _KERNEL, padding=_KERNEL // 2, bias=False),
+            nn.BatchNorm2d(after),
+            nn.ReLU(),
+        ]
+    return nn.Sequential(*layers)
+
 
 PATCH = 2
 """Frames and bins that become one token."""
@@ -23,18 +99,19 @@ HEAD_WIDTH = 16
 
 
 class SwinDenoiser(Denoiser):
-    """Patches of 2 × 2 cells, window attention at two levels, and back.
+    """Small Swin transformer, shaped as a U, over velocity and time.
 
-    A token learns which velocity it stands for, because windows alone do not say.
+    Z. Liu et al., "Swin Transformer: Hierarchical Vision Transformer using Shifted Windows",
+    ICCV 2021, with the coarse level brought back to the fine one through a skip connection, as
+    in H. Cao et al., "Swin-Unet", 2021. Patches of 2 × 2 cells are the tokens. A token learns which
+    velocity it stands for, because windows alone do not say.
 
     Parameters
     ----------
-    bins : int
     channels : int
         Width of the fine level, a multiple of 16; the coarse one is twice as wide.
     depth : int
         Blocks per level; every second one has its windows shifted.
-    dropout : float
     """
 
     causal = False
@@ -66,7 +143,7 @@ class SwinDenoiser(Denoiser):
         self.head = nn.Linear(channels, PATCH * PATCH)
 
     def forward(self, values: Tensor) -> Tensor:
-        """Any number of frames and bins; windows of 72 frames are what it learns from."""
+        """Denoise (batch, frames, bins) of any number of frames; it learns from 72."""
         frames, bins = values.shape[1:]
         picture = padded(values[:, None], self._frames_step, self._bins_step)
         tokens = self.embed(picture).permute(0, 2, 3, 1) + self.velocity  # (B, L/2, bins/2, C)
@@ -78,14 +155,12 @@ class SwinDenoiser(Denoiser):
 
 
 class WindowBlock(nn.Module):
-    """Attention within windows, then a perceptron; both added to what comes in.
+    """Attention within windows, then a perceptron, both with a residual connection.
 
     Parameters
     ----------
-    channels : int
     shifted : bool
-        Whether windows are moved by half their size, so that neighbours meet.
-    dropout : float
+        True to move windows by half their size, so that neighbours meet.
     """
 
     def __init__(self, channels: int, shifted: bool, dropout: float) -> None:
@@ -109,7 +184,7 @@ class WindowBlock(nn.Module):
         self.dropout = nn.Dropout(dropout)
 
     def forward(self, tokens: Tensor) -> Tensor:
-        """(B, rows, columns, C); rows and columns are multiples of the window."""
+        """Apply to (B, rows, columns, C); rows and columns are multiples of the window."""
         tokens = tokens + self.dropout(self._attention(self.norm_attention(tokens)))
         return tokens + self.perceptron(tokens)
 
@@ -138,21 +213,21 @@ def _level(channels: int, depth: int, dropout: float) -> nn.Sequential:
 
 
 def _gathered(tokens: Tensor) -> Tensor:
-    """Four neighbours become one token of four times the width."""
+    """Merge four neighbours into one token of four times the width."""
     batch, rows, columns, channels = tokens.shape
     blocks = tokens.view(batch, rows // 2, 2, columns // 2, 2, channels)
     return blocks.transpose(2, 3).reshape(batch, rows // 2, columns // 2, 4 * channels)
 
 
 def _spread(tokens: Tensor) -> Tensor:
-    """One token becomes four neighbours of a quarter of the width."""
+    """Split one token into four neighbours of a quarter of the width."""
     batch, rows, columns, channels = tokens.shape
     blocks = tokens.view(batch, rows, columns, 2, 2, channels // 4)
     return blocks.transpose(2, 3).reshape(batch, 2 * rows, 2 * columns, channels // 4)
 
 
 def _windows(tokens: Tensor) -> Tensor:
-    """(B, rows, columns, C) to (B, windows, places, C)."""
+    """Cut into windows, (B, rows, columns, C) to (B, windows, places, C)."""
     batch, rows, columns, channels = tokens.shape
     tall, wide = WINDOW
     blocks = tokens.view(batch, rows // tall, tall, columns // wide, wide, channels)
@@ -176,7 +251,7 @@ def _relative_positions() -> Tensor:
 
 
 def _apart(rows: int, columns: int, shift: tuple[int, ...], device: torch.device) -> Tensor:
-    """−∞ between places that only the shift brought together, (windows, P, P)."""
+    """Attention mask: −∞ between places that only the shift brought together, (windows, P, P)."""
     part = torch.zeros(1, rows, columns, 1, device=device)
     part[:, rows - shift[0] :] += 1
     part[:, :, columns - shift[1] :] += 2

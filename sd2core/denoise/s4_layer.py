@@ -1,4 +1,4 @@
-"""State spaces that learn: what their parameters are, and what follows from them."""
+"""S4 layer: learned state spaces, a convolution in training and a recurrence live."""
 
 from __future__ import annotations
 
@@ -9,26 +9,29 @@ from typing import Any, Literal, TypeAlias
 
 import torch
 from torch import Tensor, nn
+from torch.nn import functional
 
-from sd2core.denoise.recurrence import (
-    Block,
-    Recurrence,
-    block_of,
-    diagonal_recurrence,
-    low_rank_recurrence,
-)
-from sd2core.denoise.ssm import (
+from sd2core.denoise.s4_functions import SMALLEST_VARIANCE, causal_convolution, mix_gated, normalise
+from sd2core.denoise.s4_kernel import (
     StateMatrix,
     diagonal_kernel,
     legs_kernel,
     legs_state_matrix,
     to_normal_basis,
 )
+from sd2core.denoise.s4_recurrence import (
+    BLOCK,
+    Block,
+    Recurrence,
+    block_of,
+    diagonal_recurrence,
+    nplr_recurrence,
+)
 from sd2core.errors import Sd2Error
 
 Kernel = Literal["legs", "diagonal"]
 State: TypeAlias = Tensor
-"""(H, B, N) float64: what a layer remembers of the frames so far."""
+"""State x of a layer after the frames so far, (H, B, N) float64."""
 
 # Poles stay at least this far left of the imaginary axis, whatever is learned.
 SLOWEST_DECAY = 1e-4
@@ -40,7 +43,7 @@ MOST_KEPT = 8
 
 
 class StateSpace(nn.Module):
-    """H systems of one input and one output, their parameters, and what follows from them.
+    """Learned state spaces of H channels, with their kernel and their recurrence.
 
     Learned per channel: the step Δ (as its logarithm), the poles Λ (the decay as the logarithm of
     what exceeds `SLOWEST_DECAY`, and the frequency), the output C and the skip D; with "legs" also
@@ -102,40 +105,40 @@ class StateSpace(nn.Module):
             self.outputs = nn.Parameter(torch.randn(channels, pairs, 2) * math.sqrt(0.5))
 
     def ssm_parameters(self) -> Iterator[nn.Parameter]:
-        """Those that shape the dynamics: all but C and D."""
+        """Parameters that shape the dynamics: all but C and D."""
         for name, parameter in self.named_parameters():
             if name not in ("outputs", "skip"):
                 yield parameter
 
     def dt(self) -> Tensor:
-        """Δ, (H,) float64, within `STEP_RANGE`."""
+        """Step size Δ per channel, (H,) float64, within `STEP_RANGE`."""
         low, high = (math.log(step) for step in STEP_RANGE)
         return self.log_dt.double().clamp(low, high).exp()
 
     def poles(self) -> Tensor:
-        """Λ, (H, N/2) complex128."""
+        """Poles Λ, (H, N/2) complex128."""
         decay = self.log_decay.double().clamp(-LARGEST_LOG, LARGEST_LOG).exp()
         return torch.complex(-(decay + SLOWEST_DECAY), self.frequency.double())
 
     def matrix(self) -> StateMatrix:
-        """Λ, p and B of "legs"."""
+        """State matrix and input Λ, p and B of the kernel "legs"."""
         inputs = torch.view_as_complex(self.inputs.double())
         return StateMatrix(self.poles(), self.low_rank.double(), inputs)
 
     # What follows from the parameters alone is kept while nothing is being learned.
 
     def kernel(self, length: int) -> Tensor:
-        """(H, length), D included, of the parameters' type."""
+        """Convolution kernel, (H, length), D included, of the parameters' type."""
         kernel: Tensor = self._keep(length, lambda: self._made_kernel(length))
         return kernel
 
     def recurrence(self) -> Recurrence:
-        """The same systems, one frame at a time."""
+        """Recurrence of the same systems, one frame at a time."""
         recurrence: Recurrence = self._keep("recurrence", self._made_recurrence)
         return recurrence
 
     def block(self) -> Block:
-        """The same systems, some frames at a time."""
+        """Recurrence of the same systems, a block of frames at a time."""
         block: Block = self._keep("block", lambda: block_of(self.recurrence()))
         return block
 
@@ -151,7 +154,7 @@ class StateSpace(nn.Module):
     def _made_recurrence(self) -> Recurrence:
         if self.kernel_name == "legs":
             outputs = to_normal_basis(self.outputs)
-            return low_rank_recurrence(self.matrix(), outputs, self.dt(), self.skip)
+            return nplr_recurrence(self.matrix(), outputs, self.dt(), self.skip)
         outputs = torch.view_as_complex(self.outputs.double())
         ones = torch.ones_like(outputs)
         return diagonal_recurrence(self.poles(), ones, outputs, self.dt(), self.skip)
@@ -175,7 +178,7 @@ class StateSpace(nn.Module):
         self._kept, self._held, self._counts = {}, (), ()
 
     def train(self, mode: bool = True) -> StateSpace:
-        """As of `nn.Module`."""
+        """Set the mode as `nn.Module.train` does, and drop what was derived from the weights."""
         self._forget()
         super().train(mode)
         return self
@@ -193,5 +196,120 @@ class StateSpace(nn.Module):
 
 
 def _per_channel(values: Tensor, channels: int) -> nn.Parameter:
-    """The same start for all channels, each free to leave it."""
+    """Parameter with the same initial values for all channels."""
     return nn.Parameter(values.float().expand(channels, *values.shape).clone())
+
+
+__all__ = ["Kernel", "S4Layer", "State"]
+
+
+class S4Layer(nn.Module):
+    """Residual S4 layer x + mix(gelu(k ∗ norm(x) + D norm(x))), one state space per channel.
+
+    The norm is over the channels of one frame and has no gain of its own (C and D have it); the
+    mixing is a gated linear unit over channels. So nothing but the state space looks at other
+    frames, and a stack of such layers can run live.
+
+    Parameters
+    ----------
+    channels : int
+        H.
+    state_size : int
+        N, even.
+    kernel : {"legs", "diagonal"}
+    bidirectional : bool
+        A second kernel looks ahead; such a layer cannot run live.
+    dropout : float
+        Share of channels that a training step leaves out, the same ones for all frames.
+    dt_min, dt_max : float
+        Range of the state spaces' first steps, see
+        :class:`~sd2core.denoise.s4_layer.StateSpace`.
+    """
+
+    def __init__(
+        self,
+        channels: int,
+        state_size: int = 64,
+        kernel: Kernel = "legs",
+        bidirectional: bool = False,
+        dropout: float = 0.0,
+        dt_min: float = DT_MIN,
+        dt_max: float = DT_MAX,
+    ) -> None:
+        super().__init__()
+        self.channels = channels
+        space = (channels, state_size, kernel, dt_min, dt_max)
+        self.past = StateSpace(*space)
+        self.future = StateSpace(*space) if bidirectional else None
+        self.mixing = nn.Linear(channels, 2 * channels)
+        self.dropout = dropout
+
+    def ssm_parameters(self) -> Iterator[nn.Parameter]:
+        """Parameters that get no weight decay and a lower learning rate of their own."""
+        for part in (self.past, self.future):
+            if part is not None:
+                yield from part.ssm_parameters()
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Apply the layer to whole sequences by convolution, (B, L, H) → (B, L, H).
+
+        Channels come first in memory, as convolution and mixing need them: the result is a view
+        of an (H, B, L) array, and a stack of layers copies nothing.
+        """
+        if torch.is_autocast_enabled(x.device.type):
+            # Half precision would cost the kernel its tail and save little: products are small.
+            with torch.autocast(x.device.type, enabled=False):
+                return self(x.to(self.mixing.weight.dtype))
+        batch, length, channels = x.shape
+        signal = x.permute(2, 0, 1).contiguous()  # (H, B, L)
+        normed = normalise(signal)
+        mixed = causal_convolution(normed, self.past.kernel(length))
+        if self.future is not None:
+            ahead = causal_convolution(normed.flip(-1), self.future.kernel(length))
+            mixed = mixed + ahead.flip(-1)
+        share = None
+        if self.training and self.dropout > 0.0:
+            share = functional.dropout(mixed.new_ones(channels, batch, 1), self.dropout)
+        return self._mix(mixed, signal, share).permute(1, 2, 0)
+
+    def initial_state(self, batch: int) -> State:
+        """Zero state before the first frame."""
+        return self._live().recurrence().initial_state(batch)
+
+    def step(self, frame: Tensor, state: State) -> tuple[Tensor, State]:
+        """Advance by one frame (B, H); returns its result and the next state."""
+        normed = functional.layer_norm(frame, (self.channels,), eps=SMALLEST_VARIANCE)
+        seen, state = self._live().recurrence().step(normed.t().double(), state)
+        both = self.mixing(functional.gelu(seen.t().to(frame.dtype)))
+        return frame + functional.glu(both), state
+
+    def chunk(self, x: Tensor, state: State) -> tuple[Tensor, State]:
+        """Advance by any number of frames (B, l, H), as so many steps would."""
+        signal = x.permute(2, 0, 1).contiguous()
+        length = signal.shape[-1]
+        normed = normalise(signal).double()
+        recurrence = self._live().recurrence()
+        whole = length - length % BLOCK
+        parts = []
+        if whole:
+            seen, state = self.past.block().run(normed[..., :whole], state)
+            parts.append(seen)
+        for frame in range(whole, length):
+            seen, state = recurrence.step(normed[..., frame], state)
+            parts.append(seen[..., None])
+        if not parts:
+            return x, state
+        mixed = torch.cat(parts, -1).to(signal.dtype)
+        return self._mix(mixed, signal).permute(1, 2, 0), state
+
+    def _mix(self, seen: Tensor, signal: Tensor, share: Tensor | None = None) -> Tensor:
+        return mix_gated(seen, signal, self.mixing.weight, self.mixing.bias, share)
+
+    def _live(self) -> StateSpace:
+        if self.future is not None:
+            raise Sd2Error(
+                found="a denoiser that looks ahead",
+                expected="one that needs only the past, to run frame by frame",
+                remedy="Take a causal model.",
+            )
+        return self.past

@@ -1,4 +1,4 @@
-"""The paper's denoiser: structured state spaces between two linear layers."""
+"""Causal networks: the paper's S4 denoiser, its serial form, and a GRU as the baseline."""
 
 from __future__ import annotations
 
@@ -8,16 +8,14 @@ from typing import Any, Literal
 from torch import Tensor, nn
 
 from sd2core.denoise.model import Denoiser, State
-from sd2core.denoise.s4 import S4Layer
-from sd2core.denoise.state_space_layer import DT_MAX, DT_MIN
+from sd2core.denoise.s4_layer import DT_MAX, DT_MIN, S4Layer
 
 
 class S4Denoiser(Denoiser):
-    """Each frame's bins, a linear layer, S4 layers along time, a linear layer.
+    """The paper's denoiser: a linear layer per frame, S4 layers along time, a linear layer.
 
     Parameters
     ----------
-    bins : int
     channels : int
         Width H of the layers.
     depth : int
@@ -27,7 +25,6 @@ class S4Denoiser(Denoiser):
     kernel : {"legs", "diagonal"}
     bidirectional : bool
         Also backwards in time: no longer causal, so not for live use.
-    dropout : float
     dt_min, dt_max : float
         A channel begins with a memory of between about 1 / ``dt_max`` and 1 / ``dt_min`` frames.
     """
@@ -64,18 +61,18 @@ class S4Denoiser(Denoiser):
         self.head = nn.Linear(channels, bins)
 
     def initial_state(self, batch: int = 1) -> State:
-        """One state per layer."""
+        """Zero states, one per layer."""
         return [layer.initial_state(batch) for layer in self.layers]
 
     def forward(self, values: Tensor) -> Tensor:
-        """Whole stretches by convolution."""
+        """Denoise whole sequences by convolution, (batch, frames, bins)."""
         hidden = self.lift(values)
         for layer in self.layers:
             hidden = layer(hidden)
         return self.head(hidden)
 
     def chunk(self, values: Tensor, state: State) -> tuple[Tensor, State]:
-        """Convolution, and what the state still says."""
+        """Advance by some frames."""
         hidden, after = self.lift(values), []
         for layer, one in zip(self.layers, state, strict=True):
             hidden, one = layer.chunk(hidden, one)
@@ -83,7 +80,7 @@ class S4Denoiser(Denoiser):
         return self.head(hidden), after
 
     def step(self, frame: Tensor, state: State) -> tuple[Tensor, State]:
-        """By recurrence."""
+        """Advance by one frame."""
         hidden, after = self.lift(frame), []
         for layer, one in zip(self.layers, state, strict=True):
             hidden, one = layer.step(hidden, one)
@@ -91,7 +88,7 @@ class S4Denoiser(Denoiser):
         return self.head(hidden), after
 
     def ssm_parameters(self) -> Iterator[nn.Parameter]:
-        """Those of all layers."""
+        """State-space parameters of all layers."""
         for layer in self.layers:
             yield from layer.ssm_parameters()
 
@@ -101,12 +98,7 @@ class SerialS4Denoiser(S4Denoiser):
 
     Cells come one after another, bin by bin and frame by frame; each is lifted to the
     width of the layers by itself. A cell knows the bins below it in its own frame and
-    all earlier frames.
-
-    Parameters
-    ----------
-    bins, channels, depth, state_size, kernel, dropout, dt_min, dt_max
-        As for :class:`S4Denoiser`.
+    all earlier frames. Parameters as for :class:`S4Denoiser`.
     """
 
     longest = 512
@@ -117,15 +109,58 @@ class SerialS4Denoiser(S4Denoiser):
         self.head = nn.Linear(channels, 1)
 
     def forward(self, values: Tensor) -> Tensor:
-        """Cells in a row and back."""
+        """Denoise whole sequences, (batch, frames, bins), as rows of cells."""
         return super().forward(values.flatten(1)[..., None]).view(values.shape)
 
     def chunk(self, values: Tensor, state: State) -> tuple[Tensor, State]:
-        """Whole frames, so the state stands between two frames."""
+        """Advance by whole frames, so that the state lies between two frames."""
         cells, state = super().chunk(values.flatten(1)[..., None], state)
         return cells.view(values.shape), state
 
     def step(self, frame: Tensor, state: State) -> tuple[Tensor, State]:
-        """One frame is a chunk of as many cells as there are bins."""
+        """Advance by one frame, a chunk of as many cells as there are bins."""
         answer, state = self.chunk(frame[:, None], state)
         return answer[:, 0], state
+
+
+class GruDenoiser(Denoiser):
+    """Baseline: linear layer, GRU layers (K. Cho et al., EMNLP 2014), linear layer; causal.
+
+    Parameters
+    ----------
+    channels : int
+        Width of all layers.
+    depth : int
+        Number of GRU layers.
+    dropout : float
+        Between layers, while training.
+    """
+
+    def __init__(
+        self,
+        bins: int,
+        *,
+        channels: int = 144,
+        depth: int = 2,
+        dropout: float = 0.0,
+    ) -> None:
+        super().__init__(bins)
+        self.lift = nn.Linear(bins, channels)
+        self.recurrent = nn.GRU(
+            channels,
+            channels,
+            depth,
+            batch_first=True,
+            dropout=dropout if depth > 1 else 0.0,
+        )
+        self.head = nn.Linear(channels, bins)
+
+    def initial_state(self, batch: int = 1) -> State:
+        """Zero state, (layers, batch, channels)."""
+        weight = self.lift.weight
+        return weight.new_zeros(self.recurrent.num_layers, batch, self.recurrent.hidden_size)
+
+    def chunk(self, values: Tensor, state: State) -> tuple[Tensor, State]:
+        """Advance by some frames."""
+        hidden, state = self.recurrent(self.lift(values), state)
+        return self.head(hidden), state

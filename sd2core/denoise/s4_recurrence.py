@@ -1,4 +1,4 @@
-"""The same systems as recurrences: one frame, or a block of frames, at a time.
+"""State spaces as recurrences: one frame, or a block of frames, at a time.
 
 A bilinear step of a normal matrix less one of rank one is again of that form, Ā = D − q sᵀ, so a
 step costs as much as one of a diagonal system. Ā is never diagonalised: its eigenvectors are as
@@ -13,13 +13,15 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from sd2core.denoise.ssm import StateMatrix, held_exponential
+from sd2core.denoise.s4_kernel import StateMatrix, held_exponential
 
 BLOCK = 64
 
 
 class Recurrence(NamedTuple):
-    """y = x·w + D u, x′ = Λ̄ x + (u, −x·s) (B̄, q).
+    """Discretised state spaces that advance by one frame.
+
+    y = x·w + D u, x′ = Λ̄ x + (u, −x·s) (B̄, q).
 
     Everything is real, pairs (Re, Im) interleaved; N is twice the number of pairs and k is 2 for
     a system with a loop, otherwise 1.
@@ -42,12 +44,12 @@ class Recurrence(NamedTuple):
     direct: Tensor
 
     def initial_state(self, batch: int) -> Tensor:
-        """(H, batch, N) float64 of zeros."""
+        """Zero state, (H, batch, N) float64."""
         channels, states, _ = self.watch.shape
         return self.watch.new_zeros(channels, batch, states)
 
     def step(self, signal: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
-        """One frame: (H, B) and (H, B, N) → (H, B), next state; all float64."""
+        """Advance by one frame: (H, B) and (H, B, N) → (H, B), next state; all float64."""
         seen = torch.bmm(state, self.watch)  # (H, B, k)
         out = torch.addcmul(seen[..., 0], signal, self.direct)
         into = signal[..., None]
@@ -58,7 +60,7 @@ class Recurrence(NamedTuple):
 
 
 class Block(NamedTuple):
-    """`BLOCK` frames of a recurrence in one.
+    """Recurrence that advances by `BLOCK` frames at once.
 
     Attributes
     ----------
@@ -78,9 +80,9 @@ class Block(NamedTuple):
     across: Tensor
 
     def run(self, signal: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
-        """Whole blocks: (H, B, n m) and (H, B, N) → (H, B, n m), next state; all float64.
+        """Advance by whole blocks: (H, B, n m) and (H, B, N) → (H, B, n m), next state; float64.
 
-        Only the states follow one from the other; all else is done for all blocks at once.
+        Only the states follow one from the other; the rest is computed for all blocks at once.
         """
         channels, batch, frames = signal.shape
         states = state.shape[-1]
@@ -95,8 +97,8 @@ class Block(NamedTuple):
         return out.view(channels, batch, frames), state
 
 
-def low_rank_recurrence(matrix: StateMatrix, C: Tensor, dt: Tensor, skip: Tensor) -> Recurrence:
-    """Bilinear; `skip` (H,) is added to what passes at once. Shapes as `low_rank_kernel`."""
+def nplr_recurrence(matrix: StateMatrix, C: Tensor, dt: Tensor, skip: Tensor) -> Recurrence:
+    """Bilinear recurrence of an NPLR matrix; `skip` (H,) is D, other shapes as `nplr_kernel`."""
     dt = dt.double()[..., None]
     half = 0.5 * dt
     inverse = 1.0 / (1.0 - half * matrix.poles)
@@ -109,7 +111,7 @@ def low_rank_recurrence(matrix: StateMatrix, C: Tensor, dt: Tensor, skip: Tensor
 
 
 def diagonal_recurrence(A: Tensor, B: Tensor, C: Tensor, dt: Tensor, skip: Tensor) -> Recurrence:
-    """Zero-order hold; shapes as `diagonal_kernel`."""
+    """Zero-order-hold recurrence of a diagonal matrix; shapes as `diagonal_kernel`."""
     dt = dt.double()[..., None]
     grown, held = held_exponential(dt * A.to(torch.complex128))
     inputs = B * (dt * held)
@@ -119,7 +121,7 @@ def diagonal_recurrence(A: Tensor, B: Tensor, C: Tensor, dt: Tensor, skip: Tenso
 def _recurrence(
     poles: Tensor, C: Tensor, inputs: Tensor, skip: Tensor, loop: tuple[Tensor, Tensor] | None
 ) -> Recurrence:
-    """`loop` holds s and q."""
+    # `loop` holds s and q.
     direct = skip.double()[:, None] + _sum(C * inputs)
     onwards = C * poles
     watch, drive = [onwards], [inputs]
@@ -136,17 +138,17 @@ def _recurrence(
 
 
 def _sum(values: Tensor) -> Tensor:
-    """Over pairs, (H, N/2) → (H, 1) real."""
+    """Sum over conjugate pairs, (H, N/2) → (H, 1) real."""
     return 2.0 * values.real.sum(-1, keepdim=True)
 
 
 def _interleaved(values: Tensor) -> Tensor:
-    """(…, n) complex → (…, 2n) real."""
+    """Interleave real and imaginary parts, (…, n) → (…, 2n)."""
     return torch.view_as_real(values).flatten(-2)
 
 
 def block_of(recurrence: Recurrence) -> Block:
-    """`BLOCK` frames in one, by doubling."""
+    """Combine `BLOCK` frames of a recurrence into one step, by doubling."""
     channels, states, _ = recurrence.watch.shape
     unit = torch.eye(states, dtype=torch.float64, device=recurrence.watch.device)
     silence = recurrence.watch.new_zeros(channels, states)
