@@ -14,6 +14,15 @@ class Sd2Error(Exception):
         What was expected instead.
     remedy : str
         What to do about it.
+
+    Examples
+    --------
+    >>> import sd2core as sd2
+    >>> try:
+    ...     sd2.Timebase([0.0, 0.5, 0.4])
+    ... except sd2.Sd2Error as error:
+    ...     print(error.expected)
+    times that increase from frame to frame
     """
 
     def __init__(self, found: str, expected: str = "", remedy: str = "") -> None:

@@ -84,6 +84,17 @@ class DopplerMap:
         columns say something.
     uncertainty : CellUncertainty, optional
         Where the mesh says how well its velocities are known, and one asked for it.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sd2core as sd2
+    >>> values = np.zeros((32, 3), np.float32)
+    >>> values[20] = 1.0
+    >>> times = sd2.Timebase.regular(frames=3, frames_per_s=30)
+    >>> doppler = sd2.DopplerMap(values, sd2.VelocityAxis(), times, kind="synthetic", unit="count")
+    >>> float(doppler.axis.centres_mps[doppler.values[:, 0].argmax()])
+    0.5625
     """
 
     values: NDArray[np.float32]

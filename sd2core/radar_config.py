@@ -33,6 +33,14 @@ class RadarConfig:
     Processing*, and V. Winkler, "Range Doppler detection for automotive FMCW
     radars" (EuMC 2007): v_max = lambda / (4 T_c), dv = lambda / (2 N T_c),
     dR = c / (2 B), R_max = dR * samples / 2 for real samples.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> import sd2core as sd2
+    >>> wide = replace(sd2.PAPER_RADAR, end_frequency_hz=60.875e9)
+    >>> round(wide.range_resolution_m, 3), round(wide.v_max_mps, 2)
+    (0.15, 3.18)
     """
 
     start_frequency_hz: float
@@ -139,3 +147,11 @@ PAPER_RADAR = RadarConfig(
     sample_rate_hz=2e6,
     name="60 GHz, 64 chirps, 32 samples, 30 frames/s",
 )
+"""Radar of the paper, as far as it is published.
+
+Examples
+--------
+>>> import sd2core as sd2
+>>> round(sd2.PAPER_RADAR.velocity_resolution_mps, 2), round(sd2.PAPER_RADAR.range_max_m, 1)
+(0.1, 9.6)
+"""

@@ -30,6 +30,13 @@ class VelocityAxis:
         Number of bins, at least 2.
     v_max_mps : float
         Outer edge of the last bin.
+
+    Examples
+    --------
+    >>> import sd2core as sd2
+    >>> axis = sd2.VelocityAxis(bins=32, v_max_mps=2.0)
+    >>> axis.bin_width_mps, axis.bin_of(0.3)
+    (0.125, 18)
     """
 
     bins: int = 32
@@ -78,6 +85,13 @@ class VirtualSensor:
         elevation above the horizon. (0, 0) looks along +z.
     field_of_view_deg : float
         Full opening angle that is drawn; the body is assumed inside it.
+
+    Examples
+    --------
+    >>> import sd2core as sd2
+    >>> sensor = sd2.VirtualSensor(position_m=(-1, 0, 2), azimuth_deg=30)
+    >>> sensor.position_m
+    (-1.0, 0.0, 2.0)
     """
 
     position_m: Vector = (0.0, 0.0, 0.0)

@@ -30,6 +30,15 @@ class Timebase:
     ------
     Sd2Error
         When a time is missing, not finite or not later than the one before.
+
+    Examples
+    --------
+    >>> import sd2core as sd2
+    >>> times = sd2.Timebase.regular(frames=90, frames_per_s=30)
+    >>> times.duration_s, times.frame_at(1.01)
+    (3.0, 30)
+    >>> times.frames_between(0.5, 1.0)
+    (15, 30)
     """
 
     times_s: NDArray[np.float64]

@@ -69,6 +69,13 @@ def load_model(model: Path | str) -> TrainedDenoiser:
     ------
     Sd2Error
         When there is none, or it is damaged or does not fit together.
+
+    Examples
+    --------
+    >>> import sd2core as sd2
+    >>> model = sd2.load_model("denoiser")
+    >>> model.card.model, model.card.axis.bins
+    ('s4', 32)
     """
     path = find_model(model)
     card, shapes = _read_header(path)

@@ -75,6 +75,14 @@ class SynthesisOptions:
     null_after_smoothing : bool
         Whether nulled bins are emptied again after the smoothing has spilt into
         them.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> import sd2core as sd2
+    >>> quick = replace(sd2.PRESETS["paper"], visibility="facing")
+    >>> quick.null_bins
+    (14, 15, 16)
     """
 
     visibility: Visibility = "exact"
@@ -157,7 +165,16 @@ PRESETS: dict[str, SynthesisOptions] = {
         null_after_smoothing=False,
     ),
 }
-"""Named options; ``paper`` is the default."""
+"""Named options; ``paper`` is the default.
+
+Examples
+--------
+>>> import sd2core as sd2
+>>> sorted(sd2.PRESETS)
+['paper', 'vid2doppler']
+>>> sd2.PRESETS["paper"].visibility
+'exact'
+"""
 
 
 def chosen_options(

@@ -61,6 +61,15 @@ class Synthesizer:
     ------
     Sd2Error
         For an unknown preset, or area weighting of a point cloud.
+
+    Examples
+    --------
+    >>> import sd2core as sd2
+    >>> from sd2core.files.resources import resource_path
+    >>> mesh = sd2.load_mesh(resource_path("swipes.sd2") / "mesh.zarr").between(30, 36)
+    >>> maps = sd2.Synthesizer(mesh, sd2.SynthesisOptions(visibility="facing"))
+    >>> maps.map(sd2.VirtualSensor(position_m=(0.5, 0, 0))).values.shape
+    (32, 6)
     """
 
     def __init__(

@@ -29,7 +29,15 @@ StoredPath = Annotated[str, StringConstraints(pattern=r"\S")]
 
 
 class Span(BaseModel):
-    """A labelled stretch of time, half-open ``[start_s, end_s)``."""
+    """A labelled stretch of time, half-open ``[start_s, end_s)``.
+
+    Examples
+    --------
+    >>> import sd2core as sd2
+    >>> span = sd2.Span(start_s=1.6, end_s=2.8, label="left-to-right")
+    >>> round(span.end_s - span.start_s, 1)
+    1.2
+    """
 
     model_config = ConfigDict(extra="allow", frozen=True)
 

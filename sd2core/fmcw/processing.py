@@ -95,6 +95,15 @@ def doppler_map(
     ------
     Sd2Error
         For options that do not fit this radar.
+
+    Examples
+    --------
+    >>> import sd2core as sd2
+    >>> from sd2core.files.resources import resource_path
+    >>> capture = sd2.load_capture(resource_path("swipes.sd2") / "radar")
+    >>> doppler = sd2.doppler_map(capture, bins=32, v_max_mps=2.0, clutter="mean")
+    >>> doppler.kind, doppler.values.shape
+    ('simulated', (32, 450))
     """
     options = ProcessingOptions(clutter, clutter_window_s, range_m, window)
     config = capture.config

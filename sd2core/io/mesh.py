@@ -86,6 +86,14 @@ def load_mesh(
     ------
     Sd2Error
         When the file cannot be understood; it says what to do.
+
+    Examples
+    --------
+    >>> import sd2core as sd2
+    >>> from sd2core.files.resources import resource_path
+    >>> mesh = sd2.load_mesh(resource_path("swipes.sd2") / "mesh.zarr")
+    >>> mesh.frame_count, mesh.vertex_count
+    (450, 5000)
     """
     path = Path(path)
     if scale is not None and not (np.isfinite(scale) and scale > 0):
@@ -126,6 +134,19 @@ def save_mesh(mesh: MeshSequence, path: Path | str, progress: Progress = silent)
     ------
     Sd2Error
         When the name ends in none of these, or a vertex is not finite.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import numpy as np
+    >>> import sd2core as sd2
+    >>> points = np.random.default_rng(0).random((5, 20, 3)) + [0, 0, 2]
+    >>> mesh = sd2.MeshSequence(points, None, sd2.Timebase.regular(5, 30))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     sd2.save_mesh(mesh, Path(folder) / "points.npz")
+    ...     sd2.load_mesh(Path(folder) / "points.npz").vertex_count
+    20
     """
     path = Path(path)
     if not path.absolute().parent.is_dir():

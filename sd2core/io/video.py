@@ -36,6 +36,15 @@ class VideoReader:
         When each frame that really decodes is shown; the first at 0 s.
     width, height : int
         Of the upright picture.
+
+    Examples
+    --------
+    >>> import sd2core as sd2
+    >>> from sd2core.files.resources import resource_path
+    >>> with sd2.open_video(resource_path("swipes.sd2") / "video.mp4") as video:
+    ...     first, second = video.frames(0, 2)
+    ...     first.shape, round(video.timebase.frames_per_s)
+    ((480, 640, 3), 30)
     """
 
     def __init__(self, path: Path, index: FrameIndex) -> None:
@@ -266,6 +275,14 @@ def open_video(path: Path | str, progress: Progress = silent) -> VideoReader:
     ------
     Sd2Error
         When the file is missing, is no video, or no frame of it decodes.
+
+    Examples
+    --------
+    >>> import sd2core as sd2
+    >>> from sd2core.files.resources import resource_path
+    >>> with sd2.open_video(resource_path("swipes.sd2") / "video.mp4") as video:
+    ...     len(video), video.width, video.height
+    (450, 640, 480)
     """
     path = Path(path)
     return VideoReader(path, build_index(path, progress))

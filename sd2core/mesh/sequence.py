@@ -54,6 +54,21 @@ class MeshSequence:
         nothing may be concluded from. None: there is one in every frame.
     uncertainty : VelocityUncertainty, optional
         How well velocities are known; None: nothing is said of it.
+
+    Examples
+    --------
+    A triangle that moves towards the camera at 1 m/s:
+
+    >>> import numpy as np
+    >>> import sd2core as sd2
+    >>> times = sd2.Timebase.regular(frames=4, frames_per_s=10)
+    >>> corners = np.array([[0, 0, 3], [0.5, 0, 3], [0, 0.5, 3]])
+    >>> forward = np.array([0, 0, -1.0]) * times.times_s[:, None, None]
+    >>> mesh = sd2.MeshSequence(corners + forward, np.array([[0, 2, 1]]), times)
+    >>> mesh.frame_count, mesh.vertex_count
+    (4, 3)
+    >>> mesh.between(1, 3).times_s
+    array([0.1, 0.2])
     """
 
     vertices: VertexArray

@@ -92,6 +92,20 @@ class Recording:
         True when no camera and no radar was there.
     camera : CameraEntry or None
         What is known of the camera; see :meth:`focal_px`.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import sd2core as sd2
+    >>> from sd2core.files.resources import resource_path
+    >>> video = resource_path("swipes.sd2") / "video.mp4"
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     made = sd2.Recording.create(Path(folder) / "walk.sd2", video=video, title="Walk")
+    ...     made.sensor = sd2.VirtualSensor(position_m=(0, 0, 1))
+    ...     made.save()
+    ...     sd2.open_recording(made.folder).sensor.position_m
+    (0.0, 0.0, 1.0)
     """
 
     folder: Path
@@ -390,6 +404,16 @@ def open_recording(path: Path) -> Recording:
     ------
     Sd2Error
         When it is not a recording, is damaged, or was written by a newer version.
+
+    Examples
+    --------
+    >>> import sd2core as sd2
+    >>> from sd2core.files.resources import resource_path
+    >>> recording = sd2.open_recording(resource_path("swipes.sd2"))
+    >>> recording.title, recording.missing()
+    ('Eight swipes at 2.2 m', {})
+    >>> len(recording.labelled.spans)
+    8
     """
     path = Path(path)
     folder = plain_path(path.parent if path.name == FILE_NAME else path)

@@ -46,6 +46,14 @@ def load_capture(path: Path | str) -> RadarCapture:
     ------
     Sd2Error
         When nothing supported is there, or when it is damaged.
+
+    Examples
+    --------
+    >>> import sd2core as sd2
+    >>> from sd2core.files.resources import resource_path
+    >>> capture = sd2.load_capture(resource_path("swipes.sd2") / "radar")
+    >>> capture.simulated, capture.samples.shape
+    (True, (450, 1, 64, 32))
     """
     path = Path(path).expanduser()
     if not path.exists():

@@ -35,6 +35,18 @@ class RadarCapture:
         What the reader found odd and wants the user to know.
     meta : dict
         The recording's own description; holds the truth of a simulated one.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sd2core as sd2
+    >>> radar = sd2.PAPER_RADAR
+    >>> counts = np.full((2, 1, radar.chirps_per_frame, radar.samples_per_chirp), 2048, np.uint16)
+    >>> capture = sd2.RadarCapture(counts, radar, sd2.Timebase([0.0, 1 / 30]))
+    >>> capture.read(0, 1).shape
+    (1, 1, 64, 32)
+    >>> float(capture.read(0, 1).max())
+    0.0
     """
 
     samples: NDArray[np.uint16]
