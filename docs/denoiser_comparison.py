@@ -34,7 +34,7 @@ from sd2core.files.atomic import atomic_write_text
 from sd2core.files.figure_files import save_figure
 from sd2core.pairs.store import read_pairs
 from sd2core.runs.progress import read_events, standing
-from sd2core.train.folder import RunFolder
+from sd2core.train.folder import TrainingFolder
 
 DOCS = Path(__file__).resolve().parent
 IMAGES = DOCS / "images"
@@ -238,7 +238,7 @@ def _curves(folder: Path, jobs: Mapping[str, TimedJob], seeds: int) -> None:
     axes = figure.subplots(1, 2)
     for colour, name in enumerate(COMPARED):
         for seed in range(seeds):
-            run = RunFolder(folder / jobs[name].seeded(seed).name)
+            run = TrainingFolder(folder / jobs[name].seeded(seed).name)
             epochs = [one for one in standing(read_events(run.progress)) if one["event"] == "epoch"]
             minutes = [event["epoch"] * jobs[name].epoch_s / 60 for event in epochs]
             for axis, part in zip(axes, ("validation_rmse", "validation_mae_mps"), strict=True):

@@ -12,7 +12,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from sd2core.runs.progress import read_events, standing
-from sd2core.train.folder import RunFolder
+from sd2core.train.folder import TrainingFolder
 
 PILOT_EPOCHS = 4
 
@@ -73,7 +73,7 @@ def timed(folder: Path, job: Job, minutes: float) -> TimedJob:
 
 def epoch_ends_s(run: Path) -> list[float]:
     """Processor time that a run had used by the end of each epoch."""
-    events = standing(read_events(RunFolder(run).progress))
+    events = standing(read_events(TrainingFolder(run).progress))
     return [event["processor_s"] for event in events if event["event"] == "epoch"]
 
 
@@ -96,14 +96,14 @@ def tables(folder: Path, models: Sequence[Path], data: Path, *options: object) -
 
 
 def _finished(run: Path) -> bool:
-    return RunFolder(run).exists and RunFolder(run).status().state == "finished"
+    return TrainingFolder(run).exists and TrainingFolder(run).status().state == "finished"
 
 
 def _run(folder: Path, job: Job) -> int:
     path = folder / job.name
     how = (
         ["--resume", str(path)]
-        if RunFolder(path).exists
+        if TrainingFolder(path).exists
         else [str(job.data), *job.options, "--out", str(path), "--threads", "1"]
     )
     return subprocess.run([sys.executable, "-m", "sd2core.cli", "train", *how]).returncode

@@ -1,12 +1,108 @@
-"""What processes that work for another one have in common."""
+"""Identity, priority and environment of processes that work in the background."""
 
 from __future__ import annotations
 
 import os
+import signal
+import sys
 import threading
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Self
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
 """Environment in which a process multiplies matrices on one thread, whichever library does it."""
+
+_START_TOLERANCE_S = 2.0
+"""The start of a process is told by the system's clock, which may be set meanwhile."""
+
+
+@dataclass(frozen=True)
+class ProcessId:
+    """Number and start time of a process: a number alone is given to another process later.
+
+    Parameters
+    ----------
+    pid : int
+    started_unix_s : float
+        When the system started it.
+    """
+
+    pid: int
+    started_unix_s: float
+
+    @classmethod
+    def of(cls, pid: int) -> Self | None:
+        """Process that has this number now; None where there is none."""
+        import psutil
+
+        try:
+            return cls(pid, psutil.Process(pid).create_time())
+        except psutil.Error:
+            return None
+
+    @classmethod
+    def current(cls) -> Self:
+        """Identity of the calling process."""
+        found = cls.of(os.getpid())
+        assert found is not None
+        return found
+
+    @property
+    def is_alive(self) -> bool:
+        """True until the process has ended."""
+        import psutil
+
+        if not self.is_same(self.of(self.pid)):
+            return False
+        try:
+            if psutil.Process(self.pid).status() != psutil.STATUS_ZOMBIE:
+                return True
+        except psutil.Error:
+            return False
+        # A child that has ended keeps its number until its parent asks for its exit code.
+        with suppress(ChildProcessError):
+            os.waitpid(self.pid, os.WNOHANG)
+        return False
+
+    def is_same(self, other: ProcessId | None) -> bool:
+        """True if both are one process."""
+        return (
+            other is not None
+            and self.pid == other.pid
+            and abs(self.started_unix_s - other.started_unix_s) < _START_TOLERANCE_S
+        )
+
+    def started_by(self, launched: ProcessId) -> bool:
+        """True if this is the launched process, or one that it began: Windows starts two."""
+        return self.started_unix_s > launched.started_unix_s - _START_TOLERANCE_S
+
+    def terminate(self, *, at_once: bool = False) -> None:
+        """Ask the process to end, or end it at once; a process that reuses its number is spared."""
+        if self.is_alive:
+            kill = getattr(signal, "SIGKILL", signal.SIGTERM)
+            with suppress(OSError):  # it has ended meanwhile
+                os.kill(self.pid, kill if at_once else signal.SIGTERM)
+
+
+def lower_priority(nice: int = 10) -> None:
+    """Let other programs go first; where the system refuses, the priority stays.
+
+    Parameters
+    ----------
+    nice : int
+        0 to 19; Windows knows one step below the normal priority.
+    """
+    import psutil
+
+    if nice <= 0:
+        return
+    process = psutil.Process()
+    with suppress(psutil.Error, OSError):
+        if sys.platform == "win32":
+            process.nice(psutil.BELOW_NORMAL_PRIORITY_CLASS)
+        elif nice > (process.nice() or 0):
+            process.nice(nice)
 
 
 def end_with_parent() -> None:

@@ -23,7 +23,7 @@ from sd2core.train.config import (
     config_text,
     read_config,
 )
-from sd2core.train.folder import RunFolder
+from sd2core.train.folder import TrainingFolder
 
 STEPS = 4
 """Per epoch."""
@@ -62,7 +62,7 @@ def main() -> int:
 
 
 def train(options: argparse.Namespace) -> int:
-    folder = RunFolder(options.resume or options.out)
+    folder = TrainingFolder(options.resume or options.out)
     if options.resume is None:
         folder.create(options.model)
         config = TrainConfig(

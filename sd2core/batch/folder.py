@@ -1,4 +1,4 @@
-"""The folder of a batch: what is in it, whether its process lives, how it stands.
+"""Folder of a batch: its files and its status.
 
 Needs neither Dask nor torch: the window and ``sd2 batch --status`` look at batches with it.
 ``docs/formats.md`` says what the files hold.
@@ -6,29 +6,16 @@ Needs neither Dask nor torch: the window and ``sd2 batch --status`` look at batc
 
 from __future__ import annotations
 
-import json
-import os
-import time
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import atomic_write_text
-from sd2core.files.lock import FileLock, is_locked
-from sd2core.runs.control import write_control
+from sd2core.runs.folder import RunFolder, State
 from sd2core.runs.progress import Event, last_of, read_events
-from sd2core.version import __version__
 
-State = Literal["running", "finished", "stopped", "failed", "died"]
-"""``died`` is never written: the file says that it runs, and its process is gone."""
-
-FORMAT = "sd2-batch"
-VERSION = 1
 PROGRESS_FORMAT = "sd2-batch-progress"
 PROGRESS_VERSION = 1
-
-_PATIENCE_S = 0.5
 
 
 @dataclass(frozen=True)
@@ -69,35 +56,29 @@ class BatchStatus:
     error: str | None = None
 
 
-class BatchFolder:
-    """The results of one batch on disk.
+class BatchFolder(RunFolder):
+    """Folder with the results of one batch."""
 
-    Parameters
-    ----------
-    path : Path
-    """
-
-    def __init__(self, path: Path) -> None:
-        self.path = Path(path)
-
-    about = property(lambda self: self.path / "batch.json")
-    plan = property(lambda self: self.path / "plan.toml")
-    progress = property(lambda self: self.path / "progress.jsonl")
-    control = property(lambda self: self.path / "control")
-    log = property(lambda self: self.path / "log.txt")
-    report = property(lambda self: self.path / "report.json")
-    results = property(lambda self: self.path / "results.jsonl")
-    _lock = property(lambda self: self.path / "lock")
+    format = "sd2-batch"
+    file_name = "batch.json"
+    noun = "folder of a batch"
+    maker = "sd2 batch"
+    look = "sd2 batch --status"
 
     @property
-    def exists(self) -> bool:
-        """Whether there is a batch."""
-        return bool(self.about.is_file())
+    def plan(self) -> Path:
+        """Copy of the plan."""
+        return self.path / "plan.toml"
 
     @property
-    def live(self) -> bool:
-        """Whether a process is at it."""
-        return is_locked(self._lock)
+    def report(self) -> Path:
+        """End of the last run, and its failures."""
+        return self.path / "report.json"
+
+    @property
+    def results(self) -> Path:
+        """Maps that are there, one JSON line each."""
+        return self.path / "results.jsonl"
 
     def result(self, kind: str, key: str, suffix: str) -> Path:
         """Where what a task makes is kept: in 256 folders, so that none gets too long."""
@@ -126,46 +107,6 @@ class BatchFolder:
             )
         self.path.mkdir(exist_ok=True)
 
-    def lock(self) -> FileLock:
-        """Take the batch for this process.
-
-        Raises
-        ------
-        Sd2Error
-            When another process is at it.
-        """
-        lock = FileLock(self._lock)
-        until_s = time.monotonic() + _PATIENCE_S
-        while not lock.take():
-            # Whoever looks whether the batch lives holds the file for an instant.
-            if time.monotonic() < until_s:
-                time.sleep(0.02)
-                continue
-            raise Sd2Error(
-                f"A process is at work in {self.path} already",
-                "one batch at a time in a folder",
-                f"Look at it with `sd2 batch --status {self.path}`",
-            )
-        return lock
-
-    def set_state(self, state: State, **about: Any) -> None:
-        """Note how it stands, and that this process is at it."""
-        content = {"format": FORMAT, "version": VERSION, **self._about_if_any(), **about}
-        content |= {"state": state, "pid": os.getpid(), "made_by": f"SD² Studio {__version__}"}
-        atomic_write_text(self.about, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
-
-    def stop(self) -> None:
-        """Tell the process that is at it to stop; the same command goes on later.
-
-        Raises
-        ------
-        Sd2Error
-            When no process is at it.
-        """
-        if not self.live:
-            raise Sd2Error(f"No process is at work in {self.path}", "a batch that runs")
-        write_control(self.control, "stop")
-
     def status(self) -> BatchStatus:
         """How it stands; reads all of its progress.
 
@@ -174,44 +115,8 @@ class BatchFolder:
         Sd2Error
             When there is no batch, or its description is damaged.
         """
-        about = self.read_about()
-        state: State = about["state"]
-        if state == "running" and not self.live:
-            # It may have come to its end between the two looks.
-            again: State = self.read_about()["state"]
-            state = "died" if again == "running" else again
+        state, about = self.state_and_about()
         return status_of(state, about, read_events(self.progress))
-
-    def _about_if_any(self) -> dict[str, Any]:
-        return self.read_about() if self.exists else {}
-
-    def read_about(self) -> dict[str, Any]:
-        """What its description says; of a run that died still that it runs.
-
-        Raises
-        ------
-        Sd2Error
-            When there is no batch, or the description is damaged.
-        """
-        try:
-            about = json.loads(self.about.read_text(encoding="utf-8"))
-        except FileNotFoundError:
-            raise Sd2Error(
-                f"{self.path} is no folder of a batch", "a folder that `sd2 batch` made"
-            ) from None
-        except (OSError, ValueError) as error:
-            raise Sd2Error(
-                f"{self.about} cannot be read ({error})", "what `sd2 batch` wrote"
-            ) from error
-        known = isinstance(about, dict) and about.get("format") == FORMAT
-        if not known or about.get("version") != VERSION or about.get("state") not in _WRITTEN:
-            raise Sd2Error(
-                f"{self.about} is no description of a batch", f"{FORMAT} version {VERSION}"
-            )
-        return dict(about)
-
-
-_WRITTEN = ("running", "finished", "stopped", "failed")
 
 
 def status_of(state: State, about: dict[str, Any], events: list[Event]) -> BatchStatus:

@@ -85,7 +85,7 @@ def _batch(options: argparse.Namespace) -> int:
     if options.status is not None:
         return _show_status(options.status, options.json)
     if options.stop is not None:
-        BatchFolder(options.stop).stop()
+        BatchFolder(options.stop).tell("stop")
         print(f"{options.stop} is told to stop")
         return 0
     if options.plan is None:

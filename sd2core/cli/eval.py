@@ -113,9 +113,9 @@ def _subjects(text: str | None, everybody: tuple[str, ...]) -> tuple[str, ...] |
 
 def _loaded(model: str) -> TrainedDenoiser:
     from sd2core.denoise.files import load_model
-    from sd2core.train.folder import RunFolder
+    from sd2core.train.folder import TrainingFolder
 
-    run = RunFolder(Path(model))
+    run = TrainingFolder(Path(model))
     if not run.exists:
         return load_model(model)
     if not run.best.exists():

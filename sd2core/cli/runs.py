@@ -12,7 +12,7 @@ from sd2core.cli.output import duration, print_facts, print_json
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
-    from sd2core.train.folder import RunFolder, RunStatus
+    from sd2core.train.folder import RunStatus, TrainingFolder
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
@@ -55,10 +55,10 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _runs(options: argparse.Namespace) -> None:
-    from sd2core.train.folder import RunFolder, runs_in
+    from sd2core.train.folder import TrainingFolder, runs_in
 
     if options.word is not None:
-        _steer(RunFolder(options.folder), options.word)
+        _steer(TrainingFolder(options.folder), options.word)
         return
     runs = runs_in(options.folder)
     if options.json:
@@ -69,7 +69,7 @@ def _runs(options: argparse.Namespace) -> None:
         _print_table(runs)
 
 
-def _steer(run: RunFolder, word: str) -> None:
+def _steer(run: TrainingFolder, word: str) -> None:
     state = run.state()
     if word == "cancel" and state in ("stopped", "died", "failed"):
         lock = run.lock()
@@ -89,7 +89,7 @@ def _steer(run: RunFolder, word: str) -> None:
     print(f"{run.path} is told {said[word]}")
 
 
-def _print_one(run: RunFolder) -> None:
+def _print_one(run: TrainingFolder) -> None:
     status = run.status()
     facts = {
         "state": status.state,
@@ -104,7 +104,7 @@ def _print_one(run: RunFolder) -> None:
     print_facts(str(run.path), facts)
 
 
-def _print_table(runs: list[RunFolder]) -> None:
+def _print_table(runs: list[TrainingFolder]) -> None:
     if not runs:
         print("There are no runs here. `sd2 train DATA --out RUN` makes one.")
         return

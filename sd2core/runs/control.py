@@ -1,4 +1,4 @@
-"""Steering a run from outside: one word in a file, which the training reads at every step.
+"""Steering a run from outside: one word in a file, which its process reads at every step.
 
 A file works on every system, needs no open connection, and a window that was closed and
 opened again can go on steering.
@@ -23,12 +23,12 @@ _PAUSED_POLL_S = 0.1
 
 
 def write_control(path: Path, word: Word) -> None:
-    """Tell a run what to do."""
+    """Write the word that a run is to obey."""
     atomic_write_text(path, word + "\n")
 
 
 def read_control(path: Path) -> Word:
-    """What a run was told; ``run`` where nothing, or nothing that is known, was said."""
+    """Word that a run is to obey; ``run`` where there is none, or an unknown one."""
     try:
         text = path.read_text(encoding="utf-8").strip()
     except (OSError, UnicodeDecodeError):
@@ -40,12 +40,7 @@ def read_control(path: Path) -> Word:
 
 
 class Control:
-    """What a run is told, by its file or by a signal.
-
-    Parameters
-    ----------
-    path : Path
-    """
+    """Orders to a run, by its file or by a signal."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -53,11 +48,11 @@ class Control:
 
     @property
     def interrupted(self) -> bool:
-        """Whether Ctrl-C asked for the end."""
+        """True if Ctrl-C asked for the end."""
         return self._signal is signal.SIGINT
 
     def word(self) -> Word:
-        """What to do now. A signal means ``stop``, unless the file says ``cancel``."""
+        """Current order. A signal means ``stop``, unless the file says ``cancel``."""
         word = read_control(self._path)
         if self._signal is not None and word != "cancel":
             return "stop"
@@ -70,7 +65,7 @@ class Control:
         -------
         word : Word
         seconds : float
-            How long it took.
+            Time that passed.
         """
         begun_s = time.monotonic()
         while (word := self.word()) == "pause":
@@ -89,7 +84,7 @@ class Control:
 
 @contextmanager
 def signals_kept() -> Iterator[None]:
-    """Put back how SIGTERM and SIGINT were handled."""
+    """Restore the handlers of SIGTERM and SIGINT at the end."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -1,8 +1,8 @@
-"""Progress of a run as JSON lines: written by the training, read by whoever looks on.
+"""Progress of a run as JSON lines: written by its process, read by all who follow it.
 
-``docs/formats.md`` says what the lines mean. The file is only ever added to, so that
-whoever follows it never misses a line; a run that is resumed says from where, and
-:func:`standing` drops what that makes void.
+``docs/formats.md`` says what the lines mean. Lines are only ever appended, so that
+a reader misses none; a run that is resumed says from where, and :func:`standing` drops what
+that makes void.
 """
 
 from __future__ import annotations
@@ -18,15 +18,14 @@ Event = dict[str, Any]
 
 
 class ProgressWriter:
-    """Adds lines to a file, at once.
+    """Appends lines to a file and flushes each.
 
     Parameters
     ----------
     path : Path
-        Made when it is not there. A last line that a kill tore off is ended, so that
-        the next one begins anew.
+        Made when it is not there. A last line that a kill tore off is ended first.
     watch : callable, optional
-        Told every line, too.
+        Called with every line.
     """
 
     def __init__(self, path: Path, watch: Callable[[Event], None] | None = None) -> None:
@@ -52,13 +51,7 @@ class ProgressWriter:
 
 
 class StepLines:
-    """Keeps the lines of single steps few: at most two a second.
-
-    Parameters
-    ----------
-    writer : ProgressWriter
-    every_s : float
-    """
+    """Lines of single steps, at most two a second."""
 
     def __init__(self, writer: ProgressWriter, every_s: float = 0.5) -> None:
         self._writer = writer
@@ -67,7 +60,7 @@ class StepLines:
 
     @property
     def due(self) -> bool:
-        """Whether it is time for a line."""
+        """True when it is time for a line."""
         return time.monotonic() - self._last_s >= self._every_s
 
     def say(self, **content: Any) -> None:
@@ -77,13 +70,7 @@ class StepLines:
 
 
 class ProgressTail:
-    """Follows a file that grows.
-
-    Parameters
-    ----------
-    path : Path
-        May not be there yet.
-    """
+    """Reader of a file that grows; the file may not be there yet."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -103,12 +90,12 @@ class ProgressTail:
 
 
 def read_events(path: Path) -> list[Event]:
-    """All lines of a file that are whole; none where there is no file."""
+    """Whole lines of a file; none where there is no file."""
     return ProgressTail(path).new()
 
 
 def standing(events: Iterable[Event]) -> list[Event]:
-    """The lines that count: where a run was resumed, what it did again is dropped.
+    """Lines that count: those of steps that a resumed run did again are dropped.
 
     A kill loses the steps since the last checkpoint. They are done again, with the same
     result, and would be there twice.

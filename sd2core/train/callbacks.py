@@ -12,13 +12,14 @@ import torch
 from sd2core.denoise.scaling import Scaling
 from sd2core.errors import Sd2Error
 from sd2core.runs.control import Control, Word
+from sd2core.runs.folder import State
 from sd2core.runs.progress import ProgressWriter, StepLines
 from sd2core.sensor import VelocityAxis
 from sd2core.train.checkpoint import Checkpoint, Position, write_checkpoint
 from sd2core.train.clock import Clock
 from sd2core.train.config import TrainConfig
 from sd2core.train.data import Order
-from sd2core.train.folder import RunFolder, State
+from sd2core.train.folder import TrainingFolder
 from sd2core.train.optimiser import rate_factor
 from sd2core.train.validate import Exam, Validation, validate
 
@@ -34,7 +35,7 @@ class Course:
     Parameters
     ----------
     config : TrainConfig
-    folder : RunFolder
+    folder : TrainingFolder
     writer : ProgressWriter
     control : Control
     order : Order
@@ -54,7 +55,7 @@ class Course:
     def __init__(
         self,
         config: TrainConfig,
-        folder: RunFolder,
+        folder: TrainingFolder,
         writer: ProgressWriter,
         control: Control,
         order: Order,

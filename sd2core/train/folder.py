@@ -1,49 +1,27 @@
-"""The folder of a run: what is in it, whether its process lives, how to steer it.
+"""Folder of a training run: its files and its status.
 
 Needs no torch: the window and ``sd2 runs`` look at runs without loading it.
 """
 
 from __future__ import annotations
 
-import json
-import os
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import atomic_write_text
-from sd2core.files.lock import FileLock, is_locked
-from sd2core.runs.control import Word, write_control
+from sd2core.runs.folder import LIVE, RunFolder, State
 from sd2core.runs.progress import Event, last_of, read_events, standing
-from sd2core.version import __version__
 
-State = Literal[
-    "starting", "running", "paused", "finished", "stopped", "cancelled", "failed", "died"
-]
-"""``died`` is never written: the file says that it runs, and its process is gone."""
-
-LIVE: tuple[State, ...] = ("starting", "running", "paused")
-
-FORMAT = "sd2-run"
-VERSION = 1
-
-RUN_NAME = "run.json"
 CONFIG_NAME = "config.toml"
-PROGRESS_NAME = "progress.jsonl"
-CONTROL_NAME = "control"
 BEST_NAME = "best.safetensors"
 LAST_NAME = "last.safetensors"
 LAST_RECORD_NAME = "last.json"
-LOG_NAME = "log.txt"
-LOCK_NAME = "lock"
-
-_PATIENCE_S = 0.5
 
 _OURS = (
-    CONFIG_NAME, PROGRESS_NAME, CONTROL_NAME, BEST_NAME, LAST_NAME, LAST_RECORD_NAME, LOG_NAME,
-    RUN_NAME, LOCK_NAME,
+    CONFIG_NAME, BEST_NAME, LAST_NAME, LAST_RECORD_NAME, "progress.jsonl", "control", "log.txt",
+    "run.json", "lock",
 )  # fmt: skip
 
 
@@ -92,56 +70,35 @@ class RunStatus:
     error: str | None
 
 
-class RunFolder:
-    """One run on disk.
+class TrainingFolder(RunFolder):
+    """Folder of one training run."""
 
-    Parameters
-    ----------
-    path : Path
-    """
-
-    def __init__(self, path: Path) -> None:
-        self.path = Path(path)
-
-    config = property(lambda self: self.path / CONFIG_NAME)
-    progress = property(lambda self: self.path / PROGRESS_NAME)
-    control = property(lambda self: self.path / CONTROL_NAME)
-    best = property(lambda self: self.path / BEST_NAME)
-    last = property(lambda self: self.path / LAST_NAME)
-    last_record = property(lambda self: self.path / LAST_RECORD_NAME)
-    log = property(lambda self: self.path / LOG_NAME)
+    format = "sd2-run"
+    file_name = "run.json"
+    noun = "run"
+    maker = "sd2 train"
+    working = "training"
+    look = "sd2 runs"
 
     @property
-    def exists(self) -> bool:
-        """Whether there is a run."""
-        return (self.path / RUN_NAME).is_file()
+    def config(self) -> Path:
+        """Settings."""
+        return self.path / CONFIG_NAME
 
     @property
-    def live(self) -> bool:
-        """Whether a process is at it."""
-        return is_locked(self.path / LOCK_NAME)
+    def best(self) -> Path:
+        """Model of the best epoch."""
+        return self.path / BEST_NAME
 
-    def lock(self) -> FileLock:
-        """Take the run for this process.
+    @property
+    def last(self) -> Path:
+        """Checkpoint to resume from."""
+        return self.path / LAST_NAME
 
-        Raises
-        ------
-        Sd2Error
-            When another process is at it.
-        """
-        lock = FileLock(self.path / LOCK_NAME)
-        until_s = time.monotonic() + _PATIENCE_S
-        while not lock.take():
-            # Whoever looks whether the run lives holds the file for an instant.
-            if time.monotonic() < until_s:
-                time.sleep(0.02)
-                continue
-            raise Sd2Error(
-                f"A process is training in {self.path} already",
-                "one process per run",
-                f"Look at it with `sd2 runs {self.path}`",
-            )
-        return lock
+    @property
+    def last_record(self) -> Path:
+        """Description of the checkpoint."""
+        return self.path / LAST_RECORD_NAME
 
     def make(self) -> None:
         """Make the folder.
@@ -175,40 +132,7 @@ class RunFolder:
             As :meth:`make`.
         """
         self.make()
-        self._write({"model": model, "started_unix_s": time.time(), "state": "starting"})
-
-    def set_state(self, state: State) -> None:
-        """Note how it stands, and that this process is at it."""
-        about = self._about()
-        self._write({**about, "state": state})
-
-    def tell(self, word: Word) -> None:
-        """Tell the process what to do.
-
-        Raises
-        ------
-        Sd2Error
-            When there is no run, or no process is at it.
-        """
-        state = self.state()
-        if state not in LIVE:
-            raise Sd2Error(
-                f"The run {self.path} has {_WORDS[state]}",
-                "a run whose process is there",
-                f"Go on with it: `sd2 train --resume {self.path}`"
-                if state in ("stopped", "died") else "",
-            )  # fmt: skip
-        write_control(self.control, word)
-
-    def state(self) -> State:
-        """How it stands, in one word.
-
-        Raises
-        ------
-        Sd2Error
-            When there is no run, or its description is damaged.
-        """
-        return self._state_and_about()[0]
+        self.set_state("starting", model=model, started_unix_s=time.time())
 
     def status(self) -> RunStatus:
         """How it stands; reads all of its progress.
@@ -218,7 +142,7 @@ class RunFolder:
         Sd2Error
             When there is no run, or its description is damaged.
         """
-        state, about = self._state_and_about()
+        state, about = self.state_and_about()
         return _status(self, state, about, standing(read_events(self.progress)))
 
     def discard(self) -> None:
@@ -233,41 +157,14 @@ class RunFolder:
 
     def _is_empty(self) -> bool:
         """Whether it is a folder in which nothing is but the lock of who is about to use it."""
-        return self.path.is_dir() and all(one.name == LOCK_NAME for one in self.path.iterdir())
+        return self.path.is_dir() and all(one.name == "lock" for one in self.path.iterdir())
 
-    def _state_and_about(self) -> tuple[State, dict[str, Any]]:
-        about = self._about()
-        state: State = about["state"]
-        if state in LIVE and not self.live:
-            # It may have come to its end between the two looks.
-            about = self._about()
-            state = about["state"] if about["state"] not in LIVE else "died"
-        return state, about
-
-    def _about(self) -> dict[str, Any]:
-        path = self.path / RUN_NAME
-        try:
-            about = json.loads(path.read_text(encoding="utf-8"))
-        except FileNotFoundError:
-            raise Sd2Error(
-                f"{self.path} is no run", f"a folder with {RUN_NAME}, made by `sd2 train`"
-            ) from None
-        except (OSError, ValueError) as error:
-            raise Sd2Error(f"{path} cannot be read ({error})", "what `sd2 train` wrote") from error
-        known = isinstance(about, dict) and about.get("format") == FORMAT
-        if not known or about.get("version") != VERSION or about.get("state") not in _WORDS:
-            raise Sd2Error(f"{path} is no description of a run", f"{FORMAT} version {VERSION}")
-        return dict(about)
-
-    def _write(self, about: dict[str, Any]) -> None:
-        content = {"format": FORMAT, "version": VERSION, **about}
-        content |= {"pid": os.getpid(), "made_by": f"SD² Studio {__version__}"}
-        atomic_write_text(
-            self.path / RUN_NAME, json.dumps(content, indent=2, ensure_ascii=False) + "\n"
-        )
+    def _how_to_resume(self, state: State) -> str:
+        resumable = state in ("stopped", "died")
+        return f"Go on with it: `sd2 train --resume {self.path}`" if resumable else ""
 
 
-def runs_in(folder: Path) -> list[RunFolder]:
+def runs_in(folder: Path) -> list[TrainingFolder]:
     """The runs in a folder, by their names; the folder itself when it is one.
 
     Raises
@@ -278,26 +175,14 @@ def runs_in(folder: Path) -> list[RunFolder]:
     folder = Path(folder)
     if not folder.is_dir():
         raise Sd2Error(f"The folder {folder} does not exist", "a run, or a folder of runs")
-    if RunFolder(folder).exists:
-        return [RunFolder(folder)]
-    runs = [RunFolder(path) for path in sorted(folder.iterdir()) if path.is_dir()]
+    if TrainingFolder(folder).exists:
+        return [TrainingFolder(folder)]
+    runs = [TrainingFolder(path) for path in sorted(folder.iterdir()) if path.is_dir()]
     return [run for run in runs if run.exists]
 
 
-_WORDS: dict[State, str] = {
-    "starting": "not begun yet",
-    "running": "not ended",
-    "paused": "not ended",
-    "finished": "finished",
-    "stopped": "been stopped",
-    "cancelled": "been cancelled",
-    "failed": "failed",
-    "died": "lost its process",
-}
-
-
 def _status(
-    folder: RunFolder, state: State, about: dict[str, Any], events: list[Event]
+    folder: TrainingFolder, state: State, about: dict[str, Any], events: list[Event]
 ) -> RunStatus:
     start = last_of(events, "start") or {}
     epoch = last_of(events, "epoch") or {}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import os
-import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,8 +15,6 @@ from sd2core.errors import Sd2Error
 from sd2core.train.config import MachineConfig
 
 Device = Literal["cpu", "cuda"]
-
-_BELOW_NORMAL = 0x4000  # Windows' BELOW_NORMAL_PRIORITY_CLASS
 
 # Nothing that a user could act on; whatever else is warned of is passed on.
 _BESIDE_THE_POINT = (
@@ -61,24 +58,6 @@ def precision_of(machine: MachineConfig, device: Device) -> Literal["32-true", "
     if machine.precision == "auto" and device == "cuda" and torch.cuda.is_bf16_supported():
         return "bf16-mixed"
     return "32-true"
-
-
-def give_way(nice: int) -> None:
-    """Let other programs go first; where that is refused, go on as before."""
-    if nice <= 0:
-        return
-    try:
-        if sys.platform == "win32":
-            import ctypes
-
-            kernel = ctypes.windll.kernel32
-            kernel.SetPriorityClass(kernel.GetCurrentProcess(), _BELOW_NORMAL)
-        else:
-            missing = nice - os.nice(0)
-            if missing > 0:
-                os.nice(missing)
-    except OSError:
-        pass
 
 
 @contextmanager

@@ -20,20 +20,21 @@ from sd2core.denoise.model import Denoiser, parameter_count
 from sd2core.denoise.registry import build, options
 from sd2core.denoise.scaling import Scaling
 from sd2core.errors import Sd2Error
+from sd2core.processes import lower_priority
 from sd2core.runs.control import Control, signals_kept
 from sd2core.runs.progress import ProgressWriter
 from sd2core.train.callbacks import Course, Outcome
 from sd2core.train.checkpoint import Checkpoint, Position, read_checkpoint
 from sd2core.train.config import TrainConfig
 from sd2core.train.data import Order, TrainingData, prepare, read_mixed
-from sd2core.train.folder import RunFolder
+from sd2core.train.folder import TrainingFolder
 from sd2core.train.learner import Learner, Steps
-from sd2core.train.machine import device_of, give_way, machine_words, precision_of, settled
+from sd2core.train.machine import device_of, machine_words, precision_of, settled
 from sd2core.train.validate import Exam, Validation
 
 
 def carry_out(
-    folder: RunFolder,
+    folder: TrainingFolder,
     config: TrainConfig,
     writer: ProgressWriter,
     control: Control,
@@ -45,7 +46,7 @@ def carry_out(
 
     Parameters
     ----------
-    folder : RunFolder
+    folder : TrainingFolder
         Made, and held by this process.
     config : TrainConfig
     writer : ProgressWriter
@@ -60,7 +61,7 @@ def carry_out(
     Sd2Error
         For what the user can mend.
     """
-    give_way(config.machine.nice)
+    lower_priority(config.machine.nice)
     device = device_of(config.machine)
     checkpoint = read_checkpoint(folder.last) if resume else None
     threads = config.machine.threads or torch.get_num_threads()

@@ -24,7 +24,7 @@ from sd2core.files.lock import FileLock
 from sd2core.runs.control import Control, signals_kept, write_control
 from sd2core.runs.progress import Event, ProgressWriter
 from sd2core.train.config import TrainConfig, config_text, read_config
-from sd2core.train.folder import RunFolder
+from sd2core.train.folder import TrainingFolder
 
 if TYPE_CHECKING:
     from sd2core.train.checkpoint import Position
@@ -82,7 +82,7 @@ def begin(
         For what the user can mend; the run's folder then says it, too, if it was made.
     """
     check(config)
-    folder = RunFolder(out)
+    folder = TrainingFolder(out)
     if _is_other_rank():
         return _beside(folder, config, command, resume=False)
     _clear_failed(folder)
@@ -109,7 +109,7 @@ def go_on(out: Path, *, command: str = "", watch: Watch | None = None) -> Ending
     Sd2Error
         When there is nothing to go on with.
     """
-    folder = RunFolder(out)
+    folder = TrainingFolder(out)
     state = folder.state()
     if state == "finished":
         raise Sd2Error(
@@ -158,7 +158,7 @@ def check(config: TrainConfig) -> None:
 
 
 def _trained(
-    folder: RunFolder,
+    folder: TrainingFolder,
     config: TrainConfig,
     command: str,
     watch: Watch | None,
@@ -197,7 +197,7 @@ def _trained(
     )
 
 
-def _beside(folder: RunFolder, config: TrainConfig, command: str, resume: bool) -> Ending:
+def _beside(folder: TrainingFolder, config: TrainConfig, command: str, resume: bool) -> Ending:
     """Another of several processes: it computes, and the first one writes."""
     from sd2core.train.run import carry_out
 
@@ -209,7 +209,7 @@ def _beside(folder: RunFolder, config: TrainConfig, command: str, resume: bool) 
     return Ending(outcome, None, None, None, None, first=False)
 
 
-def _end_line(folder: RunFolder, outcome: str, position: Position) -> dict[str, Any]:
+def _end_line(folder: TrainingFolder, outcome: str, position: Position) -> dict[str, Any]:
     best = position.best or {}
     return {
         "outcome": outcome,
@@ -221,7 +221,7 @@ def _end_line(folder: RunFolder, outcome: str, position: Position) -> dict[str, 
     }
 
 
-def _note_failure(folder: RunFolder, writer: ProgressWriter, error: BaseException) -> None:
+def _note_failure(folder: TrainingFolder, writer: ProgressWriter, error: BaseException) -> None:
     """Say it in words in the lines, and in full in the log."""
     with folder.log.open("a", encoding="utf-8") as log:
         log.write(time.strftime("%Y-%m-%d %H:%M:%S\n"))
@@ -250,7 +250,7 @@ def _note_failure(folder: RunFolder, writer: ProgressWriter, error: BaseExceptio
     folder.set_state("failed")
 
 
-def _clear_failed(folder: RunFolder) -> None:
+def _clear_failed(folder: TrainingFolder) -> None:
     """A run that failed before it had learnt anything makes way for the next attempt."""
     learnt = folder.last.exists() or folder.best.exists()
     if folder.exists and folder.state() == "failed" and not learnt:

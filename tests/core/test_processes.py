@@ -10,6 +10,8 @@ import time
 
 import pytest
 
+from sd2core.processes import ProcessId
+
 PARENT = """
 import multiprocessing, os, sys, time
 from sd2core.processes import end_with_parent
@@ -60,3 +62,33 @@ def _lives(process: int) -> bool:
             return stream.read().rpartition(")")[2].split()[0] != "Z"
     except OSError:
         return True
+
+
+def test_a_process_that_ended_is_told_from_one_with_its_number() -> None:
+    process = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
+    ours = ProcessId.of(process.pid)
+    assert ours is not None
+    assert ours.is_alive
+    # The same number, of a process that started an hour before.
+    earlier = ProcessId(process.pid, ours.started_unix_s - 3600.0)
+    assert not earlier.is_alive
+    earlier.terminate(at_once=True)
+    assert ours.is_alive
+    ours.terminate(at_once=True)
+    process.communicate()
+    assert not ours.is_alive
+    assert not ours.is_same(ProcessId.of(process.pid))
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="nothing lingers there")
+def test_a_child_that_nobody_waits_for_is_not_alive() -> None:
+    process = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
+    ours = ProcessId.of(process.pid)
+    assert ours is not None
+    assert process.stdin is not None
+    process.stdin.close()
+    until_s = time.monotonic() + 30.0
+    while ours.is_alive and time.monotonic() < until_s:
+        time.sleep(0.02)
+    assert not ours.is_alive
+    process.returncode = 0  # its exit code was taken by then

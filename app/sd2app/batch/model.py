@@ -108,7 +108,7 @@ class BatchModel(QObject):
         Sd2Error
             When there is none.
         """
-        BatchFolder(path).read_about()
+        BatchFolder(path).about()
         self.select(path)
 
     def ask_estimate(self) -> None:

@@ -158,7 +158,7 @@ class BatchFollower(QObject):
             return
         self._stopping = True
         with suppress(Sd2Error):  # not as far as that
-            self.folder.stop()
+            self.folder.tell("stop")
         self.phase_changed.emit()
         self.changed.emit()
 
@@ -210,7 +210,7 @@ class BatchFollower(QObject):
         """Where it had no folder when this was asked for, it may not have heard."""
         if found.live:
             with suppress(Sd2Error, OSError):
-                self.folder.stop()
+                self.folder.tell("stop")
         elif self._pid is not None:
             with suppress(OSError):
                 os.kill(self._pid, signal.SIGTERM)
@@ -259,7 +259,7 @@ class _Looker:
             self._learn(event)
         status = None
         if folder.exists:
-            about = folder.read_about()
+            about = folder.about()
             state = about["state"]
             if state == "running" and not live:
                 state = "running" if folder.live else "died"

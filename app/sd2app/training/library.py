@@ -11,7 +11,8 @@ from sd2app.background.latest import LatestRunner
 from sd2app.training.text import model_name, state_text
 from sd2app.widgets.text import clock_text
 from sd2core.errors import Sd2Error
-from sd2core.train.folder import LIVE, RunFolder, RunStatus, runs_in
+from sd2core.runs.folder import LIVE
+from sd2core.train.folder import RunStatus, TrainingFolder, runs_in
 
 
 @dataclass(frozen=True)
@@ -103,7 +104,7 @@ class TrainingLibrary(QObject):
         found = [known for run in folders if (known := self._known(run)) is not None]
         return tuple(sorted(found, key=lambda run: run.status.started_unix_s, reverse=True))
 
-    def _known(self, run: RunFolder) -> KnownRun | None:
+    def _known(self, run: TrainingFolder) -> KnownRun | None:
         try:
             stamps = [
                 path.stat().st_mtime_ns if path.exists() else 0

@@ -26,7 +26,7 @@ from sd2app.training.run import TrainingFollower
 from sd2app.training.setup import TrainingSetupModel
 from sd2core.errors import Sd2Error
 from sd2core.processes import ONE_THREAD
-from sd2core.train.folder import RunFolder
+from sd2core.train.folder import TrainingFolder
 
 Closing = Literal["ask", "keep", "stop"]
 
@@ -199,7 +199,7 @@ class TrainingModel(QObject):
         Sd2Error
             When there is none.
         """
-        RunFolder(path).state()
+        TrainingFolder(path).state()
         self.select(path)
 
     def start(self) -> None:
@@ -344,5 +344,5 @@ class TrainingModel(QObject):
             return
         last = self._settings.stored("training/run", "")
         # It may lie elsewhere.
-        if last and RunFolder(Path(last)).exists:
+        if last and TrainingFolder(Path(last)).exists:
             self.select(Path(last))

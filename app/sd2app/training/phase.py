@@ -8,8 +8,9 @@ from typing import Any, Literal
 from sd2app.training.history import TrainingHistory
 from sd2core.errors import Sd2Error
 from sd2core.runs.control import Word, read_control
+from sd2core.runs.folder import LIVE
 from sd2core.runs.progress import ProgressTail
-from sd2core.train.folder import LIVE, RunFolder
+from sd2core.train.folder import TrainingFolder
 
 Phase = Literal[
     "starting", "running", "pausing", "paused", "resuming", "stopping", "cancelling",
@@ -48,7 +49,7 @@ class Look:
     events: list[dict[str, Any]] = field(default_factory=list)
 
 
-def look_at(folder: RunFolder, tail: ProgressTail) -> Look:
+def look_at(folder: TrainingFolder, tail: ProgressTail) -> Look:
     """Look once; may wait for the disk."""
     # The process first: when it is gone, all that it wrote is there to be read.
     live, exists = folder.live, folder.exists

@@ -21,7 +21,7 @@ from sd2core.errors import Sd2Error
 from sd2core.runs.control import Word, write_control
 from sd2core.runs.progress import ProgressTail
 from sd2core.train.config import TrainConfig, read_config
-from sd2core.train.folder import RunFolder
+from sd2core.train.folder import TrainingFolder
 
 POLL_MS = 250
 SLOW_POLL_MS = 1000
@@ -68,7 +68,7 @@ class TrainingFollower(QObject):
         clock_s: Callable[[], float] = time.monotonic,
     ) -> None:
         super().__init__(parent)
-        self.folder = RunFolder(path)
+        self.folder = TrainingFolder(path)
         self.history = TrainingHistory()
         self._pid, self._output = pid, output_of(path)
         self._clock_s = clock_s

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from sd2app.training.result import Gain
     from sd2app.training.run import TrainingFollower
     from sd2core.pairs.summary import PairFacts
+    from sd2core.runs.folder import State
     from sd2core.train.data import Split
-    from sd2core.train.folder import State
 
 MODEL_WORDS = {
     "s4": ("S4", "The paper's: a structured state space. It also runs frame by frame."),

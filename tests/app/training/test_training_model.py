@@ -22,7 +22,7 @@ from sd2core.cli.train import _config
 from sd2core.errors import Sd2Error
 from sd2core.runs.control import read_control
 from sd2core.train.data import prepare, read_mixed
-from sd2core.train.folder import RunFolder
+from sd2core.train.folder import TrainingFolder
 
 FAKE = Path(__file__).resolve().parents[2] / "fake_train.py"
 TIMING = (sys.executable, "-c", "print('{\"step_s\": 0.25}')")
@@ -206,7 +206,7 @@ def test_the_next_window_finds_the_run(made, qtbot) -> None:
     wait_for(qtbot, first, "running")
     path = first.run.folder.path
     first.close()
-    assert RunFolder(path).live
+    assert TrainingFolder(path).live
     second = made()
     with qtbot.waitSignal(second.noted, timeout=5_000) as said:
         second.look_for_runs()
@@ -223,9 +223,9 @@ def test_the_next_window_shows_what_ended_meanwhile(made, qtbot) -> None:
     first = made(settings=settings)
     first.start()
     path = first.run.folder.path
-    qtbot.waitUntil(lambda: RunFolder(path).exists, timeout=15_000)
+    qtbot.waitUntil(lambda: TrainingFolder(path).exists, timeout=15_000)
     first.close()
-    qtbot.waitUntil(lambda: not RunFolder(path).live, timeout=15_000)
+    qtbot.waitUntil(lambda: not TrainingFolder(path).live, timeout=15_000)
     second = made(settings=settings)
     second.look_for_runs()
     wait_for(qtbot, second, "finished")
@@ -269,7 +269,7 @@ def test_a_run_deleted_by_somebody_else_is_put_away(made, qtbot) -> None:
     model = made()
     model.start()
     wait_for(qtbot, model, "finished")
-    RunFolder(model.run.folder.path).discard()
+    TrainingFolder(model.run.folder.path).discard()
     qtbot.waitUntil(lambda: model.run is None, timeout=5_000)
 
 

@@ -271,7 +271,7 @@ def test_stopped_it_goes_on(run: Runs) -> None:
 
     def watch(event: dict[str, Any]) -> None:
         if event["event"] == "workers":
-            folder.stop()
+            folder.tell("stop")
 
     end = run(MAPS, watch=watch)
     assert (end.outcome, end.interrupted) == ("stopped", False)

@@ -14,7 +14,7 @@ from cli_outcome import Sd2
 from small_pairs import write_pairs
 
 from sd2core.runs.progress import ProgressWriter, read_events
-from sd2core.train.folder import RunFolder
+from sd2core.train.folder import TrainingFolder
 
 SMALL = ("--model", "gru", "--set", "channels=4", "--set", "depth=1", "--segment-frames", "30")
 QUICK = (*SMALL, "--device", "cpu", "--threads", "1", "--epochs", "2")
@@ -89,7 +89,7 @@ class TestTrain:
         assert f"sd2 train --resume {tmp_path / 'run'}" in outcome.out
         monkeypatch.undo()
         assert sd2("train", "--resume", tmp_path / "run").code == 0
-        assert RunFolder(tmp_path / "run").state() == "finished"
+        assert TrainingFolder(tmp_path / "run").state() == "finished"
 
     def test_options_go_before_the_file(self, sd2: Sd2, pairs: Path, tmp_path: Path) -> None:
         toml = tmp_path / "a.toml"
@@ -157,7 +157,7 @@ class TestRuns:
     def runs(self, tmp_path: Path) -> Path:
         """One that ended, one under way, one whose process is gone."""
         for name, state in (("a", "finished"), ("b", "running"), ("c", "running")):
-            run = RunFolder(tmp_path / name)
+            run = TrainingFolder(tmp_path / name)
             run.create("gru")
             with ProgressWriter(run.progress) as writer:
                 writer.say("start", epochs=10, resumed=False, steps_done=0)
@@ -169,7 +169,7 @@ class TestRuns:
         return tmp_path
 
     def test_the_list(self, sd2: Sd2, runs: Path) -> None:
-        lock = RunFolder(runs / "b").lock()
+        lock = TrainingFolder(runs / "b").lock()
         try:
             rows = [line.split() for line in sd2("runs", runs).out.splitlines()]
             content = json.loads(sd2("runs", runs, "--json").out)["runs"]
@@ -188,7 +188,7 @@ class TestRuns:
         assert f"sd2 train --resume {runs / 'c'}" in out
 
     def test_steering(self, sd2: Sd2, runs: Path) -> None:
-        run = RunFolder(runs / "b")
+        run = TrainingFolder(runs / "b")
         lock = run.lock()
         try:
             for word, written in (("pause", "pause"), ("resume", "run"), ("stop", "stop")):
@@ -213,7 +213,7 @@ class TestRuns:
 
 class TestEval:
     def test_refused(self, sd2: Sd2, pairs: Path, tmp_path: Path) -> None:
-        RunFolder(tmp_path / "run").create("gru")
+        TrainingFolder(tmp_path / "run").create("gru")
         outcome = sd2("eval", tmp_path / "run", "--data", pairs)
         assert outcome.code == 1
         assert "has no model yet" in outcome.err

@@ -19,7 +19,7 @@ from sd2core.runs.progress import (
     read_events,
     standing,
 )
-from sd2core.train.folder import RunFolder, runs_in
+from sd2core.train.folder import TrainingFolder, runs_in
 
 
 class TestProgress:
@@ -99,7 +99,7 @@ class TestControl:
 
 class TestFolder:
     def test_a_run_without_its_process_has_died(self, tmp_path: Path) -> None:
-        run = RunFolder(tmp_path / "run")
+        run = TrainingFolder(tmp_path / "run")
         run.create("gru")
         run.set_state("running")
         lock = run.lock()
@@ -113,7 +113,7 @@ class TestFolder:
             run.tell("pause")
 
     def test_one_process_per_run(self, tmp_path: Path) -> None:
-        run = RunFolder(tmp_path / "run")
+        run = TrainingFolder(tmp_path / "run")
         run.create("gru")
         process = held(run.path / "lock")
         try:
@@ -126,19 +126,19 @@ class TestFolder:
             process.communicate()
 
     def test_nothing_is_overwritten(self, tmp_path: Path) -> None:
-        run = RunFolder(tmp_path / "run")
+        run = TrainingFolder(tmp_path / "run")
         run.create("gru")
         with pytest.raises(Sd2Error, match=r"is a run already.*--resume"):
             run.create("gru")
         (tmp_path / "full").mkdir()
         (tmp_path / "full" / "a").touch()
         with pytest.raises(Sd2Error, match="not an empty folder"):
-            RunFolder(tmp_path / "full").create("gru")
+            TrainingFolder(tmp_path / "full").create("gru")
         with pytest.raises(Sd2Error, match="does not exist"):
-            RunFolder(tmp_path / "no" / "run").create("gru")
+            TrainingFolder(tmp_path / "no" / "run").create("gru")
 
     def test_the_status_is_that_of_the_lines(self, tmp_path: Path) -> None:
-        run = RunFolder(tmp_path / "run")
+        run = TrainingFolder(tmp_path / "run")
         run.create("gru")
         with ProgressWriter(run.progress) as writer:
             writer.say("start", epochs=9, resumed=False)
@@ -152,7 +152,7 @@ class TestFolder:
         assert (status.validation_rmse, status.elapsed_s, status.error) == (0.5, 4.0, "No.")
 
     def test_discarding_takes_only_what_the_run_made(self, tmp_path: Path) -> None:
-        run = RunFolder(tmp_path / "run")
+        run = TrainingFolder(tmp_path / "run")
         run.create("gru")
         write_control(run.control, "run")
         (run.path / "notes.txt").write_text("mine")
@@ -165,7 +165,7 @@ class TestFolder:
 
     def test_runs_in_a_folder(self, tmp_path: Path) -> None:
         for name in ("b", "a"):
-            RunFolder(tmp_path / name).create("gru")
+            TrainingFolder(tmp_path / name).create("gru")
         (tmp_path / "c").mkdir()
         assert [run.path.name for run in runs_in(tmp_path)] == ["a", "b"]
         assert [run.path.name for run in runs_in(tmp_path / "a")] == ["a"]
@@ -174,7 +174,7 @@ class TestFolder:
 
     @pytest.mark.parametrize("text", ["{", "[]", '{"format": "x"}'])
     def test_a_damaged_description(self, tmp_path: Path, text: str) -> None:
-        run = RunFolder(tmp_path)
+        run = TrainingFolder(tmp_path)
         (tmp_path / "run.json").write_text(text)
         with pytest.raises(Sd2Error, match=r"run\.json"):
             run.state()

@@ -30,7 +30,7 @@ from sd2core.train.config import (
     TrainingConfig,
     config_text,
 )
-from sd2core.train.folder import RunFolder
+from sd2core.train.folder import TrainingFolder
 from sd2core.train.start import Ending, begin, go_on
 from sd2core.train.validate import Validation
 
@@ -175,7 +175,7 @@ class TestSteering:
     def test_stopped_and_gone_on_with(self, pairs: Path, tmp_path: Path, model: str) -> None:
         config = settings(pairs, model)
         whole = begin(config, tmp_path / "whole")
-        run = RunFolder(tmp_path / "run")
+        run = TrainingFolder(tmp_path / "run")
         stop = at(4, lambda: run.tell("stop"))
         stopped = begin(config, run.path, watch=stop)
         assert stopped.outcome == "stopped"
@@ -191,7 +191,7 @@ class TestSteering:
     def test_paused(self, pairs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         config = settings(pairs)
         begin(config, tmp_path / "whole")
-        run = RunFolder(tmp_path / "run")
+        run = TrainingFolder(tmp_path / "run")
         states = []
 
         def nap(seconds: float) -> None:
@@ -207,7 +207,7 @@ class TestSteering:
         assert said.index("paused") < said.index("resumed") < said.index("end")
 
     def test_cancelled(self, pairs: Path, tmp_path: Path) -> None:
-        run = RunFolder(tmp_path / "run")
+        run = TrainingFolder(tmp_path / "run")
         said: list[Event] = []
         cancel = at(4, lambda: run.tell("cancel"))
 
@@ -228,7 +228,7 @@ class TestSteering:
         assert before == [signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGINT)]
 
     def test_stopped_before_the_first_epoch_ends(self, pairs: Path, tmp_path: Path) -> None:
-        run = RunFolder(tmp_path / "run")
+        run = TrainingFolder(tmp_path / "run")
         ending = begin(settings(pairs), run.path, watch=at(1, lambda: run.tell("stop")))
         assert ending.outcome == "stopped"
         assert ending.best_epoch is None
@@ -258,7 +258,7 @@ def wait_for(tail: ProgressTail, step: int, training: subprocess.Popen[bytes]) -
 def test_terminated_and_killed(pairs: Path, tmp_path: Path) -> None:
     """As a user's machine may do it: first a polite end, then a power cut."""
     config = settings(pairs, epochs=24, checkpoint_s=0.2)
-    run = RunFolder(tmp_path / "run")
+    run = TrainingFolder(tmp_path / "run")
     terminate = at(12, lambda: os.kill(os.getpid(), signal.SIGTERM))
     ending = begin(config, run.path, watch=terminate)
     assert (ending.outcome, ending.interrupted) == ("stopped", False)
@@ -315,7 +315,7 @@ class TestFailure:
         assert end["outcome"] == "failed"
         assert end["error"]["found"] == error.found
         assert "400 frames long" in error.found
-        status = RunFolder(tmp_path / "run").status()
+        status = TrainingFolder(tmp_path / "run").status()
         assert (status.state, status.resumable, status.error) == ("failed", False, str(error))
         assert "Traceback" in (tmp_path / "run" / "log.txt").read_text()
 
@@ -346,7 +346,7 @@ class TestFailure:
 
     def test_other_pairs(self, pairs: Path, tmp_path: Path) -> None:
         own = write_pairs(tmp_path / "own.zarr")
-        run = RunFolder(tmp_path / "run")
+        run = TrainingFolder(tmp_path / "run")
         begin(settings(own), run.path, watch=at(3, lambda: run.tell("stop")))
         for path in sorted(own.rglob("*"), reverse=True):
             path.unlink() if path.is_file() else path.rmdir()
@@ -383,4 +383,4 @@ def test_control_of_a_run_that_is_over(pairs: Path, tmp_path: Path) -> None:
     assert ending.outcome == "finished"
     write_control(tmp_path / "run" / "control", "stop")
     with pytest.raises(Sd2Error, match="has finished"):
-        RunFolder(tmp_path / "run").tell("stop")
+        TrainingFolder(tmp_path / "run").tell("stop")

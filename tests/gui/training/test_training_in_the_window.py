@@ -19,7 +19,7 @@ from sd2app.training import run as training_follower
 from sd2app.training.pair_maker import PairMaker
 from sd2app.training.panel import TrainingPanel
 from sd2core.pairs.store import read_pairs
-from sd2core.train.folder import RunFolder
+from sd2core.train.folder import TrainingFolder
 
 FAKE = Path(__file__).resolve().parents[2] / "fake_train.py"
 
@@ -83,7 +83,7 @@ def test_a_run_outlives_its_window_and_is_found_by_the_next(made, qtbot, tmp_pat
     answer(qtbot, "Keep training in the background")
     window.close()
     assert not window.isVisible()
-    assert RunFolder(path).live
+    assert TrainingFolder(path).live
     again = made(settings=settings)
     training = again.context.training
     qtbot.waitUntil(lambda: training.run is not None and training.run.phase == "running")
