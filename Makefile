@@ -10,7 +10,7 @@ export PYTHON
 INSTALLED := .venv/.installed
 COMPILED := .venv/.compiled
 # Among them every module in KERNEL_MODULES of sd2core/numerics/compiled.py.
-KERNELS := $(wildcard sd2core/numerics/*.py sd2core/body/*.py sd2core/scattering/*.py sd2core/doppler/*.py sd2core/fmcw/*.py sd2core/simulate/people/*.py)
+KERNELS := $(wildcard sd2core/numerics/*.py sd2core/body/*.py sd2core/scattering/*.py sd2core/doppler/*.py sd2core/fmcw/*.py)
 
 .PHONY: help setup demo test test-slow lint format bench wheel screenshots accuracy fitting denoiser denoiser-comparison range-synthesis scale classifier whole-loop clean
 
@@ -83,33 +83,33 @@ wheel: $(INSTALLED)
 	$(BIN)/python -m build --wheel --no-isolation
 
 screenshots: system-packages-for-tests setup
-	scripts/on_display.sh $(BIN)/python docs/screenshots.py
+	scripts/on_display.sh $(BIN)/python -m tools.documentation.screenshots
 
 accuracy: setup
-	$(BIN)/python docs/accuracy_and_speed.py
+	$(BIN)/python -m tools.documentation.accuracy_and_speed
 
 fitting: setup
-	$(BIN)/python docs/fitting.py
+	$(BIN)/python -m tools.documentation.fitting
 
 denoiser: setup
-	$(BIN)/python docs/denoiser.py
+	$(BIN)/python -m tools.documentation.denoiser
 
 denoiser-comparison: setup
-	$(BIN)/python docs/denoiser_comparison.py
+	$(BIN)/python -m tools.documentation.denoiser_comparison
 
 range-synthesis: setup
-	$(BIN)/python docs/range_synthesis.py
+	$(BIN)/python -m tools.documentation.range_synthesis
 
 classifier: setup
-	$(BIN)/python docs/classifier.py
+	$(BIN)/python -m tools.documentation.classifier
 
 whole-loop: setup
-	$(BIN)/python docs/whole_loop.py
+	$(BIN)/python -m tools.documentation.whole_loop
 
 scale: setup
-	$(BIN)/python docs/scale.py
+	$(BIN)/python -m tools.documentation.scale
 
 clean:
 	rm -rf .venv build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks \
 		.import_linter_cache
-	find sd2core app tests docs -name __pycache__ -type d -prune -exec rm -rf {} +
+	find sd2core app tests tools -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -47,7 +47,7 @@ _ANCHORS = {
 # Where the landmark model puts its landmarks beside these points, fixed to the same bone:
 # thousandths of the stature at rest, to the left, down, backwards; the left side, which
 # the right side mirrors. Mean of both sides over simulated people, measured by
-# `sd2 simulate landmark-offsets` (docs/decisions/0018).
+# `python -m tools.train_lifter offsets` (docs/decisions/0018).
 _SEEN_BESIDE = {
     "nose": (0.0, -8.4, 10.3),
     "eye_inner.L": (-1.5, -3.7, 2.5),

@@ -180,7 +180,7 @@ class Lifter:
             When the file is missing, damaged or of a later version.
         """
         path = resource_path("lifter.npz") if path is None else Path(path)
-        command = "sd2 simulate train-lifter"
+        command = "python -m tools.train_lifter train"
         with open_bundled_arrays(path, FORMAT, VERSION, "a lifter", command) as (meta, data):
             arrays = {name: data[name].astype(np.float32) for name in meta["arrays"]}
             calibration = data["calibration"].astype(np.float32)

@@ -220,7 +220,7 @@ def read_body_arrays(names: Sequence[str], path: Path | None = None) -> list[NDA
         When the file is missing, damaged, of a later version, or lacks one of them.
     """
     path = resource_path("body.npz") if path is None else Path(path)
-    command = "sd2 simulate export-body"
+    command = "python -m tools.build_body export"
     with open_bundled_arrays(path, FORMAT, VERSION, "a body", command) as (_, data):
         return [data[name] for name in names]
 

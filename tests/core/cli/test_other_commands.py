@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -10,21 +12,7 @@ from cli_outcome import Sd2
 from sd2core.progress import Progress
 
 
-@pytest.mark.parametrize(
-    ("command", "function", "name"),
-    [
-        ("sample", "sd2core.simulate.sample.make_sample", "mine.sd2"),
-        ("export-body", "sd2core.simulate.export_body.export_body", "body.npz"),
-    ],
-)
-def test_simulate(
-    sd2: Sd2,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    command: str,
-    function: str,
-    name: str,
-) -> None:
+def test_simulate_sample(sd2: Sd2, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Path] = []
 
     def make(out: Path, progress: Progress) -> Path:
@@ -32,11 +20,21 @@ def test_simulate(
         asked.append(out)
         return out
 
-    monkeypatch.setattr(function, make)
-    outcome = sd2("simulate", command, tmp_path / name)
+    monkeypatch.setattr("sd2core.simulate.sample.make_sample", make)
+    outcome = sd2("simulate", "sample", tmp_path / "mine.sd2")
     assert outcome.code == 0
-    assert asked == [tmp_path / name]
-    assert str(tmp_path / name) in outcome.out
+    assert asked == [tmp_path / "mine.sd2"]
+    assert str(tmp_path / "mine.sd2") in outcome.out
+
+
+def test_the_module_runs_the_librarys_commands() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "sd2core.cli", "simulate", "--help"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert "campaign" in done.stdout
 
 
 def test_an_existing_sample_is_not_replaced(sd2: Sd2, tmp_path: Path) -> None:

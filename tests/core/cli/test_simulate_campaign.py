@@ -1,4 +1,4 @@
-"""``sd2 simulate campaign`` and ``fit-errors`` on the command line."""
+"""``sd2 simulate campaign`` on the command line."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 from cli_outcome import Sd2
 
-from sd2core.compare.truth import FORMAT, VERSION
 from sd2core.pairs.store import read_pairs
 
 
@@ -40,22 +39,3 @@ def test_other_things_are_not_written_over(sd2: Sd2, tmp_path: Path) -> None:
     outcome = sd2("simulate", "campaign", tmp_path, "--minutes", 0.03, "--take-seconds", 2)
     assert outcome.code == 1
     assert "holds no pairs" in outcome.err
-
-
-def test_fits_that_are_missing_are_named(sd2: Sd2, tmp_path: Path) -> None:
-    for folder in (tmp_path / "truth" / "walk", tmp_path / "fits"):
-        folder.mkdir(parents=True)
-    meta = {"format": FORMAT, "version": VERSION, "clip": {"name": "walk"}}
-    (tmp_path / "truth" / "walk" / "truth.json").write_text(json.dumps(meta))
-    outcome = sd2(
-        "simulate",
-        "fit-errors",
-        tmp_path / "truth",
-        tmp_path / "fits",
-        "--out",
-        tmp_path / "e.json",
-    )
-    assert outcome.code == 1
-    assert "no landmarks of the clip 'walk'" in outcome.err
-    assert "sd2 score-fit" in outcome.err
-    assert not (tmp_path / "e.json").exists()

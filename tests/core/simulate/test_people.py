@@ -1,54 +1,16 @@
-"""Random people: their motion, their pictures, and what is learnt from them."""
+"""Random people and their motion."""
 
 from __future__ import annotations
-
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from sd2core.body.blazepose import CROP_PX, Pose, Roi
-from sd2core.body.camera import PinholeCamera
-from sd2core.body.lifter import POINTS, Lifter
-from sd2core.body.lifter_features import rate
 from sd2core.body.shape import ShapeSpace
 from sd2core.simulate.people.arms import GESTURE_STYLES, HELD_OUT_STYLES, TRAINING_STYLES
-from sd2core.simulate.people.crops import CropPainter, Look
-from sd2core.simulate.people.emulate import Emulator, Walk, random_walks
-from sd2core.simulate.people.examples import batch, emulated, example, varied
-from sd2core.simulate.people.motion import Deed, random_deed, random_motion
+from sd2core.simulate.people.motion import Deed, random_motion
 from sd2core.simulate.people.signals import Moves, follow, wander
-from sd2core.simulate.people.takes import Stage, Take, TakeMaker
-from sd2core.simulate.people.wardrobe import Wardrobe
 
 TIMES = np.arange(45) / 30.0
-
-
-@pytest.fixture(scope="module")
-def stage() -> Stage:
-    return Stage()
-
-
-class _PerfectLandmarker:
-    """Says where a fixed person is, whatever the picture shows."""
-
-    def on_crop(self, crop: np.ndarray, roi: Roi) -> Pose:
-        assert crop.shape == (CROP_PX, CROP_PX, 3)
-        middle = np.array([roi.centre_x_px, roi.centre_y_px])
-        image = np.tile(middle, (39, 1)) + roi.size_px * 0.2 * np.sin(np.arange(78)).reshape(39, 2)
-        image[33], image[34] = middle, middle - [0.0, roi.size_px / 2.5]
-        ones = np.ones(33)
-        mask = np.zeros((CROP_PX, CROP_PX), np.float32)
-        world = np.sin(np.arange(99.0)).reshape(33, 3)
-        return Pose(image, ones, world, ones, ones, 1.0, mask, roi)
-
-    on_both_sides = on_crop
-
-
-@pytest.fixture(scope="module")
-def takes() -> list[Take]:
-    maker = TakeMaker(_PerfectLandmarker())  # type: ignore[arg-type]
-    return [maker.make((7, 0, number), frames=24) for number in range(4)]
 
 
 def test_moves_go_from_pose_to_pose_and_hold() -> None:
@@ -103,120 +65,3 @@ def test_a_still_deed_is_still() -> None:
     transforms = skeleton.transforms(*random_motion(rng, skeleton, 1.7, TIMES, deed))
     heads = (transforms[..., :3] @ skeleton.heads_m[..., None])[..., 0] + transforms[..., 3]
     assert np.abs(np.gradient(heads, 1.0 / 30.0, axis=0)).max() < 0.08
-
-
-def test_who_gestures_does_not_walk_and_moves_the_hands_before_the_body(stage: Stage) -> None:
-    deeds = [random_deed(np.random.default_rng(n), manner="gestures") for n in range(60)]
-    assert {deed.legs for deed in deeds} == {"stand", "shift", "sit"}
-    assert all(set(deed.arms) & set(GESTURE_STYLES) for deed in deeds)
-    ahead = []
-    for n in range(12):
-        scene = stage.scene(np.random.default_rng(n), manner="gestures", frames=60)
-        places, middle = scene.keypoints_m, scene.keypoints_m[:, [11, 12, 23, 24]].mean(axis=1)
-        across = places[:, 11] - places[:, 12]
-        up = places[:, [11, 12]].mean(axis=1) - places[:, [23, 24]].mean(axis=1)
-        front = np.cross(across, up)
-        front /= np.linalg.norm(front, axis=1, keepdims=True)
-        hands = places[:, [15, 16]] - middle[:, None]
-        ahead.append((hands * front[:, None]).sum(axis=2).max())
-    assert np.median(ahead) > 0.2
-    assert min(ahead) > 0.0
-
-
-def test_scenes_repeat_and_show_the_upper_body(stage: Stage) -> None:
-    one, again = (stage.scene(np.random.default_rng(9), frames=30) for _ in range(2))
-    np.testing.assert_array_equal(one.keypoints_m, again.keypoints_m)
-    size = np.array([one.camera.width, one.camera.height])
-    shown = one.camera.project(one.keypoints_m)[:, [0, 11, 12]]
-    assert ((shown > 0) & (shown < size)).all()
-
-
-def test_what_is_drawn_lies_where_it_is_seen() -> None:
-    # A square board of two triangles, and nothing else.
-    corners = np.array([[-0.2, -0.3], [0.2, -0.3], [0.2, 0.3], [-0.2, 0.3]])
-    board = np.concatenate([corners, np.full((4, 1), 2.0)], axis=1).astype(np.float32)
-    faces = np.array([[0, 2, 1], [0, 3, 2]], np.int32)
-    ones = np.ones((9, 3), np.float32)
-    wardrobe = Wardrobe(np.full((4, 8), -1, np.float32), ones, np.ones((2, 4), np.float32))
-    camera = PinholeCamera(400, 300, 500.0)
-    look = Look((), 1.0, 1.0, 0.0, 0.0, 0)
-    background = np.zeros((300, 400, 3), np.uint8)
-    painter = CropPainter(faces, wardrobe, camera, look, background, np.random.default_rng(0))
-    roi = Roi(210.0, 140.0, 320.0, 0.3)
-    crop = painter.crop(board, roi)
-    rows, columns = np.nonzero(crop[..., 0] > 127)
-    seen = np.array([columns.mean() + 0.5, rows.mean() + 0.5, 1.0]) @ roi.matrix().T
-    np.testing.assert_allclose(
-        seen, camera.project(board.astype(np.float64)).mean(axis=0), atol=0.5
-    )
-    area = len(rows) * (roi.size_px / CROP_PX) ** 2
-    np.testing.assert_allclose(area, (0.4 * 250.0) * (0.6 * 250.0), rtol=0.01)
-
-
-def test_takes_come_back_from_disk(takes: list[Take], tmp_path: Path) -> None:
-    takes[0].save(tmp_path / "take.npz")
-    back = Take.load(tmp_path / "take.npz")
-    assert back.camera == takes[0].camera
-    for name in ("keypoints_m", "image_px", "world_m", "confidence", "bone_turns"):
-        np.testing.assert_array_equal(getattr(back, name), getattr(takes[0], name))
-
-
-def test_velocities_of_examples_are_those_of_the_truth(takes: list[Take]) -> None:
-    truth = batch([example(takes[1])])
-    z = takes[1].keypoints_m[..., 2] / takes[1].stature_m
-    np.testing.assert_allclose(truth.velocity[0, 1:-1], 15.0 * (z[2:] - z[:-2]), atol=1e-4)
-    np.testing.assert_allclose(rate(np.arange(5.0) * 2.0, 0), 60.0)
-
-
-def test_varied_examples_keep_what_is_seen_and_true_together(takes: list[Take]) -> None:
-    # A landmark model that is right: depth it says and truth stay the same through all changes.
-    one = example(takes[2])
-    right = one._replace(seen=one.seen._replace(depth=one.depth.copy()))
-    rng = np.random.default_rng(2)
-    for _ in range(12):
-        other = varied(rng, right, 16)
-        whole = other.seen.sure > 0
-        np.testing.assert_array_equal(np.asarray(other.seen.depth)[whole], other.depth[whole])
-
-
-def test_emulated_people_look_like_the_takes(takes: list[Take]) -> None:
-    emulator = Emulator(takes)
-    walks = random_walks(emulator, 2, 5)
-    assert walks[0].places.shape == (96, 33, 3)
-    cut = Walk(walks[0].places[:24], walks[0].apparent[:24])
-    drawn = emulated(np.random.default_rng(1), emulator, cut)
-    assert drawn.seen.slopes.shape == (24, 33, 2)
-    np.testing.assert_array_equal(drawn.depth, cut.places[..., 2])
-    assert np.isfinite(batch([drawn]).told).all()
-
-
-def test_training_learns_and_repeats(takes: list[Take], tmp_path: Path) -> None:
-    pytest.importorskip("torch")
-    from sd2core.simulate.people.train_lifter import Recipe, save_lifter, train
-
-    recipe = Recipe(width=8, dilations=(1, 2), steps=30, batch=4, frames=20, dropout=0.0)
-    logged: list[str] = []
-    one = train(takes, None, None, recipe, log=logged.append)
-    two = train(takes, None, None, recipe)
-    for name, array in one.network.arrays.items():
-        np.testing.assert_array_equal(array, two.network.arrays[name])
-    first, last = (float(text.split("root ")[1].split(",")[0]) for text in (logged[0], logged[-1]))
-    assert last < first
-    save_lifter(one, tmp_path / "lifter.npz")
-    back = Lifter.load(tmp_path / "lifter.npz")
-    seen = example(takes[0]).seen
-    wanted = one.outputs(seen)
-    np.testing.assert_allclose(back.outputs(seen), wanted, atol=0.02 * np.abs(wanted).max())
-    assert wanted.shape == (24, 2 + 4 * POINTS)
-
-
-def test_training_goes_on_from_a_lifter(takes: list[Take]) -> None:
-    pytest.importorskip("torch")
-    from sd2core.simulate.people.train_lifter import Recipe, train
-
-    recipe = Recipe(width=8, dilations=(1, 2), steps=3, batch=2, frames=20, rate=1e-9)
-    one = train(takes, None, None, recipe)
-    two = train(takes, None, None, recipe, start=one)
-    for name, array in one.network.arrays.items():
-        np.testing.assert_allclose(two.network.arrays[name], array, atol=1e-6)
-    assert two.provenance["start"] == one.provenance

@@ -1,0 +1,175 @@
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from known_clip import STROKES, TIMES, standing, waving, write_clip
+
+from sd2core.body.limbs import LIMBS, vertex_limbs
+from sd2core.body.model import Body
+from sd2core.compare.joints import JOINTS, own_patches
+from sd2core.compare.measures import coverage, line_of_sight_velocity, rms
+from sd2core.errors import Sd2Error
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
+from tools.fitting.clip_score import LIMBS as MEASURED
+from tools.fitting.clip_score import ClipScore, score_clip
+from tools.fitting.report import Row, as_dict, clip_table, gesture_table, reach_table
+from tools.fitting.report_text import as_markdown, as_text
+from tools.fitting.truth import Truth, read_truth
+
+
+@pytest.fixture(scope="module")
+def truth(tmp_path_factory: pytest.TempPathFactory) -> Truth:
+    return read_truth(write_clip(tmp_path_factory.mktemp("truth") / "wave", waving()))
+
+
+@pytest.fixture(scope="module")
+def still(tmp_path_factory: pytest.TempPathFactory) -> Truth:
+    return read_truth(write_clip(tmp_path_factory.mktemp("truth") / "still", standing(), "still"))
+
+
+def moved(mesh: MeshSequence, by: np.ndarray) -> MeshSequence:
+    return replace(mesh, vertices=mesh.read(0, mesh.frame_count) + by)
+
+
+def row(scores: list[ClipScore], what: str) -> Row:
+    (found,) = (one for one in reach_table(scores) if what in one.what)
+    return found
+
+
+def test_the_truth_itself_is_perfect(truth: Truth) -> None:
+    score = score_clip(truth, truth.mesh(), seconds=(7.2, 10.8))
+    assert [one.stroke.label for one in score.strokes] == [one["label"] for one in STROKES]
+    for stroke in score.strokes:
+        for limb in MEASURED:
+            pair = stroke.velocity[limb]
+            assert (pair.error, pair.correlation, pair.peak_kept) == (0.0, 1.0, 1.0)
+            assert stroke.tempo[limb].peak_kept == 1.0
+        assert stroke.map_difference == 0.0
+        assert stroke.map_total > 0.0
+    assert score.distance_m.max() == score.aligned_m.max() == score.map_l1 == 0.0
+    assert score.overlap == 1.0
+    assert score.seconds_per_frame == pytest.approx(0.2)
+    assert score.processor_s_per_frame == pytest.approx(0.3)
+    assert score.sigma is None
+    unmet = [one.what for one in reach_table([score]) if one.met is False]
+    assert unmet == ["time for a fit"]
+
+
+def test_strokes_hold_the_hand_that_makes_them(truth: Truth) -> None:
+    score = score_clip(truth, truth.mesh())
+    joints = own_patches("low").of(truth.mesh())
+    velocity = line_of_sight_velocity(joints, TIMES)[:, JOINTS.index("hand.R")]
+    frames = (TIMES >= 0.3) & (TIMES < 0.6)
+    np.testing.assert_allclose(score.strokes[0].velocity["hand"].truth, velocity[frames], atol=1e-6)
+    assert rms(velocity[frames]) > 0.3
+
+
+def test_a_drift_is_an_error_of_velocity(truth: Truth) -> None:
+    drift = -0.1 * TIMES[:, None, None] * np.array([0.0, 0.0, 1.0])
+    score = score_clip(truth, moved(truth.mesh(), drift))
+    assert score.velocity.error == pytest.approx(0.1, rel=0.06)
+    hand = own_patches("low").of(truth.mesh())[:, JOINTS.index("hand.R")]
+    cosine = hand[:, 2] / np.linalg.norm(hand, axis=1)
+    for stroke in score.strokes:
+        during = (stroke.stroke.start_s <= TIMES) & (stroke.stroke.end_s > TIMES)
+        assert stroke.velocity["hand"].error == pytest.approx(0.1 * rms(cosine[during]), rel=0.06)
+        assert stroke.velocity["hand"].correlation > 0.99
+    assert score.aligned_m.max() < 1e-6
+    assert score.distance_m == pytest.approx((0.1 * TIMES).mean(), rel=1e-3)
+
+
+def test_half_the_motion_keeps_half_the_peak(truth: Truth) -> None:
+    mesh = truth.mesh()
+    rest = mesh.frame(0)
+    half = replace(mesh, vertices=rest + 0.5 * (mesh.read(0, mesh.frame_count) - rest))
+    scores = [score_clip(truth, half)]
+    assert row(scores, "peak hand speed kept, in space").value == pytest.approx(0.5, abs=0.01)
+    kept = row(scores, "peak hand speed kept, along")
+    # Smaller arcs point elsewhere, too.
+    assert kept.value == pytest.approx(0.5, abs=0.08)
+    assert kept.met is False
+    assert row(scores, "hands during gestures, line-of-sight velocity: RMS").value > 0.1
+    assert row(scores, "Doppler map of the gestures").value > 0.3
+
+
+def test_motion_of_who_stands_still_is_false(still: Truth) -> None:
+    """Noise of 1 mm along the line of sight: √2 · 1 mm · 15 Hz over the inner frames."""
+    noise = np.random.default_rng(0).normal(scale=0.001, size=(len(TIMES), 1229, 1))
+    score = score_clip(still, moved(still.mesh(), noise * np.array([0.0, 0.0, 1.0])))
+    inner, ends = math.sqrt(2) * 0.001 * 15.0, math.sqrt(2) * 0.001 * 30.0
+    expected = math.sqrt((34 * inner**2 + 2 * ends**2) / 36)
+    # Seen at an angle of up to 20 degrees, hence a little less.
+    assert score.vertex_velocity_mps == pytest.approx(expected, rel=0.06)
+    assert score.strokes == ()
+    assert row([score], "who stands still").met is True
+
+
+def test_artefacts_at_the_ends_are_seen(truth: Truth) -> None:
+    shake = np.full((len(TIMES), 1, 3), 0.001) * np.array([0, 0, 1.0])
+    shake[::2] *= -1
+    calm = score_clip(truth, moved(truth.mesh(), shake))
+    # The very first and last velocities are differences over half the time.
+    ratio = clip_table([calm])[0]["edge_place_ratio"]
+    assert ratio == pytest.approx(1.0, abs=0.01)
+    shake[:5] *= 4
+    shake[-5:] *= 4
+    wild = score_clip(truth, moved(truth.mesh(), shake))
+    assert clip_table([wild])[0]["edge_place_ratio"] == pytest.approx(4.0, abs=0.05)
+    assert row([wild], "ends over the middle, place").met is False
+
+
+@pytest.mark.parametrize(("factor", "covered"), [(1.2, 1.0), (0.8, 0.0)])
+def test_sigma_covers_what_it_is_larger_than(truth: Truth, factor: float, covered: float) -> None:
+    drift = -0.1 * TIMES[:, None, None] * np.array([0.0, 0.0, 1.0])
+    sigma = np.full((len(TIMES), len(LIMBS)), 0.1 * factor, np.float32)
+    known = VelocityUncertainty(LIMBS, vertex_limbs(Body.load("low")), sigma, sigma)
+    score = score_clip(truth, replace(moved(truth.mesh(), drift), uncertainty=known))
+    assert score.sigma is not None
+    assert coverage(score.sigma.truth, score.sigma.fitted) == pytest.approx(covered, abs=0.02)
+    assert row([score], "1σ of the velocity covers").met is False
+
+
+def test_frames_without_a_person_are_left_out(truth: Truth) -> None:
+    there = np.ones(len(TIMES), bool)
+    there[20:] = False
+    score = score_clip(truth, replace(truth.mesh(), present=there))
+    assert score.velocity.truth.size == 20 * len(JOINTS)
+    assert [len(one.velocity["hand"].truth) for one in score.strokes] == [9, 2]
+    assert "16 frames without a person are left out" in score.notes
+
+
+def test_another_surface_is_refused(truth: Truth) -> None:
+    other = truth.mesh()
+    with pytest.raises(Sd2Error, match="no surface of SD² Studio"):
+        score_clip(truth, replace(other, faces=other.faces[::-1].copy()))
+
+
+def test_a_range_is_met_inside_only() -> None:
+    for value, met in ((0.59, False), (0.6, True), (0.75, True), (0.76, False), (math.nan, None)):
+        assert Row("", value, reach=(">=", 0.6), upper=0.75).met is met
+    assert Row("", 0.25, reach=("<=", 0.25)).met is True
+    assert Row("", 1.0).met is None
+
+
+def test_the_tables_say_the_same_in_every_form(truth: Truth, still: Truth) -> None:
+    scores = [score_clip(one, one.mesh()) for one in (truth, still)]
+    text, markdown = as_text(scores), as_markdown(scores)
+    found = as_dict(scores)
+    assert len(found["reach"]) == len(reach_table(scores))
+    assert [one["clip"] for one in found["clips"]] == ["wave", "still"]
+    assert {(one["gesture"], one["speed"]) for one in gesture_table(scores)} == {
+        (stroke["label"], speed) for stroke in STROKES for speed in ("fast", "all")
+    }
+    for what in ("who stands still", "up-to-down", "still"):
+        assert what in text
+        assert what in markdown
+    rows = [line for line in markdown.splitlines() if line.startswith("|")]
+    assert len({line.count("|") for line in rows}) == 3
+
+
+def test_nothing_to_score_is_no_figure() -> None:
+    assert all(one.met is None for one in reach_table([]))

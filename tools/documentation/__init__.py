@@ -1,0 +1,1 @@
+"""Scripts that write the measured pages of ``docs/`` and their pictures."""

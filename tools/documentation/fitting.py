@@ -1,0 +1,116 @@
+"""Makes ``fitting.md`` and its pictures: ``make fitting``, about ten minutes.
+
+Every figure is measured when this runs. Clips and fits stay in ``build/fitting`` (or the
+folder that is named); what is there is not made again, and its time is not known. The
+real videos are left out where the recordings are not there (``SD2_SHARED_DATA``).
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from sd2core.accuracy.scene import this_machine
+from sd2core.compare.figure import draw_comparison
+from sd2core.compare.meshes import compare_meshes
+from sd2core.files.atomic import atomic_write_text
+from sd2core.files.figure_files import save_figure
+from sd2core.io.mesh import load_mesh
+from sd2core.io.video import open_video
+from sd2core.numerics.compiled import warm_up
+from tools.documentation.places import BUILD, DOCS, IMAGES, SHARED
+from tools.fitting.__main__ import main as run_fitting
+from tools.fitting.truth import read_truth
+
+REAL = ("walk.mkv", "help.mkv", "again.mkv")
+
+SHOWN = (
+    ("horizontal-slow", 2.2),
+    ("horizontal-normal", 2.0),
+    ("vertical-slow", 1.2),
+    ("all-fast", 1.2),
+    ("horizontal-fast", 1.2),
+    ("vertical-fast", 1.1),
+    ("walk", 2.0),
+    ("turn-other", 1.6),
+)
+COMPARED = "all-normal"
+
+PAGE = """\
+# How good the fit from video is
+
+What `sd2 fit` makes of videos whose motion is known, measured. Made by
+
+```
+make fitting
+```
+
+on {machine}: sixteen videos of simulated people (`python -m tools.fitting clips`), whose motions
+nothing in the program was trained with, fitted by `sd2 fit` with the camera's focal
+length and the person's height given, and measured by `python -m tools.fitting score`. What the
+clips can and cannot say is [decision 19](decisions/0019-known-truth-for-the-fit.md).
+
+![Frames of eight of the clips](images/fit-truth.png)
+
+**Line-of-sight velocity** is that of a limb towards the camera, by the exact change of range
+over the central difference, as the Doppler chain takes it. **Map L1** is the sum of the absolute
+differences between the synthetic Doppler maps of the fitted and of the true mesh (the paper's
+preset, smoothed) over the sum of the true one. **Peak kept** is the fitted hand's largest speed
+along the line of sight over the true one's; more than 1 is too much. **Ends** are the first and
+last five frames, over those between. Joints are patches of the surface. Time by the clock counts
+whatever else the machine did; processor time is the fit's own, on all cores together.
+
+What limits the figures is depth: given the true depths and velocities along the optical axis in
+the lifter's place, the same fit of the same landmarks is well within all of them ([decision
+19](decisions/0019-known-truth-for-the-fit.md), last paragraph).
+
+{tables}
+The clip {compared}, true and fitted:
+
+![Doppler maps and velocities of one clip, true and fitted](images/fit-compared.png)
+"""
+
+
+def main() -> None:
+    """Make what is missing, measure everything and write the page."""
+    warm_up()
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else BUILD / "fitting"
+    folder.mkdir(parents=True, exist_ok=True)
+    clips, fits, tables = folder / "clips", folder / "fits", folder / "tables.md"
+    _run("clips", clips)
+    _frames(clips)
+    videos = [SHARED / "video" / name for name in REAL]
+    real = [video for video in videos if video.exists()]
+    _run("score", clips, "--keep", fits, "--markdown", tables, *(["--real", *real] * bool(real)))
+    truth = read_truth(clips / COMPARED)
+    pair = [truth.mesh(), load_mesh(fits / f"{COMPARED}.zarr")]
+    compared = compare_meshes(pair, ["true", "fitted"])
+    save_figure(draw_comparison(compared), IMAGES / "fit-compared.png")
+    page = PAGE.format(machine=this_machine(), tables=tables.read_text("utf-8"), compared=COMPARED)
+    atomic_write_text(DOCS / "fitting.md", page)
+
+
+def _run(*arguments: object) -> None:
+    code = run_fitting([str(argument) for argument in arguments])
+    if code:
+        sys.exit(code)
+
+
+def _frames(clips: Path) -> None:
+    """One frame of each clip that is shown."""
+    figure = Figure(figsize=(9.6, 3.7), dpi=100)
+    for number, (name, time_s) in enumerate(SHOWN):
+        with open_video(clips / name / "video.mp4") as video:
+            picture = np.asarray(video.read(video.timebase.frame_at(time_s)))
+        column, row = number % 4, number // 4
+        axes = figure.add_axes((0.25 * column, 0.5 - 0.5 * row, 0.249, 0.498))
+        axes.imshow(picture)
+        axes.set_axis_off()
+    save_figure(figure, IMAGES / "fit-truth.png")
+
+
+if __name__ == "__main__":
+    main()

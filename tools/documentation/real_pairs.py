@@ -1,0 +1,175 @@
+"""Print the tables of docs/real-pairs.md.
+
+::
+
+    python -m tools.documentation.real_pairs inputs FOLDER...
+    python -m tools.documentation.real_pairs linear PAIRS
+
+The first compares ways to turn the Kinect's skeleton into synthetic Doppler: its mean
+velocity per frame with that of the radar's points, before any denoising. The second
+shows what the least denoiser makes of the pairs: a linear map of five frames.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.doppler import Synthesizer
+from sd2core.io.radar.mars import MarsPart, mars_parts, read_mars
+from sd2core.mocap.driving import DrivenClip
+from sd2core.mocap.mars_pairs import (
+    MarsChoices,
+    body_doppler,
+    drive,
+    radar_doppler,
+    skeleton_clip,
+    skeleton_cloud,
+)
+from sd2core.pairs.store import PairSet, read_pairs
+from sd2core.sensor import VirtualSensor
+
+Maps = list[NDArray[np.float32]]
+
+DEFAULT = MarsChoices()
+RIDGE = 10.0
+
+
+def changed(**options: object) -> MarsChoices:
+    """The default with other options of synthesis."""
+    return replace(DEFAULT, synthesis=replace(DEFAULT.synthesis, **options))  # type: ignore[arg-type]
+
+
+WAYS = {
+    "body, facing, count (default)": DEFAULT,
+    "body, all vertices, count": changed(visibility="none"),
+    "body, exact, count": changed(visibility="exact"),
+    "body, facing, area": changed(weight="area"),
+    "body, facing, projected area": changed(weight="projected"),
+    "body, 5,000 vertices, facing, count": replace(DEFAULT, resolution="medium"),
+    "body, posed at 30 Hz, facing, count": replace(DEFAULT, moments=3),
+    "body, facing, count, bins 14–16 nulled": changed(null_bins=(14, 15, 16)),
+}
+
+
+def cloud_maps(part: MarsPart) -> Maps:
+    """Synthetic Doppler of the joints as a cloud of points."""
+    options = replace(DEFAULT.synthesis, visibility="none")
+    return [
+        Synthesizer(skeleton_cloud(skeleton_clip(stretch)), options).map(VirtualSensor()).values.T
+        for stretch in part.stretches
+    ]
+
+
+def mean_mps(maps: Iterable[NDArray[np.float32]]) -> NDArray[np.float64]:
+    """Mean velocity of every frame, one stretch after the other; an empty one is at rest."""
+    values = np.concatenate(list(maps)).astype(np.float64)
+    total = values.sum(axis=1)
+    moment = values @ DEFAULT.synthesis.axis.centres_mps
+    return np.divide(moment, total, out=np.zeros(len(total)), where=total > 0)
+
+
+def row(part: MarsPart, name: str, maps: Maps, radar: Maps) -> str:
+    """One line of the table."""
+    seen = np.concatenate(radar).sum(axis=1) > 0
+    found, truth = mean_mps(maps)[seen], mean_mps(radar)[seen]
+    correlation = np.corrcoef(found, truth)[0, 1] if found.any() else np.nan
+    gain = (found * truth).sum() / max((found**2).sum(), 1e-12)
+    return (
+        f"| {part.subject}-{part.name} | {name} | {correlation:.3f}"
+        f" | {np.abs(found - truth).mean():.3f} | {np.abs(gain * found - truth).mean():.3f} |"
+    )
+
+
+def residuals(driven: list[DrivenClip]) -> str:
+    """How far the body's joints are from the skeleton's, in words."""
+    values = np.concatenate([clip.residual_m.ravel() for clip in driven]) * 100.0
+    values = values[np.isfinite(values)]
+    stature = driven[0].puppet.shape.stature_m
+    return (
+        f"a body of {stature:.2f} m, joints {values.mean():.1f} cm from the skeleton's in the"
+        f" mean, 95 % within {np.percentile(values, 95):.1f} cm"
+    )
+
+
+def inputs(folders: list[Path]) -> None:
+    """Print the first table, then how well the bodies fit."""
+    print("| part | input | correlation | MAE, m/s | MAE after one gain, m/s |")
+    print("|---|---|---|---|---|")
+    notes = []
+    for part in (read_mars(folder, name) for folder in folders for name in mars_parts(folder)):
+        axis = DEFAULT.synthesis.axis
+        radar = [radar_doppler(stretch, axis) for stretch in part.stretches]
+        print(row(part, "nothing moves", [0.0 * values for values in radar], radar))
+        print(row(part, "25 joints", cloud_maps(part), radar), flush=True)
+        driven = drive(part)
+        for name, choices in WAYS.items():
+            maps = [body_doppler(clip, choices) for clip in driven]
+            print(row(part, name, maps, radar), flush=True)
+        empty = 1.0 - float((np.concatenate(radar).sum(axis=1) > 0).mean())
+        notes.append(
+            f"{part.subject}-{part.name}: {residuals(driven)}; {empty:.1%} of the frames without"
+            " points"
+        )
+    print("\n" + "\n".join(f"- {note}" for note in notes))
+
+
+def features(values: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Square roots of the shares in a frame and two on each side, (frames, 5 bins)."""
+    shares = np.sqrt(values / np.maximum(values.sum(axis=1, keepdims=True), 1e-9))
+    padded = np.pad(shares, ((2, 2), (0, 0)), mode="edge")
+    return np.hstack([padded[shift : shift + len(shares)] for shift in range(5)])
+
+
+def examples(pairs: PairSet) -> tuple[NDArray[np.float64], ...]:
+    """Features, mean velocity of the radar and of the input, in frames with points."""
+    seen = [take.radar.sum(axis=1) > 0 for take in pairs.takes]
+    each = list(zip(pairs.takes, seen, strict=True))
+    return (
+        np.concatenate([features(take.synthetic)[rows] for take, rows in each]),
+        mean_mps(take.radar[rows] for take, rows in each),
+        mean_mps(take.synthetic[rows] for take, rows in each),
+    )
+
+
+def linear(path: Path) -> None:
+    """Print the second table."""
+    pairs = read_pairs(path)
+    print("| trained on | tested on | no denoising | linear map | no denoising | linear map |")
+    print("|---|---|---|---|---|---|")
+    for test in pairs.subjects:
+        person = test.partition("-")[0]
+        others = [name for name in pairs.subjects if name.partition("-")[0] != person]
+        x, y, _ = examples(pairs.of(others))
+        middle = x.mean(axis=0)
+        slope = np.linalg.solve(
+            (x - middle).T @ (x - middle) + RIDGE * np.eye(x.shape[1]),
+            (x - middle).T @ (y - y.mean()),
+        )
+        x, truth, before = examples(pairs.of([test]))
+        after = (x - middle) @ slope + y.mean()
+        errors = [f"{np.abs(found - truth).mean():.3f}" for found in (before, after)]
+        alike = [f"{np.corrcoef(found, truth)[0, 1]:.3f}" for found in (before, after)]
+        print(f"| {', '.join(others)} | {test} | {' | '.join(errors + alike)} |")
+
+
+def main() -> None:
+    """Print one of the tables."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    tables = parser.add_subparsers(dest="table", metavar="TABLE", required=True)
+    tables.add_parser("inputs").add_argument("paths", type=Path, nargs="+", metavar="FOLDER")
+    tables.add_parser("linear").add_argument("paths", type=Path, nargs=1, metavar="PAIRS")
+    options = parser.parse_args()
+    if options.table == "inputs":
+        inputs(options.paths)
+    else:
+        linear(options.paths[0])
+
+
+if __name__ == "__main__":
+    main()

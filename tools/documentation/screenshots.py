@@ -1,0 +1,176 @@
+"""Take the screenshots of the documentation: `make screenshots`.
+
+Draws the real window, on whatever display Qt finds, into docs/images. The real
+video and its mesh are read from the folder of real recordings
+(``SD2_SHARED_DATA``, by default ``../shared/data``); without it those pictures
+are left as they are.
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from PySide6.QtWidgets import QApplication
+
+from sd2app.fit.request import FitRequest
+from sd2app.mesh_comparison.window import ComparisonWindow
+from sd2app.shell.screenshot import wait_until_settled
+from sd2app.shell.window import MainWindow
+from sd2core.files.resources import resource_path
+from sd2core.placements.placements import PlacementCloud
+from sd2core.sensor import VirtualSensor, aimed_at
+from tools.documentation.learning_screenshots import learning
+from tools.documentation.places import IMAGES, REPOSITORY, SHARED
+from tools.documentation.windows import LIMIT_S, opened, save, wait_for
+
+
+def sample(window: MainWindow) -> None:
+    """The sample in the middle of a swipe."""
+    window.context.playback.seek(1.9)
+
+
+def far_in_the_dark(window: MainWindow) -> None:
+    """The sensor moved aside to 6 m, range colours, dark theme."""
+    context = window.context
+    window.set_dark(True)
+    context.playback.seek(2.0)
+    sensor = VirtualSensor(position_m=(2.6, -0.6, -2.8))
+    context.edits.place_sensor(aimed_at(sensor, context.synthesis.torso_m))
+    window.set_scene_view("overview")
+    context.display.set_mesh_colour("range")
+
+
+def trade(window: MainWindow) -> None:
+    """The Trade panel on the sample, measured, for a tolerance of 2 %."""
+    window.resize(1280, 960)
+    window.context.playback.seek(1.9)
+    window.context.trade.set_tolerance(0.02)
+    window.measure_scene()
+
+
+def labels(window: MainWindow) -> None:
+    """The spans of the sample as a table beside the maps, one of them selected."""
+    window.resize(1280, 960)
+    window.show_labels()
+    span = window.context.labels.labels.spans[2]
+    window.context.label_edits.go_to(span)
+
+
+def placements(window: MainWindow) -> None:
+    """A cloud of sensors planned around the sample's body."""
+    window.resize(1280, 960)
+    window.context.playback.seek(1.9)
+    window.show_placements()
+    window.context.edits.plan_placements(
+        PlacementCloud(120, (1.0, 4.0), (-80.0, 80.0), (-10.0, 50.0), seed=2)
+    )
+
+
+def real(window: MainWindow) -> None:
+    """A real person with the mesh fitted to the video."""
+    window.context.playback.seek(1.9)
+
+
+def strip() -> None:
+    """Frames of a swipe of the sample above its mesh."""
+    from sd2core.figures.strip import plot_strip
+    from sd2core.figures.strip_source import StripOptions, StripSource
+    from sd2core.recording.recording import open_recording
+
+    recording = open_recording(resource_path("swipes.sd2"))
+    with recording.open_video() as video:
+        source = StripSource.of(recording, video, recording.load_mesh(), recording.title)
+        figure = plot_strip(source, range(48, 84, 5), StripOptions(v_max_mps=1.5))
+    figure.savefig(IMAGES / "strip.png", dpi=110)
+    print((IMAGES / "strip.png").relative_to(REPOSITORY))
+
+
+def fitting(application: QApplication) -> None:
+    """A body being fitted to a real video, with what has been found so far."""
+    with tempfile.TemporaryDirectory() as folder:
+        video = Path(shutil.copy(SHARED / "video" / "walk.mkv", folder))
+        window = opened(application, [video])
+        fit = window.context.fit
+        fit.start(FitRequest(video, video.with_suffix(".sd2")))
+
+        def far_enough() -> bool:
+            progress = fit.progress
+            second_pass = progress is not None and progress.stage == "refine"
+            return not fit.busy or (second_pass and progress.done > 0.55 * progress.total)
+
+        wait_for(application, far_enough)
+        if fit.busy:
+            save(window, "fitting.png")
+        else:
+            print(f"fitting.png is left as it is: {fit.text}", file=sys.stderr)
+        fit.cancel()
+        wait_for(application, lambda: not fit.busy)
+        window.close()
+
+
+def comparison(application: QApplication) -> None:
+    """The sample's mesh, which is the truth, beside the body that is fitted to its video."""
+    sample_folder = resource_path("swipes.sd2")
+    with tempfile.TemporaryDirectory() as folder:
+        fitted = Path(folder) / "sd2 fit.zarr"
+        video = str(sample_folder / "video.mp4")
+        command = [sys.executable, "-m", "sd2app.command_line", "fit", video, "--out", str(fitted)]
+        if subprocess.run(command, check=False).returncode != 0:
+            print("comparison.png is left as it is: the fit failed", file=sys.stderr)
+            return
+        window = opened(application, [sample_folder])
+        window.context.playback.seek(2.1)
+        window.compare_with_mesh(fitted)
+        compared = window.findChild(ComparisonWindow)
+        wait_for(application, lambda: compared._model.comparison is not None)
+        wait_until_settled(application, window, LIMIT_S)
+        save(compared, "comparison.png")
+        window.close()
+
+
+def take(
+    application: QApplication, name: str, paths: list[Path], arrange: Callable[[MainWindow], None]
+) -> None:
+    """Open, wait, arrange, wait, write."""
+    window = opened(application, paths)
+    arrange(window)
+    if not wait_until_settled(application, window, LIMIT_S):
+        sys.exit(f"{name}: the window was still busy after {LIMIT_S:.0f} s")
+    if window.messages.text:
+        print(f"{name}: {window.messages.text}", file=sys.stderr)
+        window.messages.hide()
+        application.processEvents()
+    save(window, name)
+    window.context.document.undo_stack.setClean()
+    window.close()
+    application.processEvents()
+
+
+def main() -> None:
+    """Take them all."""
+    application = QApplication(sys.argv[:1])
+    IMAGES.mkdir(exist_ok=True)
+    strip()
+    swipes = [resource_path("swipes.sd2")]
+    take(application, "sample.png", swipes, sample)
+    take(application, "dark.png", swipes, far_in_the_dark)
+    take(application, "trade.png", swipes, trade)
+    take(application, "labels.png", swipes, labels)
+    take(application, "placements.png", swipes, placements)
+    comparison(application)
+    learning(application)
+    walk = [SHARED / "video" / "walk.mkv", SHARED / "mesh" / "walk.npz"]
+    if all(path.exists() for path in walk):
+        take(application, "real-video.png", walk, real)
+        fitting(application)
+    else:
+        print(f"real-video.png is left as it is: there is no {walk[0]}", file=sys.stderr)
+
+
+if __name__ == "__main__":
+    main()

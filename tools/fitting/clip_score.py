@@ -1,0 +1,309 @@
+"""How good one fitted mesh is, measured against a clip whose motion is known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.body.silhouette import overlap, silhouette
+from sd2core.body.track import LandmarkTrack
+from sd2core.compare.joints import (
+    JOINTS,
+    JointPatches,
+    medium_in_high,
+    own_patches,
+    own_resolution,
+)
+from sd2core.compare.maps import map_l1, maps_alike
+from sd2core.compare.measures import (
+    EDGE_FRAMES,
+    correlation,
+    line_of_sight_velocity,
+    peak_kept,
+    rms,
+    speed_mps,
+)
+from sd2core.compare.times import at_times, common_times
+from sd2core.errors import Sd2Error
+from sd2core.mesh.presence import Presence
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.progress import Progress, silent
+from sd2core.sensor import VirtualSensor
+from tools.fitting.real_score import reprojection
+from tools.fitting.truth import Stroke, Truth
+
+Floats = NDArray[np.float64]
+
+LIMBS = ("hand", "wrist", "elbow")
+"""What is measured during strokes: of the arm that makes them."""
+
+_MASK = (160, 120)
+_MASK_STEP = 5
+
+
+class Pair(NamedTuple):
+    """Fitted and true samples of one quantity, each (n,)."""
+
+    fitted: Floats
+    truth: Floats
+
+    @property
+    def error(self) -> float:
+        """RMS of the difference."""
+        return rms(self.fitted - self.truth)
+
+    @property
+    def correlation(self) -> float:
+        """Pearson's."""
+        return correlation(self.fitted, self.truth)
+
+    @property
+    def peak_kept(self) -> float:
+        """Largest magnitude of the fitted over that of the true."""
+        return peak_kept(self.fitted, self.truth)
+
+
+def pooled(pairs: list[Pair]) -> Pair:
+    """Samples of several stretches as one."""
+    if not pairs:
+        return Pair(np.zeros(0), np.zeros(0))
+    return Pair(*(np.concatenate(one) for one in zip(*pairs, strict=True)))
+
+
+@dataclass(frozen=True, eq=False)
+class StrokeScore:
+    """One gesture.
+
+    Parameters
+    ----------
+    stroke : Stroke
+    speed, hand : str
+    velocity : dict of str to Pair
+        Of each of :data:`LIMBS`, along the line of sight.
+    tempo : dict of str to Pair
+        The same limbs' speed in space.
+    map_difference, map_total : float
+        Sums over the gesture's frames of the absolute difference of the smoothed
+        Doppler maps, and of the true one.
+    """
+
+    stroke: Stroke
+    speed: str
+    hand: str
+    velocity: dict[str, Pair]
+    tempo: dict[str, Pair]
+    map_difference: float
+    map_total: float
+
+
+@dataclass(frozen=True, eq=False)
+class ClipScore:
+    """One clip.
+
+    Parameters
+    ----------
+    name, kind : str
+    frames : int
+        That were compared.
+    strokes : tuple of StrokeScore
+    distance_m : float64 array, shape (J,)
+        Mean distance of each joint.
+    aligned_m : float64 array, shape (J,)
+        The same from the pelvis.
+    velocity : Pair
+        Of all joints and frames along the line of sight, each (n · J,).
+    vertex_velocity_mps : float
+        RMS over all vertices and frames of the velocity along the line of sight: for
+        who stands still, all of it is false.
+    map_l1 : float
+        Of the whole clip.
+    edge, middle : float64 array, shape (2,)
+        RMS error of the first and last frames, and of those between: velocity along
+        the line of sight (m/s), then place (m), of all joints.
+    overlap : float
+        Mean intersection over union of the fitted and the true silhouette.
+    sigma : Pair or None
+        ``fitted`` holds standard deviations that the fit gave for the velocities of
+        joints, ``truth`` their actual errors.
+    seconds_per_frame, processor_s_per_frame : float or None
+        That the fit took by the clock, and on all cores together.
+    residual_m : float or None
+        Mean distance of joints from the landmarks that were found, in the picture at
+        the joint's depth.
+    notes : tuple of str
+    """
+
+    name: str
+    kind: str
+    frames: int
+    strokes: tuple[StrokeScore, ...]
+    distance_m: Floats
+    aligned_m: Floats
+    velocity: Pair
+    vertex_velocity_mps: float
+    map_l1: float
+    edge: Floats
+    middle: Floats
+    overlap: float
+    sigma: Pair | None = None
+    seconds_per_frame: float | None = None
+    processor_s_per_frame: float | None = None
+    residual_m: float | None = None
+    notes: tuple[str, ...] = ()
+
+
+def score_clip(
+    truth: Truth,
+    fitted: MeshSequence,
+    *,
+    seconds: tuple[float, float] | None = None,
+    track: LandmarkTrack | None = None,
+    progress: Progress = silent,
+) -> ClipScore:
+    """Measure one fitted mesh.
+
+    Parameters
+    ----------
+    truth : Truth
+    fitted : MeshSequence
+        Of this clip's video, in the camera frame, with a surface of ours. Where it says
+        how well its velocities are known, that is measured too.
+    seconds : (float, float), optional
+        That the whole fit took: by the clock, and of processor time.
+    track : LandmarkTrack, optional
+        The landmarks that were fitted to.
+    progress : Progress
+        Counts frames of the two Doppler maps.
+
+    Returns
+    -------
+    ClipScore
+
+    Raises
+    ------
+    Sd2Error
+        When the surface is none of ours or has no time in common with the clip.
+    """
+    true = truth.mesh()
+    times_s = common_times([true, fitted])
+    pair = [
+        _with_vertices_of(at_times(one, times_s)[0], other)
+        for one, other in ((true, fitted), (fitted, true))
+    ]
+    presence = pair[1].presence
+    if not presence.measured.any():
+        raise Sd2Error(f"{truth.name}: the fitted mesh has no person", "the person of the clip")
+    pair = [replace(mesh, present=presence.there) for mesh in pair]
+    patches = [_patches(mesh, truth.name) for mesh in pair]
+    joints = [
+        one.positions(np.asarray(mesh.vertices)) for one, mesh in zip(patches, pair, strict=True)
+    ]
+    velocity = [line_of_sight_velocity(one, times_s, presence=presence) for one in joints]
+    tempo = [speed_mps(one, times_s) for one in joints]
+    maps = maps_alike(pair, VirtualSensor(), progress)
+    measured = presence.measured
+    apart = np.linalg.norm(joints[1] - joints[0], axis=-1)
+    root = JOINTS.index("pelvis")
+    aligned = [one - one[:, root : root + 1] for one in joints]
+    notes = []
+    if not presence.whole:
+        notes.append(f"{int((~measured).sum())} frames without a person are left out")
+    if pair[0].vertex_count != pair[1].vertex_count:
+        notes.append("the surfaces have different vertices, so their maps differ for that alone")
+    strokes = []
+    for stroke in truth.strokes:
+        during = (times_s >= stroke.start_s) & (times_s < stroke.end_s) & measured
+        if not during.any():
+            notes.append(f"{stroke.label} at {stroke.start_s:.2f} s is not in the fitted mesh")
+            continue
+        rows = {limb: JOINTS.index(f"{limb}.{truth.hand}") for limb in LIMBS}
+        difference = np.abs(maps[1].values - maps[0].values)[:, during].sum(dtype=np.float64)
+        strokes.append(
+            StrokeScore(
+                stroke,
+                truth.speed,
+                truth.hand,
+                {k: Pair(velocity[1][during, j], velocity[0][during, j]) for k, j in rows.items()},
+                {k: Pair(tempo[1][during, j], tempo[0][during, j]) for k, j in rows.items()},
+                float(difference),
+                float(maps[0].values[:, during].sum(dtype=np.float64)),
+            )
+        )
+    errors = np.stack([velocity[1] - velocity[0], apart])  # (2, T, J)
+    edge = np.zeros(len(times_s), bool)
+    edge[:EDGE_FRAMES] = edge[-EDGE_FRAMES:] = True
+    return ClipScore(
+        name=truth.name,
+        kind=truth.kind,
+        frames=len(times_s),
+        strokes=tuple(strokes),
+        distance_m=apart[measured].mean(axis=0),
+        aligned_m=np.linalg.norm(aligned[1] - aligned[0], axis=-1)[measured].mean(axis=0),
+        velocity=Pair(velocity[1][measured].ravel(), velocity[0][measured].ravel()),
+        vertex_velocity_mps=_vertex_velocity(pair[1], presence),
+        map_l1=map_l1(maps[1], maps[0]),
+        edge=np.array([rms(one[edge & measured]) for one in errors]),
+        middle=np.array([rms(one[~edge & measured]) for one in errors]),
+        overlap=_overlap(pair[0], pair[1], truth),
+        sigma=_sigma(pair[1], patches[1], errors[0], measured),
+        seconds_per_frame=None if seconds is None else seconds[0] / len(fitted.timebase),
+        processor_s_per_frame=None if seconds is None else seconds[1] / len(fitted.timebase),
+        residual_m=None
+        if track is None
+        else float(reprojection(fitted, track, truth.camera)[1].mean()),
+        notes=tuple(notes),
+    )
+
+
+def _patches(mesh: MeshSequence, name: str) -> JointPatches:
+    resolution = own_resolution(mesh)
+    if resolution is None:
+        raise Sd2Error(
+            f"{name}: the mesh of {mesh.vertex_count} vertices is no surface of SD² Studio",
+            "a mesh made by `sd2 fit`",
+            "Measure others with `sd2 compare-meshes`",
+        )
+    return own_patches(resolution)
+
+
+def _with_vertices_of(mesh: MeshSequence, other: MeshSequence) -> MeshSequence:
+    """The finest surface with the medium one's vertices, where the other has those."""
+    if (own_resolution(mesh), own_resolution(other)) != ("high", "medium"):
+        return mesh
+    rows = medium_in_high()
+    known = None if mesh.uncertainty is None else mesh.uncertainty.of_vertices(rows)
+    return replace(mesh, vertices=mesh.vertices[:, rows], faces=other.faces, uncertainty=known)
+
+
+def _vertex_velocity(mesh: MeshSequence, presence: Presence) -> float:
+    velocity = line_of_sight_velocity(np.asarray(mesh.vertices), mesh.times_s, presence=presence)
+    return rms(velocity[presence.measured])
+
+
+def _overlap(true: MeshSequence, fitted: MeshSequence, truth: Truth) -> float:
+    assert true.faces is not None
+    assert fitted.faces is not None
+    found = [
+        overlap(
+            silhouette(true.frame(frame), true.faces, truth.camera, _MASK),
+            silhouette(fitted.frame(frame), fitted.faces, truth.camera, _MASK),
+        )
+        for frame in np.flatnonzero(fitted.presence.there)[::_MASK_STEP]
+    ]
+    return float(np.nanmean(found))
+
+
+def _sigma(
+    fitted: MeshSequence, patches: JointPatches, errors: Floats, measured: NDArray[np.bool_]
+) -> Pair | None:
+    """Standard deviations of the joints, as the vertices of their patches have them."""
+    known = fitted.uncertainty
+    if known is None:
+        return None
+    sigma = np.stack(
+        [known.along_mps[:, known.vertex_limb[rows]].mean(axis=1) for rows in patches.rows], axis=1
+    ).astype(np.float64)
+    return Pair(sigma[measured].ravel(), errors[measured].ravel())

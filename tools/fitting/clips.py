@@ -1,0 +1,358 @@
+"""Clips of simulated people with known motion, to measure a fit from video against.
+
+Every clip is a folder with the picture (``video.mp4``), the surface that was drawn
+(``mesh.zarr``), the 33 landmarks and all joints in metres (``keypoints.npz``) and what
+is known besides (``truth.json``).
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.body.keypoints import KeypointSpace
+from sd2core.body.model import Body, Resolution, Skeleton
+from sd2core.body.shape import BodyShape, ShapeSpace
+from sd2core.body.skinning import pose_vertices
+from sd2core.body.track import LANDMARKS
+from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_write, atomic_write_text
+from sd2core.io.video_writing import write_video
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.numerics.compiled import worker_count, workers
+from sd2core.progress import Progress, silent
+from sd2core.simulate.clothing import Clothes
+from sd2core.simulate.encode import write_compact_mesh
+from sd2core.simulate.gestures import GestureSpan, arm_length_m
+from sd2core.simulate.render import Camera, Renderer
+from sd2core.timebase import Timebase
+from sd2core.version import __version__
+from tools.fitting.cast import PEOPLE, ROOMS
+from tools.fitting.motions import Action, duration_s, perform
+from tools.fitting.truth import FORMAT, VERSION, read_truth
+
+FRAMES_PER_S = 30
+RESOLUTION: Resolution = "medium"
+"""Of the surface that is kept; the picture is drawn from the finest."""
+
+NOISE = 0.012
+"""Of the camera, before the video is compressed: a still room must not be perfectly still."""
+
+_HORIZONTAL = ("left-to-right", "right-to-left")
+_VERTICAL = ("up-to-down", "down-to-up")
+_ALL = (*_HORIZONTAL, *_VERTICAL)
+
+
+@dataclass(frozen=True)
+class Clip:
+    """One clip: who does what, where, seen from where.
+
+    Parameters
+    ----------
+    name : str
+    action : Action
+    person, room : str
+        Of :data:`tools.fitting.cast.PEOPLE` and ``ROOMS``.
+    distance_m, across_m : float
+        Where the person stands (at first), seen from the camera.
+    camera_m : float
+        Height of the camera over the floor; it looks level.
+    seed : int
+        Of the strokes and of the camera's noise.
+    """
+
+    name: str
+    action: Action
+    person: str
+    room: str
+    distance_m: float
+    camera_m: float
+    seed: int
+    across_m: float = 0.0
+
+
+def _swipes(names: Sequence[Any], speed: Any, hand: Any = "R") -> Action:
+    return Action("swipes", tuple(names), speed, hand)
+
+
+CLIPS = (
+    Clip("horizontal-slow", _swipes(_HORIZONTAL, "slow"), "ada", "studio", 2.2, 1.1, 11),
+    Clip("horizontal-normal", _swipes(_HORIZONTAL * 2, "normal"), "bo", "window", 2.4, 1.2, 12),
+    Clip("horizontal-fast", _swipes(_HORIZONTAL * 2, "fast"), "chen", "office", 2.2, 1.0, 13, 0.1),
+    Clip("vertical-slow", _swipes(_VERTICAL, "slow"), "dora", "evening", 2.0, 1.2, 14),
+    Clip("vertical-normal", _swipes(_VERTICAL * 2, "normal"), "emil", "studio", 2.6, 1.0, 15, -0.1),
+    Clip("vertical-fast", _swipes(_VERTICAL * 2, "fast"), "femi", "window", 2.8, 1.3, 16),
+    Clip("all-normal", _swipes(_ALL, "normal"), "ada", "office", 3.0, 1.4, 17, 0.2),
+    Clip("all-fast", _swipes(_ALL, "fast"), "emil", "evening", 2.2, 1.1, 18),
+    Clip("left-hand-normal", _swipes(_ALL, "normal", "L"), "dora", "window", 1.8, 1.2, 19),
+    Clip("left-hand-fast", _swipes(_ALL, "fast", "L"), "bo", "office", 3.5, 1.5, 20, -0.2),
+    Clip("still", Action("still"), "chen", "studio", 2.2, 1.1, 21),
+    Clip("still-hand-up", Action("still", raised=True), "femi", "evening", 3.2, 1.2, 22, 0.1),
+    Clip("walk", Action("walk"), "emil", "office", 4.5, 1.1, 23),
+    Clip(
+        "walk-aside", Action("walk", walk_m=2.4, walk_mps=0.95), "ada", "window", 4.4, 1.3, 24, 0.35
+    ),
+    Clip("turn", Action("turn"), "bo", "studio", 3.0, 1.1, 25),
+    Clip(
+        "turn-other", Action("turn", turn_deg=(-85.0, 60.0)), "dora", "office", 2.6, 1.2, 26, -0.1
+    ),
+)
+"""What ``python -m tools.fitting clips`` makes; the weights of the fit were chosen by others."""
+
+TUNING = (
+    Clip("tune-1", _swipes(_ALL, "fast"), "ada", "window", 2.4, 1.2, 101, 0.1),
+    Clip("tune-2", _swipes(_ALL, "normal"), "bo", "studio", 2.0, 1.1, 102),
+    Clip("tune-3", _swipes(_HORIZONTAL * 2, "fast", "L"), "dora", "office", 2.6, 1.3, 103, -0.1),
+    Clip("tune-4", _swipes(_VERTICAL * 2, "fast"), "chen", "evening", 2.2, 1.0, 104),
+    Clip("tune-5", _swipes(_ALL, "normal", "L"), "femi", "studio", 3.0, 1.2, 105, 0.15),
+    Clip("tune-6", _swipes(_ALL, "fast"), "emil", "window", 3.2, 1.4, 106),
+    Clip("tune-7", _swipes(_VERTICAL, "slow", "L"), "bo", "office", 2.6, 1.1, 107),
+    Clip("tune-8", _swipes(_HORIZONTAL, "slow"), "femi", "evening", 2.4, 1.2, 108, 0.1),
+    Clip("tune-9", Action("walk", walk_m=2.6, walk_mps=0.95), "dora", "studio", 4.6, 1.2, 109),
+    Clip("tune-10", Action("turn", turn_deg=(60.0, -75.0)), "ada", "window", 2.8, 1.1, 110),
+)
+"""Other clips, by which the weights of the fit were chosen (``--clips tuning``)."""
+
+
+def clip_named(name: str) -> Clip:
+    """One of :data:`CLIPS` or :data:`TUNING`.
+
+    Raises
+    ------
+    Sd2Error
+        When there is none of this name.
+    """
+    for clip in (*CLIPS, *TUNING):
+        if clip.name == name:
+            return clip
+    raise Sd2Error(
+        f"There is no clip {name!r}", ", ".join(clip.name for clip in CLIPS), "See --list"
+    )
+
+
+def make_fit_truth(
+    out: Path, clips: Sequence[Clip] = CLIPS, progress: Progress = silent
+) -> list[Path]:
+    """Make clips that are not there yet.
+
+    Parameters
+    ----------
+    out : Path
+        A folder, made if need be; every clip becomes a folder in it, and appears
+        there when it is complete.
+    clips : sequence of Clip
+    progress : Progress
+        Counts frames of the clips to be made.
+
+    Returns
+    -------
+    list of Path
+        The folders of all clips, in order.
+
+    Raises
+    ------
+    Sd2Error
+        When a folder of that name is there and is not this clip.
+    """
+    out = Path(out)
+    if not out.absolute().parent.is_dir():
+        raise Sd2Error(f"The folder {out.absolute().parent} does not exist", "an existing folder")
+    out.mkdir(exist_ok=True)
+    missing = [clip for clip in clips if not _is_made(out / clip.name, clip)]
+    total, done = sum(_frame_count(clip) for clip in missing), 0
+    for clip in missing:
+        before = done
+        _make(out, clip, lambda frames, _: progress(before + frames, total))  # noqa: B023
+        done += _frame_count(clip)
+    progress(total, total)
+    return [out / clip.name for clip in clips]
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A clip before it is drawn.
+
+    Parameters
+    ----------
+    shape : BodyShape
+    times_s : float64 array, shape (T,)
+    transforms : float64 array, shape (T, B, 3, 4)
+        Of :meth:`sd2core.body.model.Skeleton.transforms`, in the camera frame.
+    skeleton : Skeleton
+    spans : tuple of GestureSpan
+    camera : Camera
+    """
+
+    shape: BodyShape
+    times_s: NDArray[np.float64]
+    transforms: NDArray[np.float64]
+    skeleton: Skeleton
+    spans: tuple[GestureSpan, ...]
+    camera: Camera
+
+    def mesh(self, space: ShapeSpace, resolution: Resolution) -> MeshSequence:
+        """The moving surface in the camera frame, float32."""
+        body = space.load(resolution, self.shape)
+        vertices = pose_vertices(body, self.transforms)
+        return MeshSequence(vertices, body.faces, Timebase(self.times_s), source="simulated body")
+
+    def keypoints_m(self, space: ShapeSpace) -> NDArray[np.float64]:
+        """The 33 landmarks, (T, 33, 3)."""
+        return KeypointSpace(space).of(self.shape).positions(self.transforms)
+
+    def joints_m(self) -> NDArray[np.float64]:
+        """Where every bone turns, (T, B, 3)."""
+        heads = self.skeleton.heads_m[..., None]
+        turned: NDArray[np.float64] = (self.transforms[..., :3] @ heads)[..., 0]
+        return turned + self.transforms[..., 3]
+
+
+def scene(clip: Clip, space: ShapeSpace) -> Scene:
+    """Everything about a clip but its picture."""
+    shape = PEOPLE[clip.person].shape(space)
+    skeleton = space.skeleton(shape)
+    times_s = np.arange(_frame_count(clip)) / FRAMES_PER_S
+    scale = arm_length_m(skeleton) / arm_length_m(space.base_skeleton)
+    motion, spans = perform(skeleton, clip.action, times_s, clip.seed, scale)
+    place = np.array([clip.across_m, clip.camera_m, clip.distance_m])
+    transforms = skeleton.transforms(motion.rotations, motion.translation_m + place)
+    camera = Camera(above_floor_m=clip.camera_m)
+    return Scene(shape, times_s, transforms, skeleton, spans, camera)
+
+
+def renderer(clip: Clip, space: ShapeSpace, shape: BodyShape) -> Renderer:
+    """Draws this clip's person in this clip's room."""
+    body = space.load("high", shape)
+    nearest_m = clip.distance_m - (clip.action.walk_m if clip.action.kind == "walk" else 0.0)
+    studio = replace(
+        ROOMS[clip.room],
+        wall_m=max(clip.distance_m + 1.1, 3.5),
+        shadow_m=3.2 + clip.distance_m - nearest_m,
+        shadow_depth_m=0.5 * (clip.distance_m + nearest_m),
+        noise=NOISE,
+    )
+    clothes = Clothes.of(Body.load("high"), PEOPLE[clip.person].outfit)
+    return Renderer(body, Camera(above_floor_m=clip.camera_m), studio, clothes)
+
+
+def _frame_count(clip: Clip) -> int:
+    return round(duration_s(clip.action, clip.seed) * FRAMES_PER_S)
+
+
+def _is_made(folder: Path, clip: Clip) -> bool:
+    if not folder.exists():
+        return False
+    if read_truth(folder).meta["clip"] != _description(clip):
+        raise Sd2Error(
+            f"{folder} is another clip of this name",
+            "the clip that this version makes, or nothing",
+            "Delete it, or choose another folder",
+        )
+    return True
+
+
+def _make(out: Path, clip: Clip, progress: Progress) -> None:
+    workspace = Path(tempfile.mkdtemp(prefix=f".{clip.name}.", suffix=".tmp", dir=out))
+    try:
+        folder = workspace / clip.name
+        folder.mkdir()
+        _fill(folder, clip, progress)
+        folder.rename(out / clip.name)
+    finally:
+        shutil.rmtree(workspace, ignore_errors=True)
+
+
+def _fill(folder: Path, clip: Clip, progress: Progress) -> None:
+    space = ShapeSpace()
+    known = scene(clip, space)
+    camera = known.camera
+    write_video(
+        folder / "video.mp4",
+        _pictures(known.mesh(space, "high"), renderer(clip, space, known.shape), clip, progress),
+        FRAMES_PER_S,
+        (camera.width, camera.height),
+    )
+    write_compact_mesh(known.mesh(space, RESOLUTION), folder / "mesh.zarr")
+    keypoints = known.keypoints_m(space)
+    with atomic_write(folder / "keypoints.npz") as stream:
+        np.savez_compressed(
+            stream,
+            keypoints_m=keypoints.astype(np.float32),
+            names=np.array(LANDMARKS),
+            joints_m=known.joints_m().astype(np.float32),
+            joint_names=np.array(known.skeleton.names),
+            times_s=known.times_s,
+        )
+    text = json.dumps(_truth(clip, known, keypoints), indent=1)
+    atomic_write_text(folder / "truth.json", text + "\n")
+
+
+def _pictures(
+    mesh: MeshSequence, drawer: Renderer, clip: Clip, progress: Progress
+) -> Iterator[NDArray[np.uint8]]:
+    def draw(frame: int) -> NDArray[np.uint8]:
+        return drawer.frame(mesh.frame(frame).astype(np.float64), seed=1000 * clip.seed + frame)
+
+    step = worker_count()
+    progress(0, mesh.frame_count)
+    yield draw(0)  # alone: it fills what all frames share
+    for start in range(1, mesh.frame_count, step):
+        progress(start, mesh.frame_count)
+        yield from workers().map(draw, range(start, min(start + step, mesh.frame_count)))
+
+
+def _truth(clip: Clip, known: Scene, keypoints: NDArray[np.float64]) -> dict[str, Any]:
+    hand = keypoints[:, LANDMARKS.index(f"index.{clip.action.hand}")]
+    speed = np.linalg.norm(np.gradient(hand, known.times_s, axis=0), axis=1)
+    person = PEOPLE[clip.person]
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "simulated": True,
+        "made_by": f"SD² Studio {__version__}",
+        "clip": _description(clip),
+        "frames_per_s": FRAMES_PER_S,
+        "frames": len(known.times_s),
+        "camera": {
+            "width": known.camera.width,
+            "height": known.camera.height,
+            "focal_px": known.camera.focal_px,
+            "above_floor_m": known.camera.above_floor_m,
+        },
+        "stature_m": known.shape.stature_m,
+        "shape": {
+            "coefficients": [float(value) for value in known.shape.coefficients],
+            **{k: v for k, v in asdict(person).items() if k not in ("outfit", "stature_m")},
+        },
+        "spans": [span._asdict() for span in known.spans],
+        "peak_hand_speed_mps": float(speed.max()),
+        "resolution": RESOLUTION,
+        "notes": _notes(clip),
+    }
+
+
+def _notes(clip: Clip) -> list[str]:
+    notes = ["Hand and arm follow minimum-jerk moves; a person's are less even."]
+    if clip.action.kind == "still":
+        notes = ["The body does not move at all: it does not breathe. The camera has noise."]
+    elif clip.action.kind in ("walk", "turn"):
+        notes = ["A gait by construction: planned footholds, closed-form legs, swinging arms."]
+    return notes
+
+
+def _description(clip: Clip) -> dict[str, Any]:
+    """The clip as JSON gives it back."""
+    described = asdict(clip)
+    described["action"] = {
+        name: list(value) if isinstance(value, tuple) else value
+        for name, value in described["action"].items()
+    }
+    return described

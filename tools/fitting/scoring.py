@@ -1,0 +1,97 @@
+"""Scores of fits of clips and of real videos: fitted as a user does it, or read from a folder."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+from sd2core.body.camera import PinholeCamera
+from sd2core.body.landmark_files import load_track
+from sd2core.body.landmark_models import landmark_models
+from sd2core.body.landmarks import find_landmarks
+from sd2core.cli.output import progress_bar
+from sd2core.errors import Sd2Error
+from sd2core.io.mesh import load_mesh
+from sd2core.io.video import open_video
+from tools.fitting.clip_score import ClipScore, score_clip
+from tools.fitting.real_score import RealScore, score_real
+from tools.fitting.truth import Truth
+
+_SUFFIXES = (".zarr", ".npz")
+
+
+class MeshSource(NamedTuple):
+    """Fitted meshes: those of a folder, or fits into another one."""
+
+    meshes: Path | None
+    folder: Path
+    stature_known: bool
+
+    def score(self, truth: Truth) -> ClipScore:
+        """Score the fit of one clip."""
+        known = ["--focal-px", f"{truth.camera.focal_px:g}"]
+        if self.stature_known:
+            known += ["--stature-m", f"{truth.stature_m:g}"]
+        path, seconds = self._fitted(truth.name, truth.video, known)
+        landmarks = landmarks_of(path)
+        track = load_track(landmarks) if landmarks.exists() else None
+        with progress_bar(f"Measuring {truth.name}") as progress:
+            return score_clip(
+                truth, load_mesh(path), seconds=seconds, track=track, progress=progress
+            )
+
+    def score_real(self, video: Path) -> RealScore:
+        """Score the fit of a video whose motion is not known."""
+        name = f"real-{video.stem}"
+        path, _ = self._fitted(name, video, [])
+        with progress_bar(f"Looking at {video.name}") as progress, open_video(video) as reader:
+            found = find_landmarks(reader, landmark_models(), silhouettes=None, progress=progress)
+        track = found.part(0, len(found))
+        camera = PinholeCamera.default(track.width, track.height)
+        return score_real(name, load_mesh(path), track, camera)
+
+    def _fitted(
+        self, name: str, video: Path, known: list[str]
+    ) -> tuple[Path, tuple[float, float] | None]:
+        """Path of the mesh, and the seconds its fit took if it was made now."""
+        if self.meshes is not None:
+            return _mesh_in(self.meshes, name), None
+        path = self.folder / f"{name}.zarr"
+        if path.exists():
+            return path, None
+        return path, _fit(name, video, path, [*known, "--landmarks", str(landmarks_of(path))])
+
+
+def landmarks_of(mesh: Path) -> Path:
+    """Path of the landmarks that a mesh was fitted to."""
+    return mesh.with_name(f"{mesh.stem}.landmarks.npz")
+
+
+def _mesh_in(folder: Path, name: str) -> Path:
+    places = [folder / f"{name}{suffix}" for suffix in _SUFFIXES]
+    places += [folder / name / f"mesh{suffix}" for suffix in _SUFFIXES]
+    for path in places:
+        if path.exists():
+            return path
+    raise Sd2Error(
+        f"{folder} holds no mesh of the clip {name!r}",
+        f"{name}.zarr, {name}.npz or {name}/mesh.zarr",
+    )
+
+
+def _fit(name: str, video: Path, out: Path, known: list[str]) -> tuple[float, float]:
+    """Fit one video in a process of its own, as a user does; seconds and processor seconds."""
+    command = [sys.executable, "-m", "sd2core.cli", "fit", str(video), "--out", str(out), *known]
+    started, before = time.perf_counter(), os.times()
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        said = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}"]
+        raise Sd2Error(f"{name} could not be fitted: {said[0].removeprefix('sd2: ')}")
+    after = os.times()
+    worked_s = after.children_user - before.children_user
+    worked_s += after.children_system - before.children_system
+    return time.perf_counter() - started, worked_s

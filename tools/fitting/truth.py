@@ -1,0 +1,143 @@
+"""Reading clips whose motion is known: what ``python -m tools.fitting clips`` writes."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.body.camera import PinholeCamera
+from sd2core.errors import Sd2Error
+from sd2core.io.mesh import load_mesh
+from sd2core.mesh.sequence import MeshSequence
+
+FORMAT = "sd2-fit-truth"
+VERSION = 1
+
+_EXPECTED = "a clip made by `python -m tools.fitting clips`"
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """A gesture's stroke: half-open ``[start_s, end_s)``."""
+
+    start_s: float
+    end_s: float
+    label: str
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """One clip.
+
+    Parameters
+    ----------
+    folder : Path
+    meta : dict
+        What ``truth.json`` holds; see docs/formats.md.
+    """
+
+    folder: Path
+    meta: dict[str, Any]
+
+    @property
+    def name(self) -> str:
+        """Of the clip."""
+        return str(self.meta["clip"]["name"])
+
+    @property
+    def kind(self) -> str:
+        """``swipes``, ``still``, ``walk`` or ``turn``."""
+        return str(self.meta["clip"]["action"]["kind"])
+
+    @property
+    def speed(self) -> str:
+        """Of the swipes: ``slow``, ``normal`` or ``fast``."""
+        return str(self.meta["clip"]["action"]["speed"])
+
+    @property
+    def hand(self) -> str:
+        """``L`` or ``R``: the one that swipes."""
+        return str(self.meta["clip"]["action"]["hand"])
+
+    @property
+    def strokes(self) -> tuple[Stroke, ...]:
+        """The gestures."""
+        return tuple(Stroke(**span) for span in self.meta["spans"])
+
+    @property
+    def stature_m(self) -> float:
+        """Of the person, without shoes."""
+        return float(self.meta["stature_m"])
+
+    @property
+    def camera(self) -> PinholeCamera:
+        """That took the video."""
+        camera = self.meta["camera"]
+        return PinholeCamera(camera["width"], camera["height"], camera["focal_px"])
+
+    @property
+    def video(self) -> Path:
+        """The picture."""
+        return self.folder / "video.mp4"
+
+    def mesh(self) -> MeshSequence:
+        """The true surface in the camera frame."""
+        return load_mesh(self.folder / "mesh.zarr")
+
+    def keypoints_m(self) -> NDArray[np.float64]:
+        """The 33 landmarks in the camera frame, (T, 33, 3)."""
+        path = self.folder / "keypoints.npz"
+        try:
+            with np.load(path, allow_pickle=False) as data:
+                return np.asarray(data["keypoints_m"], np.float64)
+        except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
+            raise Sd2Error(f"{path} cannot be read ({error})", _EXPECTED) from error
+
+
+def read_truth(folder: Path) -> Truth:
+    """Open one clip.
+
+    Raises
+    ------
+    Sd2Error
+        When the folder holds none, or one of a later version.
+    """
+    path = Path(folder) / "truth.json"
+    try:
+        meta = json.loads(path.read_text("utf-8"))
+        kind, version = meta["format"], meta["version"]
+    except (OSError, KeyError, TypeError, ValueError) as error:
+        raise Sd2Error(f"{path} cannot be read ({error})", _EXPECTED) from error
+    if kind != FORMAT or version > VERSION:
+        raise Sd2Error(
+            f"{path} is of format {kind!r} version {version}", f"{FORMAT!r} up to {VERSION}"
+        )
+    return Truth(Path(folder), meta)
+
+
+def truth_folders(folder: Path) -> list[Path]:
+    """Clips in a folder, or the folder itself when it is one, by name.
+
+    Raises
+    ------
+    Sd2Error
+        When there is none.
+    """
+    folder = Path(folder)
+    if (folder / "truth.json").is_file():
+        return [folder]
+    found = sorted(path.parent for path in folder.glob("*/truth.json"))
+    found = [path for path in found if not path.name.startswith(".")]
+    if not found:
+        raise Sd2Error(
+            f"{folder} holds no clip of known motion",
+            "a folder made by `python -m tools.fitting clips`",
+            f"Make it: python -m tools.fitting clips {folder}",
+        )
+    return found

@@ -1,0 +1,164 @@
+"""``python -m tools.train_lifter``: how the lifter of ``sd2 fit`` is made and measured."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from sd2core.body.lifter import Lifter
+from sd2core.body.track import LANDMARKS
+from sd2core.cli.options import add_command, add_json, positive_int
+from sd2core.cli.output import print_json, progress_bar
+from sd2core.cli.reading import check_output
+from sd2core.errors import Sd2Error
+from tools.command_line import run_tool
+from tools.train_lifter.data import load_takes, make_lifter_data
+from tools.train_lifter.emulate import landmark_offsets
+from tools.train_lifter.score import score
+from tools.train_lifter.takes import Take
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one of the commands; return the exit code."""
+    return run_tool("train_lifter", "The lifter of `sd2 fit`.", _add_commands, arguments)
+
+
+def _add_commands(kinds: argparse._SubParsersAction) -> None:
+    data = add_command(
+        kinds,
+        "data",
+        "draw random people in random motion and look at them as `sd2 fit` does",
+        handler=_data,
+        description=(
+            "Makes takes of 96 frames: what the landmark models say, and the truth. Stopped and\n"
+            "started again it goes on where it was. The same seed makes the same takes."
+        ),
+        examples=(
+            "  python -m tools.train_lifter data people --takes 400 --seed 1\n"
+            "  python -m tools.train_lifter data unseen --takes 40 --held-out"
+        ),
+    )
+    data.add_argument("out", type=Path, metavar="OUT", help="folder of the takes")
+    data.add_argument(
+        "--takes", type=positive_int, default=400, metavar="N", help="how many (default: 400)"
+    )
+    data.add_argument("--seed", type=int, default=0, metavar="S", help="of all that is random")
+    data.add_argument(
+        "--held-out", action="store_true", help="with the kinds of motion kept for testing"
+    )
+    data.add_argument(
+        "--manner",
+        choices=("any", "natural", "gestures"),
+        default="any",
+        help=(
+            "how people move: with elbows any way they can be (default), as people have them,"
+            " or gesturing before the camera"
+        ),
+    )
+    data.add_argument("--processes", type=positive_int, default=2, metavar="P", help="(default: 2)")
+    data.add_argument("--models", type=Path, metavar="FOLDER", help="the landmark models")
+    train = add_command(
+        kinds,
+        "train",
+        "train the lifter of `sd2 fit` on such takes",
+        handler=_train,
+        examples=(
+            "  python -m tools.train_lifter train people --out lifter.npz\n"
+            "  python -m tools.train_lifter train people more --start lifter.npz --out better.npz"
+        ),
+    )
+    train.add_argument("data", type=Path, nargs="+", metavar="DATA", help="folders of the takes")
+    train.add_argument("--start", type=Path, metavar="FILE", help="a lifter to go on from")
+    train.add_argument(
+        "--steps",
+        type=positive_int,
+        metavar="N",
+        help="of optimisation (default: %(default)s)",
+        default=5000,
+    )
+    train.add_argument("--out", type=Path, required=True, metavar="FILE", help="to write (.npz)")
+    train.add_argument("--seed", type=int, default=0, metavar="S", help="of all that is random")
+    scoring = add_command(
+        kinds,
+        "score",
+        "measure a lifter on such takes",
+        handler=_score,
+        description="Errors of the velocity along the line of sight, joint by joint.",
+        examples="  python -m tools.train_lifter score unseen",
+    )
+    scoring.add_argument("data", type=Path, metavar="DATA", help="folder of the takes")
+    scoring.add_argument("--lifter", type=Path, metavar="FILE", help="(default: the bundled one)")
+    add_json(scoring)
+    offsets = add_command(
+        kinds,
+        "offsets",
+        "measure where the landmark model puts each landmark beside our keypoint",
+        handler=_offsets,
+        description="Prints thousandths of the stature, at rest: to the left, down, backwards.",
+        examples="  python -m tools.train_lifter offsets people",
+    )
+    offsets.add_argument("data", type=Path, metavar="DATA", help="folder of the takes")
+
+
+def _data(options: argparse.Namespace) -> None:
+    with progress_bar("Drawing people", unit="take") as progress:
+        made = make_lifter_data(
+            options.out,
+            options.takes,
+            options.seed,
+            held_out=options.held_out,
+            manner=options.manner,
+            processes=options.processes,
+            models=options.models,
+            progress=progress,
+        )
+    print(f"Made {made} takes in {options.out}")
+
+
+def _train(options: argparse.Namespace) -> None:
+    check_output(options.out, ".npz")
+    takes = [take for folder in options.data for take in _takes(folder)]
+    start = Lifter.load(options.start) if options.start else None
+    from tools.train_lifter.training import Recipe, save_lifter, train_on  # needs torch
+
+    with progress_bar("Training", unit="step") as progress:
+        recipe = Recipe(steps=options.steps, seed=options.seed)
+        lifter = train_on(takes, recipe, progress, start=start)
+    save_lifter(lifter, options.out)
+    print(f"Wrote {options.out}")
+
+
+def _score(options: argparse.Namespace) -> None:
+    found = score(Lifter.load(options.lifter), _takes(options.data))
+    if options.json:
+        joints = {joint: values._asdict() for joint, values in found.joints.items()}
+        print_json({"joints": joints, "still_mps": found.still_mps})
+        return
+    print("joint       error  of true  corr.  kept  within 1σ  edge  depth")
+    for joint, one in found.joints.items():
+        print(
+            f"{joint:10s}{one.rms_mps:7.3f}{one.truth_mps:9.3f}{one.correlation:7.2f}"
+            f"{one.kept:6.2f}{one.covered:10.2f}{one.edge:7.2f}{one.depth_cm:6.1f} cm"
+        )
+    print(f"Nothing moves: {found.still_mps:.3f} m/s over all landmarks")
+
+
+def _offsets(options: argparse.Namespace) -> None:
+    for name, offset in zip(LANDMARKS, landmark_offsets(_takes(options.data)), strict=True):
+        print(f"{name:14s}" + "".join(f"{1000.0 * value:8.1f}" for value in offset))
+
+
+def _takes(folder: Path) -> list[Take]:
+    takes = load_takes(folder)
+    if not takes:
+        raise Sd2Error(
+            f"There are no takes in {folder}",
+            "a folder made by `python -m tools.train_lifter data`",
+        )
+    return takes
+
+
+if __name__ == "__main__":
+    sys.exit(main())

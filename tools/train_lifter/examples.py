@@ -1,0 +1,130 @@
+"""Batches that the lifter learns from: takes cut, mirrored, turned and reversed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.body.lifter_features import Seen, features, mirrored, rate, typical_size
+from sd2core.body.track import MIRRORED, TORSO_CORNERS
+from tools.train_lifter.emulate import Emulator, Walk
+from tools.train_lifter.takes import Take
+
+Singles = NDArray[np.float32]
+
+_TURN_DEG = 8.0
+_GAP_SHARE = 0.15
+_LONGEST_GAP = 8
+
+
+class Example(NamedTuple):
+    """One take as the lifter sees it, and its truth.
+
+    Parameters
+    ----------
+    seen : Seen
+        (T, ...).
+    depth : float32 array, shape (T, 33)
+        Z of the keypoints in statures.
+    """
+
+    seen: Seen
+    depth: Singles
+
+
+class Batch(NamedTuple):
+    """What goes in and what should come out.
+
+    Parameters
+    ----------
+    told : float32 array, shape (N, T, C)
+    root : float32 array, shape (N, T)
+        Logarithm of the centre's depth times the typical size.
+    depth, velocity : float32 array, shape (N, T, 33)
+    size : float32 array, shape (N,)
+        The typical apparent size.
+    """
+
+    told: Singles
+    root: Singles
+    depth: Singles
+    velocity: Singles
+    size: Singles
+
+
+def example(take: Take) -> Example:
+    """Of a drawn take."""
+    camera = take.camera
+    seen = Seen(
+        camera.slopes(take.image_px.astype(np.float64)).astype(np.float32),
+        (take.depth_px / camera.focal_px).astype(np.float32),
+        take.world_m,
+        take.visibility,
+        take.confidence,
+    )
+    return Example(seen, take.keypoints_m[..., 2] / np.float32(take.stature_m))
+
+
+def emulated(rng: np.random.Generator, emulator: Emulator, walk: Walk) -> Example:
+    """Of a motion that nobody has drawn."""
+    seen = emulator.seen(rng, walk)
+    return Example(Seen(*(np.asarray(part, np.float32) for part in seen)), walk.places[..., 2])
+
+
+def batch(examples: Sequence[Example]) -> Batch:
+    """Whole examples of equal length, as they are."""
+    seen = Seen(*(np.stack(parts) for parts in zip(*(e.seen for e in examples), strict=True)))
+    truth = np.stack([e.depth for e in examples])
+    centre = truth[..., list(TORSO_CORNERS)].mean(axis=-1)
+    size = typical_size(seen.slopes)
+    root = np.log(centre * size[:, None])
+    return Batch(
+        features(seen),
+        root.astype(np.float32),
+        truth - centre[..., None],
+        np.asarray(rate(truth, 1), np.float32),
+        size.astype(np.float32),
+    )
+
+
+def varied(rng: np.random.Generator, one: Example, length: int) -> Example:
+    """A part of an example, perhaps mirrored, reversed, turned, with a gap."""
+    start = int(rng.integers(0, len(one.depth) - length + 1))
+    step = slice(start, start + length)
+    slopes, depth, world, visibility, sure = (np.array(part[step]) for part in one.seen)
+    truth = one.depth[step]
+    if rng.random() < 0.5:
+        other = mirrored(Seen(slopes, depth, world, visibility, sure))
+        slopes, depth, world, visibility, sure = (np.asarray(part) for part in other)
+        truth = truth[:, list(MIRRORED)]
+    if rng.random() < 0.5:
+        slopes, depth, world, visibility, sure, truth = (
+            part[::-1] for part in (slopes, depth, world, visibility, sure, truth)
+        )
+    angle = np.radians(_TURN_DEG * rng.uniform(-1.0, 1.0))
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]], np.float32)
+    slopes = slopes @ turn
+    world = np.concatenate([world[..., :2] @ turn, world[..., 2:]], axis=-1)
+    seen = Seen(slopes, depth, world, visibility, sure)
+    if rng.random() < _GAP_SHARE:
+        seen = _bridged(rng, seen)
+    return Example(seen, truth)
+
+
+def _bridged(rng: np.random.Generator, seen: Seen) -> Seen:
+    """Some frames lost and interpolated, as the tracker does it."""
+    count = len(seen.sure)
+    gap = int(rng.integers(1, _LONGEST_GAP + 1))
+    first = int(rng.integers(1, count - gap - 1))
+    share = (np.arange(1, gap + 1) / (gap + 1)).astype(np.float32)
+    parts = []
+    for part in seen:
+        part = np.array(part)
+        weight = share.reshape(-1, *(1,) * (part.ndim - 1))
+        part[first : first + gap] = (1 - weight) * part[first - 1] + weight * part[first + gap]
+        parts.append(part)
+    parts[-1][first : first + gap] = 0.0
+    return Seen(*parts)

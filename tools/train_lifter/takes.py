@@ -1,0 +1,252 @@
+"""Takes of random people, with what the landmark network says about them and the truth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.body.blazepose import CLOSE_UP, PoseLandmarker, Roi
+from sd2core.body.camera import PinholeCamera
+from sd2core.body.keypoints import KeypointSpace
+from sd2core.body.rotations import Floats
+from sd2core.body.shape import BodyShape, ShapeSpace
+from sd2core.body.skinning import pose_vertices
+from sd2core.body.track import LANDMARKS
+from sd2core.files.atomic import atomic_write
+from sd2core.simulate.people.motion import Manner, random_deed, random_motion
+from tools.train_lifter.crops import CropPainter, random_background, random_look
+from tools.train_lifter.view import random_view
+from tools.train_lifter.wardrobe import random_wardrobe
+
+FRAMES = 96
+RATE_HZ = 30.0
+
+_HIPS = [LANDMARKS.index("hip.L"), LANDMARKS.index("hip.R")]
+_ROI_FOLLOWS = 0.25
+_LOST = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Take:
+    """One take.
+
+    Parameters
+    ----------
+    camera : PinholeCamera
+    stature_m : float
+    keypoints_m : float32 array, shape (T, 33, 3)
+        Truth, camera frame.
+    bone_turns : float32 array, shape (T, 33, 3, 3)
+        Turn against rest of the bone that each keypoint is fixed to.
+    image_px : float32 array, shape (T, 33, 2)
+    depth_px : float32 array, shape (T, 33)
+    world_m : float32 array, shape (T, 33, 3)
+    visibility : float32 array, shape (T, 33)
+    confidence : float32 array, shape (T,)
+        What the network says; see :class:`~sd2core.body.track.LandmarkTrack`.
+    """
+
+    camera: PinholeCamera
+    stature_m: float
+    keypoints_m: NDArray[np.float32]
+    bone_turns: NDArray[np.float32]
+    image_px: NDArray[np.float32]
+    depth_px: NDArray[np.float32]
+    world_m: NDArray[np.float32]
+    visibility: NDArray[np.float32]
+    confidence: NDArray[np.float32]
+
+    def save(self, path: Path) -> None:
+        """Write one ``.npz``, whole or not at all."""
+        camera = self.camera
+        arrays: dict[str, Any] = {
+            name: value for name, value in vars(self).items() if name != "camera"
+        }
+        arrays["camera"] = np.array([camera.width, camera.height, camera.focal_px])
+        with atomic_write(path) as stream:
+            np.savez_compressed(stream, **arrays)
+
+    @classmethod
+    def load(cls, path: Path) -> Take:
+        """Read what :meth:`save` wrote."""
+        with np.load(path, allow_pickle=False) as data:
+            arrays: dict[str, Any] = {name: data[name] for name in data.files}
+        width, height, focal_px = arrays.pop("camera")
+        arrays["stature_m"] = float(arrays["stature_m"])
+        return cls(camera=PinholeCamera(int(width), int(height), float(focal_px)), **arrays)
+
+
+class Scene(NamedTuple):
+    """A random person moving before a random camera.
+
+    Parameters
+    ----------
+    shape : BodyShape
+    camera : PinholeCamera
+    transforms : float64 array, shape (T, B, 3, 4)
+        Of the bones, ending in the camera frame.
+    keypoints_m : float64 array, shape (T, 33, 3)
+        Camera frame.
+    bone_turns : float64 array, shape (T, 33, 3, 3)
+    """
+
+    shape: BodyShape
+    camera: PinholeCamera
+    transforms: Floats
+    keypoints_m: Floats
+    bone_turns: Floats
+
+
+class Stage:
+    """Makes scenes."""
+
+    def __init__(self) -> None:
+        self.space = ShapeSpace()
+        self._keypoints = KeypointSpace(self.space)
+
+    def scene(
+        self,
+        rng: np.random.Generator,
+        *,
+        held_out: bool = False,
+        manner: Manner = "any",
+        elbows_rest: bool = False,
+        frames: int = FRAMES,
+    ) -> Scene:
+        """A random scene; ``held_out`` with the motion that is kept for testing."""
+        times = np.arange(frames) / RATE_HZ
+        while True:
+            shape = self.space.random(rng)
+            skeleton = self.space.skeleton(shape)
+            deed = random_deed(rng, held_out=held_out, manner=manner)
+            deed = replace(deed, elbows_rest=elbows_rest)
+            motion = random_motion(rng, skeleton, shape.stature_m, times, deed)
+            transforms = skeleton.transforms(*motion)
+            keypoints = self._keypoints.of(shape)
+            view = random_view(rng, keypoints.positions(transforms))
+            if view is None:
+                continue
+            transforms = view.transforms(transforms)
+            return Scene(
+                shape,
+                view.camera,
+                transforms,
+                keypoints.positions(transforms),
+                transforms[:, keypoints.bones, :, :3],
+            )
+
+
+class TakeMaker:
+    """Makes takes; each depends on its seed only.
+
+    Parameters
+    ----------
+    landmarker : PoseLandmarker
+    """
+
+    def __init__(self, landmarker: PoseLandmarker) -> None:
+        self._landmarker = landmarker
+        self._stage = Stage()
+
+    def make(
+        self,
+        seed: tuple[int, ...],
+        *,
+        held_out: bool = False,
+        manner: Manner = "any",
+        frames: int = FRAMES,
+    ) -> Take:
+        """One take of a random person.
+
+        Parameters
+        ----------
+        seed : tuple of int
+        held_out : bool
+            With the motion that is kept for testing.
+        manner : {"any", "natural", "gestures"}
+            How people move.
+        frames : int
+        """
+        rng = np.random.default_rng(seed)
+        scene = self._stage.scene(rng, held_out=held_out, manner=manner, frames=frames)
+        camera = scene.camera
+        body = self._stage.space.load("medium", scene.shape)
+        painter = CropPainter(
+            body.faces,
+            random_wardrobe(rng, body),
+            camera,
+            random_look(rng),
+            random_background(rng, camera.width, camera.height),
+            rng,
+        )
+        vertices = pose_vertices(body, scene.transforms)
+        return Take(
+            camera,
+            scene.shape.stature_m,
+            scene.keypoints_m.astype(np.float32),
+            scene.bone_turns.astype(np.float32),
+            **self._watched(rng, painter, vertices, camera.project(scene.keypoints_m)),
+        )
+
+    def _watched(
+        self,
+        rng: np.random.Generator,
+        painter: CropPainter,
+        vertices: NDArray[np.float32],
+        places_px: Floats,
+    ) -> dict[str, NDArray[np.float32]]:
+        """What the network says about every frame, the square following the person."""
+        roi = self._landmarker.on_crop(*_first(rng, painter, vertices[0], places_px[0])).next_roi
+        poses = []
+        for frame, surface in enumerate(vertices):
+            # As the tracker's second pass looks.
+            near = roi.scaled(CLOSE_UP)
+            pose = self._landmarker.on_both_sides(painter.crop(surface, near), near)
+            poses.append(pose)
+            if pose.confidence < _LOST:
+                roi = _around(places_px[frame])
+            else:
+                roi = _towards(roi, pose.next_roi)
+        return {
+            "image_px": np.array([pose.image_px[:33] for pose in poses], np.float32),
+            "depth_px": np.array([pose.depth_px for pose in poses], np.float32),
+            "world_m": np.array([pose.world_m for pose in poses], np.float32),
+            "visibility": np.array([pose.visibility * pose.presence for pose in poses], np.float32),
+            "confidence": np.array([pose.confidence for pose in poses], np.float32),
+        }
+
+
+def _first(
+    rng: np.random.Generator, painter: CropPainter, surface: NDArray[np.float32], places_px: Floats
+) -> tuple[NDArray[np.uint8], Roi]:
+    roi = _around(places_px)
+    move = 0.04 * roi.size_px * rng.standard_normal(2)
+    roi = Roi(
+        roi.centre_x_px + move[0],
+        roi.centre_y_px + move[1],
+        roi.size_px * float(np.exp(0.08 * rng.standard_normal())),
+    )
+    return painter.crop(surface, roi), roi
+
+
+def _around(places_px: Floats) -> Roi:
+    """The square around true keypoints, upright."""
+    centre = places_px[_HIPS].mean(axis=0)
+    radius = 1.08 * float(np.linalg.norm(places_px - centre, axis=1).max())
+    return Roi.around(centre, centre - np.array([0.0, radius]))
+
+
+def _towards(old: Roi, new: Roi) -> Roi:
+    """A square that follows smoothly."""
+    turn = np.arctan2(np.sin(new.angle_rad - old.angle_rad), np.cos(new.angle_rad - old.angle_rad))
+    share = _ROI_FOLLOWS
+    return Roi(
+        old.centre_x_px + share * (new.centre_x_px - old.centre_x_px),
+        old.centre_y_px + share * (new.centre_y_px - old.centre_y_px),
+        old.size_px * float((new.size_px / old.size_px) ** share),
+        old.angle_rad + share * float(turn),
+    )

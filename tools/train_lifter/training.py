@@ -1,0 +1,303 @@
+"""Training of the lifter, in torch."""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from sd2core.body.lifter import (
+    FORMAT,
+    LOG_SIGMA,
+    OUTPUTS,
+    POINTS,
+    VERSION,
+    Lifter,
+    Network,
+    symmetric,
+)
+from sd2core.body.lifter_features import RATE_HZ
+from sd2core.body.track import LANDMARKS
+from sd2core.files.atomic import atomic_write
+from sd2core.progress import Progress, silent
+from tools.train_lifter.emulate import Emulator, Walk, random_walks
+from tools.train_lifter.examples import Batch, Example, batch, emulated, example, varied
+from tools.train_lifter.network import LifterNetwork
+from tools.train_lifter.takes import Take
+
+Singles = NDArray[np.float32]
+
+_CALIBRATION_EVERY = 10
+"""Every tenth take calibrates the spreads and is not trained on."""
+
+_WEIGHTS = {"wrist": 3.0, "pinky": 3.0, "index": 3.0, "thumb": 3.0, "elbow": 2.5} | {
+    "shoulder": 1.5,
+    "hip": 1.5,
+    "knee": 0.6,
+    "ankle": 0.4,
+    "heel": 0.3,
+    "foot_index": 0.3,
+}
+_FACE_WEIGHT = 0.5
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """How the lifter is trained.
+
+    Parameters
+    ----------
+    width : int
+    dilations : tuple of int
+    dropout : float
+    steps : int
+        Of optimisation.
+    emulated_share : float
+        Of every batch; the rest is from drawn takes.
+    batch : int
+    frames : int
+        Of each example.
+    rate : float
+        Of learning, at its highest.
+    velocity, depth, root, change : float
+        Weights of the losses; ``change`` is that of the depths' differences over
+        1, 2 and 4 frames.
+    walks : int
+        Motions to emulate.
+    seed : int
+    """
+
+    width: int = 128
+    dilations: tuple[int, ...] = (1, 2, 4, 8, 2, 1)
+    dropout: float = 0.1
+    steps: int = 5000
+    emulated_share: float = 0.6
+    batch: int = 24
+    frames: int = 64
+    rate: float = 1.5e-3
+    velocity: float = 1.0
+    depth: float = 4.0
+    root: float = 2.0
+    change: float = 0.3
+    walks: int = 1000
+    seed: int = 0
+
+
+def train_on(
+    takes: Sequence[Take],
+    recipe: Recipe,
+    progress: Progress = silent,
+    start: Lifter | None = None,
+) -> Lifter:
+    """Train on drawn takes and on emulated motion that follows them.
+
+    Deterministic for the same takes, recipe, machine and number of threads.
+    """
+    emulator = Emulator([take for n, take in enumerate(takes) if n % _CALIBRATION_EVERY])
+    walks = random_walks(emulator, recipe.walks, recipe.seed)
+    return train(takes, walks, emulator, recipe, progress, start=start)
+
+
+def train(
+    takes: Sequence[Take],
+    walks: Sequence[Walk] | None,
+    emulator: Emulator | None,
+    recipe: Recipe,
+    progress: Progress = silent,
+    log: Callable[[str], None] | None = None,
+    start: Lifter | None = None,
+) -> Lifter:
+    """Train a lifter.
+
+    Parameters
+    ----------
+    takes : sequence of Take
+        Drawn ones; every tenth is kept for calibration.
+    walks : sequence of Walk, optional
+        Motions to emulate.
+    emulator : Emulator, optional
+    recipe : Recipe
+    progress : Progress
+    log : callable, optional
+        Told the losses now and then.
+    start : Lifter, optional
+        To go on from; its width and dilations stay.
+    """
+    torch.manual_seed(recipe.seed)
+    rng = np.random.default_rng(recipe.seed)
+    examples = [example(take) for take in takes]
+    kept = [one for n, one in enumerate(examples) if n % _CALIBRATION_EVERY == 0]
+    learnt = [one for n, one in enumerate(examples) if n % _CALIBRATION_EVERY]
+    told = np.concatenate([batch([one]).told[0] for one in learnt[:200]])
+    if start is not None:
+        network = LifterNetwork.continued(start.network, recipe.dropout)
+    else:
+        spread = np.maximum(told.std(axis=0), 1e-3)
+        network = LifterNetwork(
+            told.mean(axis=0), spread, recipe.width, recipe.dilations, recipe.dropout
+        )
+    share = recipe.emulated_share if walks else 0.0
+    mean = copy.deepcopy(network)
+    optimiser = torch.optim.AdamW(network.parameters(), lr=recipe.rate, weight_decay=0.02)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(
+        optimiser, recipe.rate, total_steps=recipe.steps + 1, pct_start=0.1
+    )
+    network.train()
+    for step in range(recipe.steps):
+        drawn = _drawn(rng, learnt, walks, emulator, share, recipe)
+        loss, parts = losses(network(torch.from_numpy(drawn.told)), drawn, recipe)
+        optimiser.zero_grad()
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
+        optimiser.step()
+        schedule.step()
+        _follow(mean, network, min(0.995, step / (step + 20.0)))
+        progress(step + 1, recipe.steps)
+        if log is not None and (step % 250 == 0 or step == recipe.steps - 1):
+            log(f"{step + 1}: " + ", ".join(f"{name} {value:.4f}" for name, value in parts.items()))
+    mean.eval()
+    exported = mean.exported()
+    return Lifter(
+        exported,
+        calibration(exported, kept),
+        {
+            "recipe": asdict(recipe),
+            "takes": len(takes),
+            "walks": len(walks or ()),
+            "start": dict(start.provenance) if start is not None else None,
+        },
+    )
+
+
+def _drawn(
+    rng: np.random.Generator,
+    learnt: Sequence[Example],
+    walks: Sequence[Walk] | None,
+    emulator: Emulator | None,
+    share: float,
+    recipe: Recipe,
+) -> Batch:
+    chosen = []
+    frames = int(rng.integers(recipe.frames // 2, recipe.frames + 1))
+    for _ in range(recipe.batch):
+        if walks and emulator is not None and rng.random() < share:
+            one = emulated(rng, emulator, walks[int(rng.integers(len(walks)))])
+        else:
+            one = learnt[int(rng.integers(len(learnt)))]
+        chosen.append(varied(rng, one, frames))
+    return batch(chosen)
+
+
+def losses(
+    out: torch.Tensor, truth: Batch, recipe: Recipe
+) -> tuple[torch.Tensor, dict[str, float]]:
+    """The loss and its parts; spreads learn from errors, but errors not from spreads."""
+    weights = torch.from_numpy(landmark_weights())
+    rest = out[..., 2:].unflatten(-1, (4, POINTS))
+    root, depth, velocity, size = (torch.from_numpy(part) for part in truth[1:])
+    root_error = out[..., 0] - root
+    depth_error = rest[..., 0, :] - depth
+    centre = torch.exp(out[..., :1].detach()) / size[:, None, None] * _rate(out[..., :1])
+    velocity_error = rest[..., 2, :] + _rate(rest[..., 0, :]) + centre - velocity
+    change = sum(
+        (_huber((depth_error[:, k:] - depth_error[:, :-k]) * 30.0 / k, 1.0) * weights).mean()
+        for k in (1, 2, 4)
+    )
+    parts = {
+        "velocity": recipe.velocity * (_huber(velocity_error, 0.6) * weights).mean(),
+        "depth": recipe.depth * (_huber(depth_error, 0.15) * weights).mean(),
+        "root": recipe.root * _huber(root_error, 0.2).mean(),
+        "change": recipe.change * change,
+        "spreads": 0.02
+        * (
+            _likelihood(root_error, out[..., 1]).mean()
+            + _likelihood(depth_error, rest[..., 1, :]).mean()
+            + _likelihood(velocity_error, rest[..., 3, :]).mean()
+        ),
+    }
+    total = torch.stack([torch.as_tensor(part) for part in parts.values()]).sum()
+    return total, {name: float(part.detach()) for name, part in parts.items()}
+
+
+def landmark_weights() -> Singles:
+    """How much each landmark counts, mean 1."""
+    weights = [_WEIGHTS.get(name.split(".")[0], _FACE_WEIGHT) for name in LANDMARKS]
+    return np.array(weights, np.float32) / np.float32(np.mean(weights))
+
+
+def _rate(values: torch.Tensor) -> torch.Tensor:
+    """Of (N, T, n), as :func:`sd2core.body.lifter_features.rate`."""
+    inner = (values[:, 2:] - values[:, :-2]) / 2.0
+    ends = values[:, 1:2] - values[:, :1], values[:, -1:] - values[:, -2:-1]
+    return RATE_HZ * torch.cat([ends[0], inner, ends[1]], dim=1)
+
+
+def _huber(error: torch.Tensor, knee: float) -> torch.Tensor:
+    return torch.nn.functional.huber_loss(
+        error, torch.zeros_like(error), reduction="none", delta=knee
+    )
+
+
+def _likelihood(error: torch.Tensor, log_sigma: torch.Tensor) -> torch.Tensor:
+    """Negative logarithm of a normal density, of errors taken as given."""
+    log_sigma = log_sigma.clamp(*LOG_SIGMA)
+    return log_sigma + 0.5 * (error.detach() * torch.exp(-log_sigma)) ** 2
+
+
+def _follow(mean: LifterNetwork, network: LifterNetwork, inertia: float) -> None:
+    with torch.no_grad():
+        for slow, fast in zip(mean.parameters(), network.parameters(), strict=True):
+            slow.lerp_(fast, 1.0 - inertia)
+
+
+def calibration(network: Network, kept: Sequence[Example]) -> Singles:
+    """What to add to logarithms of spreads so that 68 % of errors lie within."""
+    ratios = []
+    for one in kept:
+        truth = batch([one])
+        out = symmetric(network, one.seen)
+        error, log_sigma = errors(out, truth)
+        ratios.append(np.abs(error) / np.exp(np.clip(log_sigma, *LOG_SIGMA)))
+    share = np.quantile(np.concatenate(ratios), 0.68, axis=0)  # (1 + 33 + 33,)
+    added = np.zeros(OUTPUTS, np.float32)
+    logs = np.log(np.maximum(share, 1e-3))
+    added[1] = logs[0]
+    added[2 + POINTS : 2 + 2 * POINTS] = logs[1 : 1 + POINTS]
+    added[2 + 3 * POINTS :] = logs[1 + POINTS :]
+    return added
+
+
+def errors(out: Singles, truth: Batch) -> tuple[Singles, Singles]:
+    """Errors of root, depths and velocities of one example, and their log spreads, (T, 67)."""
+    rest = out[:, 2:].reshape(len(out), 4, POINTS)
+    error = [out[:, :1] - truth.root[0][:, None], rest[:, 0] - truth.depth[0]]
+    error.append(rest[:, 2] - truth.velocity[0])
+    return (
+        np.concatenate(error, axis=1),
+        np.concatenate([out[:, 1:2], rest[:, 1], rest[:, 3]], axis=1),
+    )
+
+
+def save_lifter(lifter: Lifter, path: Path) -> None:
+    """Write a lifter, its weights in half precision."""
+    arrays: dict[str, Any] = {
+        name: array if name in ("mean", "spread") else array.astype(np.float16)
+        for name, array in lifter.network.arrays.items()
+    }
+    meta = {
+        "format": FORMAT,
+        "version": VERSION,
+        "dilations": list(lifter.network.dilations),
+        "beyond_rates": lifter.network.beyond_rates,
+        "arrays": sorted(arrays),
+        "provenance": dict(lifter.provenance),
+    }
+    with atomic_write(path) as stream:
+        np.savez_compressed(stream, **arrays, calibration=lifter.calibration, meta=json.dumps(meta))
