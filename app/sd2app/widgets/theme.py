@@ -26,8 +26,12 @@ _ROLES = {
 
 
 def apply_theme(application: QApplication, dark: bool) -> None:
-    """Dress the whole application."""
+    """Give every widget the light or the dark theme, unless the application has it already."""
     colours = palette_for(dark)
+    sheet = _style_sheet(colours)
+    # Setting a sheet, be it the same, styles every widget again.
+    if application.styleSheet() == sheet:
+        return
     palette = QPalette()
     for role, name in _ROLES.items():
         palette.setColor(role, QColor(getattr(colours, name)))
@@ -37,10 +41,9 @@ def apply_theme(application: QApplication, dark: bool) -> None:
         QPalette.ColorRole.ButtonText,
     ):
         palette.setColor(QPalette.ColorGroup.Disabled, role, QColor(colours.hatch))
-    if application.style().objectName() != "fusion":
-        application.setStyle("Fusion")
+    application.setStyle("Fusion")
     application.setPalette(palette)
-    application.setStyleSheet(_style_sheet(colours))
+    application.setStyleSheet(sheet)
 
 
 def _style_sheet(c: Palette) -> str:
