@@ -8,9 +8,15 @@ NO_TESTS_COLLECTED=5
 # Small products gain nothing from threads, and threads that wait for each other cost much
 # when the machine does other work.
 export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+# Without kept bytecode every worker and every process that a test starts compiles every module,
+# and pytest rewrites the assertions of every test file.
+unset PYTHONDONTWRITEBYTECODE
 pytest=".venv/bin/python -m pytest"
-# Files side by side, so that what a file shares is made once.
-side_by_side="-n logical --maxprocesses 4 --dist loadfile"
+# Neighbours stay together, so that what a file shares is made once; a worker that has nothing
+# left takes half of what another has still to do.
+side_by_side="-n logical --maxprocesses 4 --dist worksteal"
+# Only these are read for the second part.
+on_display=$(grep -rl --include='test_*.py' 'pytest\.mark\.gl' tests)
 expression=$1
 
 echo "== Tests without a display"
@@ -18,7 +24,7 @@ QT_QPA_PLATFORM=offscreen $pytest $side_by_side -m "($expression) and not gl" < 
 offscreen=$?
 
 echo "== Tests on a display"
-scripts/on_display.sh $pytest -m "($expression) and gl" < /dev/null
+scripts/on_display.sh $pytest -m "($expression) and gl" $on_display < /dev/null
 display=$?
 if [ $display -eq $NO_TESTS_COLLECTED ]; then display=0; fi
 
