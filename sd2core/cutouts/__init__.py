@@ -1,1 +1,1 @@
-"""What was labelled, cut out of a recording: a folder per span with video, mesh and maps."""
+"""Cut-outs: a folder per labelled span with its video, mesh and maps."""

@@ -1,4 +1,4 @@
-"""Spans cut out into folders, each whole or not there at all."""
+"""Writing of cut-outs into folders, each complete or absent."""
 
 from __future__ import annotations
 
@@ -36,15 +36,7 @@ _COLUMNS = (
 
 @dataclass(frozen=True)
 class Cut:
-    """A span, and the folder that it becomes.
-
-    Parameters
-    ----------
-    span : Span
-    path : Path
-    state : {"new", "same", "other"}
-        Whether nothing is there, the very same, or something else.
-    """
+    """Span, the folder to write it to, and if that is new, the same or something else."""
 
     span: Span
     path: Path
@@ -52,7 +44,7 @@ class Cut:
 
 
 def plan_cuts(source: CutSource, spans: Iterable[Span], folder: Path) -> list[Cut]:
-    """What cutting out would find in a folder, in the order of time.
+    """List the cut-outs of spans in the order of time, compared with a folder's content.
 
     Raises
     ------
@@ -79,10 +71,10 @@ def cut_out(
     replace_others: bool = False,
     progress: Progress = silent,
 ) -> list[Path]:
-    """Write the folders that are not there yet, and an index of all.
+    """Write the folders that do not exist yet, and an index of all.
 
-    A folder has its name only once it is complete. What is the same is left alone, so that
-    what was stopped goes on where it was.
+    A folder has its name only once it is complete. Folders with the same content are kept, so a
+    stopped export continues where it was.
 
     Parameters
     ----------
@@ -90,7 +82,7 @@ def cut_out(
     cuts : sequence of Cut
         Of :func:`plan_cuts`.
     folder : Path
-        Made where it is not there.
+        Made where it does not exist.
     replace_others : bool
         Replace folders of the same name that hold something else; otherwise they stay.
     progress : Progress
@@ -104,12 +96,14 @@ def cut_out(
     Raises
     ------
     Sd2Error
-        When somebody else is writing there.
+        When another process is writing there.
     """
     folder.mkdir(parents=True, exist_ok=True)
     lock = FileLock(folder / _LOCK)
     if not lock.take():
-        raise Sd2Error(f"Somebody is writing to {folder}", "a folder of its own", "Wait for that")
+        raise Sd2Error(
+            f"Another process is writing to {folder}", "a folder of its own", "Wait for that"
+        )
     try:
         for left in folder.glob(f"{_UNFINISHED}*"):
             shutil.rmtree(left, ignore_errors=True)
@@ -125,7 +119,7 @@ def cut_out(
 
 
 def write_index(folder: Path) -> None:
-    """Write ``index.csv`` and ``index.json`` of all that was cut out into a folder."""
+    """Write ``index.csv`` and ``index.json`` of all cut-outs in a folder."""
     entries = []
     for path in sorted(folder.glob(f"*/{_DETAILS}")):
         found = _read(path)

@@ -1,4 +1,4 @@
-"""What spans are cut out of, and what each of them is to become."""
+"""Source of cut-outs: a recording's video, mesh and maps."""
 
 from __future__ import annotations
 
@@ -24,20 +24,7 @@ _LONGEST_SLUG = 40
 
 @dataclass(frozen=True, eq=False)
 class CutSource:
-    """A recording with its parts at hand.
-
-    Parameters
-    ----------
-    title : str
-    simulated : bool
-    timebase : Timebase
-        The recording's clock.
-    video : Path, optional
-    mesh : MeshSequence, optional
-    maps : dict of str to DopplerMap
-        On the recording's clock, by the name of their file.
-    sensor_position_m : tuple of float
-    """
+    """Recording with the parts to cut out, maps by the name of their file."""
 
     title: str
     simulated: bool
@@ -52,7 +39,7 @@ class CutSource:
             raise Sd2Error(f"{self.title} has nothing to cut out", "a video, a mesh or a map")
 
     def only(self, parts: Iterable[Part]) -> CutSource:
-        """The same with some of its parts."""
+        """Return the same source with some of its parts."""
         kept = {*parts}
         return CutSource(
             self.title,
@@ -65,21 +52,21 @@ class CutSource:
         )
 
     def frames_of(self, span: Span) -> tuple[int, int]:
-        """Frames of the recording that are on screen during a span, half-open."""
+        """Return the frames on screen during a span, half-open."""
         return self.timebase.frames_between(span.start_s, span.end_s)
 
     def zero_s(self, span: Span) -> float:
-        """When the first frame of a span appears: 0 s in what is cut out."""
+        """Return the time of the first frame of a span, which is 0 s in its cut-out."""
         return self.timebase.time_of(self.frames_of(span)[0])
 
     def files(self) -> list[str]:
-        """What a folder of a span holds besides ``span.json``."""
+        """List the files of a cut-out besides ``span.json``."""
         files = ["video.mp4"] if self.video is not None else []
         files += ["mesh.zarr"] if self.mesh is not None else []
         return files + [f"{name}.npz" for name in self.maps]
 
     def described(self, span: Span) -> dict[str, Any]:
-        """What ``span.json`` says; the same source and span give the same."""
+        """Return the content of ``span.json``; the same for the same source and span."""
         first, stop = self.frames_of(span)
         return {
             "format": FORMAT,
@@ -105,7 +92,7 @@ class CutSource:
 
 
 def folder_name(span: Span) -> str:
-    """Sorts by time, can be read, and is the span's own: ``00001.600s left-to-right 7``."""
+    """Return a name that sorts by time and is unique: ``00001.600s left-to-right 7``."""
     slug = re.sub(r"[^\w.-]+", "-", span.label)[:_LONGEST_SLUG].strip("-.") or "label"
     return f"{span.start_s:09.3f}s_{slug}_{span.id}"
 

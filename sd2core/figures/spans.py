@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from sd2core.labels.formats.lanes import apart
+from sd2core.labels.formats.rows import apart
 from sd2core.labels.spans import Labels, Span
 
 if TYPE_CHECKING:

@@ -1,12 +1,10 @@
-"""How far two people who labelled the same recording agree.
+"""Agreement of two people who labelled the same recording, frame by frame.
 
-Frame by frame: Cohen's kappa. J. Cohen, "A coefficient of agreement for nominal scales",
+Cohen's kappa. J. Cohen, "A coefficient of agreement for nominal scales",
 Educational and Psychological Measurement 20(1), 1960:
 kappa = (p_o - p_e) / (1 - p_e), where p_o is the share of frames in which both say the
 same, and p_e the share in which they would if each used each answer as often as they did,
-independently of the other.
-
-Span by span: :mod:`sd2core.labels.matching`.
+independently of the other. Agreement span by span: :mod:`sd2core.labels.matching`.
 """
 
 from __future__ import annotations
@@ -20,6 +18,7 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.labels.matching import SpanAgreement, match_spans
 from sd2core.labels.spans import Labels, Span
+from sd2core.mesh.presence import runs
 from sd2core.timebase import Timebase
 
 Answer = tuple[str, ...]
@@ -49,7 +48,7 @@ class Kappa:
 
     @classmethod
     def of(cls, confusion: NDArray[np.int64]) -> Kappa:
-        """Of counts (n, n) of what one (rows) and the other (columns) answered."""
+        """Compute kappa from counts (n, n) of the answers of one (rows) and the other (columns)."""
         frames = int(confusion.sum())
         same = int(np.trace(confusion))
         # Whole numbers, so that an undefined kappa is told exactly. Python's do not overflow.
@@ -71,7 +70,7 @@ class FrameAgreement:
     overall : Kappa
         Of whole answers.
     of_label : dict of str to Kappa
-        Of every label that either used: is it there, or not?
+        Presence or absence of every label that either used.
     answers : tuple of Answer
         Every answer that either gave, ``()`` first.
     confusion : int64 array, shape (n, n)
@@ -86,7 +85,7 @@ class FrameAgreement:
 
 @dataclass(frozen=True)
 class Agreement:
-    """Both ways to see it."""
+    """Agreement frame by frame and span by span."""
 
     frames: FrameAgreement
     spans: SpanAgreement
@@ -95,7 +94,7 @@ class Agreement:
 def agreement(
     a: Labels, b: Labels, timebase: Timebase, *, min_iou: float = 0.5, track: str | None = None
 ) -> Agreement:
-    """Compare what two people said of one recording.
+    """Compare the labels of two people for one recording.
 
     Parameters
     ----------
@@ -155,7 +154,7 @@ def _spans(labels: Labels, track: str | None, which: str) -> tuple[Span, ...]:
 
 
 def held_labels(spans: Sequence[Span], labels: list[str], timebase: Timebase) -> NDArray[np.bool_]:
-    """Which labels hold when each frame appears, (labels, T)."""
+    """Return whether each label is present in each frame, (labels, T)."""
     held = np.zeros((len(labels), len(timebase)), bool)
     rows = {label: row for row, label in enumerate(labels)}
     edges_s = np.array([(span.start_s, span.end_s) for span in spans]).reshape(-1, 2) - _ROUNDING_S
@@ -167,3 +166,58 @@ def held_labels(spans: Sequence[Span], labels: list[str], timebase: Timebase) ->
 
 def _confusion(a: NDArray[np.int64], b: NDArray[np.int64], answers: int) -> NDArray[np.int64]:
     return np.bincount(a * answers + b, minlength=answers**2).reshape(answers, answers)
+
+
+_WORDS = (
+    (0.0, "less than by chance"),
+    (0.2, "slight"),
+    (0.4, "fair"),
+    (0.6, "moderate"),
+    (0.8, "substantial"),
+)
+"""J. R. Landis and G. G. Koch, "The measurement of observer agreement for categorical data",
+Biometrics 33(1), 1977: upper ends, and what they call it. The steps are custom, not theory."""
+
+
+@dataclass(frozen=True)
+class Disagreement:
+    """Consecutive frames in which two people give different answers.
+
+    ``a`` and ``b`` are the answers of each in most of the frames.
+    """
+
+    start_s: float
+    end_s: float
+    frames: int
+    a: Answer
+    b: Answer
+
+
+def disagreements(
+    a: Sequence[Span], b: Sequence[Span], timebase: Timebase
+) -> tuple[Disagreement, ...]:
+    """Find runs of frames whose labels differ, in order.
+
+    Frames have the labels that hold when they appear, as in :func:`frame_agreement`.
+    """
+    labels = sorted({span.label for span in (*a, *b)})
+    held = np.stack([held_labels(spans, labels, timebase) for spans in (a, b)])  # (2, labels, T)
+    differs = (held[0] != held[1]).any(axis=0)
+    found = []
+    for start, stop in runs(differs):
+        both = held[:, :, start:stop].reshape(-1, stop - start)
+        answers, counts = np.unique(both, axis=1, return_counts=True)
+        usual = answers[:, int(np.argmax(counts))].reshape(2, -1)
+        said = [
+            tuple(label for label, there in zip(labels, row, strict=True) if there) for row in usual
+        ]
+        end_s = timebase.time_of(stop) if stop < len(timebase) else timebase.end_s
+        found.append(Disagreement(timebase.time_of(start), end_s, stop - start, said[0], said[1]))
+    return tuple(found)
+
+
+def kappa_words(kappa: float | None) -> str:
+    """Return the customary word for a kappa, such as "moderate"."""
+    if kappa is None:
+        return "not defined: both say one and the same throughout"
+    return next((words for high, words in _WORDS if kappa < high), "almost perfect")

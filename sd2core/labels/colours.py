@@ -1,6 +1,6 @@
-"""Colours of labels: some to choose from, and which ones somebody could not tell apart.
+"""Colours of labels: a palette, and pairs that are hard to tell apart.
 
-Every label has a name and a key besides; colour is never all there is.
+Every label also has a name and a key, so colour is never the only sign.
 """
 
 from __future__ import annotations
@@ -74,14 +74,9 @@ _LAB = np.array(
 
 
 class Alike(NamedTuple):
-    """Two labels whose colours pass for one.
+    """Two labels whose colours look alike, to all viewers or with a colour vision deficiency.
 
-    Parameters
-    ----------
-    one, other : str
-        Names of the labels.
-    vision : str
-        Whose eyes see them so, e.g. "without red cones"; empty: everybody's.
+    ``vision`` is, for instance, "without red cones"; empty for normal colour vision.
     """
 
     one: str
@@ -89,13 +84,13 @@ class Alike(NamedTuple):
     vision: str
 
     def words(self) -> str:
-        """A sentence without its full stop."""
+        """Sentence without its full stop."""
         to_whom = f" to eyes {self.vision}" if self.vision else ""
         return f"{self.one} and {self.other} look alike{to_whom}"
 
 
 def alike(labels: Sequence[Label]) -> list[Alike]:
-    """Pairs of labels whose colours pass for one, each with the first vision that fails."""
+    """Find pairs of labels whose colours look alike, each with the first vision that fails."""
     found = []
     for one, other in combinations(labels, 2):
         for vision in _VISION:
@@ -106,7 +101,7 @@ def alike(labels: Sequence[Label]) -> list[Alike]:
 
 
 def distance(one: str, other: str, vision: str = "") -> float:
-    """How far two colours are apart in OKLab, where 1 is black from white."""
+    """Return the distance of two colours in OKLab, where black and white are 1 apart."""
     return float(np.linalg.norm(_lab(one, vision) - _lab(other, vision)))
 
 

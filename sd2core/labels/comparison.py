@@ -1,4 +1,4 @@
-"""What one state of labels has that another has not."""
+"""Differences between two states of labels."""
 
 from __future__ import annotations
 
@@ -10,14 +10,7 @@ from sd2core.labels.spans import Labels, Span
 
 @dataclass(frozen=True)
 class Comparison:
-    """How many spans differ, by their ids.
-
-    Parameters
-    ----------
-    added, changed, removed : int
-    tracks, label_set : bool
-        Whether these differ.
-    """
+    """Numbers of spans that differ, by their ids; and if tracks or label set differ."""
 
     added: int
     changed: int
@@ -37,7 +30,7 @@ class Comparison:
 
 
 def compare(before: Labels, after: Labels) -> Comparison:
-    """What has to be done to ``before`` for it to become ``after``."""
+    """Count the changes that turn ``before`` into ``after``."""
     old = {span.id: span for span in before.spans}
     new = {span.id: span for span in after.spans}
     both = old.keys() & new.keys()
@@ -51,7 +44,7 @@ def compare(before: Labels, after: Labels) -> Comparison:
 
 
 def changed_stretch(before: Labels, after: Labels) -> tuple[float, float] | None:
-    """From the first to the last second of spans in which two states differ; None: in none."""
+    """Return the earliest start and latest end of spans that differ; None where none does."""
     first, stop = same_ends(before.spans, after.spans)
     old = before.spans[first : len(before.spans) - stop]
     new = after.spans[first : len(after.spans) - stop]
@@ -62,9 +55,9 @@ def changed_stretch(before: Labels, after: Labels) -> tuple[float, float] | None
 
 
 def same_ends(one: Sequence[Span], other: Sequence[Span]) -> tuple[int, int]:
-    """How many spans are the same at the start, and how many of the others at the end.
+    """Count the identical spans at the start of both sequences, and those at the end.
 
-    The very same, which spans are that an edit did not touch: 10,000 are soon looked at.
+    Identical means the same object, as edits leave the spans that they do not touch.
     """
     shorter = min(len(one), len(other))
     first = next((k for k in range(shorter) if one[k] is not other[k]), shorter)

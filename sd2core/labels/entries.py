@@ -1,4 +1,4 @@
-"""Labels as JSON entries: what files and the journal write, checked when it is read."""
+"""JSON entries of labels, for files and the journal, checked when they are read."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from sd2core.labels.spans import Labels, LabelTrack, Origin, Overlap, Span
 
 
 class Entry(BaseModel):
-    """Refuses what it does not know: an edit would lose it without a word."""
+    """Base of the entries; unknown keys are refused, because an edit would lose them."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
 
 class LabelEntry(Entry):
-    """A :class:`Label`."""
+    """Entry of a :class:`Label`."""
 
     name: str
     colour: str
@@ -27,25 +27,25 @@ class LabelEntry(Entry):
 
 
 class LabelSetEntry(Entry):
-    """A :class:`LabelSet`."""
+    """Entry of a :class:`LabelSet`."""
 
     name: str
     labels: tuple[LabelEntry, ...]
 
     def made(self) -> LabelSet:
-        """The label set itself."""
+        """Make the label set."""
         return LabelSet(self.name, tuple(Label(**dict(entry)) for entry in self.labels))
 
 
 class TrackEntry(Entry):
-    """A :class:`LabelTrack`."""
+    """Entry of a :class:`LabelTrack`."""
 
     name: str
     overlap: Overlap = "exclusive"
 
 
 class SpanEntry(Entry):
-    """A :class:`Span`; ``frames`` are for people, the times hold."""
+    """Entry of a :class:`Span`; ``frames`` are informative, the times count."""
 
     id: int
     track: str
@@ -59,19 +59,19 @@ class SpanEntry(Entry):
     origin: Origin = "person"
 
     def made(self) -> Span:
-        """The span itself."""
+        """Make the span."""
         return Span(**{name: getattr(self, name) for name in _SPAN_FIELDS})
 
 
 class LabelsEntry(Entry):
-    """A whole :class:`Labels`."""
+    """Entry of a whole :class:`Labels`."""
 
     label_set: LabelSetEntry
     tracks: tuple[TrackEntry, ...]
     spans: tuple[SpanEntry, ...]
 
     def made(self) -> Labels:
-        """The labels themselves."""
+        """Make the labels."""
         tracks = tuple(LabelTrack(**dict(entry)) for entry in self.tracks)
         return Labels(tracks, tuple(entry.made() for entry in self.spans), self.label_set.made())
 
@@ -82,7 +82,7 @@ _SPAN_OPTIONAL = {"note": "", "author": "", "confidence": None, "origin": "perso
 
 
 def span_entry(span: Span, frames: tuple[int, int] | None = None) -> dict[str, Any]:
-    """What is written of a span; what nobody said is left out."""
+    """Encode a span; fields at their defaults are left out."""
     entry: dict[str, Any] = {}
     for name in _SPAN_FIELDS:
         value = getattr(span, name)
@@ -94,19 +94,19 @@ def span_entry(span: Span, frames: tuple[int, int] | None = None) -> dict[str, A
 
 
 def track_entries(tracks: tuple[LabelTrack, ...]) -> list[dict[str, Any]]:
-    """What is written of tracks."""
+    """Encode tracks."""
     return [{"name": track.name, "overlap": track.overlap} for track in tracks]
 
 
 def label_set_entry(label_set: LabelSet) -> dict[str, Any]:
-    """What is written of a label set."""
+    """Encode a label set."""
     names = [field.name for field in fields(Label)]
     labels = [{name: getattr(label, name) for name in names} for label in label_set.labels]
     return {"name": label_set.name, "labels": labels}
 
 
 def labels_entry(labels: Labels) -> dict[str, Any]:
-    """What is written of all labels of a recording."""
+    """Encode all labels of a recording."""
     return {
         "label_set": label_set_entry(labels.label_set),
         "tracks": track_entries(labels.tracks),
@@ -115,7 +115,7 @@ def labels_entry(labels: Labels) -> dict[str, Any]:
 
 
 def first_fault(error: ValidationError) -> str:
-    """Where the first fault is, what stands there and what is wrong with it."""
+    """Describe the first fault: its place, the value found and the reason."""
     first = error.errors(include_url=False)[0]
     where = ".".join(str(part) for part in first["loc"]) or "the file"
     if first["type"] == "missing":

@@ -1,6 +1,6 @@
-"""``labels.json``, the file of the labels of one recording, and label sets in files of their own.
+"""``labels.json``, the file of the labels of one recording, and files of label sets.
 
-See ``docs/formats.md``. Other programs' formats are elsewhere.
+See ``docs/formats.md``. Formats of other programs: :mod:`sd2core.labels.formats`.
 """
 
 from __future__ import annotations
@@ -62,14 +62,7 @@ class _Makes(Protocol[_Made]):
 
 @dataclass(frozen=True)
 class LabelFile:
-    """What a ``labels.json`` holds.
-
-    Parameters
-    ----------
-    labels : Labels
-    recording, video : Path or None
-        What they are of; absolute paths, which need not exist.
-    """
+    """Content of a ``labels.json``; paths are absolute and need not exist."""
 
     labels: Labels
     recording: Path | None = None
@@ -90,10 +83,11 @@ def write_labels(
     ----------
     path : Path
         Usually ``labels.json`` in the folder of the recording.
+    labels : Labels
     timebase : Timebase, optional
-        Frames of the recording: every span then says its frames as well, for people.
+        Frames of the recording, to write the frames of every span as well, for readers.
     recording, video : Path, optional
-        What the labels are of; stored relative to the file's folder.
+        Source of the labels; stored relative to the file's folder.
 
     Raises
     ------
@@ -127,8 +121,8 @@ def read_labels(path: Path) -> LabelFile:
     Raises
     ------
     Sd2Error
-        When it is not there, damaged, of a later version, holds what this version does not
-        know, or spans that cannot be; the message names file and place.
+        When it is missing, damaged, of a later version, or holds unknown keys or invalid spans;
+        the message names file and place.
     """
     path = Path(path)
     document = _read(path, _LabelsDocument, FORMAT)
@@ -141,7 +135,7 @@ def read_labels(path: Path) -> LabelFile:
 
 
 def write_label_set(path: Path, label_set: LabelSet) -> None:
-    """Write a label set by itself, to be shared between projects."""
+    """Write a label set to a file of its own, to share it between projects."""
     head = {"format": SET_FORMAT, "version": VERSION}
     atomic_write_text(path, _text(head | label_set_entry(label_set)))
 
@@ -152,10 +146,10 @@ def read_label_set(path: Path) -> LabelSet:
 
 
 def labels_of(spans: Iterable[InlineSpan], track: str = "Gestures") -> Labels:
-    """Labels from the spans in a ``recording.json``, with ids in the order of time.
+    """Make labels from the spans in a ``recording.json``, with ids in the order of time.
 
-    Where they overlap, the track allows it. A label that no file can hold is put on one line
-    and shortened. What else those spans say stays in ``recording.json``.
+    The track allows overlaps where there are some. A label that no file can hold is put on one
+    line and shortened.
     """
     ordered = sorted(spans, key=lambda one: (one.start_s, one.end_s))
     apart = all(one.end_s <= after.start_s for one, after in pairwise(ordered))

@@ -1,4 +1,4 @@
-"""Labels of a file taken into a recording: what fits, what is cut, and what is left out."""
+"""Import of labels from a file into a recording, cut to the recording's time."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ Way = Literal["replace", "add"]
 
 @dataclass(frozen=True)
 class Incoming:
-    """What a file holds, as a recording can take it.
+    """Labels of a file, fitted to a recording.
 
     Parameters
     ----------
     labels : Labels
-        What is taken: inside the recording, each span with at least one frame.
+        Labels to import: inside the recording, each span with at least one frame.
     cut : tuple of Span
-        As they are in the file: they reach beyond the recording and end with it.
+        Spans of the file that reach beyond the recording and are cut at its ends.
     outside : tuple of Span
-        As they are in the file: without a frame of the recording, and left out.
+        Spans of the file without a frame of the recording, which are left out.
     """
 
     labels: Labels
@@ -38,7 +38,7 @@ class Incoming:
 
     @classmethod
     def of(cls, labels: Labels, timebase: Timebase) -> Incoming:
-        """Labels of a file on the frames of a recording.
+        """Fit labels of a file to the frames of a recording.
 
         Edges inside the recording stay where the file has them, on a frame or not.
         """
@@ -58,13 +58,13 @@ class Incoming:
         return cls(replace(labels, spans=tuple(kept)), tuple(cut), tuple(outside))
 
     def unknown(self, label_set: LabelSet) -> dict[str, int]:
-        """Labels that a set does not have, with how many spans have them."""
+        """Count the spans of each label that a set does not have."""
         counts = Counter(span.label for span in self.labels.spans)
         return {name: count for name, count in counts.items() if label_set.find(name) is None}
 
 
 def take_in(labels: Labels, incoming: Incoming, way: Way, source: str) -> Edit:
-    """Put the labels of a file into a recording.
+    """Import the labels of a file into a recording.
 
     Replacing takes the tracks, spans and numbers of the file, and its label set where it
     brings one of its own. Adding leaves all that is there: the file's tracks come below it,
@@ -111,7 +111,7 @@ def take_in(labels: Labels, incoming: Incoming, way: Way, source: str) -> Edit:
 
 
 def free_name(name: str, source: str, taken: Collection[str]) -> str:
-    """A name of a track that is not taken: itself, with the source, or with a number besides."""
+    """Return a track name that is not in use: itself, with the source, or with a number as well."""
     if name not in taken:
         return name
     shown = "".join(one if one.isprintable() else " " for one in source).strip() or "import"
@@ -125,9 +125,9 @@ def free_name(name: str, source: str, taken: Collection[str]) -> str:
 
 
 def set_after(label_set: LabelSet, incoming: Incoming, way: Way) -> LabelSet:
-    """The label set of a recording after :func:`take_in`.
+    """Return the label set of a recording after :func:`take_in`.
 
-    Added labels bring those of their labels that only the file has a colour for.
+    Adding brings those labels that only the file has.
     """
     theirs = incoming.labels.label_set
     if way == "replace":

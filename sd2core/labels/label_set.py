@@ -1,4 +1,4 @@
-"""What can be said of a span: labels with a colour, a key and a class for the classifier."""
+"""Label sets: labels with a colour, a key and a class for the classifier."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ LONGEST_NAME = 200
 
 @dataclass(frozen=True)
 class Label:
-    """One label.
+    """Label with its colour, key and class.
 
     Parameters
     ----------
@@ -22,9 +22,9 @@ class Label:
     colour : str
         ``#rrggbb``, lower case.
     key : str
-        The character that marks with it, or nothing.
+        Character that marks with it, or empty.
     gesture_class : str
-        What the classifier is to call it, or nothing: such spans are not learnt from.
+        Class that the classifier learns for it; empty for spans that are not learnt from.
     """
 
     name: str
@@ -45,13 +45,9 @@ class Label:
 
 @dataclass(frozen=True)
 class LabelSet:
-    """The labels of a project, in the order in which they are offered.
+    """Labels of a project, in the order in which they are offered.
 
-    Parameters
-    ----------
-    name : str
-    labels : tuple of Label
-        Names differ, and keys as well; lower and upper case are one key.
+    Names differ, and keys as well; lower and upper case are one key.
     """
 
     name: str
@@ -72,16 +68,16 @@ class LabelSet:
                 )
 
     def find(self, name: str) -> Label | None:
-        """The label of that name, if there is one."""
+        """Return the label of that name, or None."""
         return next((one for one in self.labels if one.name == name), None)
 
     def of_class(self, name: str) -> tuple[Label, ...]:
-        """The labels that a classifier is to call so."""
+        """Return the labels of a class of the classifier."""
         return tuple(one for one in self.labels if one.gesture_class == name)
 
 
 def check_name(name: str, what: str) -> None:
-    """Refuse a name that no file and no menu can hold."""
+    """Raise an error for a name that no file and no menu can hold."""
     if not name.strip() or len(name) > LONGEST_NAME or not name.isprintable():
         raise Sd2Error(
             f"The name of a {what} is {name[: LONGEST_NAME + 1]!r}",
@@ -90,7 +86,7 @@ def check_name(name: str, what: str) -> None:
 
 
 def check_text(text: str, what: str) -> None:
-    """Refuse a text that no file can hold: half of a character of two (a lone surrogate)."""
+    """Raise an error for a text that no file can hold: half of a character (a lone surrogate)."""
     if not text.isascii() and any("\ud800" <= one <= "\udfff" for one in text):
         raise Sd2Error(f"The {what} is {text[:LONGEST_NAME]!r}", "whole characters")
 

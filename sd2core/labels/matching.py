@@ -1,7 +1,4 @@
-"""Spans of two people matched one to one.
-
-By intersection over union (IoU) of time, as detections of actions are matched to the truth.
-"""
+"""One-to-one matching of the spans of two people, by intersection over union (IoU) of time."""
 
 from __future__ import annotations
 
@@ -24,7 +21,7 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Match:
-    """A span of a and the span of b that is taken for the same.
+    """Pair of spans, one of a and one of b, taken for the same event.
 
     Parameters
     ----------
@@ -47,22 +44,13 @@ class Match:
 
     @property
     def same_label(self) -> bool:
-        """Whether both call it the same."""
+        """True if both spans have the same label."""
         return self.a.label == self.b.label
 
 
 @dataclass(frozen=True)
 class SpanAgreement:
-    """Agreement span by span.
-
-    Parameters
-    ----------
-    matches : tuple of Match
-        In the order of a.
-    only_a, only_b : tuple of Span
-        What has no match.
-    min_iou : float
-    """
+    """Matches in the order of a, and the spans of each without a match."""
 
     matches: tuple[Match, ...]
     only_a: tuple[Span, ...]
@@ -110,10 +98,7 @@ def match_spans(
 
 
 def _touching(a: Sequence[Span], b: Sequence[Span]) -> list[tuple[list[int], list[int]]]:
-    """Groups of spans of a and b that may be matched: they hang together by overlaps.
-
-    Ten thousand spans of each are matched in groups of a few.
-    """
+    """Groups of spans of a and b connected by overlaps, so that only small groups are matched."""
     kinds = [(span.start_s, span.end_s, 0, at) for at, span in enumerate(a)]
     kinds += [(span.start_s, span.end_s, 1, at) for at, span in enumerate(b)]
     groups: list[tuple[list[int], list[int]]] = []
@@ -146,7 +131,7 @@ def _paired(
 
 
 def iou_of(a: Sequence[Span], b: Sequence[Span]) -> NDArray[np.float64]:
-    """Intersection over union of the times of spans, (len(a), len(b))."""
+    """Compute the intersection over union of the times of spans, (len(a), len(b))."""
     start_a, end_a = np.array([(s.start_s, s.end_s) for s in a]).reshape(-1, 2).T[:, :, None]
     start_b, end_b = np.array([(s.start_s, s.end_s) for s in b]).reshape(-1, 2).T[:, None, :]
     both = np.maximum(np.minimum(end_a, end_b) - np.maximum(start_a, start_b), 0.0)

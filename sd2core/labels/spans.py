@@ -1,4 +1,4 @@
-"""Spans, the tracks they stand on, and all labels of one recording."""
+"""Labelled spans, their tracks, and all labels of one recording."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _IN_ORDER = attrgetter("start_s", "end_s", "id")
 
 @dataclass(frozen=True)
 class Span:
-    """A stretch of time with a label, half-open: ``[start_s, end_s)``.
+    """Labelled interval of time, half-open: ``[start_s, end_s)``.
 
     Parameters
     ----------
@@ -34,10 +34,8 @@ class Span:
         On the clock of the recording; ``start_s < end_s``.
     label : str
         Usually one of the label set; others are shown in grey.
-    note, author : str
     confidence : float, optional
         0 to 1.
-    origin : {"person", "suggestion", "import"}
     """
 
     id: int
@@ -71,28 +69,21 @@ class Span:
 
     @property
     def duration_s(self) -> float:
-        """From start to end."""
+        """End less start."""
         return self.end_s - self.start_s
 
     def overlaps(self, other: Span) -> bool:
-        """Whether both hold some instant; spans that touch do not."""
+        """True if the two spans share some instant; spans that only touch do not."""
         return self.start_s < other.end_s and other.start_s < self.end_s
 
     def words(self) -> str:
-        """What to call it in a sentence."""
+        """Name of the span in a sentence."""
         return f"Span {self.id} ({self.label!r}, {self.start_s:g} to {self.end_s:g} s)"
 
 
 @dataclass(frozen=True)
 class LabelTrack:
-    """A row of spans.
-
-    Parameters
-    ----------
-    name : str
-    overlap : {"exclusive", "free"}
-        Whether spans of this track may hold the same instant.
-    """
+    """Row of spans; on an ``"exclusive"`` one they do not overlap."""
 
     name: str
     overlap: Overlap = "exclusive"
@@ -159,22 +150,22 @@ class Labels:
 
     @property
     def next_id(self) -> int:
-        """An id that no span has."""
+        """Smallest id above those in use."""
         return max((span.id for span in self.spans), default=0) + 1
 
     def of_track(self, name: str) -> tuple[Span, ...]:
-        """The spans of one track, in order."""
+        """Return the spans of one track, in order."""
         return tuple(span for span in self.spans if span.track == name)
 
     def span(self, span_id: int) -> Span:
-        """The span of that id; it must exist."""
+        """Return the span of an id; it must exist."""
         for span in self.spans:
             if span.id == span_id:
                 return span
         raise Sd2Error(f"No span has the id {span_id}", f"one of the {len(self.spans)} spans")
 
     def these(self, ids: Iterable[int]) -> list[Span]:
-        """The spans of those ids, in order; they must exist."""
+        """Return the spans of some ids, in order; they must exist."""
         wanted = set(ids)
         found = [span for span in self.spans if span.id in wanted]
         for missing in wanted.difference(span.id for span in found):
@@ -182,7 +173,7 @@ class Labels:
         return found
 
     def track(self, name: str) -> LabelTrack:
-        """The track of that name; it must exist."""
+        """Return the track of a name; it must exist."""
         for track in self.tracks:
             if track.name == name:
                 return track
@@ -190,7 +181,7 @@ class Labels:
         raise Sd2Error(f"No track is called {name!r}", f"one of {known}" if known else "a track")
 
     def shifted(self, offset_s: float) -> Labels:
-        """The same labels ``offset_s`` later."""
+        """Return the same labels ``offset_s`` later."""
         moved = (
             replace(span, start_s=span.start_s + offset_s, end_s=span.end_s + offset_s)
             for span in self.spans
@@ -198,9 +189,9 @@ class Labels:
         return replace(self, spans=tuple(moved))
 
     def with_spans(self, changed: Iterable[Span] = (), without: Collection[int] = ()) -> Labels:
-        """The same with some spans instead of those with their ids, or besides, or left out.
+        """Return the same labels with spans replaced by id, added or removed.
 
-        What changes nothing gives these very labels.
+        Without any change these very labels are returned.
         """
         put = {span.id: span for span in changed}
         kept = [put.pop(one.id, one) for one in self.spans if one.id not in without]

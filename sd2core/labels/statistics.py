@@ -1,4 +1,4 @@
-"""How many spans each label has, how long they are, and how much of the recording they hold."""
+"""Statistics per label: number and durations of spans, and share of the recording."""
 
 from __future__ import annotations
 
@@ -27,20 +27,18 @@ NO_NUMBER = "–"
 
 @dataclass(frozen=True)
 class LabelStatistics:
-    """The spans of one label.
+    """Statistics of the spans of one label.
 
     Parameters
     ----------
-    label : str
-    count : int
     total_s : float
         Sum of their durations: where spans overlap, an instant counts in each.
     mean_s, sd_s, median_s, shortest_s, longest_s : float, optional
-        Of their durations; ``sd_s`` is the sample's (n − 1), None below two spans, the
+        Of their durations; ``sd_s`` is the sample's (n - 1), None below two spans, the
         others without any.
     share : float, optional
-        How much of the recording they hold, 0 to 1, an instant counting once. None where
-        nobody said how long it is.
+        Share of the recording that they cover, 0 to 1, overlaps counting once. None where the
+        length of the recording is unknown.
     """
 
     label: str
@@ -57,7 +55,7 @@ class LabelStatistics:
 def label_statistics(
     labels: Labels, extent_s: tuple[float, float] | None = None
 ) -> list[LabelStatistics]:
-    """Statistics of every label of the set, also those without a span, then of any others.
+    """Compute statistics of every label of the set, also those without a span, then of others.
 
     Parameters
     ----------
@@ -74,7 +72,7 @@ def label_statistics(
 
 
 def statistics_rows(found: Iterable[LabelStatistics]) -> list[tuple[str, ...]]:
-    """A row of text per label, in the order of :data:`HEADINGS`."""
+    """Format a row of text per label, in the order of :data:`HEADINGS`."""
     return [
         (
             one.label,
@@ -97,7 +95,7 @@ def statistics_rows(found: Iterable[LabelStatistics]) -> list[tuple[str, ...]]:
 
 
 def statistics_text(rows: Iterable[Sequence[str]], separator: str = ",") -> str:
-    """Rows with their headings as CSV, or with a tab as a table to paste."""
+    """Format rows with their headings as CSV, or with a tab as a table to paste."""
     written = io.StringIO()
     writer = csv.writer(written, delimiter=separator, lineterminator="\n")
     writer.writerow(HEADINGS)
@@ -122,7 +120,7 @@ def _of(label: str, spans: Sequence[Span], extent_s: tuple[float, float] | None)
 
 
 def _held_s(spans: Iterable[Span], extent_s: tuple[float, float]) -> float:
-    """How much of a stretch spans hold together; they come in the order of their starts."""
+    """Total time covered inside an interval by spans in the order of their starts."""
     held_s, until_s = 0.0, extent_s[0]
     for span in spans:
         start_s, end_s = max(span.start_s, until_s), min(span.end_s, extent_s[1])

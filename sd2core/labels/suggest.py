@@ -1,9 +1,9 @@
-"""Where something moves: candidate spans from the energy of a Doppler map.
+"""Candidate spans of motion, from the energy of a Doppler map.
 
 Every bin is measured against its own quiet level, so that what stands still, and the
 sidelobes that it leaves in other bins, count as quiet. Two thresholds (hysteresis, as for
 the edges of J. Canny, "A computational approach to edge detection", IEEE TPAMI 8(6),
-1986) tell motion from it. What was chosen, and how flat it is: docs/decisions/0032.
+1986) separate motion from it. For the choice of values see docs/decisions/0032.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from sd2core.timebase import Timebase
 TRACK = "Suggestions"
 """Name of the track that suggestions stand on unless another is asked for."""
 LABEL = "gesture"
-"""What a suggestion is called: energy says that something moves, not what."""
+"""Label of suggestions: energy shows that something moves, not what."""
 SURE_DB = 20.0
 """A span that is found with this threshold as well has the confidence 1."""
 
@@ -40,18 +40,18 @@ _ROUNDING_S = 1e-6
 
 @dataclass(frozen=True)
 class SuggestOptions:
-    """When a stretch of motion is worth suggesting.
+    """Thresholds and margins for suggesting spans.
 
     Parameters
     ----------
     high_db : float
-        Energy over the quiet level that a span must reach somewhere.
+        Energy over the quiet level that the peak of a span must reach.
     low_db : float
-        Energy over the quiet level that it must not fall below, up to `high_db`.
+        Energy over the quiet level that a span never falls below, up to `high_db`.
     min_duration_s : float
-        For so long at least, before the margins are added.
+        Least duration, before the margins are added.
     merge_gap_s : float
-        Quiet stretches up to this one do not end a span.
+        Quiet up to this long does not end a span.
     margin_s : float
         Added on both sides, but no more than a third of the quiet up to a neighbour: a
         gesture begins and ends more slowly than energy shows.
@@ -76,7 +76,7 @@ class SuggestOptions:
 
 
 def motion_energy_db(doppler: DopplerMap) -> NDArray[np.float64]:
-    """Energy of every frame over the map's own quiet level, in dB, (frames,).
+    """Compute the energy of every frame over the map's own quiet level, in dB, (frames,).
 
     A bin's quiet level is what it does not exceed in a quarter of the frames, but at
     least 30 dB below the strongest frame. A frame's energy is the mean of its bins in
@@ -126,7 +126,7 @@ def suggest_spans(
     track: str = TRACK,
     first_id: int = 1,
 ) -> tuple[Span, ...]:
-    """Stretches in which something moves, in order; edges are those of frames.
+    """Find spans in which something moves, in order; edges are those of frames.
 
     Parameters
     ----------
@@ -193,7 +193,10 @@ def _confidence(peak_db: float, high_db: float) -> float:
 def stretches(
     timebase: Timebase, there: NDArray[np.bool_]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """First and last frame of the stretch of each frame: pauses part as absence does."""
+    """Return first and last frame of the uninterrupted part that each frame is in.
+
+    Parts end at pauses of the recording and where no person is present.
+    """
     presence = Presence.of(there, len(timebase))
     longest_s = max(_PAUSE_FRAMES * timebase.frame_duration_s, _PAUSE_S)
     begins = presence.first == np.arange(len(timebase))
@@ -204,7 +207,7 @@ def stretches(
 
 
 def frame_ends_s(timebase: Timebase, last: NDArray[np.int64]) -> NDArray[np.float64]:
-    """When each frame ends, (T,): at the next one, or after its usual time before a pause."""
+    """Return the end of each frame, (T,): the next one, or its usual duration before a pause."""
     ends_s = np.append(timebase.times_s[1:], timebase.end_s)
     usual_s = timebase.times_s + timebase.frame_duration_s
     before_a_break = last == np.arange(len(timebase))

@@ -1,8 +1,8 @@
-"""Times of spans as people type them: seconds, or frames.
+"""Parsing of typed times of spans: seconds or frames.
 
 ``1.5``, ``1,5`` and ``1.5 s`` are seconds, ``1:02.5`` is a minute and 2.5 s, ``0:01:02.5``
 the same with hours; ``f48`` and ``48 f`` are a frame. A frame typed as a start is the first
-one that a span holds, as an end the last one, as a duration it is how many.
+one of a span, as an end the last one, as a duration the number of frames.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _LONGEST_SHOWN = 40
 
 
 def typed_start(text: str, timebase: Timebase) -> float:
-    """When a span is to begin, in seconds.
+    """Parse the start of a span, in seconds.
 
     Raises
     ------
@@ -32,13 +32,13 @@ def typed_start(text: str, timebase: Timebase) -> float:
 
 
 def typed_end(text: str, timebase: Timebase) -> float:
-    """When a span is to end, in seconds; errors are those of :func:`typed_start`."""
+    """Parse the end of a span, in seconds; errors are those of :func:`typed_start`."""
     frame = _typed_frames(text)
     return _typed_seconds(text) if frame is None else _end_of(_known(frame, timebase), timebase)
 
 
 def typed_duration_end(text: str, start_s: float, timebase: Timebase) -> float:
-    """When a span that begins at ``start_s`` is to end, from how long it is to last."""
+    """Parse a duration and return the end of a span that begins at ``start_s``, in seconds."""
     frames = _typed_frames(text)
     if frames is None:
         return start_s + _typed_seconds(text)

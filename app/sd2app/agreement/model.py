@@ -12,8 +12,7 @@ from sd2app.background.latest import Emit, LatestRunner
 from sd2app.labels.model import LabelsModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.time_window import VisibleSpanModel
-from sd2core.labels.agreement import Agreement, agreement
-from sd2core.labels.disagreement import Disagreement, disagreements
+from sd2core.labels.agreement import Agreement, Disagreement, agreement, disagreements
 from sd2core.labels.formats import read_labels
 from sd2core.labels.import_labels import Incoming
 from sd2core.labels.spans import Labels

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from statistics import median
 
 from sd2app.agreement.model import AgreementModel
-from sd2core.labels.disagreement import kappa_words
+from sd2core.labels.agreement import kappa_words
 
 
 def verdict(model: AgreementModel) -> str:

@@ -8,7 +8,7 @@ from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import Emit, LatestRunner
 from sd2core.labels.formats import FORMATS, format_for, read_labels
-from sd2core.labels.formats.boris_reading import observations
+from sd2core.labels.formats.boris import observations
 from sd2core.labels.import_labels import Incoming, Way, set_after
 from sd2core.labels.spans import Labels, Span
 from sd2core.timebase import Timebase

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,22 +18,23 @@ from sd2core.cli.labels.reading import (
     check_label_output,
     clock_of,
     labels_at,
+    print_lost,
     with_rate,
     write,
 )
 from sd2core.cli.labels.recover import add_recover
-from sd2core.cli.labels.statistics import add_statistics, print_statistics, statistics_of
 from sd2core.cli.labels.suggest import add_suggest
 from sd2core.cli.options import add_command, add_json
 from sd2core.cli.output import counted, print_json, print_rows
 
 if TYPE_CHECKING:
     from sd2core.labels.spans import Labels
+    from sd2core.labels.statistics import LabelStatistics
     from sd2core.timebase import Timebase
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``labels`` with what it does."""
+    """Add ``labels`` and its commands."""
     parser = add_command(
         commands,
         "labels",
@@ -51,7 +53,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     show = add_command(
         kinds,
         "show",
-        "print labels, and how many and how long they are",
+        "print labels with their number and durations",
         handler=_show,
         description=(
             "FILE is a labels.json, a recording, the .h5 of a K60168A, or a file of ELAN, Praat,\n"
@@ -88,7 +90,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     add_clock(convert)
     add_json(convert)
 
-    add_statistics(kinds)
+    _add_statistics(kinds)
     add_set(kinds)
     add_suggest(kinds)
     add_figure(kinds)
@@ -102,7 +104,7 @@ def _show(options: argparse.Namespace) -> None:
     labels = labels_at(options.file, clock, options.format, options.observation)
     clock = with_rate(options, clock, labels)
     if options.json:
-        print_json(described(labels, clock))
+        print_json(_described(labels, clock))
         return
     if not labels.spans:
         print(f"{options.file} holds no spans.")
@@ -123,7 +125,7 @@ def _show(options: argparse.Namespace) -> None:
         )
     print_rows(rows, right=(0, 1, 2))
     print()
-    print_statistics(labels, clock)
+    _print_statistics(labels, clock)
 
 
 def _convert(options: argparse.Namespace) -> None:
@@ -135,30 +137,79 @@ def _convert(options: argparse.Namespace) -> None:
         print_json({"path": str(options.out), "spans": len(labels.spans), "not_kept": lost})
         return
     print(f"Wrote {options.out} with {counted(len(labels.spans), 'span')}")
-    for sentence in lost:
-        print(f"  not kept: {sentence}")
+    print_lost(lost)
 
 
-def described(labels: Labels, clock: Timebase | None) -> dict[str, Any]:
-    """Labels for programs."""
+def _described(labels: Labels, clock: Timebase | None) -> dict[str, Any]:
     return {
         "tracks": [{"name": track.name, "overlap": track.overlap} for track in labels.tracks],
         "spans": [
-            {
-                "id": span.id,
-                "track": span.track,
-                "start_s": span.start_s,
-                "end_s": span.end_s,
+            asdict(span)
+            | {
                 "frames": None
                 if clock is None
-                else list(clock.frames_between(span.start_s, span.end_s)),
-                "label": span.label,
-                "note": span.note,
-                "author": span.author,
-                "confidence": span.confidence,
-                "origin": span.origin,
+                else list(clock.frames_between(span.start_s, span.end_s))
             }
             for span in labels.spans
         ],
-        "labels": statistics_of(labels, clock),
+        "labels": _statistics_of(labels, clock),
     }
+
+
+def _add_statistics(kinds: argparse._SubParsersAction) -> None:
+    parser = add_command(
+        kinds,
+        "statistics",
+        "count the spans of every label and print their durations",
+        handler=_statistics,
+        description=(
+            "Durations per label, and with frame times the share of the recording that its spans\n"
+            "cover; overlapping spans count once."
+        ),
+        examples=(
+            "  sd2 labels statistics walk.sd2\n"
+            "  sd2 labels statistics walk.eaf --video walk.mp4 --csv"
+        ),
+    )
+    parser.add_argument("file", type=Path, metavar="FILE", help="the file with labels")
+    add_reading(parser, "FILE")
+    add_clock(parser)
+    form = parser.add_mutually_exclusive_group()
+    form.add_argument("--csv", action="store_true", help="print comma-separated values")
+    add_json(form)
+
+
+def _statistics(options: argparse.Namespace) -> None:
+    from sd2core.labels.statistics import statistics_rows, statistics_text
+
+    clock = clock_of(options, options.file)
+    labels = labels_at(options.file, clock, options.format, options.observation)
+    clock = with_rate(options, clock, labels)
+    if options.json:
+        print_json({"labels": _statistics_of(labels, clock)})
+    elif options.csv:
+        print(statistics_text(statistics_rows(_found(labels, clock))), end="")
+    else:
+        _print_statistics(labels, clock)
+
+
+def _print_statistics(labels: Labels, clock: Timebase | None) -> None:
+    from sd2core.labels.statistics import HEADINGS, statistics_rows
+
+    rows = [HEADINGS, *statistics_rows(_found(labels, clock))]
+    print_rows(rows, right=range(1, len(HEADINGS)))
+
+
+def _statistics_of(labels: Labels, clock: Timebase | None) -> dict[str, dict[str, Any]]:
+    described = {one.label: asdict(one) for one in _found(labels, clock)}
+    for one in described.values():
+        del one["label"]
+    return described
+
+
+def _found(labels: Labels, clock: Timebase | None) -> list[LabelStatistics]:
+    """Statistics of the labels in use: files of other programs bring no set of their own."""
+    from sd2core.labels.statistics import label_statistics
+
+    extent_s = None if clock is None else (clock.start_s, clock.end_s)
+    return [one for one in label_statistics(labels, extent_s) if one.count]

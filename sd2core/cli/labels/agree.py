@@ -1,4 +1,4 @@
-"""``sd2 labels agree``: how far two people who labelled the same recording agree."""
+"""``sd2 labels agree``: agreement of two people who labelled the same recording."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def _print(found: Agreement) -> None:
     rows += [(label, *_kappa(kappa)) for label, kappa in frames.of_label.items()]
     print_rows(rows, right=(1, 2, 3))
     if frames.overall.value is None:
-        print("No kappa: both give one and the same answer in all frames.")
+        print("Kappa is undefined: both give the same single answer in all frames.")
     print()
     rows = [("frames: A \\ B", *(_answer(answer) for answer in frames.answers))]
     rows += [
@@ -85,7 +85,7 @@ def _print(found: Agreement) -> None:
     if spans.matches:
         start_s = median(abs(match.start_difference_s) for match in spans.matches)
         end_s = median(abs(match.end_difference_s) for match in spans.matches)
-        print(f"Edges differ by {start_s:.3f} s (starts) and {end_s:.3f} s (ends), median")
+        print(f"Median difference: {start_s:.3f} s between starts, {end_s:.3f} s between ends")
         rows = [("A", "B", "label", "IoU", "start s", "frames", "end s", "frames")]
         for match in spans.matches:
             words = match.a.label if match.same_label else f"{match.a.label} / {match.b.label}"

@@ -30,8 +30,8 @@ def add_cut(kinds: argparse._SubParsersAction) -> None:
         description=(
             "Makes a folder per span with video.mp4 (its very frames, encoded again), mesh.zarr,\n"
             "a map file each, and span.json; index.csv and index.json list them all. In each\n"
-            "folder 0 s is the span's first frame. What is there already and the same is left\n"
-            "alone; a folder has its name only once it is complete. Suggestions that nobody has\n"
+            "folder 0 s is the span's first frame. Folders that are there already and the same\n"
+            "are kept; a folder has its name only once it is complete. Suggestions that were not\n"
             "accepted are left out."
         ),
         examples=(
@@ -41,13 +41,15 @@ def add_cut(kinds: argparse._SubParsersAction) -> None:
         ),
     )
     parser.add_argument("recording", type=Path, metavar="RECORDING", help="a recording (.sd2)")
-    parser.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="made if missing")
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="FOLDER", help="folder, made if missing"
+    )
     parser.add_argument(
         "--label", action="append", metavar="NAME", help="only spans with this label; may be given"
         " several times",
     )  # fmt: skip
     parser.add_argument(
-        "--parts", default=_PARTS, metavar="LIST", help=f"some of {_PARTS} (default: all there are)"
+        "--parts", default=_PARTS, metavar="LIST", help=f"some of {_PARTS} (default: all)"
     )
     parser.add_argument(
         "--maps",

@@ -1,4 +1,4 @@
-"""``sd2 labels figure``: the Doppler maps of a recording with what was labelled."""
+"""``sd2 labels figure``: the Doppler maps of a recording with its labels."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def add_figure(kinds: argparse._SubParsersAction) -> None:
         description=(
             "Maps one above the other on one time axis, the labels below them with names and a\n"
             "hatch for each, and their edges on the maps. 0 dB is the strongest bin of a map.\n"
-            "Suggestions that nobody has accepted are not drawn."
+            "Suggestions that were not accepted are not drawn."
         ),
         examples=(
             "  sd2 labels figure walk.sd2 --out walk.pdf\n"
@@ -44,8 +44,12 @@ def add_figure(kinds: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--labels", type=Path, metavar="FILE", help="other labels than the recording's own"
     )
-    parser.add_argument("--from-s", type=not_negative_float, metavar="S", help="where it begins")
-    parser.add_argument("--to-s", type=not_negative_float, metavar="S", help="where it ends")
+    parser.add_argument(
+        "--from-s", type=not_negative_float, metavar="S", help="start of the figure, in seconds"
+    )
+    parser.add_argument(
+        "--to-s", type=not_negative_float, metavar="S", help="end of the figure, in seconds"
+    )
 
 
 def _figure(options: argparse.Namespace) -> None:

@@ -1,4 +1,4 @@
-"""``sd2 labels set``: the label set of a file, written by itself or exchanged for another."""
+"""``sd2 labels set``: print, export or replace the label set of a file."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from sd2core.cli.labels.reading import (
     check_label_output,
     clock_of,
     labels_at,
+    print_lost,
     with_rate,
     write,
 )
@@ -37,8 +38,8 @@ def add_set(kinds: argparse._SubParsersAction) -> None:
         handler=_set,
         description=(
             "Prints the labels with key, colour, class for the classifier and how many spans have\n"
-            "them, and which two look alike. With --use spans keep their labels, also those that\n"
-            "the other set does not have."
+            "them, and labels whose colours look alike. With --use spans keep their labels, also\n"
+            "those that the other set does not have."
         ),
         examples=(
             "  sd2 labels set walk.sd2\n"
@@ -84,8 +85,7 @@ def _set(options: argparse.Namespace) -> None:
         return
     for path in written:
         print(f"Wrote {path} with {counted(len(labels.label_set.labels), 'label')}")
-    for sentence in lost:
-        print(f"  not kept: {sentence}")
+    print_lost(lost)
     if not written:
         _print(labels)
 

@@ -1,4 +1,4 @@
-"""Reading and writing labels that the command line names, and the clock that they need."""
+"""Reading and writing of label files named on the command line, and their frame times."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _FORMATS = "sd2, csv, audacity, elan, textgrid, boris or mne"
 
 
 def add_clock(parser: argparse.ArgumentParser) -> None:
-    """Add what says when frames are."""
+    """Add the options that give the times of frames."""
     group = parser.add_argument_group("frame times", "one of these; a recording brings its own")
     choice = group.add_mutually_exclusive_group()
     choice.add_argument("--recording", type=Path, metavar="REC.sd2", help="those of a recording")
@@ -32,7 +32,7 @@ def add_clock(parser: argparse.ArgumentParser) -> None:
 
 
 def add_reading(parser: argparse.ArgumentParser, name: str) -> None:
-    """Add what says how a file is to be read."""
+    """Add the options on how to read a file."""
     parser.add_argument("--format", metavar="NAME", help=f"the format of {name}: {_FORMATS}")
     parser.add_argument(
         "--observation", metavar="NAME", help="which one of a BORIS project with several"
@@ -50,7 +50,7 @@ def labels_at(
     file_format: str | None = None,
     observation: str | None = None,
 ) -> Labels:
-    """Labels of a ``labels.json``, a recording, a radar file or another program's file."""
+    """Read labels of a ``labels.json``, a recording, a radar file or another program's file."""
     from sd2core.io.radar import holds_map, load_recorded_map
     from sd2core.labels import files
     from sd2core.labels.formats import read_labels
@@ -70,10 +70,10 @@ def labels_at(
 
 
 def clock_of(options: argparse.Namespace, *sources: Path) -> Timebase | None:
-    """Frame times as the options say, else those of the first source that has some.
+    """Return the frame times of the options, else those of the first source that has some.
 
     A source is a file with labels: a recording, a radar file, or a ``labels.json`` that
-    names its recording or video. None where nothing says it.
+    names its recording or video. None without any.
     """
     from sd2core.io.radar import holds_map, load_recorded_map
     from sd2core.labels import files
@@ -104,7 +104,7 @@ def clock_of(options: argparse.Namespace, *sources: Path) -> Timebase | None:
 def with_rate(
     options: argparse.Namespace, timebase: Timebase | None, *labels: Labels
 ) -> Timebase | None:
-    """The same clock, or one of ``--rate`` that is as long as the labels."""
+    """Return the same frame times, or those of ``--rate`` for as long as the labels."""
     from sd2core.timebase import Timebase
 
     if options.rate is None:
@@ -121,7 +121,7 @@ def with_rate(
 
 
 def needed(timebase: Timebase | None, why: str) -> Timebase:
-    """The clock, or the sentence that one is needed."""
+    """Return the frame times, or raise an error where there are none."""
     if timebase is None:
         raise Sd2Error(
             f"{why} needs the times of frames",
@@ -132,7 +132,7 @@ def needed(timebase: Timebase | None, why: str) -> Timebase:
 
 
 def recording_clock(recording: Recording) -> Timebase:
-    """Frames of a recording's clock: the video's, else the mesh's, else the radar's."""
+    """Return the frame times of a recording: the video's, else the mesh's, else the radar's."""
     missing = recording.missing()
     if recording.video is not None and "video" not in missing:
         with recording.open_video() as video:
@@ -153,7 +153,7 @@ def recording_clock(recording: Recording) -> Timebase:
 def write(
     path: Path, labels: Labels, timebase: Timebase | None, file_format: str | None = None
 ) -> list[str]:
-    """Write labels by the file's suffix; what the file could not hold, as sentences."""
+    """Write labels by the file's suffix; return the losses as sentences."""
     from sd2core.labels import files
     from sd2core.labels.formats import write_labels
 
@@ -162,6 +162,12 @@ def write(
         return []
     clock = needed(timebase, f"A file {path.suffix or path.name}")
     return [str(loss) for loss in write_labels(path, labels, clock, file_format)]
+
+
+def print_lost(lost: list[str]) -> None:
+    """Print the losses that :func:`write` returned."""
+    for sentence in lost:
+        print(f"  not kept: {sentence}")
 
 
 def check_label_output(path: Path, *, replace: bool) -> None:

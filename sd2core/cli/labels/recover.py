@@ -35,7 +35,7 @@ def add_recover(kinds: argparse._SubParsersAction) -> None:
         type=Path,
         nargs="?",
         metavar="REC",
-        help="what was labelled: a recording, or the video that was not saved as one yet",
+        help="the labelled recording, or a video that was not saved as one yet",
     )
     parser.add_argument(
         "--out", type=Path, metavar="FILE.json", help="write the newest of REC, for `convert`"

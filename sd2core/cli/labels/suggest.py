@@ -7,7 +7,13 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sd2core.cli.labels.reading import add_replace, check_label_output, recording_clock, write
+from sd2core.cli.labels.reading import (
+    add_replace,
+    check_label_output,
+    print_lost,
+    recording_clock,
+    write,
+)
 from sd2core.cli.options import add_command, add_json, not_negative_float
 from sd2core.cli.output import counted, print_json, print_rows
 from sd2core.cli.recording_maps import MapName, maps_of
@@ -20,8 +26,8 @@ if TYPE_CHECKING:
     from sd2core.timebase import Timebase
 
 _HELP = {
-    "high_db": ("DB", "energy over the quiet level that a span reaches somewhere (default: 8)"),
-    "low_db": ("DB", "energy that it does not fall below (default: 5)"),
+    "high_db": ("DB", "energy over the quiet level that the peak of a span reaches (default: 8)"),
+    "low_db": ("DB", "energy that a span never falls below (default: 5)"),
     "min_duration_s": ("S", "least duration, without margins (default: 0.2)"),
     "merge_gap_s": ("S", "quiet stretches up to this do not end a span (default: 0.1)"),
     "margin_s": ("S", "added on both sides (default: 0.3)"),
@@ -62,7 +68,7 @@ def add_suggest(kinds: argparse._SubParsersAction) -> None:
         parser.add_argument(
             f"--{name.replace('_', '-')}", type=not_negative_float, metavar=metavar, help=text
         )
-    parser.add_argument("--label", default="gesture", help="what to call them (default: gesture)")
+    parser.add_argument("--label", default="gesture", help="label of the spans (default: gesture)")
     add_json(parser)
 
 
@@ -129,16 +135,15 @@ def _suggest(options: argparse.Namespace) -> None:
         print(f"The loudest frame is {loudest_db:.1f} dB over the quiet level.")
     if options.out is not None:
         print(f"Wrote {options.out}")
-    for sentence in lost:
-        print(f"  not kept: {sentence}")
+    print_lost(lost)
 
 
 def map_and_clock(
     options: argparse.Namespace, axis: VelocityAxis | None = None
 ) -> tuple[DopplerMap, Timebase]:
-    """The map that ``options.map`` and ``options.of`` name, and the clock of its labels.
+    """Read the map of ``options.map`` and ``options.of``, and the frame times of its labels.
 
-    A recording's capture becomes a map on the axis, or on one of its own.
+    A recording's capture becomes a map on the velocity axis given, or on its own.
     """
     from sd2core.io.kinds import kind_of
     from sd2core.io.radar import holds_map, load_recorded_map
@@ -166,6 +171,6 @@ def map_and_clock(
 
 
 def _map_of(recording: Recording, which: MapName | None, axis: VelocityAxis | None) -> DopplerMap:
-    """The synthetic map where there is a mesh, else the radar's, or the one asked for."""
+    """Map asked for; otherwise the synthetic one where there is a mesh, else the radar's."""
     name = which or ("radar" if recording.mesh is None else "synthetic")
     return maps_of(recording, (name,), axis=axis)[name]

@@ -8,25 +8,25 @@ are half-open here and in every file: an end is the first instant after the span
 
 from __future__ import annotations
 
+import re
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from sd2core.errors import Sd2Error
+from sd2core.labels import files
 from sd2core.labels.formats import (
     audacity,
     boris,
-    boris_reading,
     csv_table,
     elan,
     elan_reading,
     mne_annotations,
-    own,
     textgrid,
 )
 from sd2core.labels.formats.losses import ASPECTS, Aspect, LabelFormat, Loss, sentences
-from sd2core.labels.formats.recognition import format_of_text
+from sd2core.labels.formats.texts import read_text
 from sd2core.labels.spans import Labels
 from sd2core.timebase import Timebase
 
@@ -46,22 +46,47 @@ __all__ = [
 
 @dataclass(frozen=True)
 class _Program:
-    """How a format is read and written."""
+    """Reader and writer of a format."""
 
     about: LabelFormat
     read: Callable[[Path, Timebase | None, str | None], Labels]
     write: Callable[[Path, Labels, Timebase, Path | None], list[Loss]]
 
 
+OWN = LabelFormat(
+    name="sd2",
+    title="SD² Studio",
+    suffixes=(".json",),
+    made_for="SD² Studio",
+    keeps=frozenset(ASPECTS),
+)
+
+_TIME = r"\s*[-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?\s*"
+_AUDACITY = re.compile(rf"{_TIME}\t{_TIME}(?:\t.*)?")
+_MNE = re.compile(rf"{_TIME},{_TIME},[^,]*(?:,[^,]*)?")
+_EXPECTED_TEXT = "labels of Audacity, MNE, Praat, or a table with a heading"
+
+
+def _write_own(
+    path: Path, labels: Labels, timebase: Timebase, media: Path | None = None
+) -> list[Loss]:
+    files.write_labels(path, labels, timebase=timebase, video=media)
+    return []
+
+
+def _read_own(path: Path, timebase: Timebase | None, observation: str | None) -> Labels:
+    return files.read_labels(path).labels
+
+
 _PROGRAMS = {
     program.about.name: program
     for program in (
-        _Program(own.FORMAT, own.read, own.write),
+        _Program(OWN, _read_own, _write_own),
         _Program(csv_table.FORMAT, csv_table.read, csv_table.write),
         _Program(audacity.FORMAT, audacity.read, audacity.write),
         _Program(elan.FORMAT, elan_reading.read, elan.write),
         _Program(textgrid.FORMAT, textgrid.read, textgrid.write),
-        _Program(boris.FORMAT, boris_reading.read, boris.write),
+        _Program(boris.FORMAT, boris.read, boris.write),
         _Program(mne_annotations.FORMAT, mne_annotations.read, mne_annotations.write),
     )
 }
@@ -147,7 +172,7 @@ def write_labels(
 def would_lose(
     labels: Labels, timebase: Timebase, format: str, *, media: Path | str | None = None
 ) -> list[Loss]:
-    """What a file of that format would not hold as it was, without a file being left.
+    """Return what a file of a format would not hold, without leaving a file.
 
     Raises
     ------
@@ -160,7 +185,7 @@ def would_lose(
 
 
 def format_for(path: Path, *, writing: bool) -> LabelFormat:
-    """Which format a file has by its name, or by its content when it is read.
+    """Find the format of a file by its name, or by its content when it is read.
 
     Raises
     ------
@@ -179,7 +204,7 @@ def format_for(path: Path, *, writing: bool) -> LabelFormat:
     if len(fitting) == 1:
         return fitting[0]
     if not writing:
-        return _named(format_of_text(path))
+        return _named(_format_of_text(path))
     titles = " or ".join(one.title for one in fitting)
     raise Sd2Error(
         f"{path} could be a file for {titles}", "a format that is certain", "Name the format"
@@ -190,3 +215,22 @@ def _named(name: str) -> LabelFormat:
     if name not in _PROGRAMS:
         raise Sd2Error(f"A label format {name!r} is not known", f"one of {', '.join(_PROGRAMS)}")
     return _PROGRAMS[name].about
+
+
+def _format_of_text(path: Path) -> str:
+    """Name of the format that a text file has by its first line."""
+    lines = (line for line in read_text(path, _EXPECTED_TEXT).splitlines() if line.strip())
+    first = next(lines)
+    if "ooTextFile" in first or "ooBinaryFile" in first:
+        return "textgrid"
+    if first.startswith("#"):
+        return "mne"
+    if _AUDACITY.fullmatch(first):
+        return "audacity"
+    if _MNE.fullmatch(first):
+        return "mne"
+    if any(separator in first for separator in ",;\t|"):
+        return "csv"
+    raise Sd2Error(
+        f"{path} begins with {first[:100]!r}", _EXPECTED_TEXT, "Check the file, or name its format"
+    )

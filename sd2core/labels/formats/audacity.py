@@ -23,7 +23,7 @@ FORMAT = LabelFormat(
     suffixes=(".txt",),
     made_for="Audacity 2 and 3, labels of one label track",
     keeps=frozenset(),
-    remark="Frequencies of spectral labels are read over.",
+    remark="Frequencies of spectral labels are ignored.",
 )
 
 _EXPECTED = "an Audacity label file: start, end and text in each line, separated by tabs"

@@ -1,4 +1,4 @@
-"""Projects of BORIS (.boris), format 7.0: an ethogram and one observation of state events.
+"""Projects of BORIS (.boris), format 7.0: an ethogram and observations of state events.
 
 Source: BORIS user guide, and projects saved by BORIS 7 to 9. A span is a START and a STOP of the
 same subject and behaviour, in that order; the subject is the track, the behaviour the label. Its
@@ -15,13 +15,14 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.paths import plain_path, stored_path
-from sd2core.labels.formats.boris_reading import DETAILS, LABEL_SET
-from sd2core.labels.formats.lanes import Lane, lanes_of
-from sd2core.labels.formats.losses import ASPECTS, LabelFormat, Loss, losses_by_format
-from sd2core.labels.label_set import Label
-from sd2core.labels.spans import Labels, Span
+from sd2core.labels.formats.losses import ASPECTS, LabelFormat, Loss, counted, losses_by_format
+from sd2core.labels.formats.rows import Lane, Row, assemble, clean_name, edges_s, lanes_of, track_of
+from sd2core.labels.formats.texts import read_text
+from sd2core.labels.label_set import GESTURES, Label, LabelSet
+from sd2core.labels.spans import Labels, Overlap, Span
 from sd2core.timebase import Timebase
 
 FORMAT = LabelFormat(
@@ -36,6 +37,14 @@ FORMAT = LabelFormat(
 _GREY = "#999999"
 _PLAYERS = 8
 
+_DETAILS = "sd2 "
+"""Prefix of the comment of a STOP that holds id, author, confidence and origin."""
+
+_LABEL_SET = "sd2_label_set"
+
+_EXPECTED = "a BORIS project (.boris) with observations"
+_NO_SUBJECT = "No focal subject"
+
 
 def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = None) -> list[Loss]:
     """Write a project with one observation, called like the file; what it cannot hold is returned.
@@ -46,7 +55,7 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
         The video; without one it is a live observation.
     """
     now = datetime.now().isoformat(timespec="seconds")
-    lanes = lanes_of(labels, _edges)
+    lanes = lanes_of(labels, edges_s)
     behaviours = _behaviours(labels)
     categories = sorted({one.gesture_class for one in behaviours if one.gesture_class})
     project = {
@@ -82,7 +91,7 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
         "behaviors_coding_map": [],
         "converters": {},
         "observations": {path.stem: _observation(path, lanes, timebase, media, now)},
-        LABEL_SET: {
+        _LABEL_SET: {
             "name": labels.label_set.name,
             "labels": [one.name for one in labels.label_set.labels],
         },
@@ -91,8 +100,189 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
     return losses_by_format(labels, FORMAT) + _unwelcome(labels)
 
 
-def _edges(span: Span) -> tuple[float, float]:
-    return span.start_s, span.end_s
+def read(path: Path, timebase: Timebase | None = None, observation: str | None = None) -> Labels:
+    """Read the state events of one observation; point events become one frame each.
+
+    Parameters
+    ----------
+    observation : str, optional
+        Its id; needed when the project has several.
+
+    Raises
+    ------
+    Sd2Error
+        When the file is no project, the observation is not certain, or a state that has begun
+        does not end.
+    """
+    project = _project(path)
+    name = _chosen(path, project["observations"], observation)
+    content = project["observations"][name]
+    events = content.get("events") if isinstance(content, dict) else None
+    if not isinstance(events, list):
+        raise Sd2Error(f"The observation {name!r} in {path} has no events", _EXPECTED)
+    behaviours = [one for one in _entries(project, "behaviors_conf") if isinstance(one, dict)]
+    points = {
+        str(one.get("code")) for one in behaviours if "point" in str(one.get("type")).casefold()
+    }
+    rows = _rows(path, events, points)
+    subjects = [str(one.get("name", "")) for one in _entries(project, "subjects_conf")]
+    used = {row.track for row in rows}
+    ours = _LABEL_SET in project
+    tracks: list[tuple[str, Overlap | None]] = []
+    for subject in subjects:
+        track, overlap = track_of(subject)
+        if ours or track in used:
+            tracks.append((track, overlap))
+    label_set = _label_set(project.get(_LABEL_SET), behaviours)
+    return assemble(path, rows, tracks=tracks, label_set=label_set, timebase=timebase)
+
+
+def _project(path: Path) -> dict[str, Any]:
+    text = read_text(path, _EXPECTED)
+    try:
+        project = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise Sd2Error(
+            f"{path} is not whole JSON: {error}", _EXPECTED, "Copy it again, or save it in BORIS"
+        ) from None
+    if not isinstance(project, dict) or not isinstance(project.get("observations"), dict):
+        raise Sd2Error(f"{path} is JSON without observations", _EXPECTED)
+    return project
+
+
+def _entries(project: dict[str, Any], key: str) -> list[Any]:
+    found = project.get(key)
+    entries = list(found.values()) if isinstance(found, dict) else []
+    return [one for one in entries if isinstance(one, dict)]
+
+
+def observations(path: Path) -> tuple[str, ...]:
+    """The ids of the observations of a project; there may be several, one per video.
+
+    Raises
+    ------
+    Sd2Error
+        When the file is no project.
+    """
+    return tuple(_project(path)["observations"])
+
+
+def _chosen(path: Path, observations: dict[str, Any], wanted: str | None) -> str:
+    if wanted is not None and wanted in observations:
+        return wanted
+    if wanted is None and len(observations) == 1:
+        return next(iter(observations))
+    names = ", ".join(map(repr, list(observations)[:20])) or "none"
+    raise Sd2Error(
+        f"{path} has {len(observations)} observations: {names}",
+        "one observation" if wanted is None else f"the observation {wanted!r}",
+        "Name the one to read",
+    )
+
+
+def _rows(path: Path, events: list[Any], points: set[str]) -> list[Row]:
+    """Spans of events: each second one of a subject, behaviour and modifiers is a stop."""
+    rows: list[Row] = []
+    begun: dict[tuple[str, str, str], tuple[float, str]] = {}
+    for number, event in enumerate(events, start=1):
+        place = f"event {number}"
+        time_s, subject, code, modifiers, comment = _event(path, place, event)
+        track = track_of(subject or _NO_SUBJECT)[0]
+        key = (subject, code, modifiers)
+        if code in points:
+            rows.append(Row(place, time_s, time_s, code, track, _note(modifiers, comment, "")))
+        elif key not in begun:
+            begun[key] = (time_s, comment)
+        else:
+            start_s, first = begun.pop(key)
+            rows.append(_span(place, start_s, time_s, code, track, modifiers, first, comment))
+    if begun:
+        (subject, code, _), (time_s, _) = next(iter(begun.items()))
+        raise Sd2Error(
+            f"{path}: {code!r} of {subject or _NO_SUBJECT!r} begins at {time_s:g} s and does not "
+            "end",
+            "a stop for every start",
+            "Mend it in BORIS: Observations, Fix unpaired events",
+        )
+    return rows
+
+
+def _event(path: Path, place: str, event: Any) -> tuple[float, str, str, str, str]:
+    if not isinstance(event, list) or len(event) < 3 or isinstance(event[0], bool):
+        raise Sd2Error(f"{path}, {place} is {str(event)[:100]!r}", "time, subject and behaviour")
+    time_s = event[0] if isinstance(event[0], int | float) else math.nan
+    if not abs(time_s) < 1e15:
+        raise Sd2Error(f"{path}, {place}: the time is {str(event[0])[:50]!r}", "seconds")
+    subject, code, modifiers, comment = (
+        "" if one is None else str(one) for one in (*event[1:5], *[""] * (5 - len(event)))
+    )
+    return float(time_s), subject, code, modifiers, comment
+
+
+def _span(
+    place: str,
+    start_s: float,
+    end_s: float,
+    code: str,
+    track: str,
+    modifiers: str,
+    first: str,
+    second: str,
+) -> Row:
+    kept = _parsed_details(second)
+    if kept is None:
+        return Row(place, start_s, end_s, code, track, _note(modifiers, first, second))
+    known = kept.get("confidence")
+    number = kept.get("id")
+    return Row(
+        place,
+        start_s,
+        end_s,
+        code,
+        track,
+        _note(modifiers, first, ""),
+        str(kept.get("author", "")),
+        float(known) if isinstance(known, int | float) else None,
+        str(kept.get("origin", "import")),
+        number if isinstance(number, int) and not isinstance(number, bool) else None,
+    )
+
+
+def _parsed_details(comment: str) -> dict[str, Any] | None:
+    if not comment.startswith(_DETAILS):
+        return None
+    try:
+        kept = json.loads(comment[len(_DETAILS) :])
+    except (ValueError, RecursionError):
+        return None
+    return kept if isinstance(kept, dict) else None
+
+
+def _note(modifiers: str, first: str, second: str) -> str:
+    return "\n".join(text for text in (modifiers, first, second) if text)
+
+
+def _label_set(kept: Any, behaviours: list[dict[str, Any]]) -> LabelSet:
+    """The ethogram; of a project that this program wrote, without what was only used."""
+    ours = isinstance(kept, dict) and isinstance(kept.get("labels"), list)
+    if not behaviours and not ours:
+        return GESTURES
+    labels: dict[str, Label] = {}
+    keys: set[str] = set()
+    for one in behaviours:
+        code = str(one.get("code", ""))
+        name = clean_name(code)
+        if name in labels or (ours and code not in kept["labels"]):
+            continue
+        key = str(one.get("key") or "")
+        key = key if len(key) == 1 and not key.isspace() and key.casefold() not in keys else ""
+        keys.add(key.casefold())
+        category = str(one.get("category") or "")
+        try:
+            labels[name] = Label(name, str(one.get("color") or ""), key, category)
+        except Sd2Error:  # BORIS' colours may be names, or absent
+            labels[name] = Label(name, "#999999", key, category)
+    return LabelSet(str(kept.get("name", "")) if ours else "BORIS", tuple(labels.values()))
 
 
 def _behaviours(labels: Labels) -> list[Label]:
@@ -147,7 +337,7 @@ def _events(lanes: Sequence[Lane], timebase: Timebase, *, frames: bool) -> list[
         for span in lane.spans:
             for side, time_s, comment in (
                 (1, float(span.start_s), span.note),
-                (0, float(span.end_s), _details(span)),
+                (0, float(span.end_s), _stop_comment(span)),
             ):
                 event = [time_s, lane.name, span.label, "", comment]
                 if frames:
@@ -156,7 +346,7 @@ def _events(lanes: Sequence[Lane], timebase: Timebase, *, frames: bool) -> list[
     return [event for _, event in sorted(found, key=lambda one: one[0])]
 
 
-def _details(span: Span) -> str:
+def _stop_comment(span: Span) -> str:
     kept: dict[str, Any] = {"id": span.id}
     if span.author:
         kept["author"] = span.author
@@ -164,11 +354,11 @@ def _details(span: Span) -> str:
         kept["confidence"] = float(span.confidence)
     if span.origin != "import":
         kept["origin"] = span.origin
-    return DETAILS + json.dumps(kept)
+    return _DETAILS + json.dumps(kept)
 
 
 def _unwelcome(labels: Labels) -> list[Loss]:
-    """What the file holds, but BORIS asks about or changes."""
+    """Losses that occur only when BORIS opens or edits the file."""
     losses: list[Loss] = []
     names = {*(span.label for span in labels.spans), *(track.name for track in labels.tracks)}
     barred = sorted(name for name in names if "|" in name or name != name.strip())
@@ -176,9 +366,11 @@ def _unwelcome(labels: Labels) -> list[Loss]:
         words = f"BORIS wants names without bars and without spaces at their ends: {barred[0]!r}"
         words += f" and {len(barred) - 1} more" if len(barred) > 1 else ""
         losses.append(Loss("characters", len(barred), f"{words} may be refused when edited there"))
-    edges_ms = [edge_s * 1000 for span in labels.spans for edge_s in _edges(span)]
+    edges_ms = [edge_s * 1000 for span in labels.spans for edge_s in edges_s(span)]
     count = sum(not math.isclose(edge, round(edge), abs_tol=1e-6) for edge in edges_ms)
     if count:
-        words = f"BORIS counts whole milliseconds: {count} edge{'s' * (count > 1)} will move by up "
-        losses.append(Loss("times", count, words + "to 0.5 ms when it opens the file"))
+        words = (
+            f"BORIS counts whole milliseconds: {counted(count, 'edge')} will move by up to 0.5 ms"
+        )
+        losses.append(Loss("times", count, f"{words} when it opens the file"))
     return losses

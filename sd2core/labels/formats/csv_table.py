@@ -24,15 +24,14 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.labels.formats.losses import (
     ASPECTS,
-    DEFAULT_TRACK,
     LabelFormat,
     Loss,
     hold_texts,
     losses_by_format,
 )
-from sd2core.labels.formats.rows import UNNAMED, Row, assemble, clean_name
+from sd2core.labels.formats.rows import UNNAMED, TableRows, assemble
 from sd2core.labels.formats.texts import read_text, whole_number
-from sd2core.labels.spans import OVERLAPS, Labels, Overlap
+from sd2core.labels.spans import Labels
 from sd2core.timebase import Timebase
 
 FORMAT = LabelFormat(
@@ -119,31 +118,14 @@ def read(path: Path, timebase: Timebase | None = None, observation: str | None =
     if "observation" in where:
         lines = _of_observation(path, lines, where["observation"], observation)
     numbers = _Numbers(path, lines, where)
-    found: list[Row] = []
-    overlaps: dict[str, Overlap | None] = {}
+    table = TableRows()
     for line, cells in lines:
         cell = {name: cells[index] for name, index in where.items()}
-        start_s, end_s = _edges(path, line, numbers, cell, timebase)
-        track = cell.get("track") or DEFAULT_TRACK
-        stated = next((one for one in OVERLAPS if one == cell.get("overlap")), None)
-        overlaps[clean_name(track)] = stated
-        found.append(
-            Row(
-                f"line {line}",
-                start_s,
-                end_s,
-                cell["label"] or UNNAMED,
-                track,
-                cell.get("note", ""),
-                cell.get("author", ""),
-                numbers.of(line, "confidence", cell["confidence"])
-                if cell.get("confidence")
-                else None,
-                cell.get("origin", ""),
-                whole_number(cell.get("id", "")),
-            )
-        )
-    return assemble(path, found, tracks=overlaps.items(), timebase=timebase)
+        edges_s = _edges_s(path, line, numbers, cell, timebase)
+        known = cell.get("confidence")
+        confidence = numbers.of(line, "confidence", known) if known else None
+        table.add(line, edges_s, cell["label"] or UNNAMED, confidence, cell)
+    return assemble(path, table.rows, tracks=table.tracks.items(), timebase=timebase)
 
 
 def _table(path: Path, text: str) -> tuple[list[str], list[tuple[int, list[str]]]]:
@@ -279,7 +261,7 @@ class _Numbers:
         return value
 
 
-def _edges(
+def _edges_s(
     path: Path, line: int, numbers: _Numbers, cell: dict[str, str], timebase: Timebase | None
 ) -> tuple[float, float]:
     if "start_s" in cell and "end_s" in cell:

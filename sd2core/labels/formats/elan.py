@@ -12,10 +12,12 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from datetime import datetime
+from itertools import count
 from pathlib import Path
 from urllib.parse import quote
-from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
@@ -27,14 +29,15 @@ from sd2core.labels.formats.elan_reading import (
     VOCABULARY_LANGUAGE,
     vocabulary_id,
 )
-from sd2core.labels.formats.lanes import Lane, lanes_of
 from sd2core.labels.formats.losses import (
     ASPECTS,
     LabelFormat,
     Loss,
+    counted,
     hold_texts,
     losses_by_format,
 )
+from sd2core.labels.formats.rows import Lane, edges_s, lanes_of
 from sd2core.labels.label_set import LabelSet
 from sd2core.labels.spans import Labels, Span
 from sd2core.timebase import Timebase
@@ -84,7 +87,7 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
     """
     held, replaced = hold_texts(labels, _BANNED, FORMAT.title)
     held, moved = _in_range(path, held)
-    document = ElementTree.Element(
+    document = Element(
         "ANNOTATION_DOCUMENT",
         {
             "AUTHOR": _common(span.author for span in held.spans),
@@ -107,8 +110,8 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
     entries = {one.name: f"cve{number}" for number, one in enumerate(held.label_set.labels)}
     _tiers(document, lanes, slots, entries, details, last)
     _types(document, held.label_set)
-    ElementTree.indent(document)
-    text = ElementTree.tostring(document, encoding="unicode")
+    indent(document)
+    text = tostring(document, encoding="unicode")
     # A bare carriage return would be read as a new line.
     content = '<?xml version="1.0" encoding="UTF-8"?>\n' + text.replace("\r", "&#13;") + "\n"
     with atomic_write(path) as stream:
@@ -135,53 +138,39 @@ def _in_range(path: Path, labels: Labels) -> tuple[Labels, list[Loss]]:
     kept = tuple(span for span in labels.spans if edges_ms(span)[1] > 0 and span.end_s > 0)
     gone = len(labels.spans) - len(kept)
     if gone:
-        words = f"ELAN has no times before 0: {gone} earlier span{'s' * (gone > 1)} left out"
+        words = f"ELAN has no times before 0: {counted(gone, 'earlier span')} left out"
         losses.append(Loss("spans", gone, words))
-    spans = tuple(
-        span
-        if span.start_s >= 0
-        else Span(
-            *(span.id, span.track, 0.0, span.end_s, span.label),
-            *(span.note, span.author, span.confidence, span.origin),
-        )
-        for span in kept
-    )
+    spans = tuple(span if span.start_s >= 0 else replace(span, start_s=0.0) for span in kept)
     cut = sum(a != b for a, b in zip(spans, kept, strict=True))
     if cut:
-        words = f"ELAN has no times before 0: {cut} span{'s' * (cut > 1)} cut there"
+        words = f"ELAN has no times before 0: {counted(cut, 'span')} cut there"
         losses.append(Loss("times", cut, words))
     off_ms = [
-        max(abs(ms - s * 1000) for ms, s in zip(edges_ms(span), _seconds(span), strict=True))
+        max(abs(ms - s * 1000) for ms, s in zip(edges_ms(span), edges_s(span), strict=True))
         for span in spans
     ]
     moved = [off for off in off_ms if off > 1e-6]
     if moved:
-        words = f"ELAN counts whole milliseconds: edges of {len(moved)} "
-        words += f"span{'s' * (len(moved) > 1)} moved by up to {max(moved):.2g} ms"
+        words = f"ELAN counts whole milliseconds: edges of {counted(len(moved), 'span')} moved by "
+        words += f"up to {max(moved):.2g} ms"
         losses.append(Loss("times", len(moved), words))
-    return Labels(labels.tracks, spans, labels.label_set), losses
-
-
-def _seconds(span: Span) -> tuple[float, float]:
-    return span.start_s, span.end_s
+    return replace(labels, spans=spans), losses
 
 
 def _header(
-    document: ElementTree.Element,
+    document: Element,
     path: Path,
     media: Path | None,
     label_set: LabelSet,
     last_id: int,
 ) -> None:
-    header = ElementTree.SubElement(
-        document, "HEADER", {"MEDIA_FILE": "", "TIME_UNITS": "milliseconds"}
-    )
+    header = SubElement(document, "HEADER", {"MEDIA_FILE": "", "TIME_UNITS": "milliseconds"})
     if media is not None:
         here = plain_path(path).parent
         relative = stored_path(plain_path(media), here)
         if not relative.startswith((".", "/")):
             relative = f"./{relative}"
-        ElementTree.SubElement(
+        SubElement(
             header,
             "MEDIA_DESCRIPTOR",
             {
@@ -190,9 +179,9 @@ def _header(
                 "RELATIVE_MEDIA_URL": quote(relative),
             },
         )
-    used = ElementTree.SubElement(header, "PROPERTY", {"NAME": "lastUsedAnnotationId"})
+    used = SubElement(header, "PROPERTY", {"NAME": "lastUsedAnnotationId"})
     used.text = str(last_id)
-    shown = ElementTree.SubElement(header, "PROPERTY", {"NAME": PROPERTY})
+    shown = SubElement(header, "PROPERTY", {"NAME": PROPERTY})
     shown.text = json.dumps(
         {
             "label_set": label_set.name,
@@ -201,9 +190,9 @@ def _header(
     )
 
 
-def _time_order(document: ElementTree.Element, lanes: list[Lane]) -> dict[int, tuple[str, str]]:
+def _time_order(document: Element, lanes: list[Lane]) -> dict[int, tuple[str, str]]:
     """Two slots of its own for every span, in the order of time; their names by id."""
-    order = ElementTree.SubElement(document, "TIME_ORDER")
+    order = SubElement(document, "TIME_ORDER")
     edges = sorted(
         (edge_ms, side, span.id)
         for lane in lanes
@@ -213,30 +202,28 @@ def _time_order(document: ElementTree.Element, lanes: list[Lane]) -> dict[int, t
     names: dict[tuple[int, int], str] = {}
     for number, (edge_ms, side, span_id) in enumerate(edges, start=1):
         names[span_id, side] = f"ts{number}"
-        ElementTree.SubElement(
-            order, "TIME_SLOT", {"TIME_SLOT_ID": f"ts{number}", "TIME_VALUE": str(edge_ms)}
-        )
+        SubElement(order, "TIME_SLOT", {"TIME_SLOT_ID": f"ts{number}", "TIME_VALUE": str(edge_ms)})
     return {
         span.id: (names[span.id, 0], names[span.id, 1]) for lane in lanes for span in lane.spans
     }
 
 
 def _tiers(
-    document: ElementTree.Element,
+    document: Element,
     lanes: list[Lane],
     slots: dict[int, tuple[str, str]],
     entries: dict[str, str],
     details: list[tuple[str, Callable[[Span], str]]],
     last_id: int,
 ) -> None:
-    numbers = _numbers(last_id + 1)
+    numbers = count(last_id + 1)
     taken = {lane.name for lane in lanes}
     for lane in lanes:
         attributes = {"LINGUISTIC_TYPE_REF": LABELS, "TIER_ID": lane.name}
         author = _common(span.author for span in lane.spans)
         if author:
             attributes["ANNOTATOR"] = author
-        tier = ElementTree.SubElement(document, "TIER", attributes)
+        tier = SubElement(document, "TIER", attributes)
         for span in lane.spans:
             first, second = slots[span.id]
             # The entry of the vocabulary, so that renaming it in ELAN renames the annotation.
@@ -255,7 +242,7 @@ def _tiers(
             while name in taken:
                 name += "'"
             taken.add(name)
-            below = ElementTree.SubElement(
+            below = SubElement(
                 document,
                 "TIER",
                 {"LINGUISTIC_TYPE_REF": DETAILS[kind], "PARENT_REF": lane.name, "TIER_ID": name},
@@ -271,15 +258,15 @@ def _tiers(
                     )
 
 
-def _annotation(tier: ElementTree.Element, kind: str, value: str, **attributes: str) -> None:
-    outer = ElementTree.SubElement(tier, "ANNOTATION")
-    inner = ElementTree.SubElement(outer, kind, attributes)
-    ElementTree.SubElement(inner, "ANNOTATION_VALUE").text = value
+def _annotation(tier: Element, kind: str, value: str, **attributes: str) -> None:
+    outer = SubElement(tier, "ANNOTATION")
+    inner = SubElement(outer, kind, attributes)
+    SubElement(inner, "ANNOTATION_VALUE").text = value
 
 
-def _types(document: ElementTree.Element, label_set: LabelSet) -> None:
+def _types(document: Element, label_set: LabelSet) -> None:
     """Types of tiers, and the labels as vocabulary, in the order of the schema."""
-    ElementTree.SubElement(
+    SubElement(
         document,
         "LINGUISTIC_TYPE",
         {
@@ -290,7 +277,7 @@ def _types(document: ElementTree.Element, label_set: LabelSet) -> None:
         },
     )
     for name in DETAILS.values():
-        ElementTree.SubElement(
+        SubElement(
             document,
             "LINGUISTIC_TYPE",
             {
@@ -301,7 +288,7 @@ def _types(document: ElementTree.Element, label_set: LabelSet) -> None:
             },
         )
     language = VOCABULARY_LANGUAGE
-    ElementTree.SubElement(
+    SubElement(
         document,
         "LANGUAGE",
         {
@@ -311,19 +298,15 @@ def _types(document: ElementTree.Element, label_set: LabelSet) -> None:
         },
     )
     for stereotype, description in _CONSTRAINTS.items():
-        ElementTree.SubElement(
-            document, "CONSTRAINT", {"DESCRIPTION": description, "STEREOTYPE": stereotype}
-        )
-    vocabulary = ElementTree.SubElement(
+        SubElement(document, "CONSTRAINT", {"DESCRIPTION": description, "STEREOTYPE": stereotype})
+    vocabulary = SubElement(
         document, "CONTROLLED_VOCABULARY", {"CV_ID": vocabulary_id(label_set.name)}
     )
-    ElementTree.SubElement(vocabulary, "DESCRIPTION", {"LANG_REF": language})
+    SubElement(vocabulary, "DESCRIPTION", {"LANG_REF": language})
     for number, label in enumerate(label_set.labels):
-        entry = ElementTree.SubElement(vocabulary, "CV_ENTRY_ML", {"CVE_ID": f"cve{number}"})
+        entry = SubElement(vocabulary, "CV_ENTRY_ML", {"CVE_ID": f"cve{number}"})
         meaning = _BANNED.sub("\N{REPLACEMENT CHARACTER}", label.gesture_class)
-        value = ElementTree.SubElement(
-            entry, "CVE_VALUE", {"DESCRIPTION": meaning, "LANG_REF": language}
-        )
+        value = SubElement(entry, "CVE_VALUE", {"DESCRIPTION": meaning, "LANG_REF": language})
         value.text = label.name
 
 
@@ -331,12 +314,6 @@ def _common(texts: Iterator[str]) -> str:
     """The one text that all of them are, or nothing."""
     different = set(texts)
     return different.pop() if len(different) == 1 else ""
-
-
-def _numbers(first: int) -> Iterator[int]:
-    while True:
-        yield first
-        first += 1
 
 
 _DETAIL_TEXTS: dict[str, Callable[[Span], str]] = {

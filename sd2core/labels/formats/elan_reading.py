@@ -1,4 +1,4 @@
-"""ELAN annotation files into labels, those of this program and others."""
+"""Reader of ELAN annotation files, those of this program and others."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import fromstring
 
 from sd2core.errors import Sd2Error
-from sd2core.labels.formats.lanes import track_of
-from sd2core.labels.formats.rows import Row, assemble, clean_name
+from sd2core.labels.formats.rows import Row, assemble, clean_name, track_of
 from sd2core.labels.formats.texts import read_content, whole_number
 from sd2core.labels.label_set import GESTURES, Label, LabelSet
 from sd2core.labels.spans import Labels
@@ -31,7 +30,7 @@ VOCABULARY_LANGUAGE = "und"
 
 
 def vocabulary_id(name: str) -> str:
-    """What a label set is called as a vocabulary: one line, and not nothing."""
+    """Return the id of a label set as a vocabulary: one line, not empty."""
     return clean_name(name)
 
 
@@ -122,7 +121,7 @@ def _slots(path: Path, document: Element) -> dict[str, int]:
 
 
 def _time_origin_s(document: Element) -> float:
-    """Where in the linked video ELAN's zero lies."""
+    """Time in the linked video of ELAN's zero."""
     media = document.find("HEADER/MEDIA_DESCRIPTOR")
     text = "" if media is None else media.get("TIME_ORIGIN", "")
     return int(text) / 1000 if re.fullmatch(r"-?\d{1,18}", text) else 0.0

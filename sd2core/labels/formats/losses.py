@@ -1,4 +1,4 @@
-"""What a format can hold, and what of given labels is left out for that reason."""
+"""Capabilities of label formats, and the losses of writing given labels to them."""
 
 from __future__ import annotations
 
@@ -27,24 +27,24 @@ DEFAULT_TRACK = "Gestures"
 
 @dataclass(frozen=True)
 class LabelFormat:
-    """A kind of label file, as data.
+    """Description of a label format.
 
     Parameters
     ----------
     name : str
-        What it is called in code and on the command line.
+        Name in code and on the command line.
     title : str
-        What it is called to people.
+        Name on screen.
     suffixes : tuple of str
         Lower case, with the dot; the first is the usual one.
     made_for : str
         Programs that open it, with the version of the format.
     keeps : frozenset of Aspect
-        What it holds besides start, end and label of each span.
+        Aspects that it holds besides start, end and label of each span.
     resolution_s : float
-        Step between times that it tells apart; 0 where they are kept exactly.
+        Smallest step between times; 0 where they are kept exactly.
     remark : str
-        What one has to know besides, as a sentence; may be empty.
+        A sentence on anything else to know; may be empty.
     """
 
     name: str
@@ -58,16 +58,16 @@ class LabelFormat:
 
 @dataclass(frozen=True)
 class Loss:
-    """Something of the labels that is not in the file as it was.
+    """Loss of a part of the labels in a file.
 
     Parameters
     ----------
     what : str
         An :data:`Aspect`, or ``"times"``, ``"characters"`` or ``"spans"``.
     count : int
-        How many spans, tracks or sets it concerns.
+        Number of spans, tracks or sets concerned.
     sentence : str
-        The same for people.
+        The same for readers.
     """
 
     what: str
@@ -79,7 +79,7 @@ class Loss:
 
 
 def losses_by_format(labels: Labels, file_format: LabelFormat) -> list[Loss]:
-    """What of these labels a file of that format has no room for."""
+    """List the losses of these labels in a file of a format."""
     title = file_format.title
     found: list[Loss] = []
 
@@ -96,22 +96,26 @@ def losses_by_format(labels: Labels, file_format: LabelFormat) -> list[Loss]:
         leave_out("tracks", len(names), f"{title} keeps no tracks: {become}")
     if "tracks" in file_format.keeps and labels.tracks != (LabelTrack(DEFAULT_TRACK),):
         empty = sum(not labels.of_track(track.name) for track in labels.tracks)
-        words = f"{title} keeps no tracks without spans: {_of(empty, 'track')} left out"
+        words = f"{title} keeps no tracks without spans: {counted(empty, 'track')} left out"
         leave_out("empty tracks", empty, words)
     apart = sum(track.overlap == "free" for track in labels.tracks)
-    words = f"{title} does not say whether spans may overlap: {_of(apart, 'free track')}"
+    words = f"{title} does not say whether spans may overlap: {counted(apart, 'free track')}"
     leave_out("overlap", apart, f"{words} may come back as exclusive")
     count = sum(span.id != number for number, span in enumerate(labels.spans, start=1))
-    leave_out("ids", count, f"{title} keeps no numbers of spans: {_of(count, 'span')} renumbered")
+    leave_out(
+        "ids", count, f"{title} keeps no numbers of spans: {counted(count, 'span')} renumbered"
+    )
     count = spans_with(lambda span: bool(span.note))
-    leave_out("notes", count, f"{title} keeps no notes: {_of(count, 'note')} left out")
+    leave_out("notes", count, f"{title} keeps no notes: {counted(count, 'note')} left out")
     count = spans_with(lambda span: bool(span.author))
-    leave_out("authors", count, f"{title} keeps no authors: those of {_of(count, 'span')} left out")
+    leave_out(
+        "authors", count, f"{title} keeps no authors: those of {counted(count, 'span')} left out"
+    )
     count = spans_with(lambda span: span.confidence is not None)
-    words = f"{title} keeps no confidence: that of {_of(count, 'span')} left out"
+    words = f"{title} keeps no confidence: that of {counted(count, 'span')} left out"
     leave_out("confidence", count, words)
     count = spans_with(lambda span: span.origin != "import")
-    words = f"{title} does not say who made a span: {_of(count, 'span')} will count as imported"
+    words = f"{title} does not say who made a span: {counted(count, 'span')} will count as imported"
     leave_out("origin", count, words)
     if labels.label_set != GESTURES:
         name = labels.label_set.name
@@ -124,7 +128,7 @@ def losses_by_format(labels: Labels, file_format: LabelFormat) -> list[Loss]:
 
 
 def hold_texts(labels: Labels, banned: re.Pattern[str], title: str) -> tuple[Labels, list[Loss]]:
-    """Notes and authors without characters that a format cannot hold; names have none."""
+    """Replace characters in notes and authors that a format cannot hold; names have none."""
 
     def held(text: str) -> str:
         return banned.sub("\N{REPLACEMENT CHARACTER}", text)
@@ -135,16 +139,19 @@ def hold_texts(labels: Labels, banned: re.Pattern[str], title: str) -> tuple[Lab
     count = sum(a != b for a, b in zip(spans, labels.spans, strict=True))
     if not count:
         return labels, []
-    words = f"{title} cannot hold control characters: replaced in {_of(count, 'note or author')}"
+    words = (
+        f"{title} cannot hold control characters: replaced in {counted(count, 'note or author')}"
+    )
     return replace(labels, spans=spans), [Loss("characters", count, words)]
 
 
 def sentences(losses: Iterable[Loss]) -> str:
-    """One after the other, each with its full stop."""
+    """Join losses, each with its full stop."""
     return " ".join(f"{loss.sentence}." for loss in losses)
 
 
-def _of(count: int, what: str) -> str:
+def counted(count: int, what: str) -> str:
+    """Such as "3 spans", or "2 notes or authors" of "note or author"."""
     if count == 1:
         return f"1 {what}"
     return f"{count} " + " or ".join(f"{word}s" for word in what.split(" or "))

@@ -17,14 +17,14 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.labels.formats.losses import (
     ASPECTS,
-    DEFAULT_TRACK,
     LabelFormat,
     Loss,
+    counted,
     losses_by_format,
 )
-from sd2core.labels.formats.rows import Row, assemble, clean_name
-from sd2core.labels.formats.texts import positional, read_text, whole_number
-from sd2core.labels.spans import OVERLAPS, Labels, Overlap, Span
+from sd2core.labels.formats.rows import TableRows, assemble
+from sd2core.labels.formats.texts import positional, read_text
+from sd2core.labels.spans import Labels, Span
 from sd2core.timebase import Timebase
 
 FORMAT = LabelFormat(
@@ -80,8 +80,7 @@ def read(path: Path, timebase: Timebase | None = None, observation: str | None =
     heading = [line for line in lines if line.startswith("#")]
     decode = unquote_exactly if _ENCODED in heading else str
     columns = _columns(path, heading)
-    rows: list[Row] = []
-    overlaps: dict[str, Overlap | None] = {}
+    table = TableRows()
     for number, line in enumerate(lines, start=1):
         if line.startswith("#") or not line.strip():
             continue
@@ -97,25 +96,10 @@ def read(path: Path, timebase: Timebase | None = None, observation: str | None =
         cell = {name: decode(text) for name, text in zip(columns, cells, strict=True)}
         start_s = _number(path, number, "onset", cell["onset"])
         end_s = start_s + _number(path, number, "duration", cell["duration"])
-        track = cell.get("track") or DEFAULT_TRACK
-        stated = next((one for one in OVERLAPS if one == cell.get("overlap")), None)
-        overlaps[clean_name(track)] = stated
         known = cell.get("confidence", "").strip()
-        rows.append(
-            Row(
-                f"line {number}",
-                start_s,
-                end_s,
-                cell["description"],
-                track,
-                cell.get("note", ""),
-                cell.get("author", ""),
-                _number(path, number, "confidence", known) if known else None,
-                cell.get("origin", ""),
-                whole_number(cell.get("id", "")),
-            )
-        )
-    return assemble(path, rows, tracks=overlaps.items(), timebase=timebase)
+        confidence = _number(path, number, "confidence", known) if known else None
+        table.add(number, (start_s, end_s), cell["description"], confidence, cell)
+    return assemble(path, table.rows, tracks=table.tracks.items(), timebase=timebase)
 
 
 def unquote_exactly(text: str) -> str:
@@ -154,13 +138,14 @@ def _changed(labels: Labels) -> list[Loss]:
         for span in labels.spans
     )
     if count:
-        words = f"MNE's text files hold plain ASCII without commas: texts of {count} "
-        words += f"span{'s' * (count > 1)} are percent-encoded there"
-        losses.append(Loss("characters", count, words))
+        words = (
+            f"MNE's text files hold plain ASCII without commas: texts of {counted(count, 'span')}"
+        )
+        losses.append(Loss("characters", count, f"{words} are percent-encoded there"))
     off_s = [abs(span.start_s + _duration_s(span) - span.end_s) for span in labels.spans]
     moved = [off for off in off_s if off > FORMAT.resolution_s]
     if moved:
-        words = f"MNE keeps durations: ends of {len(moved)} span{'s' * (len(moved) > 1)} moved by "
+        words = f"MNE keeps durations: ends of {counted(len(moved), 'span')} moved by "
         losses.append(Loss("times", len(moved), words + f"up to {max(moved):.1g} s"))
     return losses
 

@@ -1,15 +1,24 @@
-"""What a reader found, line by line, made into labels."""
+"""Rows of label files: made into labels when read, and free of overlaps when written.
+
+Tiers of ELAN and Praat hold no two intervals at one instant, and BORIS pairs the start and the
+stop of a behaviour by its subject. A free track therefore becomes the rows ``NAME [overlap 1]``,
+``NAME [overlap 2]`` and so on; an exclusive one stays ``NAME``. Whatever tracks are called, they
+come back: an exclusive track whose own name looks like such a row becomes ``NAME [overlap 0]``.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 from sd2core.errors import Sd2Error
 from sd2core.labels.formats.losses import DEFAULT_TRACK
+from sd2core.labels.formats.texts import whole_number
 from sd2core.labels.label_set import GESTURES, LONGEST_NAME, LabelSet
-from sd2core.labels.spans import ORIGINS, Labels, LabelTrack, Origin, Overlap, Span
+from sd2core.labels.spans import ORIGINS, OVERLAPS, Labels, LabelTrack, Origin, Overlap, Span
 from sd2core.timebase import Timebase
 
 UNNAMED = "unnamed"
@@ -18,10 +27,7 @@ UNNAMED = "unnamed"
 
 @dataclass(frozen=True)
 class Row:
-    """A span as a file has it, not yet checked.
-
-    ``place`` says where it stands, for messages: ``"line 3"``.
-    """
+    """Unchecked span of a file; ``place`` is where it stands, for messages: ``"line 3"``."""
 
     place: str
     start_s: float
@@ -33,6 +39,39 @@ class Row:
     confidence: float | None = None
     origin: str = "import"
     id: int | None = None
+
+
+class TableRows:
+    """Rows of a table by the names of its columns, and the tracks that they name."""
+
+    def __init__(self) -> None:
+        self.rows: list[Row] = []
+        self.tracks: dict[str, Overlap | None] = {}
+
+    def add(
+        self,
+        line: int,
+        edges_s: tuple[float, float],
+        label: str,
+        confidence: float | None,
+        cells: Mapping[str, str],
+    ) -> None:
+        """Add a line of the table, with what has been read of it; the rest is in ``cells``."""
+        track = cells.get("track") or DEFAULT_TRACK
+        stated = next((one for one in OVERLAPS if one == cells.get("overlap")), None)
+        self.tracks[clean_name(track)] = stated
+        row = Row(
+            f"line {line}",
+            *edges_s,
+            label,
+            track,
+            note=cells.get("note", ""),
+            author=cells.get("author", ""),
+            confidence=confidence,
+            origin=cells.get("origin", ""),
+            id=whole_number(cells.get("id", "")),
+        )
+        self.rows.append(row)
 
 
 def assemble(
@@ -75,7 +114,7 @@ def assemble(
         overlaps.setdefault(span.track, None)
     if not overlaps:
         overlaps[DEFAULT_TRACK] = None
-    crowded = _with_overlap(spans)
+    crowded = _overlapping(spans)
     made = tuple(
         LabelTrack(name, "free" if name in crowded else overlap or "exclusive")
         for name, overlap in overlaps.items()
@@ -84,7 +123,7 @@ def assemble(
 
 
 def clean_name(name: str) -> str:
-    """Make a label or a track of any text: one line that can be shown."""
+    """Make a name for a label or a track of any text: one printable line."""
     if name.isprintable() and name.strip() and len(name) <= LONGEST_NAME:
         return name
     line = " ".join("".join(one if one.isprintable() else " " for one in name).split())
@@ -138,7 +177,7 @@ def _span(path: Path, row: Row, number: int, timebase: Timebase | None) -> Span:
         raise Sd2Error(f"{where}: {error.found}", error.expected, "Mend that place") from None
 
 
-def _with_overlap(spans: Sequence[Span]) -> set[str]:
+def _overlapping(spans: Sequence[Span]) -> set[str]:
     last_end_s: dict[str, float] = {}
     found: set[str] = set()
     for span in sorted(spans, key=lambda one: (one.start_s, one.end_s)):
@@ -146,3 +185,64 @@ def _with_overlap(spans: Sequence[Span]) -> set[str]:
             found.add(span.track)
         last_end_s[span.track] = max(span.end_s, last_end_s.get(span.track, span.end_s))
     return found
+
+
+_ROW = re.compile(r"(.+) \[overlap (\d+)\]")
+
+Time = TypeVar("Time", int, float)
+
+
+@dataclass(frozen=True)
+class Lane:
+    """Spans that do not overlap, in order, and the name of their row in a file."""
+
+    name: str
+    track: LabelTrack
+    spans: tuple[Span, ...]
+
+
+def lanes_of(labels: Labels, edges: Callable[[Span], tuple[Time, Time]]) -> list[Lane]:
+    """Distribute the spans of every track over rows, at least one each.
+
+    ``edges`` gives start and end of a span in the times of the file, half-open.
+    """
+    found: list[Lane] = []
+    for track in labels.tracks:
+        rows = apart(labels.of_track(track.name), edges)
+        free = track.overlap == "free" or len(rows) > 1
+        first = 1 if free else 0
+        bare = not free and not _ROW.fullmatch(track.name)
+        for number, spans in enumerate(rows, start=first):
+            name = track.name if bare else f"{track.name} [overlap {number}]"
+            found.append(Lane(name, track, tuple(spans)))
+    return found
+
+
+def edges_s(span: Span) -> tuple[float, float]:
+    """Start and end of a span, for files that have times in seconds."""
+    return span.start_s, span.end_s
+
+
+def track_of(row: str) -> tuple[str, Overlap | None]:
+    """Return the track that a row belongs to, and its overlap where the row says so."""
+    match = _ROW.fullmatch(row)
+    if match is None:
+        return row, None
+    return match[1], "exclusive" if int(match[2]) == 0 else "free"
+
+
+def apart(spans: Sequence[Span], edges: Callable[[Span], tuple[Time, Time]]) -> list[list[Span]]:
+    """Distribute spans over rows without overlaps: first fit by start; at least one."""
+    rows: list[list[Span]] = [[]]
+    ends: list[Time | None] = [None]
+    for span in sorted(spans, key=lambda one: (*edges(one), one.id)):
+        start, end = edges(span)
+        for number, last in enumerate(ends):
+            if last is None or last <= start:
+                rows[number].append(span)
+                ends[number] = end
+                break
+        else:
+            rows.append([span])
+            ends.append(end)
+    return rows

@@ -14,11 +14,10 @@ from pathlib import Path
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
-from sd2core.labels.formats.lanes import Lane, lanes_of, track_of
 from sd2core.labels.formats.losses import LabelFormat, Loss, losses_by_format
-from sd2core.labels.formats.rows import Row, assemble
+from sd2core.labels.formats.rows import Lane, Row, assemble, edges_s, lanes_of, track_of
 from sd2core.labels.formats.texts import positional, read_text, whole_number
-from sd2core.labels.spans import Labels, Overlap, Span
+from sd2core.labels.spans import Labels, Overlap
 from sd2core.timebase import Timebase
 
 FORMAT = LabelFormat(
@@ -46,7 +45,7 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
     """
     start_s = min([timebase.start_s, *(span.start_s for span in labels.spans)])
     end_s = max([timebase.end_s, *(span.end_s for span in labels.spans)])
-    lanes = lanes_of(labels, _edges)
+    lanes = lanes_of(labels, edges_s)
     lines = [
         'File type = "ooTextFile"',
         'Object class = "TextGrid"',
@@ -96,10 +95,6 @@ def read(path: Path, timebase: Timebase | None = None, observation: str | None =
     return assemble(path, rows, tracks=tracks, timebase=timebase)
 
 
-def _edges(span: Span) -> tuple[float, float]:
-    return span.start_s, span.end_s
-
-
 def _tier(number: int, lane: Lane, start_s: float, end_s: float) -> list[str]:
     intervals: list[tuple[float, float, str]] = []
     reached_s = start_s
@@ -133,7 +128,7 @@ def _quoted(text: str) -> str:
 
 
 class _Tokens:
-    """Texts, numbers and flags of a file, one after the other."""
+    """Sequence of the texts, numbers and flags of a file."""
 
     def __init__(self, path: Path, text: str) -> None:
         self._path = path
@@ -143,7 +138,6 @@ class _Tokens:
         )
 
     def heading(self) -> None:
-        """Refuse what is no TextGrid in text form."""
         if "ooBinaryFile" in self._first_line:
             raise Sd2Error(
                 f"{self._path} is a binary file of Praat", _EXPECTED, "Save it as a text file there"
@@ -162,15 +156,12 @@ class _Tokens:
             )
 
     def has_tiers(self) -> bool:
-        """Whether the flag says that there are any."""
         return self._next("flag", "flag <exists>") == "<exists>"
 
     def text(self, what: str) -> str:
-        """The next token, which is to be a text."""
         return self._next("text", what).replace('""', '"')
 
     def number(self, what: str) -> float:
-        """The next token, which is to be a number."""
         found = self._next("number", what)
         try:
             value = float(found)
@@ -181,7 +172,6 @@ class _Tokens:
         return value
 
     def count(self, what: str) -> int:
-        """The next token, which is to be a number of things."""
         found = self._next("number", f"number of {what}")
         value = whole_number(found)
         if value is None:

@@ -1,4 +1,4 @@
-"""Files into text, with a sentence for whatever is no text."""
+"""Reading of text files, with clear errors for anything that is no text."""
 
 from __future__ import annotations
 
@@ -20,13 +20,7 @@ _MARKS = (
 
 
 def read_content(path: Path, expected: str) -> bytes:
-    """Read a whole file.
-
-    Parameters
-    ----------
-    path : Path
-    expected : str
-        What the file should be, for the message: ``"an ELAN file"``.
+    """Read a whole file; ``expected`` describes it for the message: ``"an ELAN file"``.
 
     Raises
     ------
@@ -85,10 +79,10 @@ def read_text(path: Path, expected: str) -> str:
 
 
 def positional(value: float, *, min_digits: int | None = None) -> str:
-    """Write the shortest decimal number, without an exponent, that reads back as the same."""
+    """Format the shortest decimal number, without an exponent, that reads back as the same."""
     return np.format_float_positional(value, unique=True, trim="0", min_digits=min_digits)
 
 
 def whole_number(text: str) -> int | None:
-    """Number of a text that is nothing but digits, of at most 18."""
+    """Parse a text of at most 18 digits; None for any other."""
     return int(text) if text.isascii() and text.isdigit() and len(text) <= 18 else None

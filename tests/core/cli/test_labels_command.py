@@ -266,7 +266,7 @@ def test_agree_prints_json(sd2: Sd2, anna: Path, ben: Path) -> None:
 def test_agree_without_a_number_says_so(sd2: Sd2, tmp_path: Path) -> None:
     nothing = written(tmp_path / "none.json")
     done = sd2("labels", "agree", nothing, nothing, "--rate", 10)
-    assert "No kappa: both give one and the same answer in all frames." in done.out
+    assert "Kappa is undefined: both give the same single answer in all frames." in done.out
 
 
 def test_agree_refuses_what_it_cannot_do(sd2: Sd2, anna: Path, ben: Path) -> None:

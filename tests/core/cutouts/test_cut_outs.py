@@ -145,7 +145,7 @@ def test_two_do_not_write_to_one_folder(source, tmp_path) -> None:
 
     lock = FileLock(tmp_path / ".sd2-lock")
     assert lock.take()
-    with pytest.raises(Sd2Error, match="Somebody is writing"):
+    with pytest.raises(Sd2Error, match="Another process is writing"):
         cut(source, tmp_path, WAVE)
     lock.release()
 

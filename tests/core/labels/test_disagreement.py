@@ -10,8 +10,7 @@ from any_labels import any_labels
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from sd2core.labels.agreement import frame_agreement
-from sd2core.labels.disagreement import disagreements, kappa_words
+from sd2core.labels.agreement import disagreements, frame_agreement, kappa_words
 from sd2core.labels.matching import iou_of, match_spans
 from sd2core.labels.spans import Span
 from sd2core.timebase import Timebase
