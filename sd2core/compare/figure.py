@@ -21,10 +21,6 @@ _CURVES = ("hands", "elbows", "torso")
 def draw_comparison(comparison: Comparison) -> Figure:
     """Draw maps and curves on one time axis.
 
-    Parameters
-    ----------
-    comparison : Comparison
-
     Returns
     -------
     matplotlib.figure.Figure

@@ -169,7 +169,6 @@ class Carried(NamedTuple):
 
     Parameters
     ----------
-    patches : JointPatches
     frame : int
         In which the two surfaces lie closest, counted on their common times.
     distance_m : float

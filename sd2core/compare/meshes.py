@@ -38,7 +38,6 @@ class Difference:
 
     Parameters
     ----------
-    label : str
     distance_m : float64 array, shape (J,)
         Mean distance of each joint over time, after the alignment.
     velocity_rms_mps : float64 array, shape (J,)
@@ -71,12 +70,10 @@ class Comparison:
 
     Parameters
     ----------
-    labels : tuple of str
     reference : int
         Number of the mesh that the others are measured against.
     times_s : float64 array, shape (T,)
         Common to all.
-    sensor : VirtualSensor
     alignment : {"none", "root"}
         Whether joint distances are those of the places, or of the places from the
         pelvis. Velocities and maps are never aligned.
@@ -86,7 +83,6 @@ class Comparison:
         Along the line of sight, positive when approaching.
     measured : bool array, shape (T,)
         Frames that count: those in which every mesh has a person.
-    maps : tuple of DopplerMap
     differences : tuple of Difference
         Of every mesh, the reference included.
     notes : tuple of str
@@ -157,10 +153,6 @@ def compare_meshes(
         Of joint distances; see :class:`Comparison`.
     progress : Progress
         Counts frames of the Doppler maps.
-
-    Returns
-    -------
-    Comparison
 
     Raises
     ------

@@ -46,7 +46,6 @@ def at_times(mesh: MeshSequence, times_s: NDArray[np.float64]) -> tuple[MeshSequ
 
     Parameters
     ----------
-    mesh : MeshSequence
     times_s : float64 array, shape (n,)
 
     Returns

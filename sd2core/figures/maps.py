@@ -73,7 +73,6 @@ class MapRow:
 
     Parameters
     ----------
-    doppler : DopplerMap
     title : str
         What it is, with the word simulated where it is.
     reference : float
@@ -139,7 +138,6 @@ def draw_maps(
     ----------
     rows : sequence of MapRow
         From top to bottom.
-    levels : Levels
     start_s, end_s : float
         Stretch that is shown.
     difference : tuple of int, optional
@@ -207,8 +205,6 @@ def save_maps(figure: Figure, path: Path, rows: Sequence[MapRow], about: dict[st
     ----------
     figure : matplotlib.figure.Figure
         Of :func:`draw_maps`.
-    path : Path
-    rows : sequence of MapRow
     about : dict
         What else is to be known, fit for JSON.
     """

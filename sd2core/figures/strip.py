@@ -36,10 +36,8 @@ def plot_strip(
 
     Parameters
     ----------
-    source : StripSource
     frames : sequence of int
         On :attr:`StripSource.clock`.
-    options : StripOptions, optional
     progress : Progress
         Called once per frame.
 

@@ -67,8 +67,6 @@ class StripSource:
 
     Parameters
     ----------
-    video : VideoReader or None
-    mesh : MeshSequence or None
     camera : PinholeCamera
         Sees both.
     sensor : VirtualSensor

@@ -110,7 +110,6 @@ def seen(
         Metres in the camera's frame; triangles with an unknown corner are left out.
     faces : int32 array, shape (F, 3)
         Counter-clockwise seen from outside.
-    camera : PinholeCamera
     frame : Frame, optional
         The whole picture by default.
     """
@@ -152,7 +151,6 @@ def shaded(
         Metres in the camera's frame.
     faces : int32 array, shape (F, 3), or None
         None: dots.
-    camera : PinholeCamera
     frame : Frame, optional
         The whole picture by default.
 

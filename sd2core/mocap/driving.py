@@ -43,7 +43,6 @@ class Puppet:
     shape : BodyShape
     keypoints : Keypoints
         Where the joints are at rest, as landmarks.
-    markers : tuple of Marker
     """
 
     shape: BodyShape
@@ -70,9 +69,6 @@ class DrivenClip:
 
     Parameters
     ----------
-    puppet : Puppet
-    clip : SkeletonClip
-    pose : Pose
     landmarks_m : float64 array, shape (T, 33, 3)
         Where the joints are on the moving body.
     residual_m : float64 array, shape (T, 33)
@@ -111,7 +107,6 @@ def puppet_of(clips: Sequence[SkeletonClip], markers: tuple[Marker, ...]) -> Pup
     ----------
     clips : sequence of SkeletonClip
         All of the same person.
-    markers : tuple of Marker
 
     Raises
     ------

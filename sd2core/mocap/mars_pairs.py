@@ -161,7 +161,6 @@ def make_mars_pairs(
         Each with one person's parts.
     out : Path
         The store to write.
-    choices : MarsChoices, optional
     progress : Progress
         Counts frames.
 

@@ -63,14 +63,11 @@ def make_recording_pairs(
 
     Parameters
     ----------
-    recordings : sequence of Path
-    out : Path
     synthesis : SynthesisOptions
         Of the input; its axis is the target's, too.
     subjects : sequence of str, optional
         Who each recording is of; by default everyone's recording is of another person,
         who is called as it is.
-    progress : Progress
 
     Raises
     ------
@@ -223,7 +220,6 @@ def on_clock(radar: DopplerMap, timebase: Timebase) -> DopplerMap:
     ----------
     radar : DopplerMap
         At its times on that clock.
-    timebase : Timebase
 
     Returns
     -------

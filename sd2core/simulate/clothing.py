@@ -38,7 +38,6 @@ class Outfit:
 
     Parameters
     ----------
-    skin, hair, shirt, trousers, shoes : colours
     pattern : {"plain", "stripes", "checks"}
         Of the shirt.
     second : colour
@@ -75,7 +74,6 @@ class Clothes:
         irises, lips; metres for the first four.
     places_m : float32 array, shape (V, 3)
         Of the vertices at rest: what a pattern is printed on.
-    outfit : Outfit
     """
 
     fields: Singles
@@ -91,7 +89,6 @@ class Clothes:
         body : Body
             With the bundled shape: borders are sewn for it. A shaped body of the same
             surface wears the same clothes, vertex by vertex.
-        outfit : Outfit, optional
         """
         outfit = outfit or Outfit()
         # All lengths are metres on this body's rest shape, fitted by looking at pictures.

@@ -119,9 +119,7 @@ def gait(skeleton: Skeleton, times_s: Floats, path: Path, arm_scale: float = 1.0
 
     Parameters
     ----------
-    skeleton : Skeleton
     times_s : float64 array, shape (T,)
-    path : Path
     arm_scale : float
         See :func:`sd2core.simulate.gestures.reach`.
 

@@ -126,7 +126,6 @@ def swipes(skeleton: Skeleton, times_s: ArrayLike) -> Motion:
 
     Parameters
     ----------
-    skeleton : Skeleton
     times_s : array_like, shape (T,)
     """
     times = np.asarray(times_s, dtype=np.float64)
@@ -206,7 +205,6 @@ def reach(
 
     Parameters
     ----------
-    skeleton : Skeleton
     rotations : float64 array, shape (T, B, 3, 3)
         Of the whole body; those of the arm are replaced. The body faces the camera.
     side : {"L", "R"}

@@ -33,7 +33,6 @@ class Camera(PinholeCamera):
     ----------
     width, height : int
         Pixels.
-    focal_px : float
     above_floor_m : float
         Height of the optical axis.
     """
@@ -49,8 +48,6 @@ class Studio:
     ----------
     wall_m : float
         Depth of the wall behind the person.
-    wall, floor, skirting : colours
-    key, fill, rim : light directions (towards the light), not normalised
     key_power, fill_power, ambient, sky : float
         How bright: from one side, from the other, from everywhere, from above.
     key_colour : (float, float, float)
@@ -85,8 +82,6 @@ class Renderer:
     ----------
     body : Body
         Gives the faces.
-    camera : Camera
-    studio : Studio
     clothes : Clothes, optional
         Of this surface; by default a T-shirt and trousers sewn for the body's rest
         shape, which must be the bundled one.

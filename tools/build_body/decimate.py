@@ -32,7 +32,6 @@ def decimate(
     vertices_m : float64 array, shape (V, 3)
     faces : int32 array, shape (F, 3)
         A closed manifold; it stays one.
-    count : int
 
     Returns
     -------

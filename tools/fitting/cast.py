@@ -17,8 +17,6 @@ class Person:
     ----------
     gender, muscle, weight, proportions : float
         From 0 to 1; see :data:`sd2core.body.shape.PHENOTYPES`.
-    stature_m : float
-    outfit : Outfit
     """
 
     gender: float

@@ -79,8 +79,6 @@ class StrokeScore:
 
     Parameters
     ----------
-    stroke : Stroke
-    speed, hand : str
     velocity : dict of str to Pair
         Of each of :data:`LIMBS`, along the line of sight.
     tempo : dict of str to Pair
@@ -105,10 +103,8 @@ class ClipScore:
 
     Parameters
     ----------
-    name, kind : str
     frames : int
         That were compared.
-    strokes : tuple of StrokeScore
     distance_m : float64 array, shape (J,)
         Mean distance of each joint.
     aligned_m : float64 array, shape (J,)
@@ -133,7 +129,6 @@ class ClipScore:
     residual_m : float or None
         Mean distance of joints from the landmarks that were found, in the picture at
         the joint's depth.
-    notes : tuple of str
     """
 
     name: str
@@ -167,7 +162,6 @@ def score_clip(
 
     Parameters
     ----------
-    truth : Truth
     fitted : MeshSequence
         Of this clip's video, in the camera frame, with a surface of ours. Where it says
         how well its velocities are known, that is measured too.
@@ -177,10 +171,6 @@ def score_clip(
         The landmarks that were fitted to.
     progress : Progress
         Counts frames of the two Doppler maps.
-
-    Returns
-    -------
-    ClipScore
 
     Raises
     ------

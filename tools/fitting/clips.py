@@ -57,8 +57,6 @@ class Clip:
 
     Parameters
     ----------
-    name : str
-    action : Action
     person, room : str
         Of :data:`tools.fitting.cast.PEOPLE` and ``ROOMS``.
     distance_m, across_m : float
@@ -148,7 +146,6 @@ def make_fit_truth(
     out : Path
         A folder, made if need be; every clip becomes a folder in it, and appears
         there when it is complete.
-    clips : sequence of Clip
     progress : Progress
         Counts frames of the clips to be made.
 
@@ -186,9 +183,6 @@ class Scene:
     times_s : float64 array, shape (T,)
     transforms : float64 array, shape (T, B, 3, 4)
         Of :meth:`sd2core.body.model.Skeleton.transforms`, in the camera frame.
-    skeleton : Skeleton
-    spans : tuple of GestureSpan
-    camera : Camera
     """
 
     shape: BodyShape

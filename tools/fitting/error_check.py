@@ -42,8 +42,6 @@ class Likeness(NamedTuple):
 
     Parameters
     ----------
-    what, unit : str
-    measured : float
     drawn : tuple of float
         One for each draw of errors.
     """
@@ -77,10 +75,8 @@ def compare_errors(
 
     Parameters
     ----------
-    truths : sequence of Truth
     fits : Path
         Folder with ``NAME.zarr``, as ``python -m tools.fitting score --keep`` leaves them.
-    errors : FitErrors
     draws : int
         Of errors, with seeds 0, 1 ...
     progress : Progress

@@ -104,17 +104,12 @@ def perform(
     ----------
     skeleton : Skeleton
         Bundled or shaped.
-    action : Action
     times_s : float64 array, shape (T,)
         Multiples of 1/240 s for walking and turning.
     seed : int
         Of where exactly each stroke begins and ends: no two are alike.
     arm_scale : float
         Length of this skeleton's arm to the bundled one's.
-
-    Returns
-    -------
-    Performance
     """
     rng = np.random.default_rng(seed)
     times = np.asarray(times_s, dtype=np.float64)

@@ -28,11 +28,9 @@ class RealScore:
 
     Parameters
     ----------
-    name : str
     overlap : float
         Mean over frames of the intersection over union of the mesh's silhouette and
         the landmark model's mask, within the picture.
-    overlap_least : float
     reprojection_px, reprojection_m : float
         Mean distance of joints from their landmarks in the picture, and the same at
         the joint's depth. Landmarks that are hidden or outside the picture are left out.
@@ -59,12 +57,10 @@ def score_real(
 
     Parameters
     ----------
-    name : str
     mesh : MeshSequence
         With a surface of ours, frame by frame of the track.
     track : LandmarkTrack
         With silhouettes.
-    camera : PinholeCamera
 
     Raises
     ------
@@ -105,8 +101,6 @@ def reprojection(
     ----------
     mesh : MeshSequence
         With a surface of ours, frame by frame of the track.
-    track : LandmarkTrack
-    camera : PinholeCamera
 
     Returns
     -------

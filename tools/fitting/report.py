@@ -23,7 +23,6 @@ class Row:
 
     Parameters
     ----------
-    what : str
     value : float
         NaN when nothing could be measured.
     unit : str
@@ -32,7 +31,6 @@ class Row:
         ``"<="`` or ``">="`` and what is wanted.
     upper : float
         Upper end of a range that is wanted, with ``reach`` its lower end.
-    detail : str
     """
 
     what: str

@@ -37,7 +37,6 @@ class Truth:
 
     Parameters
     ----------
-    folder : Path
     meta : dict
         What ``truth.json`` holds; see docs/formats.md.
     """

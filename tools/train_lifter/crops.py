@@ -28,8 +28,6 @@ class Look:
     ----------
     lights : tuple of (direction, strength)
         Towards the lights, camera frame, unit vectors.
-    ambient : float
-    exposure : float
     blur_px : float
         Standard deviation in the picture's pixels.
     noise : float
@@ -92,9 +90,6 @@ class CropPainter:
     Parameters
     ----------
     faces : int32 array, shape (F, 3)
-    wardrobe : Wardrobe
-    camera : PinholeCamera
-    look : Look
     background : uint8 array, shape (height, width, 3)
     rng : numpy.random.Generator
         For the noise.
@@ -128,7 +123,6 @@ class CropPainter:
         ----------
         vertices_m : float32 array, shape (V, 3)
             Camera frame, all in front of the camera.
-        roi : Roi
         """
         import cv2
 

@@ -34,15 +34,12 @@ def make_lifter_data(
         Made when missing; ``take-NNNNN.npz`` are written whole or not at all.
     takes : int
         How many there shall be.
-    seed : int
     held_out : bool
         With the motion that is kept for testing.
     manner : {"any", "natural", "gestures"}
         How people move.
-    processes : int
     models : Path, optional
         Folder of the landmark models.
-    progress : Progress
 
     Returns
     -------

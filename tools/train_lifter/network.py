@@ -22,9 +22,6 @@ class LifterNetwork(nn.Module):
     ----------
     mean, spread : float32 array, shape (C,)
         Of the features.
-    width : int
-    dilations : tuple of int
-    dropout : float
     """
 
     def __init__(

@@ -34,7 +34,6 @@ class JointScore(NamedTuple):
         Error of the velocity along z.
     truth_mps : float
         Root mean square of the true velocity.
-    correlation : float
     kept : float
         Share of the true velocity that is found where it is above 0.5 m/s (slope of
         the found on the true).
@@ -60,7 +59,6 @@ class Score(NamedTuple):
 
     Parameters
     ----------
-    joints : dict of str to JointScore
     still_mps : float
         Root mean square of all velocities found in takes in which nothing moves;
         NaN where there is no such take.

@@ -36,8 +36,6 @@ class Take:
 
     Parameters
     ----------
-    camera : PinholeCamera
-    stature_m : float
     keypoints_m : float32 array, shape (T, 33, 3)
         Truth, camera frame.
     bone_turns : float32 array, shape (T, 33, 3, 3)
@@ -86,7 +84,6 @@ class Scene(NamedTuple):
     Parameters
     ----------
     shape : BodyShape
-    camera : PinholeCamera
     transforms : float64 array, shape (T, B, 3, 4)
         Of the bones, ending in the camera frame.
     keypoints_m : float64 array, shape (T, 33, 3)
@@ -141,12 +138,7 @@ class Stage:
 
 
 class TakeMaker:
-    """Makes takes; each depends on its seed only.
-
-    Parameters
-    ----------
-    landmarker : PoseLandmarker
-    """
+    """Makes takes; each depends on its seed only."""
 
     def __init__(self, landmarker: PoseLandmarker) -> None:
         self._landmarker = landmarker
@@ -164,12 +156,10 @@ class TakeMaker:
 
         Parameters
         ----------
-        seed : tuple of int
         held_out : bool
             With the motion that is kept for testing.
         manner : {"any", "natural", "gestures"}
             How people move.
-        frames : int
         """
         rng = np.random.default_rng(seed)
         scene = self._stage.scene(rng, held_out=held_out, manner=manner, frames=frames)

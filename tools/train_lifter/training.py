@@ -54,14 +54,10 @@ class Recipe:
 
     Parameters
     ----------
-    width : int
-    dilations : tuple of int
-    dropout : float
     steps : int
         Of optimisation.
     emulated_share : float
         Of every batch; the rest is from drawn takes.
-    batch : int
     frames : int
         Of each example.
     rate : float
@@ -71,7 +67,6 @@ class Recipe:
         1, 2 and 4 frames.
     walks : int
         Motions to emulate.
-    seed : int
     """
 
     width: int = 128
@@ -122,9 +117,6 @@ def train(
         Drawn ones; every tenth is kept for calibration.
     walks : sequence of Walk, optional
         Motions to emulate.
-    emulator : Emulator, optional
-    recipe : Recipe
-    progress : Progress
     log : callable, optional
         Told the losses now and then.
     start : Lifter, optional

@@ -24,7 +24,6 @@ class View:
 
     Parameters
     ----------
-    camera : PinholeCamera
     turn : float64 array, shape (3, 3)
     shift_m : float64 array, shape (3,)
         A point x of the world is at ``turn @ x + shift_m`` in the camera frame.
@@ -51,7 +50,6 @@ def random_view(rng: np.random.Generator, keypoints_m: Floats) -> View | None:
 
     Parameters
     ----------
-    rng : numpy.random.Generator
     keypoints_m : array, shape (T, 33, 3)
         On the floor of the world, y down, facing about -z.
 

@@ -51,8 +51,6 @@ def make_campaign(
     ----------
     out : Path
         Folder of the pairs.
-    campaign : Campaign
-    subjects : int
     minutes : float
         Of all subjects together; placements count once.
     processes : int

@@ -86,14 +86,12 @@ class Move:
 
     Parameters
     ----------
-    start_s, end_s : float
     to : float64 array, shape (9,)
         Fields of :class:`~sd2core.simulate.gestures.ArmPose`.
     bow : float64 array, shape (9,)
         How far the way is from the straight one in its middle.
     skew : float
         1: fastest in the middle of the time; below 1 earlier.
-    label : int
     """
 
     start_s: float
@@ -116,8 +114,6 @@ def perform(
 
     Parameters
     ----------
-    rng : Generator
-    subject : Subject
     skeleton, base : Skeleton
         The person's, and that of the bundled body.
     times_s : float64 array, shape (T,)

@@ -18,7 +18,6 @@ class Subject:
 
     Parameters
     ----------
-    name : str
     shape : BodyShape
     hand : {"L", "R"}
         That makes most gestures.

@@ -85,7 +85,6 @@ def posture(skeleton: Skeleton, transforms: Floats, axes: Floats | None = None) 
 
     Parameters
     ----------
-    skeleton : Skeleton
     transforms : float64 array, shape (T, B, 3, 4)
         Of :meth:`~sd2core.body.model.Skeleton.transforms`, in the camera frame.
     axes : float64 array, shape (T, 3, 3), optional
@@ -147,7 +146,6 @@ def held_otherwise(
         the posture was read from.
     transforms : float64 array, shape (T, B, 3, 4)
         Of the body in the true posture.
-    true : Posture
     change : dict of (group, side) to float64 array, shape (T, n)
         As :func:`errors` gives them; ``place`` and ``trunk`` have the side "".
 

@@ -80,16 +80,12 @@ def radar_target(
     ----------
     mesh : MeshSequence
         With faces; the radar's frames are at the mesh's times.
-    config : RadarConfig
-    sensor : VirtualSensor
-    axis : VelocityAxis
     null_bins : sequence of int
         Emptied, as in the synthetic map.
     reflectors : tuple of Reflector
         Static clutter.
     seed : sequence of int
         Of phases and noise.
-    options : TargetOptions
     on_frame : callable
         Called before every frame; may raise to stop.
 

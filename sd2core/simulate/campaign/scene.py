@@ -36,7 +36,6 @@ class Setting:
         From facing along the camera's axis.
     sensors : tuple of VirtualSensor
         The take's own beside the camera, then others.
-    reflectors : tuple of Reflector
     """
 
     place_m: Floats

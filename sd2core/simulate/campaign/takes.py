@@ -42,12 +42,8 @@ class Campaign:
 
     Parameters
     ----------
-    seed : int
-    take_seconds : float
     placements : int
         Sensors that see every take.
-    radar : RadarConfig
-    target : TargetOptions
     """
 
     seed: int = 0
@@ -88,7 +84,6 @@ class TakeMaker:
 
     Parameters
     ----------
-    campaign : Campaign
     errors : FitErrors, optional
         How fits of its videos err; by default not at all.
     """
@@ -114,7 +109,6 @@ class TakeMaker:
 
         Parameters
         ----------
-        subject_number, number : int
         on_frame : callable
             Called before every radar frame; may raise to stop.
         look : int

@@ -43,7 +43,6 @@ class ArmStyle:
         Time of one move, drawn evenly in its logarithm.
     hold : float
         Chance that the arm rests between two moves.
-    longest_hold_s : float
     zones : tuple of (str, float)
         Names of :data:`ZONES`, and how likely each is the next target.
     wave : float

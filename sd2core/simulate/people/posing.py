@@ -28,7 +28,6 @@ def place_limb(
 
     Parameters
     ----------
-    skeleton : Skeleton
     rotations : array, shape (T, B, 3, 3)
         The first two bones' are written.
     bones : tuple of str
@@ -76,7 +75,6 @@ def turn_hand(
 
     Parameters
     ----------
-    skeleton : Skeleton
     rotations : array, shape (T, B, 3, 3)
         Of forearm, wrist and fingers, written.
     side : {"L", "R"}
