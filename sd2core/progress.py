@@ -1,4 +1,4 @@
-"""How long work reports where it is, and how it is stopped."""
+"""Reporting the progress of long work, and cancelling it."""
 
 from __future__ import annotations
 

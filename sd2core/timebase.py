@@ -94,7 +94,7 @@ class Timebase:
 
     @property
     def duration_s(self) -> float:
-        """From the start of the first frame to the end of the last."""
+        """Time from the start of the first frame to the end of the last."""
         return self.end_s - self.start_s
 
     def frame_at(self, time_s: float) -> int:
@@ -107,7 +107,7 @@ class Timebase:
         return int(np.argmin(np.abs(self.times_s - time_s)))
 
     def covers(self, time_s: float) -> bool:
-        """Whether some frame is on screen at ``time_s``."""
+        """True if some frame is on screen at ``time_s``."""
         return self.start_s - _TOLERANCE_S <= time_s < self.end_s - _TOLERANCE_S
 
     def time_of(self, frame: int) -> float:
@@ -125,5 +125,5 @@ class Timebase:
         return (first, max(last, first + 1))
 
     def shifted(self, offset_s: float) -> Timebase:
-        """The same frames ``offset_s`` later."""
+        """Timebase with all frames ``offset_s`` later."""
         return Timebase(self.times_s + offset_s)

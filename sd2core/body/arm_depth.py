@@ -1,9 +1,8 @@
-"""Which way arms lean: towards the camera or away from it.
+"""Depth of elbows and wrists, towards or away from the camera, from the lengths of the arms.
 
-A limb of known length that looks shorter than it is leans by the rest of its length,
-one way or the other. For upper arm and forearm that makes four cases in every frame;
-the likeliest sequence of them (Viterbi) lies near the lifted depths, moves little
-along the line of sight, and keeps arms from behind the chest, where they seldom are.
+A limb that looks shorter than it is points towards the camera or away from it. For upper arm
+and forearm that makes four cases per frame; the likeliest sequence of them (Viterbi) lies near
+the lifted depths, moves little along the line of sight, and keeps arms in front of the chest.
 """
 
 from __future__ import annotations
@@ -31,19 +30,7 @@ _MOST = 3.0
 
 
 def resolve_arm_depths(evidence: Evidence, rig: Rig) -> Evidence:
-    """Depths of elbows, wrists and hands by the lengths of the arms.
-
-    Parameters
-    ----------
-    evidence : Evidence
-        Of consecutive frames.
-    rig : Rig
-
-    Returns
-    -------
-    Evidence
-        With these depths, known to 6 cm.
-    """
+    """Replace depths of elbows, wrists and hands by those that the arms' lengths allow, ± 6 cm."""
     points_m = evidence.points_m
     back = _back(points_m)
     for side in "LR":
@@ -87,7 +74,7 @@ def _lean(points_m: Floats, evidence: Evidence, rig: Rig, back: Floats, side: st
 
 
 def _on_ray(start: Floats, ray: Floats, length_m: float, sign: Floats) -> Floats:
-    """The point of a ray that is so far from a start, before or behind it; else the nearest."""
+    """Point of a ray at a distance from a start, before or behind it; else the nearest point."""
     square = (ray * ray).sum(axis=-1)
     nearest = (ray * start).sum(axis=-1) / square
     short = length_m**2 - (start * start).sum(axis=-1) + nearest**2 * square
@@ -103,7 +90,7 @@ def _likeliest(
     elbow: Floats,
     wrist: Floats,
 ) -> NDArray[np.intp]:
-    """Number of a case for every frame, (T,)."""
+    """Number of the likeliest case in every frame, (T,)."""
     both = np.stack([elbow, wrist], axis=2)  # (T, 4, 2, 3)
     # How far a limb leans, not where it is: lifted depths are drawn towards the trunk's.
     lean = both[..., 2].copy()

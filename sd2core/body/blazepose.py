@@ -45,15 +45,7 @@ _MIRRORED = list(MIRRORED)
 
 @dataclass(frozen=True, eq=False)
 class Detection:
-    """A person found in a whole picture.
-
-    Parameters
-    ----------
-    roi : Roi
-        The square around the person.
-    score : float
-        0.5 to 1.
-    """
+    """A person found in a whole picture, with a score from 0.5 to 1."""
 
     roi: Roi
     score: float
@@ -61,68 +53,38 @@ class Detection:
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """What the landmark network says about one square.
+    """Output of the landmark network for one square of a picture."""
 
-    Parameters
-    ----------
-    image_px : float64 array, shape (39, 2)
-        In the picture: the 33 :data:`~sd2core.body.track.LANDMARKS`, then
-        :data:`CENTRE` and :data:`RIM`, then four that are not used.
-    depth_px : float64 array, shape (33,)
-        Behind the hips, at the scale of the picture.
-    world_m : float64 array, shape (33, 3)
-        From the middle of the hips; x right, y down in the picture, z away.
-    visibility, presence : float64 array, shape (33,)
-        From 0 to 1: that the point is seen, that it is inside the picture.
-    confidence : float
-        That there is a person in the square, 0 to 1.
-    mask : float32 array, shape (256, 256)
-        That a pixel of the square shows the person, 0 to 1.
-    roi : Roi
-        The square.
-    """
-
-    image_px: Floats
-    depth_px: Floats
-    world_m: Floats
-    visibility: Floats
-    presence: Floats
-    confidence: float
-    mask: Singles
+    image_px: Floats  # (39, 2) in the picture: LANDMARKS, CENTRE, RIM, four unused
+    depth_px: Floats  # (33,) behind the hips, at the scale of the picture
+    world_m: Floats  # (33, 3) from the middle of the hips; x right, y down, z away
+    visibility: Floats  # (33,) from 0 to 1: the point is seen
+    presence: Floats  # (33,) from 0 to 1: the point is inside the picture
+    confidence: float  # that there is a person in the square, from 0 to 1
+    mask: Singles  # (256, 256) that a pixel of the square shows the person, from 0 to 1
     roi: Roi
 
     @property
     def next_roi(self) -> Roi:
-        """Where the person of this picture will be in the next one."""
+        """Square in which the person is expected in the next picture."""
         return Roi.around(self.image_px[CENTRE], self.image_px[RIM])
 
 
 class PoseDetector:
-    """Finds people in a whole picture.
-
-    Parameters
-    ----------
-    path : Path
-        ``pose_detection.tflite``.
-    threads : int
-    """
+    """Person detector for whole pictures; ``path`` is that of ``pose_detection.tflite``."""
 
     def __init__(self, path: Path, threads: int = 1) -> None:
         self._network = _Network(path, threads)
 
     def people(self, picture: Pixels) -> list[Detection]:
-        """Everybody in a picture (height, width, 3), RGB; surest first."""
+        """People in an RGB picture (height, width, 3), the surest first."""
         return self.look(picture)[0]
 
     def look(self, picture: Pixels, square: Roi | None = None) -> tuple[list[Detection], float]:
-        """Everybody in a picture, and how sure the surest place is of showing a person.
+        """Detect people; return them and the highest score of any place.
 
-        Parameters
-        ----------
-        picture : uint8 array, shape (height, width, 3)
-        square : Roi, optional
-            Only in this upright part of it: people less than some two fifths as high
-            as what is looked at are not found.
+        With ``square``, only that upright part of the picture is searched: people less than about
+        two fifths as high as the searched part are not found.
         """
         height, width = picture.shape[:2]
         if square is None:
@@ -156,42 +118,20 @@ class PoseDetector:
 
 
 class PoseLandmarker:
-    """Finds the points of one person in a square.
+    """Landmark network for one person in a square; ``path`` is ``pose_landmark_full.tflite``.
 
-    Not to be used by two threads at once; make one for each. It lets other
-    threads run meanwhile.
-
-    Parameters
-    ----------
-    path : Path
-        ``pose_landmark_full.tflite``.
-    threads : int
+    Not to be used by two threads at once: make one for each. It releases the GIL.
     """
 
     def __init__(self, path: Path, threads: int = 1) -> None:
         self._network = _Network(path, threads)
 
     def in_picture(self, picture: Pixels, roi: Roi) -> Pose:
-        """Points of the person in a square of a picture.
-
-        Parameters
-        ----------
-        picture : uint8 array, shape (height, width, 3)
-            RGB.
-        roi : Roi
-        """
+        """Landmarks of the person in a square of an RGB picture (height, width, 3)."""
         return self.on_crop(roi.cut(picture), roi)
 
     def on_crop(self, crop: Pixels, roi: Roi) -> Pose:
-        """Points of the person in a square that is cut out already.
-
-        Parameters
-        ----------
-        crop : uint8 array, shape (256, 256, 3)
-            RGB.
-        roi : Roi
-            Where in the picture it is from.
-        """
+        """Landmarks of the person in a crop (256, 256, 3), RGB, cut from ``roi`` of a picture."""
         points, flag, mask, heat, world = self._network.run(
             crop.astype(np.float32) * np.float32(1.0 / 255.0)
         )
@@ -213,18 +153,11 @@ class PoseLandmarker:
         )
 
     def on_both_sides(self, crop: Pixels, roi: Roi) -> Pose:
-        """Points of the person in a square and in its mirror image, averaged.
+        """Landmarks of the person in a crop and in its mirror image, averaged.
 
-        The network is not symmetric: the mean has 0.7 times the jitter, and a depth
-        that follows the limbs better; it takes twice as long. Where the two differ by
-        much more than 4 % of the square, only the first counts: one of them has taken
-        a hand for the other.
-
-        Parameters
-        ----------
-        crop : uint8 array, shape (256, 256, 3)
-        roi : Roi
-            See :meth:`on_crop`.
+        The network is not symmetric: the mean has 0.7 times the jitter and a better depth, and
+        takes twice as long. Where the two differ by much more than 4 % of the square, one of
+        them has taken one hand for the other, and only the first counts.
         """
         one = self.on_crop(crop, roi)
         two = _unmirrored(self.on_crop(np.ascontiguousarray(crop[:, ::-1]), _upright(roi)), roi)
@@ -272,7 +205,7 @@ class _Network:
 
 @contextmanager
 def _without_chatter() -> Iterator[None]:
-    """Keep LiteRT, which cannot be told to, from writing to standard error as it starts."""
+    """Keep LiteRT from writing to standard error while it starts."""
     with _CHATTER:
         try:
             kept = os.dup(2)
@@ -290,12 +223,12 @@ def _without_chatter() -> Iterator[None]:
 
 
 def _upright(roi: Roi) -> Roi:
-    """A square of the same size that is the picture itself: points are those of the crop."""
+    """Square of the same size that is the whole picture: points are those of the crop."""
     return Roi(roi.size_px / 2.0, roi.size_px / 2.0, roi.size_px)
 
 
 def _unmirrored(pose: Pose, roi: Roi) -> Pose:
-    """What was found in the mirror image of a square, as if found in the square."""
+    """Landmarks found in a mirror image, turned back into those of the square."""
     turned = roi.matrix()
     turn = turned[:, :2] / (roi.size_px / CROP_PX)
     points = pose.image_px[[*_MIRRORED, *range(33, POINTS)]] * [-1.0, 1.0] + [roi.size_px, 0.0]
@@ -315,13 +248,13 @@ def _unmirrored(pose: Pose, roi: Roi) -> Pose:
 
 
 def _mean(one: Floats, two: Floats, share: Floats) -> Floats:
-    """Rows of both, ``share`` (up to a half) of the second."""
+    """Weighted mean of rows, ``share`` (up to a half) of the second."""
     share = share.reshape(-1, *(1,) * (one.ndim - 1))
     return (1.0 - share) * one + share * two
 
 
 def _same_person(centres: Floats, sizes: Floats, scores: Floats) -> list[NDArray[np.intp]]:
-    """Rows of boxes that overlap the surest one of them, for every person."""
+    """Group boxes by person: those that overlap the surest one, then the next."""
     left = np.argsort(-scores, kind="stable")
     people = []
     while left.size:
@@ -338,14 +271,7 @@ def _same_person(centres: Floats, sizes: Floats, scores: Floats) -> list[NDArray
 
 
 def _refined(points_px: Floats, heat: Singles) -> Floats:
-    """Points of the crop, moved to the mean of the heat around them.
-
-    Parameters
-    ----------
-    points_px : float64 array, shape (39, 2)
-    heat : float32 array, shape (64, 64, 39)
-        Logits.
-    """
+    """Points (39, 2) of the crop moved to the mean of the heat map (64, 64, 39) around them."""
     cells = np.floor(points_px / _CELL_PX).astype(np.intp)
     steps = np.arange(-_REFINE_CELLS, _REFINE_CELLS + 1)
     columns = cells[:, 0, None, None] + steps[None, None, :]  # (39, 1, 7)

@@ -46,13 +46,13 @@ class PinholeCamera:
 
     @classmethod
     def default(cls, width: int, height: int) -> PinholeCamera:
-        """A camera of :data:`DEFAULT_FIELD_OF_VIEW_DEG` for pictures of this size."""
+        """Camera of :data:`DEFAULT_FIELD_OF_VIEW_DEG` for pictures of this size."""
         half = math.radians(DEFAULT_FIELD_OF_VIEW_DEG) / 2.0
         return cls(width, height, max(width, height) / 2.0 / math.tan(half))
 
     @property
     def centre_px(self) -> NDArray[np.float64]:
-        """Where the optical axis meets the picture, (2,)."""
+        """Principal point, the middle of the picture, (2,)."""
         return np.array([self.width, self.height]) / 2.0
 
     def project(self, points_m: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -65,7 +65,7 @@ class PinholeCamera:
 
 
 Source = Literal["user", "metadata", "default"]
-"""How a focal length is known, in the words of recordings."""
+"""Source of a focal length, as recordings name it."""
 
 # com.apple.quicktime.camera.focal_length.35mm_equivalent, FocalLengthIn35mmFormat, …
 _EQUIVALENT = re.compile(r"focal.?length.*35.?mm", re.IGNORECASE)
@@ -79,7 +79,7 @@ def camera_of(
     focal_px: float | None = None,
     field_of_view_deg: float | None = None,
 ) -> tuple[PinholeCamera, Source]:
-    """The camera of a video, and how its focal length is known.
+    """Camera of a video, and the source of its focal length.
 
     Parameters
     ----------
@@ -93,14 +93,13 @@ def camera_of(
     -------
     PinholeCamera
     {"user", "metadata", "default"}
-        Metadata: the focal length equivalent on 35 mm film, by the diagonal of the
-        picture, where the file has one, as phones write it. Default: 56° across the
-        longer side.
+        Metadata: focal length equivalent on 35 mm film, by the diagonal of the picture, as phones
+        write it. Default: 56° across the longer side.
 
     Raises
     ------
     Sd2Error
-        When both are given, or are none of a camera.
+        If both are given, or are impossible.
     """
     size = video.width, video.height
     if focal_px is not None and field_of_view_deg is not None:
@@ -124,7 +123,7 @@ def camera_of(
 
 
 def written_focal_mm(metadata: Mapping[str, str]) -> float | None:
-    """Focal length equivalent on 35 mm film among what a file says of itself, or None."""
+    """35 mm equivalent focal length among a file's metadata, or None."""
     for name, value in metadata.items():
         found = _NUMBER.search(value) if _EQUIVALENT.search(name) else None
         if found is None:

@@ -1,4 +1,4 @@
-"""What a fit goes by: landmarks in the picture, and their depth as the lifter tells it."""
+"""Measurements that a body is fitted to: landmarks in the picture and their lifted depth."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sd2core.body.rotations import Floats
 from sd2core.body.track import TORSO_CORNERS, Landmarks, LandmarkTrack, parts
 
 _PICTURE_SD = 0.006
-"""Of a landmark that is well visible, in apparent statures: 3 pixels of 480."""
+"""Standard deviation of a well visible landmark, in apparent statures: 3 pixels of 480."""
 _LEAST_VISIBILITY = 0.05
 DEPTH_CAUTION = 2.0
 VELOCITY_CAUTION = 4.0
@@ -23,42 +23,27 @@ VELOCITY_CAUTION = 4.0
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What was seen of one stretch of frames; everything in the camera frame.
+    """Measurements of a stretch of frames, in the camera frame, with standard deviations."""
 
-    Parameters
-    ----------
-    times_s : float64 array, shape (T,)
-    slopes, slopes_sd : float64 arrays, shapes (T, 33, 2) and (T, 33)
-        x / z and y / z of each landmark.
-    trunk : tuple of int
-        Landmarks whose mean is the middle of the trunk.
-    depth_m, depth_sd_m : float64 arrays, shape (T, 33)
-        Behind the middle of the trunk.
-    trunk_m, trunk_sd_m : float64 arrays, shape (T,)
-        Depth of the middle of the trunk.
-    velocity_mps, velocity_sd_mps : float64 arrays, shape (T, 33)
-        Change of that depth, positive away.
-    """
-
-    times_s: Floats
-    slopes: Floats
-    slopes_sd: Floats
-    trunk: tuple[int, ...]
-    depth_m: Floats
-    depth_sd_m: Floats
-    trunk_m: Floats
-    trunk_sd_m: Floats
-    velocity_mps: Floats
-    velocity_sd_mps: Floats
+    times_s: Floats  # (T,)
+    slopes: Floats  # (T, 33, 2) x / z and y / z of each landmark
+    slopes_sd: Floats  # (T, 33)
+    trunk: tuple[int, ...]  # landmarks whose mean is the middle of the trunk
+    depth_m: Floats  # (T, 33) behind the middle of the trunk
+    depth_sd_m: Floats  # (T, 33)
+    trunk_m: Floats  # (T,) depth of the middle of the trunk
+    trunk_sd_m: Floats  # (T,)
+    velocity_mps: Floats  # (T, 33) change of depth_m, positive away
+    velocity_sd_mps: Floats  # (T, 33)
 
     @property
     def points_m(self) -> Floats:
-        """Where the landmarks are according to slopes and depths, (T, 33, 3)."""
+        """Places of the landmarks by slopes and depths, (T, 33, 3)."""
         depth = (self.trunk_m[:, None] + self.depth_m)[..., None]
         return np.concatenate([self.slopes * depth, depth], axis=-1)
 
     def __getitem__(self, frames: slice | NDArray[np.intp]) -> Evidence:
-        """Only some frames."""
+        """Evidence of some frames."""
         parts = {
             field.name: getattr(self, field.name)[frames]
             for field in fields(self)
@@ -70,16 +55,7 @@ class Evidence:
 def evidence_of(
     track: LandmarkTrack, lifted: LiftedTrack, camera: PinholeCamera, stature_m: float
 ) -> Evidence:
-    """Landmarks and their depths in metres and seconds.
-
-    Parameters
-    ----------
-    track, lifted
-        Of the same frames; NaN in empty ones.
-    camera : PinholeCamera
-    stature_m : float
-        Gives everything its scale.
-    """
+    """Landmarks and depths of the same frames in metres and seconds, scaled by the stature."""
     # How the trunk moves is told better by how the person grows in the picture.
     trunk = lifted.velocity[:, TORSO_CORNERS].mean(axis=1, keepdims=True)
     visibility = np.clip(track.visibility.astype(np.float64), _LEAST_VISIBILITY, 1.0)
@@ -99,15 +75,7 @@ def evidence_of(
 
 
 class EvidenceInParts:
-    """What a fit goes by in a clip of any length.
-
-    Parameters
-    ----------
-    track, lifted
-        Of the same frames.
-    camera : PinholeCamera
-    stature_m : float
-    """
+    """Evidence of a clip of any length, made part by part."""
 
     def __init__(
         self, track: Landmarks, lifted: Lifted, camera: PinholeCamera, stature_m: float
@@ -116,16 +84,16 @@ class EvidenceInParts:
         self._camera, self._stature_m = camera, stature_m
 
     def part(self, start: int, stop: int) -> tuple[Evidence, LandmarkTrack, LiftedTrack]:
-        """Evidence of frames ``start`` to ``stop``, and what it was made of."""
+        """Evidence of frames ``start`` to ``stop``, with its track and lifted track."""
         track, lifted = self._track.part(start, stop), self._lifted.part(start, stop)
         return evidence_of(track, lifted, self._camera, self._stature_m), track, lifted
 
     def chosen(
         self, frames: NDArray[np.intp], looked: Callable[[int], None]
     ) -> tuple[Evidence, Floats]:
-        """Evidence of some frames (ascending) of the clip, and their visibility (n, 33).
+        """Evidence of some frames (ascending), and their visibility (n, 33).
 
-        ``looked`` is called with the number of parts that have been gone through.
+        ``looked`` is called with the number of parts that were read.
         """
         pieces, trust = [], []
         for number, (start, stop) in enumerate(parts(len(self._track))):

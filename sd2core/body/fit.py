@@ -31,7 +31,7 @@ from sd2core.progress import Progress, silent
 Lift = Callable[[Landmarks, PinholeCamera], Lifted]
 
 DEFAULT_STATURE_M = 1.72
-"""Where nobody says how tall the person is; distances and speeds scale with it."""
+"""Body height if none is given; distances and speeds scale with it."""
 
 STATURES_M = (0.5, 2.6)
 
@@ -45,7 +45,7 @@ _ALONG = 0.22
 _ACROSS_PER_S = 3.0
 
 _UNSEEN_MPS = 0.3
-"""What a limb may do that the picture cuts off or something hides; a guess, not measured."""
+"""Velocity deviation of limbs that are cut off or hidden; a guess, not measured."""
 
 
 def fit_body(
@@ -57,7 +57,7 @@ def fit_body(
     workspace: Path | None = None,
     progress: Progress = silent,
 ) -> BodyFit:
-    """Fit a body to landmarks, with all that is known of it in memory.
+    """Fit a body to landmarks, with everything in memory.
 
     Parameters
     ----------
@@ -66,21 +66,16 @@ def fit_body(
     stature_m : float, optional
         The person's height, which fixes the scale; :data:`DEFAULT_STATURE_M` without.
     lift : callable, optional
-        Gives the landmarks their depth: the bundled lifter, where not given.
+        Gives the landmarks their depth; by default the bundled lifter.
     workspace : Path, optional
-        An existing folder where finished stretches are kept, so that a stopped fit
-        goes on there.
+        Existing folder in which finished stretches are kept, so that a stopped fit goes on there.
     progress : Progress
         Counts steps of the solver, at most.
-
-    Returns
-    -------
-    BodyFit
 
     Raises
     ------
     Sd2Error
-        When the height is none of a person, or no frame shows one.
+        If the height is none of a person, or no frame shows one.
     """
     fitting = Fitting(track, camera, stature_m, lift, workspace)
     found = list(fitting.finished(progress))
@@ -103,10 +98,10 @@ def fit_motion(
     workspace: Path,
     progress: Progress = silent,
 ) -> FittedMotion:
-    """The same for a clip of any length, with the poses in the workspace.
+    """Fit a body to a clip of any length; the poses stay in the workspace.
 
-    Parameters and errors are those of :func:`fit_body`; the workspace is needed as
-    long as the poses are.
+    Parameters and errors are those of :func:`fit_body`; the workspace must live as long as the
+    poses are used.
     """
     fitting = Fitting(track, camera, stature_m, None, workspace)
     along_mps, across_mps = np.zeros((2, len(track), len(LIMBS)), np.float32)
@@ -133,18 +128,7 @@ def fit_motion(
 
 
 class Fitting:
-    """A fit under way, of which a window of frames is in memory at a time.
-
-    Parameters
-    ----------
-    track, camera, stature_m, lift, workspace
-        See :func:`fit_body`.
-
-    Attributes
-    ----------
-    windows : Windows
-        The poses, as far as they have been found.
-    """
+    """Fit of one clip, with one window of frames in memory at a time; see :func:`fit_body`."""
 
     def __init__(
         self,
@@ -170,7 +154,7 @@ class Fitting:
         self.windows = Windows(track.present, workspace)
 
     def finished(self, progress: Progress) -> Iterator[BodyFit]:
-        """The fit of ever later frames, each as soon as its pose is final."""
+        """Fits of successive stretches, each as soon as its pose is final."""
         spans = self.windows.spans
         looked = sum(1 for _ in parts(len(self._track)))
         total = looked + len(spans) * ROUNDS
@@ -201,10 +185,7 @@ class Fitting:
         self.windows.keep(number, part, solve(rig, leaning, first, tick))
 
     def _shape(self, people: _People, looked: Callable[[int], None]) -> BodyShape:
-        """Bone lengths from all frames, then girth from those whose outlines are kept.
-
-        Of long clips the bone lengths are from frames that are evenly spread.
-        """
+        """Bone lengths from evenly chosen frames, then girth from those with outlines."""
         track = self._track
         there = track.present & ~track.bridged
         there = there if there.any() else track.present
@@ -281,7 +262,7 @@ def _outlined(track: Landmarks, there: NDArray[np.bool_]) -> NDArray[np.intp]:
 
 
 def _thinned(rows: NDArray[np.intp], most: int) -> NDArray[np.intp]:
-    """At most so many of them, evenly spread."""
+    """At most so many of the rows, evenly spread."""
     if not len(rows):
         return rows
     return rows[np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(int)]

@@ -1,4 +1,4 @@
-"""A video to a mesh, from end to end, so that it can be stopped at any moment and go on."""
+"""Video to mesh from end to end; a stopped fit goes on where it ended."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ from sd2core.version import __version__
 Stage = Literal["models", "find", "refine", "fit", "write"]
 
 STAGES: tuple[Stage, ...] = ("find", "refine", "fit", "write")
-"""What is done to every video, in order; ``models`` comes before, where they are missing."""
+"""Stages of a fit, in order; ``models`` comes first if they are missing."""
 
 
 @dataclass(frozen=True)
 class FitChoices:
-    """What the user may say about a video.
+    """Options of a fit.
 
     Parameters
     ----------
@@ -56,9 +56,9 @@ class FitChoices:
     focal_px, field_of_view_deg : float, optional
         Of the camera; see :func:`~sd2core.body.camera.camera_of`.
     stature_m : float, optional
-        How tall the person is.
+        The person's height.
     max_gap_s : float
-        The longest gap without the person that is bridged.
+        Longest gap without the person that is bridged.
     resolution : {"low", "medium", "high"}
         Of the mesh: 1,229, 5,000 or 13,348 vertices.
     """
@@ -73,17 +73,16 @@ class FitChoices:
 
 @dataclass(frozen=True)
 class FitReport:
-    """Where what is done is reported; every callback may raise ``Cancelled``.
+    """Callbacks of a running fit; each may raise ``Cancelled``.
 
     Parameters
     ----------
     progress_of : callable
         Gives the progress callback of a stage that begins.
     started : callable
-        Called with the open video, and whether a stopped run is continued.
+        Called with the open video, and True if a stopped run is continued.
     on_frame : callable
-        Called with a stage and what it found in a frame: its number, points in
-        pixels (33, 2) and visibility (33,).
+        Called with a stage and a frame's number, landmarks in pixels (33, 2) and visibility (33,).
     """
 
     progress_of: Callable[[Stage], Progress]
@@ -93,33 +92,17 @@ class FitReport:
 
 @dataclass(frozen=True, eq=False)
 class FittedVideo:
-    """What was made.
-
-    Parameters
-    ----------
-    camera : PinholeCamera
-    camera_source : {"user", "metadata", "default"}
-    frames : int
-    frames_per_s : float
-    present, bridged : int
-        Frames with the person, and those of them that were interpolated.
-    residual_m : float
-        How far from the body the lifted landmarks are, on average.
-    quality : float
-        From 0 to 1, on average over the frames with the person.
-    notes : tuple of str
-        Sentences on the video and what was repaired.
-    """
+    """Summary of a finished fit."""
 
     camera: PinholeCamera
     camera_source: Source
     frames: int
     frames_per_s: float
-    present: int
-    bridged: int
-    residual_m: float
-    quality: float
-    notes: tuple[str, ...]
+    present: int  # frames with the person
+    bridged: int  # those of them that were interpolated
+    residual_m: float  # mean distance of the lifted landmarks from the body
+    quality: float  # from 0 to 1, mean over frames with the person
+    notes: tuple[str, ...]  # sentences on the video and on repairs
 
 
 def fit_video(
@@ -134,8 +117,8 @@ def fit_video(
 ) -> FittedVideo:
     """Fit a body to the person in a video and write it as a mesh.
 
-    What is done is kept in ``OUT.partial`` until the mesh is complete; the same call
-    goes on from there, however the one before was ended.
+    Results are kept in ``OUT.partial`` until the mesh is complete; the same call goes on from
+    there, even after a kill.
 
     Parameters
     ----------
@@ -146,16 +129,16 @@ def fit_video(
     choices : FitChoices
     report : FitReport
     models : Path, optional
-        The folder of the landmark models.
+        Folder of the landmark models.
     landmarks_out : Path, optional
-        Where the landmarks are to be kept (.npz).
+        File (.npz) for the landmarks.
     restart : bool
-        Begin anew.
+        Discard the results of a stopped fit.
 
     Raises
     ------
     Sd2Error
-        When something is wrong with the video, the choices or the output.
+        If something is wrong with the video, the choices or the output.
     """
     check_fit_output(out)
     partial = out.with_name(out.name + PARTIAL)
@@ -205,7 +188,7 @@ def fit_video(
 
 
 def provenance(made: FittedVideo, path: Path, choices: FitChoices) -> dict[str, Any]:
-    """What a mesh file says about where it is from."""
+    """Provenance that is stored in a mesh file."""
     stature_m = choices.stature_m
     return {
         "made_by": f"SD² Studio {__version__}, sd2 fit",
@@ -224,17 +207,14 @@ def provenance(made: FittedVideo, path: Path, choices: FitChoices) -> dict[str, 
 
 
 def _give_back_memory() -> None:
-    """Give back what decoder and networks have freed.
-
-    The GNU C library keeps it, in parts for each thread that had it; others need no telling.
-    """
+    """Return freed memory of decoder and networks, which the GNU C library would keep."""
     # Elsewhere there is no such library, or it has no such function.
     with suppress(AttributeError, OSError, TypeError):
         ctypes.CDLL(None).malloc_trim(0)
 
 
 class _Stages:
-    """Gives what the landmarks report to the stage they are in."""
+    """Hands the reports of the landmark search to the stage that runs."""
 
     def __init__(self, report: FitReport) -> None:
         self._report = report
@@ -257,7 +237,7 @@ class _Stages:
 def _fit_folder(
     partial: Path, track: Landmarks, choices: FitChoices, camera: PinholeCamera
 ) -> Path:
-    """Where the fit of these landmarks with these choices keeps what it has done."""
+    """Folder of a fit, named by its landmarks and choices."""
     landmarks = hashlib.sha256()
     for start, stop in parts(len(track)):
         part = track.part(start, stop)
@@ -291,7 +271,7 @@ def _write(
 
 
 def _describe(mesh: Path, about: Mapping[str, Any]) -> None:
-    """Write where a mesh is from into its file."""
+    """Write provenance into a mesh file."""
     if mesh.is_dir():
         import zarr
 
@@ -306,7 +286,7 @@ def _describe(mesh: Path, about: Mapping[str, Any]) -> None:
 
 
 def _take_place(partial: Path, out: Path) -> None:
-    """Give the complete mesh its name; one of that name makes way."""
+    """Rename the complete mesh, replacing an earlier one."""
     new = partial / _new(out)
     if new.is_dir():
         if out.exists():

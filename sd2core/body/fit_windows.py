@@ -1,4 +1,4 @@
-"""The windows in which a long clip is fitted, and the poses that go over from one to the next."""
+"""Windows in which a long clip is fitted, and the blending of their poses."""
 
 from __future__ import annotations
 
@@ -22,24 +22,13 @@ _OVERLAP_FRAMES = 60
 """Less than half of any window: no frame is in three of them."""
 
 _TOLD_BY = ("slopes", "depth_m", "trunk_m")
-"""What tells that a kept window was fitted to the same evidence."""
+"""Arrays by which a kept window is known to be fitted to the same evidence."""
 
 
 class Windows:
-    """Poses of a clip, fitted window by window.
+    """Poses of a clip, fitted window by window, in a folder or in memory.
 
-    Parameters
-    ----------
-    present : bool array, shape (T,)
-        Frames with a person, at least one.
-    workspace : Path, optional
-        An existing folder for the poses; without one they are kept in memory.
-
-    Attributes
-    ----------
-    spans : list of (int, int, int)
-        Of each window where it starts and stops, and how many frames it shares with
-        the one before.
+    ``spans`` holds of each window its start, its stop and the frames shared with the one before.
     """
 
     def __init__(self, present: NDArray[np.bool_], workspace: Path | None) -> None:
@@ -59,7 +48,7 @@ class Windows:
             write_arrays(self._file(number), told | found._asdict(), {})
 
     def is_kept(self, number: int, part: Evidence) -> bool:
-        """Whether an earlier run has finished a window, with the same evidence."""
+        """True if an earlier run has finished a window with the same evidence."""
         if self._workspace is None:
             return False
         try:
@@ -87,7 +76,7 @@ class Windows:
         return pose.at(place)
 
     def _lay(self, pose: Pose, frames: NDArray[np.intp], number: int) -> None:
-        """Write a window's pose, going over from the one before where they overlap."""
+        """Write a window's pose, blended with the one before where they overlap."""
         start, stop, overlap = self.spans[number]
         low, middle, high = np.searchsorted(frames, [start, start + overlap, stop])
         if low == high:

@@ -1,4 +1,4 @@
-"""What a fit finds: a person's shape and motion, and the moving surface they make."""
+"""Result of a fit: shape and motion of a person, and the moving surface made of them."""
 
 from __future__ import annotations
 
@@ -39,49 +39,23 @@ PER_FRAME = (
 
 @dataclass(frozen=True, eq=False)
 class BodyFit:
-    """A person's shape and motion.
-
-    Parameters
-    ----------
-    timebase : Timebase
-    shape : BodyShape
-    turns : float64 array, shape (T, J, 3, 3)
-        Rotation of every joint of :data:`sd2core.body.rig.JOINTS`; the last known one
-        in empty frames.
-    translation_m : float64 array, shape (T, 3)
-    present : bool array, shape (T,)
-        False in empty frames.
-    keypoints_m : float64 array, shape (T, 33, 3)
-        The fitted body's landmarks in the camera frame.
-    residual_m : float64 array, shape (T, 33)
-        How far from them the lifted landmarks are, around the fitted trunk; NaN in empty
-        frames.
-    along_sd_mps, across_sd_mps : float64 arrays, shape (T, 33)
-        Standard deviation of each landmark's velocity along the line of sight, and in
-        any direction at right angles to it; 0 in empty frames.
-    """
+    """A person's shape and motion."""
 
     timebase: Timebase
     shape: BodyShape
-    turns: Floats
-    translation_m: Floats
-    present: NDArray[np.bool_]
-    keypoints_m: Floats
-    residual_m: Floats
-    along_sd_mps: Floats
-    across_sd_mps: Floats
+    turns: Floats  # (T, J, 3, 3) rotation of every joint of rig.JOINTS; held in empty frames
+    translation_m: Floats  # (T, 3)
+    present: NDArray[np.bool_]  # (T,) False in empty frames
+    keypoints_m: Floats  # (T, 33, 3) the fitted body's landmarks in the camera frame
+    residual_m: Floats  # (T, 33) distance of the lifted landmarks from them; NaN in empty frames
+    along_sd_mps: Floats  # (T, 33) deviation of velocity along the line of sight; 0 in empty ones
+    across_sd_mps: Floats  # (T, 33) deviation in any direction at right angles to it
 
     def __len__(self) -> int:
         return len(self.timebase)
 
     def mesh(self, resolution: Resolution = "high") -> MeshSequence:
-        """The moving surface; vertices are posed where they are read.
-
-        Parameters
-        ----------
-        resolution : {"high", "medium", "low"}
-            13,348, 5,000 or 1,229 vertices.
-        """
+        """The moving surface of 13,348 (high), 5,000 or 1,229 vertices, posed where it is read."""
         return surface(
             self.shape,
             self.timebase,
@@ -94,38 +68,23 @@ class BodyFit:
 
     @property
     def quality(self) -> Floats:
-        """From 0 (no person) to 1 (landmarks on the body) in every frame, (T,)."""
+        """Quality of the fit per frame, (T,): from 0 (no person) to 1 (landmarks on the body)."""
         residual = np.nan_to_num(self.residual_m, nan=np.inf)
         return np.asarray(np.exp(-np.median(residual, axis=1) / 0.05))
 
 
 @dataclass(frozen=True, eq=False)
 class FittedMotion:
-    """A person's shape and motion in a clip of any length; poses are read as they are needed.
-
-    Parameters
-    ----------
-    timebase : Timebase
-    shape : BodyShape
-    poses : callable
-        Gives the pose of frames (n,).
-    present : bool array, shape (T,)
-    along_sd_mps, across_sd_mps : float32 arrays, shape (T, L)
-        Of :class:`BodyFit`, the mean over each limb's landmarks.
-    residual_m : float
-        Mean of :attr:`BodyFit.residual_m`.
-    quality : float
-        Mean of :attr:`BodyFit.quality` over frames with the person.
-    """
+    """A person's shape and motion in a clip of any length; poses are read as they are needed."""
 
     timebase: Timebase
     shape: BodyShape
     poses: Poses
     present: NDArray[np.bool_]
-    along_sd_mps: NDArray[np.float32]
-    across_sd_mps: NDArray[np.float32]
-    residual_m: float
-    quality: float
+    along_sd_mps: NDArray[np.float32]  # (T, L) of BodyFit, mean over each limb's landmarks
+    across_sd_mps: NDArray[np.float32]  # (T, L)
+    residual_m: float  # mean of BodyFit.residual_m
+    quality: float  # mean of BodyFit.quality over frames with the person
 
     def mesh(self, resolution: Resolution = "high") -> MeshSequence:
         """The moving surface, as :meth:`BodyFit.mesh`."""
@@ -163,16 +122,7 @@ def surface(
 
 
 class FittedVertices:
-    """Vertices (T, V, 3) of a body in a pose, float32, made when they are asked for.
-
-    Parameters
-    ----------
-    body : Body
-    rig : Rig
-    frames : int
-    poses : callable
-        Gives the pose of frames (n,).
-    """
+    """Vertices (T, V, 3) of a posed body, float32, computed when they are read."""
 
     def __init__(self, body: Body, rig: Rig, frames: int, poses: Poses) -> None:
         self._body, self._rig, self._poses = body, rig, poses

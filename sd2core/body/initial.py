@@ -32,16 +32,7 @@ class Pose(NamedTuple):
 
 
 def initial_pose(rig: Rig, seen_m: Floats, trust: Floats) -> Pose:
-    """The pose whose limbs lie along those seen.
-
-    Parameters
-    ----------
-    rig : Rig
-    seen_m : float64 array, shape (T, 33, 3)
-        Landmarks in the camera frame.
-    trust : float64 array, shape (T, 33)
-        Weight of each; near 0 where it is a guess.
-    """
+    """Pose whose limbs lie along landmarks (T, 33, 3) in the camera frame, weighted by trust."""
     frames = len(seen_m)
     pose = Pose(np.tile(np.eye(3), (frames, len(JOINTS), 1, 1)), np.zeros((frames, 3)))
     fit = _Fitting(rig, pose, seen_m, trust)

@@ -71,35 +71,19 @@ _SEEN_BESIDE = {
 
 @dataclass(frozen=True, eq=False)
 class Keypoints:
-    """Points fixed to the bones of one body.
+    """Points fixed to the bones of one body."""
 
-    Parameters
-    ----------
-    bones : intp array, shape (33,)
-    rest_m : float64 array, shape (33, 3)
-        Where they are at rest.
-    """
-
-    bones: NDArray[np.intp]
-    rest_m: Floats
+    bones: NDArray[np.intp]  # (33,)
+    rest_m: Floats  # (33, 3) at rest
 
     def positions(self, transforms: Floats) -> Floats:
-        """Where they are under :meth:`Skeleton.transforms` (T, B, 3, 4): (T, 33, 3)."""
+        """Positions (T, 33, 3) under :meth:`Skeleton.transforms` (T, B, 3, 4)."""
         moved = transforms[:, self.bones]
         return np.asarray(applied(moved[..., :3], self.rest_m) + moved[..., 3])
 
 
 class KeypointSpace:
-    """Where the landmarks are on bodies of any shape.
-
-    Attributes
-    ----------
-    bones : intp array, shape (33,)
-    base_m : float64 array, shape (33, 3)
-        On the bundled body at rest.
-    directions_m : float64 array, shape (K, 33, 3)
-        What one unit of each coefficient of shape moves them.
-    """
+    """Landmarks on bodies of any shape: ``base_m`` (33, 3), ``directions_m`` (K, 33, 3)."""
 
     def __init__(self, space: ShapeSpace) -> None:
         skeleton = space.base_skeleton
@@ -128,22 +112,21 @@ class KeypointSpace:
                 self.directions_m[:, number] = directions[:, row]
 
     def of(self, shape: BodyShape) -> Keypoints:
-        """The landmarks of one body."""
+        """Landmarks of one body."""
         moved = self.base_m + np.tensordot(shape.coefficients, self.directions_m, 1)
         return Keypoints(self.bones, shape.stature_m / self._space.base_stature_m * moved)
 
     def seen_on(self, shape: BodyShape) -> Keypoints:
-        """Where the landmark model sees the landmarks of one body.
+        """Landmarks of one body as the landmark model sees them, for comparison with pictures.
 
-        Up to 4 cm beside :meth:`of`: its hips lie further forward, its ears and
-        thumbs further out. What is compared with places in a picture should be these.
+        They lie up to 4 cm beside :meth:`of`: hips further forward, ears and thumbs further out.
         """
         points = self.of(shape)
         return Keypoints(points.bones, points.rest_m + shape.stature_m * seen_beside())
 
 
 def seen_beside() -> Floats:
-    """How far beside our keypoints the landmark model sees them, in statures, (33, 3)."""
+    """Offsets of the landmark model's landmarks from our keypoints, in statures, (33, 3)."""
     rows = []
     for name in LANDMARKS:
         left, down, back = _SEEN_BESIDE[name.replace(".R", ".L")]

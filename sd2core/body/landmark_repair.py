@@ -22,12 +22,12 @@ ARMS = tuple(range(13, 23))
 LEGS = tuple(range(25, 33))
 TRUNK = tuple(number for number in range(33) if number not in ARMS + LEGS)
 SIDED_PARTS = {"head and trunk": TRUNK, "the arms": ARMS, "the legs": LEGS}
-"""What is swapped as one, and its landmarks."""
+"""Parts of the body that are swapped as one, and their landmarks."""
 
 _PARTNERS = np.array(MIRRORED)
 
 MAX_ACCELERATION_MPS2 = 250.0
-"""Of any landmark; a swipe of 0.8 m in 0.25 s reaches 74 m/s²."""
+"""Limit for any landmark; a swipe of 0.8 m in 0.25 s reaches 74 m/s²."""
 _SPIKE_S = 0.1
 _SCALE_S = 0.5
 _NOISE_M = 0.06
@@ -39,30 +39,18 @@ _BRIDGED_VISIBILITY = 0.25
 
 @dataclass(frozen=True, eq=False)
 class RawTrack:
-    """What was found in each frame; T frames.
+    """Landmarks as detected in each of T frames; NaN, or visibility 0, where nothing was found."""
 
-    Parameters
-    ----------
-    times_s : float64 array, shape (T,)
-    present : bool array, shape (T,)
-    bridged : bool array, shape (T,)
-    image_px : float32 array, shape (T, 33, 2)
-    depth_px : float32 array, shape (T, 33)
-    world_m : float32 array, shape (T, 33, 3)
-    visibility : float32 array, shape (T, 33)
-        The last four: NaN, or for visibility 0, where nothing was found.
-    """
-
-    times_s: Floats
-    present: NDArray[np.bool_]
-    bridged: NDArray[np.bool_]
-    image_px: Singles
-    depth_px: Singles
-    world_m: Singles
-    visibility: Singles
+    times_s: Floats  # (T,)
+    present: NDArray[np.bool_]  # (T,)
+    bridged: NDArray[np.bool_]  # (T,)
+    image_px: Singles  # (T, 33, 2)
+    depth_px: Singles  # (T, 33)
+    world_m: Singles  # (T, 33, 3)
+    visibility: Singles  # (T, 33)
 
     def picked(self, order: NDArray[np.intp], frames: NDArray[np.bool_]) -> RawTrack:
-        """The landmarks of some frames in another order (33,)."""
+        """Landmarks of some frames in another order (33,)."""
         changed = {}
         for name in ("image_px", "depth_px", "world_m", "visibility"):
             values = getattr(self, name).copy()
@@ -81,15 +69,9 @@ class RawTrack:
 def undo_side_swaps(found: RawTrack) -> tuple[RawTrack, dict[str, NDArray[np.bool_]]]:
     """Undo swaps of left and right: of head and trunk, of the arms, of the legs, or of all.
 
-    A swap is undone where that makes the motion smoother (the sum of accelerations over
-    the whole clip is the least, by dynamic programming over both sides of each frame);
-    which of the two is right is what most frames say.
-
-    Returns
-    -------
-    RawTrack
-    dict of str to bool array, shape (T,)
-        Per part, the frames that were changed.
+    A swap is undone where that makes the motion smoother (the sum of accelerations over the whole
+    clip is the least, by dynamic programming over both sides of each frame); the side that most
+    frames say is right. Returns the track, and per part the frames that were changed, (T,).
     """
     swaps: dict[str, NDArray[np.bool_]] = {}
     rows = np.flatnonzero(found.present)
@@ -111,7 +93,7 @@ def undo_side_swaps(found: RawTrack) -> tuple[RawTrack, dict[str, NDArray[np.boo
 
 
 def swap_sides(found: RawTrack, part: str, frames: NDArray[np.bool_]) -> RawTrack:
-    """Left and right of one of :data:`SIDED_PARTS` swapped in some frames (T,)."""
+    """Swap left and right of one of :data:`SIDED_PARTS` in some frames (T,)."""
     members = list(SIDED_PARTS[part])
     order = np.arange(len(LANDMARKS))
     order[members] = _PARTNERS[members]
@@ -123,24 +105,16 @@ def _pair(landmark: int) -> tuple[int, int]:
 
 
 def _place_m(found: RawTrack, rows: NDArray[np.intp], scale: Floats, landmark: int) -> Floats:
-    """Picture and model's own place of one landmark side by side, in metres, (N, 5)."""
+    """One landmark in the picture and in the model's own coordinates, in metres, (N, 5)."""
     picture = found.image_px[rows, landmark] / scale
     return np.concatenate([picture, found.world_m[rows, landmark]], axis=1, dtype=np.float64)
 
 
 def _bends(times_s: Floats, sides: Floats) -> Floats:
-    """How far the middle of three frames is from the line between the others, squared.
+    """Squared distance (m²) of the middle of three frames from the line between the others.
 
-    Parameters
-    ----------
-    times_s : float64 array, shape (N,)
-    sides : float64 array, shape (2, N, d)
-        The landmark, and the one on the other side.
-
-    Returns
-    -------
-    float64 array, shape (2, 2, 2, N - 2)
-        In m², for each choice of side in the three frames.
+    ``sides`` (2, N, d) holds the landmark and the one on the other side. The result,
+    (2, 2, 2, N - 2), is for each choice of side in the three frames.
     """
     before, middle, after = times_s[:-2], times_s[1:-1], times_s[2:]
     share = ((middle - before) / (after - before))[:, None]
@@ -153,7 +127,7 @@ def _bends(times_s: Floats, sides: Floats) -> Floats:
 
 
 def _smoothest(cost: Floats) -> NDArray[np.bool_]:
-    """The cheapest choices (N,) for costs (2, 2, 2, N - 2) of three in succession."""
+    """Cheapest choices (N,) for costs (2, 2, 2, N - 2) of three in succession."""
     steps = cost.shape[3]
     # What most frames say, where motion says nothing.
     tie = 1e-9
@@ -178,7 +152,7 @@ def _smoothest(cost: Floats) -> NDArray[np.bool_]:
 
 
 def pixels_per_metre(found: RawTrack) -> Floats:
-    """How many pixels a metre across the person takes, (T,): a median over half a second."""
+    """Scale of the person in the picture, (T,), in pixels per metre: median over 0.5 s."""
     from scipy.ndimage import median_filter
 
     image, world = (
@@ -202,17 +176,10 @@ def pixels_per_metre(found: RawTrack) -> Floats:
 def replace_outliers(found: RawTrack) -> tuple[RawTrack, NDArray[np.bool_]]:
     """Replace landmarks that jump away and back within a tenth of a second.
 
-    A run of frames is replaced by the cubic through two frames before and after it
-    where every frame of it is farther from that curve, and from the line between the two
-    nearest, than any limb can get and return
-    (:data:`MAX_ACCELERATION_MPS2`), than six standard deviations of the noise, and than
-    the way from the frame before to the frame after.
-
-    Returns
-    -------
-    RawTrack
-    bool array, shape (T, 33)
-        What was replaced.
+    A run of frames is replaced by the cubic through two frames before and after it if every frame
+    of it is farther from that curve, and from the line between the two nearest, than any limb can
+    get and return (:data:`MAX_ACCELERATION_MPS2`), than six standard deviations of the noise, and
+    than the frame before is from the frame after. Returns the track, and what was replaced (T, 33).
     """
     replaced = np.zeros(found.visibility.shape, bool)
     changed = {name: getattr(found, name).copy() for name in ("image_px", "depth_px", "world_m")}
@@ -237,7 +204,7 @@ def replace_outliers(found: RawTrack) -> tuple[RawTrack, NDArray[np.bool_]]:
 
 
 def find_spikes(times_s: Floats, places_m: Floats) -> NDArray[np.bool_]:
-    """Which of the places (T, d) of one point are outliers, (T,)."""
+    """Outliers (T,) among the places (T, d) of one point."""
     from scipy.ndimage import median_filter
 
     frames = len(times_s)
@@ -304,7 +271,7 @@ def _cubic(support: Floats, at: Floats) -> Floats:
 
 
 def _filled(times_s: Floats, values: Floats, wrong: NDArray[np.bool_]) -> Floats:
-    """Values (T, ...) with the wrong ones put on the cubic through two right ones either side."""
+    """Values (T, ...) with wrong ones put on the cubic through two right ones on either side."""
     right = np.flatnonzero(~wrong)
     filled = values.copy()
     for frame in np.flatnonzero(wrong):
@@ -358,7 +325,7 @@ def repair_landmarks(
     max_gap_s: float,
     write: Callable[[RawTrack], None],
 ) -> tuple[str, ...]:
-    """Mend everything that was found.
+    """Repair a whole clip part by part; return sentences about it.
 
     Parameters
     ----------
@@ -367,14 +334,9 @@ def repair_landmarks(
     seen : bool array, shape (T,)
         Frames in which the person was found.
     max_gap_s : float
-        The longest gap that is bridged, from the last frame before to the first after.
+        Longest gap that is bridged, from the last frame before to the first after.
     write : callable
-        Called with the mended parts, in order.
-
-    Returns
-    -------
-    tuple of str
-        Sentences about it.
+        Called with the repaired parts, in order.
     """
     swapped = find_side_swaps(read, seen)
     tally = _Tally(swapped={part: int(frames.sum()) for part, frames in swapped.items()})
@@ -393,8 +355,8 @@ def repair_landmarks(
 def find_side_swaps(read: Read, seen: NDArray[np.bool_]) -> dict[str, NDArray[np.bool_]]:
     """Frames (T,) in which left and right are to be swapped back, for each part of the body.
 
-    Which of the two sides is right is what most frames say: not those of one part of the
-    clip, but of all parts that are linked by frames that they share.
+    The side that most frames say is right: not only those of one part of the clip, but of all
+    parts that are linked by frames that they share.
     """
     frames = len(seen)
     swapped = {part: np.zeros(frames, bool) for part in SIDED_PARTS}
@@ -420,10 +382,10 @@ def find_side_swaps(read: Read, seen: NDArray[np.bool_]) -> dict[str, NDArray[np
 def _around(
     start: int, stop: int, times_s: Floats, seen: NDArray[np.bool_], max_gap_s: float
 ) -> tuple[int, int]:
-    """The frames that a part is mended with.
+    """Frames that a part is repaired with.
 
-    A gap that is bridged belongs to them with three frames on either side, on which its
-    curve rests, however long it is.
+    A gap that is bridged belongs to them with three frames on either side, on which its curve
+    rests, however long it is.
     """
     rows = np.flatnonzero(seen)
 
@@ -444,7 +406,7 @@ def _around(
 
 @dataclass
 class _Tally:
-    """How much was mended."""
+    """Counts of repairs."""
 
     swapped: dict[str, int]
     landmarks: int = 0

@@ -28,15 +28,7 @@ _VERSION = 1
 class SearchStore:
     """Arrays by name: files of a folder, or without one in memory.
 
-    Files of another search are as if they were not there.
-
-    Parameters
-    ----------
-    folder : Path, optional
-    video : VideoReader
-    person : Rectangle, optional
-    silhouettes : int, optional
-        What was asked for, which is what a search is known by.
+    Files of another search (video, person, silhouettes) are ignored.
     """
 
     def __init__(
@@ -62,7 +54,7 @@ class SearchStore:
         self._key = hashlib.sha256(json.dumps(identity).encode()).hexdigest()
 
     def read(self, name: str) -> dict[str, Any] | None:
-        """What was written under a name, if it is there and of this search."""
+        """Arrays of a name, or None if this search has not written them."""
         if self._folder is None:
             return self._in_memory.get(name)
         if not (self._folder / name).is_file():
@@ -85,24 +77,7 @@ _PLACES = ("image_px", "depth_px", "world_m", "visibility")
 
 
 class TrackInParts:
-    """Landmarks in a store; see :class:`~sd2core.body.track.Landmarks`.
-
-    Parameters
-    ----------
-    store : SearchStore
-    timebase : Timebase
-    width, height : int
-    refined : RefinedStretches
-    max_gap_s : float
-        The longest gap that is bridged.
-
-    Attributes
-    ----------
-    present, bridged : bool arrays, shape (T,)
-    silhouette_frames, silhouettes : arrays, shapes (K,) and (K, h, w)
-    notes : tuple of str
-        As :class:`~sd2core.body.track.LandmarkTrack` has them.
-    """
+    """Landmarks in a store, repaired; see :class:`~sd2core.body.track.Landmarks`."""
 
     def __init__(
         self,
@@ -165,12 +140,7 @@ class TrackInParts:
 
 
 class RefinedStretches:
-    """What the second pass found, stretch by stretch in a store.
-
-    Attributes
-    ----------
-    confidence : float32 array, shape (T,)
-    """
+    """Results of the second pass, stretch by stretch in a store."""
 
     def __init__(self, store: SearchStore, video: VideoReader, stretch_frames: int) -> None:
         self._store, self._frames_each = store, stretch_frames
@@ -184,7 +154,7 @@ class RefinedStretches:
         self._count(start, stretch)
 
     def resumed(self, start: int) -> bool:
-        """Whether the stretch that begins with a frame has been looked at already."""
+        """True if the stretch that begins with a frame is in the store already."""
         stretch = self._read(start)
         if stretch is not None:
             self._count(start, stretch)
@@ -196,7 +166,7 @@ class RefinedStretches:
         return np.concatenate(frames), np.concatenate(masks)
 
     def found(self, start: int, stop: int) -> RawTrack:
-        """Frames ``start`` to ``stop``, not mended."""
+        """Frames ``start`` to ``stop``, not repaired."""
         step = self._frames_each
         begin = start // step * step
         stretches = []
@@ -218,7 +188,7 @@ class RefinedStretches:
         )
 
     def _count(self, start: int, stretch: Stretch) -> None:
-        """Remember what has to be known of the whole clip."""
+        """Note what has to be known of the whole clip."""
         self.confidence[start : start + len(stretch.confidence)] = stretch.confidence
         self._masks.append((stretch.silhouette_frames, stretch.silhouettes))
 

@@ -1,4 +1,4 @@
-"""A video's landmarks: one person, found, followed, looked at again, and mended."""
+"""Landmarks of one person in a video: found, followed, refined and repaired."""
 
 from __future__ import annotations
 
@@ -52,9 +52,9 @@ def find_landmarks(
 ) -> TrackInParts:
     """Find the landmarks of one person in every frame.
 
-    The person is followed from a first frame both ways; the path of the square around
-    them is smooth_over_time without lag, and every frame looked at again in it. Swapped sides
-    and outliers are mended, short gaps bridged.
+    The person is followed from a first frame both ways; the path of the square around them is
+    smoothed without lag, and every frame is looked at again in it. Swapped sides and outliers are
+    repaired, short gaps bridged.
 
     Parameters
     ----------
@@ -62,22 +62,22 @@ def find_landmarks(
         Two frames or more.
     models : LandmarkModels
     person : Rectangle, optional
-        Where the person is in one frame; otherwise the most prominent one.
+        Around the person in one frame; otherwise the most prominent one.
     max_gap_s : float
-        The longest gap without the person that is bridged; longer ones stay empty.
+        Longest gap without the person that is bridged; longer ones stay empty.
     silhouettes : int or None
-        Of how many frames, evenly spread, the model's mask is kept; None for all.
+        Number of frames, evenly spread, whose mask is kept; None for all.
     threads : int, optional
         All cores (up to 8) unless given.
     progress : callable
-        Counts frames, of each stage anew; may raise ``Cancelled``.
+        Counts the frames of each stage; may raise ``Cancelled``.
     on_stage : callable, optional
         Called with ``"find"`` and ``"refine"`` when that stage begins.
     on_frame : callable, optional
         Called with what each stage found in a frame.
     workspace : Path, optional
-        A folder for what a stopped search can go on from. What is there of another
-        video or other options is not used.
+        Folder for what a stopped search can go on from. Results of another video or other options
+        in it are not used.
 
     Returns
     -------
@@ -87,7 +87,7 @@ def find_landmarks(
     Raises
     ------
     Sd2Error
-        When the video is a single picture, or nobody is found in it.
+        If the video is a single picture, or nobody is found in it.
     """
     if len(video) < 2:
         raise Sd2Error(

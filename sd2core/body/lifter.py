@@ -58,32 +58,15 @@ _BESIDE = 4
 
 @dataclass(frozen=True, eq=False)
 class LiftedTrack:
-    """Depth and motion along z of every landmark, in statures; NaN in empty frames.
-
-    Parameters
-    ----------
-    timebase : Timebase
-        That of the track, T frames.
-    centre_depth : float64 array, shape (T,)
-        Z of the body's centre, the mean of shoulders and hips.
-    centre_sigma : float64 array, shape (T,)
-        Standard deviation of it.
-    depth : float64 array, shape (T, 33)
-        How far behind the centre every landmark is.
-    depth_sigma : float64 array, shape (T, 33)
-    velocity : float64 array, shape (T, 33)
-        Of the landmark's z, the centre's motion included, per second; positive when
-        it moves away from the camera.
-    velocity_sigma : float64 array, shape (T, 33)
-    """
+    """Depth and motion along z of every landmark, in statures; NaN in empty frames."""
 
     timebase: Timebase
-    centre_depth: Floats
-    centre_sigma: Floats
-    depth: Floats
-    depth_sigma: Floats
-    velocity: Floats
-    velocity_sigma: Floats
+    centre_depth: Floats  # (T,) z of the body's centre, the mean of shoulders and hips
+    centre_sigma: Floats  # (T,) its standard deviation
+    depth: Floats  # (T, 33) behind the centre
+    depth_sigma: Floats  # (T, 33)
+    velocity: Floats  # (T, 33) of the landmark's z per second, positive away
+    velocity_sigma: Floats  # (T, 33)
 
     def part(self, start: int, stop: int) -> LiftedTrack:
         """Frames ``start`` to ``stop``."""
@@ -108,19 +91,12 @@ Floats = NDArray[np.float64]
 class Network:
     """A stack of dilated convolutions over time, as arrays.
 
-    Every block adds to what comes in: norm, bend, convolution of three frames,
-    bend, matrix. Beyond the ends of a stretch everything is zero.
-
-    Parameters
-    ----------
-    dilations : tuple of int
-        Of the blocks.
-    arrays : mapping of str to float32 array
-        ``mean``, ``spread`` (C,) of the features; ``enter`` (C, H), ``enter_bias``;
-        ``gain`` (n, H), ``wide`` (n, 3, H, H), ``wide_bias`` (n, H), ``flat`` (n, H, H),
-        ``flat_bias`` (n, H); ``last_gain`` (H,), ``leave`` (H, OUTPUTS), ``leave_bias``.
-    beyond_rates : bool
-        Whether its velocities are what is to be added to the rate of its depths.
+    Every block adds to its input: norm, SiLU, convolution of three frames, SiLU, matrix. Beyond the
+    ends of a stretch everything is zero. ``arrays`` holds ``mean``, ``spread`` (C,) of the
+    features; ``enter`` (C, H), ``enter_bias``; ``gain`` (n, H), ``wide`` (n, 3, H, H),
+    ``wide_bias`` (n, H), ``flat`` (n, H, H), ``flat_bias`` (n, H); ``last_gain`` (H,), ``leave``
+    (H, OUTPUTS) and ``leave_bias``. With ``beyond_rates``, velocities are to be added to the rate
+    of the depths.
     """
 
     dilations: tuple[int, ...]
@@ -129,7 +105,7 @@ class Network:
 
     @cached_property
     def reach(self) -> int:
-        """How many frames away something can matter."""
+        """Receptive field: frames to either side that can matter."""
         return sum(self.dilations)
 
     def __call__(self, told: Singles) -> Singles:
@@ -142,7 +118,7 @@ class Network:
         return np.concatenate(parts)
 
     def whole(self, told: Singles) -> Singles:
-        """The same in one piece."""
+        """Outputs of features, computed in one piece."""
         a = self.arrays
         x = np.clip((told - a["mean"]) / a["spread"], -_FAR, _FAR)
         state = x @ a["enter"] + a["enter_bias"]
@@ -155,16 +131,7 @@ class Network:
 
 @dataclass(frozen=True, eq=False)
 class Lifter:
-    """A trained network and how its spreads are calibrated.
-
-    Parameters
-    ----------
-    network : Network
-    calibration : float32 array, shape (OUTPUTS,)
-        Added to what comes out: 0 but at the logarithms of spreads.
-    provenance : mapping
-        What it was trained on and by which command.
-    """
+    """A trained network and the calibration (OUTPUTS,) of its standard deviations."""
 
     network: Network
     calibration: Singles
@@ -172,13 +139,7 @@ class Lifter:
 
     @classmethod
     def load(cls, path: Path | None = None) -> Lifter:
-        """Read the bundled lifter, or another one.
-
-        Raises
-        ------
-        Sd2Error
-            When the file is missing, damaged or of a later version.
-        """
+        """Read the bundled lifter, or another one; Sd2Error if it is missing, damaged or newer."""
         path = resource_path("lifter.npz") if path is None else Path(path)
         command = "python -m tools.train_lifter train"
         with open_bundled_arrays(path, FORMAT, VERSION, "a lifter", command) as (meta, data):
@@ -190,9 +151,9 @@ class Lifter:
     def outputs(self, seen: Seen, sample: Seen | None = None) -> Singles:
         """Calibrated outputs (T, OUTPUTS) of one stretch, velocities in full.
 
-        The mean of what the network says of the stretch, of its mirror image, and of
-        both played backwards, so that it treats sides and directions of time alike.
-        What a person measures is taken from ``sample``, by default the stretch itself.
+        The mean over the stretch, its mirror image, and both played backwards, so that sides and
+        directions of time are treated alike. The person's measures are taken from ``sample``, by
+        default the stretch itself.
         """
         return symmetric(self.network, seen, sample) + self.calibration
 
@@ -220,7 +181,7 @@ def symmetric(network: Network, seen: Seen, sample: Seen | None = None) -> Singl
 
 
 def with_rates(out: Singles, size: float) -> Singles:
-    """Outputs (T, OUTPUTS) with the rates of centre and depths added to the velocities.
+    """Add the rates of centre and depths to the velocities of outputs (T, OUTPUTS).
 
     ``size`` is that of :func:`~sd2core.body.lifter_features.typical_size`.
     """
@@ -231,12 +192,12 @@ def with_rates(out: Singles, size: float) -> Singles:
 
 
 def spread(logarithm: NDArray[np.floating]) -> Floats:
-    """Standard deviation of its logarithm."""
+    """Standard deviation of its clipped logarithm."""
     return np.asarray(np.exp(np.clip(logarithm, *LOG_SIGMA)))
 
 
 def _convolved(x: Singles, kernel: Singles, dilation: int) -> Singles:
-    """Convolution over three frames that far apart; zero beyond the ends."""
+    """Convolution over three frames ``dilation`` apart; zero beyond the ends."""
     result: Singles = x @ kernel[1]
     if len(x) > dilation:
         result[dilation:] += x[:-dilation] @ kernel[0]
@@ -245,13 +206,13 @@ def _convolved(x: Singles, kernel: Singles, dilation: int) -> Singles:
 
 
 def _normed(x: Singles, gain: Singles) -> Singles:
-    """Every frame brought to root mean square 1, times a gain per channel."""
+    """Root-mean-square norm of every frame, times a gain per channel."""
     power = np.mean(x * x, axis=1, keepdims=True)
     return np.asarray(x * (gain / np.sqrt(power + np.float32(1e-5))))
 
 
 def _bent(x: Singles) -> Singles:
-    """Every value times its logistic function."""
+    """SiLU: every value times its logistic function."""
     return np.asarray(x * (np.float32(0.5) + np.float32(0.5) * np.tanh(np.float32(0.5) * x)))
 
 
@@ -265,40 +226,18 @@ class _Block(NamedTuple):
 
 
 class _View(NamedTuple):
-    """A block as the network sees it.
-
-    Parameters
-    ----------
-    seen : Seen
-        At its own rate.
-    ticks : intp array, shape (n,)
-        Numbers of these moments, counted from the beginning of the stretch.
-    place : float64 array
-        Where the block's frames are among them.
-    end : float
-        Where the frames of the next block begin.
-    """
+    """A block resampled to the network's rate."""
 
     seen: Seen
-    ticks: NDArray[np.intp]
-    place: Floats
-    end: float
+    ticks: NDArray[np.intp]  # (n,) numbers of these moments, from the beginning of the stretch
+    place: Floats  # where the block's frames are among them
+    end: float  # where the frames of the next block begin
 
 
 class LiftedInParts:
-    """Depth and motion along the line of sight; see :class:`~sd2core.body.lifter.Lifted`.
+    """Track lifted in blocks as it is read; see :class:`Lifted`.
 
-    Parameters
-    ----------
-    lifter : Lifter
-    track : Landmarks
-    camera : PinholeCamera
-        Of the same picture.
-
-    Raises
-    ------
-    Sd2Error
-        When the camera's picture has another size than the track's.
+    Raises Sd2Error if the camera's picture has another size than the track's.
     """
 
     def __init__(self, lifter: Lifter, track: Landmarks, camera: PinholeCamera) -> None:
@@ -317,7 +256,7 @@ class LiftedInParts:
         self._sample = lru_cache(maxsize=1)(self._sampled)
 
     def part(self, start: int, stop: int) -> LiftedTrack:
-        """Frames ``start`` to ``stop``; NaN where there is nobody."""
+        """Frames ``start`` to ``stop``; NaN without a person."""
         raw, size = np.full((stop - start, OUTPUTS), np.nan), np.full(stop - start, np.nan)
         for block in self._blocks:
             first, last = max(block.start, start), min(block.stop, stop)
@@ -328,7 +267,7 @@ class LiftedInParts:
         return _lifted(Timebase(self._track.timebase.times_s[start:stop]), raw, size)
 
     def _lift(self, block: _Block) -> tuple[Floats, float]:
-        """What the network says of a block, and the typical size in its stretch."""
+        """Outputs of a block, and the typical size in its stretch."""
         view = self._view(block)
         # Of a stretch that is one block, the block itself.
         whole = (block.start, block.stop) == (block.first, block.last)

@@ -1,4 +1,4 @@
-"""What the lifter's network is told of every frame."""
+"""Features of every frame for the lifter's network."""
 
 from __future__ import annotations
 
@@ -51,28 +51,17 @@ class Seen(NamedTuple):
     """One stretch of a track at :data:`RATE_HZ`, as slopes instead of pixels.
 
     Leading axes of any number may stand before T.
-
-    Parameters
-    ----------
-    slopes : array, shape (..., T, 33, 2)
-        X / z and y / z of every landmark.
-    depth : array, shape (..., T, 33)
-        The landmark model's depth in pixels, divided by the focal length.
-    world_m : array, shape (..., T, 33, 3)
-    visibility : array, shape (..., T, 33)
-    sure : array, shape (..., T)
-        Confidence; 0 in bridged frames.
     """
 
-    slopes: Floats
-    depth: Floats
-    world_m: Floats
-    visibility: Floats
-    sure: Floats
+    slopes: Floats  # (..., T, 33, 2) x / z and y / z of every landmark
+    depth: Floats  # (..., T, 33) the landmark model's depth in pixels over focal length
+    world_m: Floats  # (..., T, 33, 3)
+    visibility: Floats  # (..., T, 33)
+    sure: Floats  # (..., T) confidence; 0 in bridged frames
 
 
 def mirrored(seen: Seen) -> Seen:
-    """The same before a mirror: left is right."""
+    """Mirror image of a stretch: left and right change places."""
     sides, x = list(MIRRORED), np.array([-1.0, 1.0], np.float32)
     return Seen(
         seen.slopes[..., sides, :] * x,
@@ -84,36 +73,26 @@ def mirrored(seen: Seen) -> Seen:
 
 
 def apparent_size(slopes: Floats) -> Floats:
-    """How long the torso looks: slope between the middles of shoulders and hips, (..., T)."""
+    """Apparent length of the torso: slope between middle of shoulders and of hips, (..., T)."""
     torso = slopes[..., _SHOULDERS, :].mean(axis=-2) - slopes[..., _HIPS, :].mean(axis=-2)
     return np.asarray(np.sqrt((torso**2).sum(axis=-1) + 1e-8))
 
 
 def typical_size(slopes: Floats) -> Floats:
-    """The apparent size of a whole stretch, (...,): what slopes are measured in."""
+    """Median apparent size of a whole stretch, (...,): the unit of slopes."""
     return np.asarray(np.median(apparent_size(slopes), axis=-1))
 
 
 class Scale(NamedTuple):
-    """What a whole stretch is measured in.
+    """Units of a whole stretch."""
 
-    Parameters
-    ----------
-    size : array, shape (...,)
-        See :func:`typical_size`.
-    torso_m : array, shape (...,)
-        Median length of the torso in the landmark model's own metres.
-    longest : array, shape (..., 1, bones)
-        How long each bone looks at its longest, nearly: 95 % are shorter.
-    """
-
-    size: Floats
-    torso_m: Floats
-    longest: Floats
+    size: Floats  # (...,) see typical_size
+    torso_m: Floats  # (...,) median torso length in the landmark model's own metres
+    longest: Floats  # (..., 1, bones) 95 % quantile of each bone's apparent length
 
 
 def scale_of(seen: Seen) -> Scale:
-    """What a stretch is measured in, from all its frames or a sample of them."""
+    """Units of a stretch, from all its frames or a sample of them."""
     size = typical_size(np.asarray(seen.slopes))
     world = np.asarray(seen.world_m)
     torso = world[..., _SHOULDERS, :].mean(axis=-2) - world[..., _HIPS, :].mean(axis=-2)
@@ -123,10 +102,10 @@ def scale_of(seen: Seen) -> Scale:
 
 
 def features(seen: Seen, scale: Scale | None = None) -> Singles:
-    """What the network is told of every frame, (..., T, C).
+    """Features of every frame, (..., T, C).
 
-    All but the direction of the body and its size is free of where the person
-    stands and how far away. ``scale`` is that of a longer stretch that this is part of.
+    All but the direction of the body and its size is free of where the person stands and how far
+    away. ``scale`` is that of a longer stretch that this is part of.
     """
     scale = scale_of(seen) if scale is None else scale
     slopes = np.asarray(seen.slopes)
@@ -163,7 +142,7 @@ def features(seen: Seen, scale: Scale | None = None) -> Singles:
 
 
 def _measured(seen: Seen, size: Floats, torso_m: Floats) -> tuple[Floats, Floats]:
-    """Slopes around the body's centre and the model's own places, in a stretch's measures."""
+    """Slopes around the body's centre and the model's own places, in a stretch's units."""
     slopes = np.asarray(seen.slopes)
     centre = slopes[..., list(TORSO_CORNERS), :].mean(axis=-2)
     around = (slopes - centre[..., None, :]) / size[..., None][..., None, None]
@@ -172,11 +151,10 @@ def _measured(seen: Seen, size: Floats, torso_m: Floats) -> tuple[Floats, Floats
 
 
 def _foreshortening(around: Floats, world_m: Floats) -> tuple[Floats, Floats, Floats]:
-    """Of the bones: how long they look, how far away they point, and that by their looks.
+    """Apparent length of the bones, their depth by the model, and their depth by foreshortening.
 
-    What a bone of known length lacks in the picture it has in depth; the landmark
-    model's own depth, however weak, says towards which side. All (..., T, bones), as
-    shares of the bones' lengths.
+    The depth of a bone of known length follows from its length in the picture; the landmark model's
+    own depth, however weak, gives the sign. All (..., T, bones), as shares of the bones' lengths.
     """
     length, ahead = [], []
     for near, far, torsos in _BONES:
@@ -190,7 +168,7 @@ def _foreshortening(around: Floats, world_m: Floats) -> tuple[Floats, Floats, Fl
 
 
 def rate(values: Floats, axis: int) -> Floats:
-    """Per second: central differences along one axis, one-sided at its ends."""
+    """Derivative per second: central differences along one axis, one-sided at its ends."""
     values = np.moveaxis(np.asarray(values), axis, 0)
     if len(values) < 2:
         return np.moveaxis(np.zeros_like(values), 0, axis)

@@ -70,18 +70,10 @@ _BONES = {
 
 
 def bone_limbs(skeleton: Skeleton) -> NDArray[np.uint8]:
-    """Which limb every bone carries.
+    """Limb (number in :data:`LIMBS`) of every bone, (B,).
 
-    Returns
-    -------
-    uint8 array, shape (B,)
-        Numbers of :data:`LIMBS`. The neck counts to the head, the shoulder
-        girdle and the pelvis to the torso.
-
-    Raises
-    ------
-    Sd2Error
-        When a bone is none of the bundled skeleton's.
+    The neck counts to the head, the shoulder girdle and the pelvis to the torso. Raises Sd2Error
+    if a bone is none of the bundled skeleton's.
     """
     return np.array([_limb_of(name) for name in skeleton.names], dtype=np.uint8)
 
@@ -98,13 +90,7 @@ def _limb_of(bone: str) -> int:
 
 
 def vertex_limbs(body: Body) -> NDArray[np.uint8]:
-    """Which limb every vertex follows: the one whose bones have most weight there.
-
-    Returns
-    -------
-    uint8 array, shape (V,)
-        Numbers of :data:`LIMBS`.
-    """
+    """Limb (number in :data:`LIMBS`) with the most weight at every vertex, (V,)."""
     limbs = bone_limbs(body.skeleton)[body.bones]  # (V, 8)
     shares = np.zeros((len(body.vertices_m), len(LIMBS)))
     rows = np.arange(len(shares))

@@ -26,25 +26,13 @@ Resolution = Literal["low", "medium", "high"]
 
 @dataclass(frozen=True, eq=False)
 class Skeleton:
-    """Bones at rest, every parent before its children, bone 0 the root.
-
-    Parameters
-    ----------
-    names : tuple of str
-    parents : tuple of int
-        -1 for the root.
-    heads_m, tails_m : float64 array, shape (B, 3)
-        The head is where the bone turns.
-    rotations : float64 array, shape (B, 3, 3)
-        Axes of every bone as Anny defines them, in columns. Posing does not
-        need them; whoever exchanges poses with Anny does.
-    """
+    """Bones at rest, every parent before its children, bone 0 the root."""
 
     names: tuple[str, ...]
-    parents: tuple[int, ...]
-    heads_m: Floats
-    tails_m: Floats
-    rotations: Floats
+    parents: tuple[int, ...]  # -1 for the root
+    heads_m: Floats  # (B, 3) points about which the bones turn
+    tails_m: Floats  # (B, 3)
+    rotations: Floats  # (B, 3, 3) axes as Anny defines them, in columns; for exchange only
 
     @cached_property
     def index(self) -> Mapping[str, int]:
@@ -75,20 +63,15 @@ class Skeleton:
         return pruned, rows
 
     def transforms(self, rotations: Floats, translation_m: Floats | None = None) -> Floats:
-        """Where every bone takes what is fixed to it.
+        """Transforms ``[R | t]`` of every bone, (T, B, 3, 4): a point x at rest goes to R x + t.
 
         Parameters
         ----------
         rotations : array, shape (T, B, 3, 3)
-            Rotation of every bone about its head relative to its parent, in the
-            axes of the rest pose; the identity is the rest pose.
+            Rotation of every bone about its head relative to its parent, in the axes of the rest
+            pose; the identity is the rest pose.
         translation_m : array, shape (T, 3), optional
             Added to everything.
-
-        Returns
-        -------
-        float64 array, shape (T, B, 3, 4)
-            ``[R | t]``: a point x at rest goes to R x + t.
         """
         frames = len(rotations)
         transforms = np.empty((frames, len(self), 3, 4))
@@ -112,43 +95,23 @@ class Skeleton:
 class Body:
     """A surface fixed to a skeleton.
 
-    Axes are those of the camera frame for a body that faces the camera: x to its
-    left (right in the image), y down, z backwards; the origin is on the floor.
-
-    Parameters
-    ----------
-    vertices_m : float64 array, shape (V, 3)
-        At rest.
-    faces : int32 array, shape (F, 3)
-        Counter-clockwise seen from outside.
-    bones : intp array, shape (V, 8)
-        Bones that move a vertex, strongest first.
-    weights : float64 array, shape (V, 8)
-        How much; each row adds up to 1.
-    skeleton : Skeleton
+    Axes are those of the camera frame for a body that faces the camera: x to its left (right in
+    the image), y down, z backwards; the origin is on the floor.
     """
 
-    vertices_m: Floats
-    faces: NDArray[np.int32]
-    bones: NDArray[np.intp]
-    weights: Floats
+    vertices_m: Floats  # (V, 3) at rest
+    faces: NDArray[np.int32]  # (F, 3) counter-clockwise from outside
+    bones: NDArray[np.intp]  # (V, 8) bones that move a vertex, strongest first
+    weights: Floats  # (V, 8) each row adds up to 1
     skeleton: Skeleton
 
     @classmethod
     def load(cls, resolution: Resolution = "high", path: Path | None = None) -> Body:
         """Read one surface of the bundled body (or of another export).
 
-        Parameters
-        ----------
-        resolution : {"high", "medium", "low"}
-            13,348, 5,000 or 1,229 vertices; each is one closed component. The
-            vertices of ``medium`` are vertices of ``high``.
-        path : Path, optional
-
-        Raises
-        ------
-        Sd2Error
-            When the file is missing, damaged or of a later version.
+        The resolutions have 13,348, 5,000 and 1,229 vertices, each one closed component; those
+        of ``medium`` are vertices of ``high``. Raises Sd2Error if the file is missing, damaged or
+        of a later version.
         """
         surface = [f"{resolution}_{part}" for part in ("vertices", "faces", "bones", "weights")]
         vertices, faces, bones, weights = read_body_arrays(surface, path)
@@ -167,18 +130,7 @@ class Body:
         return float(np.ptp(self.vertices_m[:, 1]))
 
     def pose(self, rotations: Floats, translation_m: Floats | None = None) -> Floats:
-        """Vertices of every frame by linear blend skinning.
-
-        Parameters
-        ----------
-        rotations : array, shape (T, B, 3, 3)
-        translation_m : array, shape (T, 3), optional
-            See :meth:`Skeleton.transforms`.
-
-        Returns
-        -------
-        float64 array, shape (T, V, 3)
-        """
+        """Vertices (T, V, 3) by linear blend skinning; arguments of :meth:`Skeleton.transforms`."""
         transforms = self.skeleton.transforms(rotations, translation_m)  # (T, B, 3, 4)
         vertices = np.empty((len(transforms), len(self.vertices_m), 3))
         for frame, bones in enumerate(transforms):
@@ -214,10 +166,7 @@ def load_skeleton(path: Path | None = None) -> Skeleton:
 def read_body_arrays(names: Sequence[str], path: Path | None = None) -> list[NDArray[Any]]:
     """Arrays of the bundled body's file (or of another export), as they are stored.
 
-    Raises
-    ------
-    Sd2Error
-        When the file is missing, damaged, of a later version, or lacks one of them.
+    Raises Sd2Error if the file is missing, damaged, of a later version, or lacks one of them.
     """
     path = resource_path("body.npz") if path is None else Path(path)
     command = "python -m tools.build_body export"

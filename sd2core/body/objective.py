@@ -1,10 +1,11 @@
-"""What a pose through time must agree with, and its Gauss–Newton equations.
+"""Cost of a pose through time, and its Gauss–Newton equations.
 
 Seven kinds of residuals, each divided by its standard deviation: landmarks in the
 picture, their depth behind the middle of the trunk, the trunk's own depth, their
-velocity along the optical axis relative to it, what joints do and can do, arms behind
+velocity along the optical axis relative to it, habits and limits of joints, arms behind
 the chest, and smoothness (the acceleration of every degree of freedom). Landmarks,
-depths and velocities far off count less (iteratively reweighted least squares).
+depths and velocities far off count less (iteratively reweighted least squares). Unknowns
+of a frame meet only those of the next two, so the equations are banded.
 """
 
 from __future__ import annotations
@@ -26,15 +27,10 @@ REACH = 2
 
 @dataclass(eq=False)
 class Normal:
-    """Normal equations of a Gauss–Newton step: a symmetric matrix of n × n blocks.
+    """Normal equations of a Gauss–Newton step: a symmetric banded matrix of n × n blocks.
 
-    Attributes
-    ----------
-    blocks : list of float64 arrays
-        ``blocks[k][t]`` is the block between frames t and t + k, shape (n, n), for
-        k = 0, 1, 2; the one of k = 0 is symmetric.
-    gradient : float64 array, shape (T, n)
-        Of half the sum of squares.
+    ``blocks[k][t]`` (n, n) is the block between frames t and t + k, for k = 0, 1, 2; ``gradient``
+    (T, n) is that of half the sum of squares.
     """
 
     blocks: list[Floats]
@@ -42,22 +38,17 @@ class Normal:
 
     @classmethod
     def zeros(cls, frames: int, unknowns: int) -> Normal:
-        """No residual yet."""
+        """Equations without residuals."""
         return cls(
             [np.zeros((max(frames - k, 0), unknowns, unknowns)) for k in range(REACH + 1)],
             np.zeros((frames, unknowns)),
         )
 
     def add(self, residual: Floats, parts: list[tuple[int, Floats]]) -> None:
-        """Add residuals that are already divided by their standard deviations.
+        """Add R residuals (m, R) of m first frames, divided by their standard deviations.
 
-        Parameters
-        ----------
-        residual : array, shape (m, R)
-            R residuals for each of m first frames (0 to m - 1).
-        parts : list of (int, array)
-            For each frame offset o the derivative (m, R, n) by the unknowns of
-            frame t + o; offsets ascend.
+        ``parts`` holds for each frame offset o, ascending, the derivative (m, R, n) by the
+        unknowns of frame t + o.
         """
         count = len(residual)
         for number, (at, left) in enumerate(parts):
@@ -79,12 +70,9 @@ class Normal:
                 self.blocks[other - at][at : at + count, rows, rows] += left * right
 
     def step(self, damping: float) -> Floats:
-        """The unknowns' change (T, n) that solves the equations.
+        """Change (T, n) of the unknowns that solves the equations (Levenberg–Marquardt).
 
-        Parameters
-        ----------
-        damping : float
-            Share of its own diagonal that is added to the matrix (Marquardt).
+        ``damping`` is the share of its own diagonal that is added to the matrix.
         """
         from scipy.linalg import solveh_banded
 
@@ -109,7 +97,7 @@ class Normal:
 
 
 _RELAXED_DEG = 35.0
-"""From the rest pose, arms held away, to hanging arms."""
+"""Angle from the rest pose, arms held away, to hanging arms."""
 
 # Standard deviation of what people do, radians from relaxed; of shared joints per place.
 _HABIT_RAD = {
@@ -159,16 +147,7 @@ class Residuals(NamedTuple):
 
 
 class Objective:
-    """Sum of squares to be made least.
-
-    Parameters
-    ----------
-    rig : Rig
-    evidence : Evidence
-    acceleration_sd : float64 array, shape (T - 2, freedoms)
-        How much every degree of freedom accelerates between three frames, rad/s²
-        and m/s².
-    """
+    """Weighted sum of squares of a pose; ``acceleration_sd`` (T - 2, n) is the smoothness."""
 
     def __init__(self, rig: Rig, evidence: Evidence, acceleration_sd: Floats) -> None:
         self.rig, self.evidence, self.acceleration_sd = rig, evidence, acceleration_sd
@@ -205,7 +184,7 @@ class Objective:
         )
 
     def accelerations(self, pose: Pose) -> Floats:
-        """Of every degree of freedom, (T - 2, freedoms), rad/s² and m/s²."""
+        """Acceleration of every degree of freedom, (T - 2, freedoms), rad/s² and m/s²."""
         step_s = self._step_s[:, None]
         turned = to_vector(transposed(pose.turns[:-1]) @ pose.turns[1:])  # (T - 1, J, 3)
         rates = [turned[:, j] @ axes / step_s for j, axes in enumerate(self.rig.axes)]
@@ -294,13 +273,9 @@ class Objective:
         )
 
     def _behind(self, marks: Floats, moves: Floats | None = None) -> tuple[Floats, Floats]:
-        """How far arms are behind the chest more than is common, and its derivative.
+        """Distance of arms behind the chest beyond what is common (T, 4), derivatives (T, 4, n).
 
-        Returns
-        -------
-        residuals : float64 array, shape (T, 4)
-        derivatives : float64 array, shape (T, 4, n)
-            Empty without the marks' own.
+        The derivatives are empty without those of the marks.
         """
         starts, ends, common, sd = (np.array(part) for part in zip(*_BEHIND, strict=True))
         lines = marks[:, ends] - marks[:, starts]  # (T, 4, 3)
@@ -315,7 +290,7 @@ class Objective:
         return residuals, slope * ((beyond > 0.0) / (sd * self._arm_m))[..., None]
 
     def _angles(self, pose: Pose) -> Floats:
-        """Turn of every joint from relaxed about its axes, (T, n); 0 for the translation."""
+        """Rotation vectors of joints from relaxed, on their axes, (T, n); 0 for the translation."""
         vectors = to_vector(transposed(self._relaxed) @ pose.turns)
         parts = [vectors[:, j] @ axes for j, axes in enumerate(self.rig.axes)]
         parts.append(np.zeros((len(vectors), 3)))

@@ -1,4 +1,4 @@
-"""Which of the people in a video is meant."""
+"""Choice of the person in a video, automatic or by a rectangle."""
 
 from __future__ import annotations
 
@@ -23,16 +23,7 @@ _NEARLY = 0.8
 
 @dataclass(frozen=True)
 class Rectangle:
-    """Where the user says the person is.
-
-    Parameters
-    ----------
-    x_px, y_px : float
-        Upper left corner, in pixels of the upright picture.
-    width_px, height_px : float
-    frame : int
-        In which frame.
-    """
+    """Rectangle that the user draws around the person, in pixels of the upright picture."""
 
     x_px: float
     y_px: float
@@ -43,13 +34,7 @@ class Rectangle:
 
 @dataclass(frozen=True)
 class Start:
-    """The person in one frame, from which they are followed both ways.
-
-    Parameters
-    ----------
-    frame : int
-    roi : Roi
-    """
+    """The person in one frame, from which they are followed both ways."""
 
     frame: int
     roi: Roi
@@ -61,20 +46,10 @@ def find_prominent_person(
     landmarker: PoseLandmarker,
     progress: Progress = silent,
 ) -> Start:
-    """The most prominent person: large, near the middle, surely a person.
+    """Find the most prominent person: large, near the middle, surely a person.
 
-    Parameters
-    ----------
-    video : VideoReader
-    detector : PoseDetector
-    landmarker : PoseLandmarker
-    progress : callable
-        Called now and then; may raise ``Cancelled``.
-
-    Raises
-    ------
-    Sd2Error
-        When no person is found in the whole video.
+    ``progress`` is called now and then and may raise ``Cancelled``. Raises Sd2Error if no person
+    is found in the whole video.
     """
     best_score = 0.0
     looked: set[int] = set()
@@ -107,7 +82,7 @@ def find_prominent_person(
 
 
 def _rounds(video: VideoReader) -> list[tuple[list[int], float]]:
-    """Frames to look at, and in parts of what size; ever more of them, ever smaller ones."""
+    """Frames to search and the size of the parts: ever more frames, ever smaller parts."""
     frames, duration_s = len(video), float(video.timebase.times_s[-1])
     few = np.unique(np.linspace(0, frames - 1, min(frames, _SURVEYED)).round().astype(int))
     step_s = 0.0 if duration_s <= _EVERY_FRAME_S else _STEP_S
@@ -142,13 +117,10 @@ def _prominence(roi: Roi, width: int, height: int) -> float:
 def find_person_in(
     rectangle: Rectangle, video: VideoReader, detector: PoseDetector, landmarker: PoseLandmarker
 ) -> Start:
-    """The person in a rectangle of one frame.
+    """Find the person in a rectangle of one frame.
 
-    Raises
-    ------
-    Sd2Error
-        When there is no such frame, the rectangle is outside the picture, or there is
-        no person in it.
+    Raises Sd2Error if there is no such frame, the rectangle is outside the picture, or there is
+    no person in it.
     """
     if not 0 <= rectangle.frame < len(video):
         raise Sd2Error(
@@ -179,7 +151,7 @@ def find_person_in(
 
 
 def _squares(rectangle: Rectangle, picture: Pixels, detector: PoseDetector) -> list[Roi]:
-    """Where to look for the person: as detected in the picture, in the rectangle, or all of it."""
+    """Squares to search: people detected in the rectangle, then the rectangle itself."""
     x = rectangle.x_px + rectangle.width_px / 2
     y = rectangle.y_px + rectangle.height_px / 2
     size = max(rectangle.width_px, rectangle.height_px)
@@ -199,7 +171,7 @@ def _squares(rectangle: Rectangle, picture: Pixels, detector: PoseDetector) -> l
 
 
 def _within(roi: Roi, rectangle: Rectangle) -> bool:
-    """Whether the hips are in the rectangle, or nearly."""
+    """True if the hips are in the rectangle, or nearly."""
     dx = abs(roi.centre_x_px - rectangle.x_px - rectangle.width_px / 2)
     dy = abs(roi.centre_y_px - rectangle.y_px - rectangle.height_px / 2)
     return bool(dx < 0.6 * rectangle.width_px and dy < 0.7 * rectangle.height_px)

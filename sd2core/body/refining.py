@@ -1,4 +1,4 @@
-"""The second pass: every frame looked at again, where the whole track says the person is.
+"""Second pass over a video: every frame again, in the smoothed square around the person.
 
 Frames do not depend on one another here, so several threads share them.
 """
@@ -26,43 +26,24 @@ SILHOUETTE_PX = 256
 
 _STRAYED = 0.25
 _AHEAD_BYTES = 128 * 2**20
-"""Of pictures that wait for a thread."""
+"""Memory of pictures that wait for a thread."""
 
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """What the second pass found in ``N`` frames in succession.
+    """Results of the second pass for N successive frames."""
 
-    Parameters
-    ----------
-    image_px : float32 array, shape (N, 33, 2)
-    depth_px : float32 array, shape (N, 33)
-    world_m : float32 array, shape (N, 33, 3)
-    visibility : float32 array, shape (N, 33)
-    confidence : float32 array, shape (N,)
-        0 where the person was not found; there the others are NaN, visibility is 0.
-    silhouette_frames : intp array, shape (K,)
-        Of the whole video.
-    silhouettes : uint8 array, shape (K, h, w)
-    """
-
-    image_px: Singles
-    depth_px: Singles
-    world_m: Singles
-    visibility: Singles
-    confidence: Singles
-    silhouette_frames: NDArray[np.intp]
-    silhouettes: NDArray[np.uint8]
+    image_px: Singles  # (N, 33, 2); NaN, as the next two, where the person was not found
+    depth_px: Singles  # (N, 33)
+    world_m: Singles  # (N, 33, 3)
+    visibility: Singles  # (N, 33)
+    confidence: Singles  # (N,); 0 where the person was not found
+    silhouette_frames: NDArray[np.intp]  # (K,) of the whole video
+    silhouettes: NDArray[np.uint8]  # (K, h, w)
 
 
 class Refiner:
-    """Looks at frames with several threads; a context manager.
-
-    Parameters
-    ----------
-    landmarkers : sequence of PoseLandmarker
-        One per thread.
-    """
+    """Landmark search by several threads, one for each landmarker; a context manager."""
 
     def __init__(self, landmarkers: Sequence[PoseLandmarker]) -> None:
         self._free: SimpleQueue[PoseLandmarker] = SimpleQueue()
@@ -85,18 +66,10 @@ class Refiner:
         kept: frozenset[int],
         seen: Callable[[int, Pose | None], None],
     ) -> Stretch:
-        """Landmarks of the frames from ``start`` on, one for each of ``rois``.
+        """Landmarks of the frames from ``start`` on, one for each of ``rois`` (None: no person).
 
-        Parameters
-        ----------
-        video : VideoReader
-        start : int
-        rois : sequence of Roi or None
-            None where there is nobody to be found.
-        kept : set of int
-            Frames of which the silhouette is kept.
-        seen : callable
-            Called with each frame and what was found, in order; may raise ``Cancelled``.
+        The silhouettes of the frames in ``kept`` are kept. ``seen`` is called with each frame and
+        its result, in order; it may raise ``Cancelled``.
         """
         frames = len(rois)
         found = Stretch(
@@ -130,7 +103,7 @@ class Refiner:
     def _poses(
         self, video: VideoReader, start: int, rois: Sequence[Roi | None]
     ) -> Iterator[Pose | None]:
-        """In order; few pictures are in memory at once, and fewer where they are large."""
+        """Poses in order; few pictures are in memory at once, and fewer where they are large."""
         room = _AHEAD_BYTES // (3 * video.width * video.height)
         ahead = max(min(2 * self._threads, room), 1)
         waiting: deque[Future[Pose | None] | None] = deque()
@@ -168,7 +141,7 @@ def silhouette_shape(video: VideoReader) -> tuple[int, int]:
 
 
 def _silhouette(pose: Pose, video: VideoReader) -> NDArray[np.uint8]:
-    """The mask of a square, laid into the picture made smaller."""
+    """Mask of a square, drawn into the picture made smaller."""
     import cv2
 
     rows, columns = silhouette_shape(video)

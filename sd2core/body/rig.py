@@ -22,18 +22,11 @@ from sd2core.body.track import LANDMARKS
 
 @dataclass(frozen=True)
 class Joint:
-    """One turn of the fit.
+    """One rotation of the fit, shared by all of its bones.
 
-    Parameters
-    ----------
-    name : str
-    bones : tuple of str
-        Every one is turned by the joint's rotation.
-    hinge : tuple of str, optional
-        Three bones: the joint turns only about the normal of the plane that their
-        heads span at rest, bending the chain further. Without it, about all axes.
-    along : tuple of str, optional
-        Two bones: the joint turns only about the line between their heads.
+    ``hinge`` names three bones: the joint turns only about the normal of the plane of their heads
+    at rest, bending the chain further. ``along`` names two: it turns only about the line between
+    their heads. Without both it turns about all axes.
     """
 
     name: str
@@ -75,18 +68,13 @@ JOINT = {joint.name: number for number, joint in enumerate(JOINTS)}
 """Number of a joint by its name."""
 
 CHEST, BEHIND = len(LANDMARKS), len(LANDMARKS) + 1
-"""Where the chest and the point behind it are among a rig's marks."""
+"""Numbers of the chest and of the point behind it among a rig's marks."""
 
 _CHEST = "spine01"
 
 
 class Rig:
-    """The joints of one body, and how its keypoints follow them.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-    keypoints : Keypoints
+    """The joints of one body, and the keypoints that follow them.
 
     Attributes
     ----------
@@ -95,12 +83,11 @@ class Rig:
     keypoints : Keypoints
         On these bones.
     marks : Keypoints
-        The same, then a point of the chest and one a metre behind it: they tell
-        what is in front of a person.
+        The same, then a point of the chest and one a metre behind it.
     axes : list of float64 arrays, shape (3, 1) or (3, 3)
-        What each joint may turn about, in the axes of the rest pose.
+        Axes of each joint, in the rest pose.
     columns : list of slice
-        Where each joint's degrees of freedom are; the translation is last.
+        Degrees of freedom of each joint; the translation is last.
     freedoms : int
         Number of all of them, translation included.
     """
@@ -127,14 +114,7 @@ class Rig:
         self.freedoms = int(ends[-1]) + 3
 
     def transforms(self, turns: Floats, translation_m: Floats) -> Floats:
-        """Transforms of the rig's bones (T, B, 3, 4).
-
-        Parameters
-        ----------
-        turns : float64 array, shape (T, J, 3, 3)
-            Rotation of each joint.
-        translation_m : float64 array, shape (T, 3)
-        """
+        """Transforms of the rig's bones (T, B, 3, 4) by joints' rotations (T, J, 3, 3)."""
         return self.skeleton.transforms(self._rotations(turns), translation_m)
 
     def body_rotations(self, turns: Floats) -> Floats:
@@ -151,7 +131,7 @@ class Rig:
         return rotations
 
     def jacobian(self, transforms: Floats, positions_m: Floats) -> Floats:
-        """How marks move with every degree of freedom, (T, 35, 3, freedoms).
+        """Derivative of the marks by every degree of freedom, (T, 35, 3, freedoms).
 
         A small turn by δ about a joint's axis a, made on the right of its rotation,
         moves a point x by δ (W a) × (x − p): W is the bone's rotation in the world
@@ -186,7 +166,7 @@ class Rig:
 
     @cached_property
     def _follows(self) -> dict[int, NDArray[np.intp]]:
-        """For every bone that turns, the marks that it carries."""
+        """Marks that each turning bone carries."""
         parents = self.skeleton.parents
 
         def carried(bone: int, by: int) -> bool:

@@ -17,21 +17,15 @@ CROP_PX = 256
 """Side of what the landmark network sees."""
 
 _MARGIN = 1.25
-"""How much larger than the person's circle the square around it is."""
+"""Side of the square over the diameter of the person's circle."""
 
 
 @dataclass(frozen=True)
 class Roi:
     """A square in the picture, turned so that the person in it stands upright.
 
-    Parameters
-    ----------
-    centre_x_px, centre_y_px : float
-        Pixel coordinates; the centre of the first pixel is at 0.5.
-    size_px : float
-        Side of the square.
-    angle_rad : float
-        How far it is turned clockwise, as seen in the picture.
+    Pixel coordinates; the centre of the first pixel is at 0.5. The angle is clockwise, as seen in
+    the picture.
     """
 
     centre_x_px: float
@@ -41,7 +35,7 @@ class Roi:
 
     @classmethod
     def around(cls, centre_px: Floats, rim_px: Floats) -> Roi:
-        """The square around a person whose hips are at ``centre_px``.
+        """Square around a person whose hips are at ``centre_px``.
 
         ``rim_px`` lies above the head, on the circle around the person.
         """
@@ -55,11 +49,11 @@ class Roi:
         )
 
     def scaled(self, factor: float) -> Roi:
-        """A square of another size around the same point."""
+        """Square of another size around the same point."""
         return replace(self, size_px=factor * self.size_px)
 
     def matrix(self, crop_px: int = CROP_PX) -> Floats:
-        """From pixel coordinates (x, y, 1) of the crop to those of the picture, (2, 3)."""
+        """Map (2, 3) from pixel coordinates (x, y, 1) of the crop to those of the picture."""
         scale = self.size_px / crop_px
         c, s = scale * math.cos(self.angle_rad), scale * math.sin(self.angle_rad)
         half = crop_px / 2.0
@@ -71,12 +65,12 @@ class Roi:
         )
 
     def cut(self, picture: Pixels, crop_px: int = CROP_PX) -> Pixels:
-        """What is in the square, (crop_px, crop_px, 3); black outside the picture."""
+        """Crop (crop_px, crop_px, 3) of the square; black outside the picture."""
         return _sampled(picture, self.matrix(crop_px), crop_px)
 
 
 def _sampled(picture: Pixels, matrix: Floats, crop_px: int) -> Pixels:
-    """The crop whose pixel coordinates ``matrix`` takes to the picture's."""
+    """Crop whose pixel coordinates ``matrix`` takes to the picture's."""
     import cv2
 
     # OpenCV counts from the centre of the first pixel, we from its corner.
@@ -99,49 +93,30 @@ _ANGLE_S = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Sightings:
-    """Frames in which the person was looked for.
+    """Frames in which the person was searched for."""
 
-    Parameters
-    ----------
-    frames : intp array, shape (N,)
-        Ascending.
-    rois : float64 array, shape (N, 4)
-        Centre x and y, size and angle of the square around the person; NaN where
-        the person was not found.
-    confidence : float64 array, shape (N,)
-    """
-
-    frames: NDArray[np.intp]
-    rois: Floats
-    confidence: Floats
+    frames: NDArray[np.intp]  # (N,) ascending
+    rois: Floats  # (N, 4) centre x and y, size, angle of the square; NaN where not found
+    confidence: Floats  # (N,)
 
 
 def roi_numbers(roi: Roi) -> Floats:
-    """A row of :attr:`Sightings.rois`."""
+    """Row of :attr:`Sightings.rois`."""
     return np.array([roi.centre_x_px, roi.centre_y_px, roi.size_px, roi.angle_rad])
 
 
 def roi_of(row: Floats) -> Roi | None:
-    """The square of such a row; None where it is NaN."""
+    """Square of a row of :attr:`Sightings.rois`; None where it is NaN."""
     if np.isnan(row[0]):
         return None
     return Roi(*(float(number) for number in row))
 
 
 def roi_path(sightings: Sightings, times_s: Floats) -> Floats:
-    """A smooth path of the square through every frame, without lag.
+    """Smooth path (T, 4) of the square through every frame, without lag.
 
-    Parameters
-    ----------
-    sightings : Sightings
-    times_s : float64 array, shape (T,)
-        Of all frames.
-
-    Returns
-    -------
-    float64 array, shape (T, 4)
-        Squares as rows, see :func:`roi_of`; NaN where the person was not found in the
-        sightings before and after.
+    Rows as in :attr:`Sightings.rois`; NaN where the person was not found in the sightings before
+    and after.
     """
     path = np.full((len(times_s), 4), np.nan)
     found = np.isfinite(sightings.rois[:, 0])

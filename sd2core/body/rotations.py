@@ -44,7 +44,7 @@ def applied(turn: Floats, point: Floats) -> Floats:
 
 
 def transposed(turn: Floats) -> Floats:
-    """The inverse of rotations (..., 3, 3)."""
+    """Inverse of rotations (..., 3, 3)."""
     return np.swapaxes(turn, -1, -2)
 
 
@@ -70,13 +70,7 @@ def to_vector(turns: Floats) -> Floats:
 
 
 def aligning(rest: Floats, seen: Floats, weights: Floats) -> Floats:
-    """Rotations (T, 3, 3) that bring vectors at rest nearest to those seen (Kabsch).
-
-    Parameters
-    ----------
-    rest, seen : arrays, shape (T, n, 3)
-    weights : array, shape (T, n)
-    """
+    """Rotations (T, 3, 3) that bring vectors at rest (T, n, 3) nearest to those seen (Kabsch)."""
     spread = np.einsum("tni,tnj,tn->tij", seen, rest, weights)
     left, _, right = np.linalg.svd(spread)
     flip = np.ones((len(spread), 3))

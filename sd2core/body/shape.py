@@ -20,35 +20,23 @@ PHENOTYPES = ("gender", "muscle", "weight", "height", "proportions")
 
 @dataclass(frozen=True, eq=False)
 class BodyShape:
-    """Shape of one person.
+    """Shape of one person."""
 
-    Parameters
-    ----------
-    coefficients : float64 array, shape (K,)
-        Along :class:`ShapeSpace`'s directions; all 0 is the bundled body.
-    stature_m : float
-        Standing height, without shoes.
-    """
-
-    coefficients: Floats
-    stature_m: float
+    coefficients: Floats  # (K,) along ShapeSpace's directions; all 0 is the bundled body
+    stature_m: float  # standing height, without shoes
 
 
 class ShapeSpace:
-    """Directions of shape of the bundled body.
+    """Directions of shape of the bundled body (or of the export at ``path``).
 
     Attributes
     ----------
-    path : Path or None
-        Of the export, None for the bundled one.
     mean, sd : float64 array, shape (K,)
         Of the coefficients over bodies of random phenotypes.
     heads_m : float64 array, shape (K, B, 3)
-        What one unit of each coefficient moves the bones' heads.
-    base_stature_m : float
+        Shift of the bones' heads per unit of each coefficient.
+    base_stature_m, base_skeleton
         Of the body whose coefficients are 0.
-    base_skeleton : Skeleton
-        Of the same.
     """
 
     def __init__(self, path: Path | None = None) -> None:
@@ -64,13 +52,7 @@ class ShapeSpace:
         return len(self.mean)
 
     def coefficients(self, **phenotypes: float) -> Floats:
-        """Coefficients (K,) of phenotypes, 0.5 where not given.
-
-        Raises
-        ------
-        Sd2Error
-            For an unknown phenotype, or one outside 0 to 1.
-        """
+        """Coefficients (K,) of phenotypes, 0.5 where not given; Sd2Error for an impossible one."""
         for name, value in phenotypes.items():
             if name not in PHENOTYPES or not 0.0 <= value <= 1.0:
                 raise Sd2Error(
@@ -86,18 +68,7 @@ class ShapeSpace:
         return BodyShape(self.coefficients(**drawn), float(np.clip(stature_m, 1.45, 2.0)))
 
     def load(self, resolution: Resolution, shape: BodyShape) -> Body:
-        """The body of one shape at rest, standing on the floor.
-
-        Parameters
-        ----------
-        resolution : {"high", "medium", "low"}
-        shape : BodyShape
-
-        Returns
-        -------
-        Body
-            With the faces, weights and bones of the bundled surface.
-        """
+        """Body of one shape at rest, standing on the floor."""
         if shape.coefficients.shape != self.mean.shape:
             raise Sd2Error(
                 f"a shape of {shape.coefficients.shape} coefficients", f"{self.mean.shape} of them"
@@ -105,12 +76,12 @@ class ShapeSpace:
         return self.shaped(Body.load(resolution, self.path), self.directions_m(resolution), shape)
 
     def directions_m(self, resolution: Resolution) -> Floats:
-        """What one unit of each coefficient moves the vertices, (K, V, 3)."""
+        """Shift of the vertices per unit of each coefficient, (K, V, 3)."""
         (directions,) = read_body_arrays((f"{resolution}_shape",), self.path)
         return np.asarray(directions.astype(np.float64))
 
     def skeleton(self, shape: BodyShape) -> Skeleton:
-        """The bones of one body at rest."""
+        """Bones of one body at rest."""
         scale = shape.stature_m / self.base_stature_m
         heads = np.tensordot(shape.coefficients, self.heads_m, 1)
         base = self.base_skeleton

@@ -1,4 +1,4 @@
-"""The shape of the person in a clip: bone lengths from landmarks, girth from outlines."""
+"""Shape of the person in a clip: bone lengths from landmarks, girth from outlines."""
 
 from __future__ import annotations
 
@@ -41,20 +41,9 @@ _TRIALS = 90
 def shape_of_lengths(
     space: ShapeSpace, keypoints: KeypointSpace, seen_m: Floats, trust: Floats, stature_m: float
 ) -> tuple[BodyShape, Floats]:
-    """The likeliest shape of these distances between landmarks.
+    """Likeliest shape for distances between landmarks (T, 33, 3), and its covariance (K, K).
 
-    Parameters
-    ----------
-    seen_m : float64 array, shape (T, 33, 3)
-    trust : float64 array, shape (T, 33)
-        From 0 to 1; what is below a half is left out.
-    stature_m : float
-
-    Returns
-    -------
-    shape : BodyShape
-    spread : float64 array, shape (K, K)
-        Covariance of its coefficients.
+    Landmarks whose trust (T, 33), from 0 to 1, is below a half are left out.
     """
     rows, lengths, sds = [], [], []
     for first, second, sd_m in _SEGMENTS:
@@ -96,16 +85,10 @@ def shape_of_outlines(
     camera: PinholeCamera,
     outlines: Sequence[NDArray[np.bool_]],
 ) -> BodyShape:
-    """The shape whose outlines overlap best with those seen, near one that fits the bones.
+    """Shape whose outlines overlap best with those seen (h, w), near one that fits the bones.
 
-    Parameters
-    ----------
-    start, spread
-        Of :func:`shape_of_lengths`.
-    transforms_of : callable
-        Poses of the frames with outlines for a shape, (n, B, 3, 4).
-    camera : PinholeCamera
-    outlines : sequence of n bool arrays, shape (h, w)
+    ``start`` and ``spread`` are those of :func:`shape_of_lengths`; ``transforms_of`` gives the
+    poses (n, B, 3, 4) of the frames with outlines for a shape.
     """
     from scipy.optimize import minimize
 

@@ -1,4 +1,4 @@
-"""Whether a mesh lies on the person in the picture: overlap of silhouettes."""
+"""Silhouettes of meshes in a picture, and their overlap."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from sd2core.body.camera import PinholeCamera
 from sd2core.numerics.raster import rasterise
 
 NEAREST_M = 0.05
-"""What is nearer to the camera, or behind it, is not in the picture."""
+"""Smallest depth that is drawn."""
 
 
 def silhouette(
@@ -20,21 +20,10 @@ def silhouette(
     camera: PinholeCamera,
     size: tuple[int, int] | None = None,
 ) -> NDArray[np.bool_]:
-    """Pixels that a mesh covers.
+    """Mask (height, width) of the pixels that a mesh in the camera frame covers.
 
-    Parameters
-    ----------
-    vertices_m : float array, shape (V, 3)
-        In the camera frame.
-    faces : int32 array, shape (F, 3)
-        Counter-clockwise seen from outside.
-    camera : PinholeCamera
-    size : (width, height), optional
-        Of the mask, which shows the whole picture; by default the picture's own.
-
-    Returns
-    -------
-    bool array, shape (height, width)
+    ``size`` (width, height) is that of the mask, which shows the whole picture; by default the
+    picture's own.
     """
     width, height = size or (camera.width, camera.height)
     vertices = np.asarray(vertices_m, np.float64)

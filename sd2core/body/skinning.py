@@ -1,4 +1,4 @@
-"""Posing a surface fast: linear blend skinning of many frames, compiled and on all cores.
+"""Fast posing of a surface: linear blend skinning of many frames, compiled and on all cores.
 
 :meth:`Body.pose` does the same slot by slot in double precision and comes out
 bit for bit alike everywhere, which the bundled sample rests on.
@@ -17,18 +17,9 @@ _JOB_FRAMES = 8
 
 
 def pose_vertices(body: Body, transforms: Floats) -> NDArray[np.float32]:
-    """Vertices of every frame, within rounding those of :meth:`Body.pose`.
+    """Vertices (T, V, 3) in float32, within rounding those of :meth:`Body.pose`.
 
-    Parameters
-    ----------
-    body : Body
-    transforms : array, shape (T, B, 3, 4)
-        Of :meth:`Skeleton.transforms`.
-
-    Returns
-    -------
-    float32 array, shape (T, V, 3)
-        Metres. Added up in double precision.
+    ``transforms`` (T, B, 3, 4) are those of :meth:`Skeleton.transforms`.
     """
     transforms = np.require(transforms, np.float64, ["C", "W"])
     vertices = np.empty((len(transforms), len(body.vertices_m), 3), np.float32)
@@ -79,7 +70,7 @@ def pose_kernel(
 def _pose_plain(
     body: Body, transforms: Floats, vertices: NDArray[np.float32]
 ) -> NDArray[np.float32]:
-    """The same in NumPy: all bones of all vertices as one matrix product per frame."""
+    """NumPy form of :func:`pose_kernel`: one matrix product of bones and vertices per frame."""
     shares = np.zeros((len(body.vertices_m), transforms.shape[1]))
     rows = np.arange(len(shares))
     for slot in range(body.weights.shape[1]):

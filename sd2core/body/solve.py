@@ -17,7 +17,7 @@ from sd2core.body.rotations import Floats
 
 
 def one_thread() -> AbstractContextManager[object]:
-    """Until it is left, products and factorisations of this process use one thread.
+    """Context in which products and factorisations of this process use one thread.
 
     A fit consists of many small ones, which gain nothing from threads; beside other work
     threads that wait for each other made it seven times as slow.
@@ -48,20 +48,11 @@ def solve(
     start: Pose,
     tick: Callable[[int], None] = lambda done: None,
 ) -> Pose:
-    """The pose through time that agrees best with the evidence.
+    """Pose through time that agrees best with the evidence of consecutive frames.
 
-    The smoothness follows the motion: after each round, every degree of freedom may
-    accelerate as much as it was found to do around each moment. What is still is
-    smooth_over_time hard, what is fast hardly.
-
-    Parameters
-    ----------
-    rig : Rig
-    evidence : Evidence
-        Of consecutive frames.
-    start : Pose
-    tick : callable
-        Called often with the number of rounds done, of :data:`ROUNDS`; it may raise.
+    The smoothness follows the motion: after each round, every degree of freedom may accelerate as
+    much as it was found to do around each moment. ``tick`` is called often with the number of
+    rounds done, of :data:`ROUNDS`; it may raise.
     """
     frames = len(evidence.times_s)
     sd = np.full((max(frames - 2, 0), rig.freedoms), _FIRST_ROTATION_RADPS2)
@@ -77,7 +68,7 @@ def solve(
 
 
 def solve_stills(rig: Rig, evidence: Evidence, start: Pose) -> Pose:
-    """The pose of each frame for itself, whatever the frames around it."""
+    """Pose of each frame for itself, independent of the frames around it."""
     apart = replace(evidence, velocity_sd_mps=np.full_like(evidence.velocity_sd_mps, np.inf))
     sd = np.full((max(len(evidence.times_s) - 2, 0), rig.freedoms), np.inf)
     objective = Objective(rig, apart, sd)

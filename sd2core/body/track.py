@@ -88,25 +88,21 @@ def parts(frames: int) -> Iterator[tuple[int, int]]:
 
 
 class Landmarks(Protocol):
-    """A track of landmarks that need not be in memory as a whole.
-
-    What it has is that of :class:`LandmarkTrack`; the landmarks themselves are read in
-    stretches of frames.
-    """
+    """A track of landmarks that need not be in memory as a whole; see :class:`LandmarkTrack`."""
 
     @property
     def timebase(self) -> Timebase:
-        """When each frame is shown."""
+        """Presentation times of the frames."""
         ...
 
     @property
     def width(self) -> int:
-        """Of the upright picture, in pixels."""
+        """Width of the upright picture in pixels."""
         ...
 
     @property
     def height(self) -> int:
-        """Of the upright picture, in pixels."""
+        """Height of the upright picture in pixels."""
         ...
 
     @property
@@ -131,7 +127,7 @@ class Landmarks(Protocol):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was found and repaired."""
+        """Sentences about repairs."""
         ...
 
     def __len__(self) -> int: ...
@@ -151,28 +147,27 @@ class LandmarkTrack:
     width, height : int
         Of the upright picture, in pixels.
     image_px : float32 array, shape (T, 33, 2)
-        Where each landmark is in the picture (also outside it); NaN in empty frames.
+        Landmarks in the picture (also outside it); NaN in empty frames.
     depth_px : float32 array, shape (T, 33)
-        The landmark model's own depth behind the hips at the scale of the picture,
-        in pixels; weak. NaN in empty frames.
+        The landmark model's own depth behind the hips at the scale of the picture, in pixels;
+        weak. NaN in empty frames.
     world_m : float32 array, shape (T, 33, 3)
-        The landmark model's own place from the middle of the hips, x right, y down,
-        z away; its depth is weak. NaN in empty frames.
+        The landmark model's own place from the middle of the hips, x right, y down, z away; its
+        depth is weak. NaN in empty frames.
     visibility : float32 array, shape (T, 33)
         From 0 (hidden or outside the picture) to 1; 0 in empty frames.
     confidence : float32 array, shape (T,)
-        How sure the model is that there is a person; 0 where it found none.
+        Of the model that there is a person; 0 where it found none.
     present : bool array, shape (T,)
         False in empty frames: no person, and the gap too long to be bridged.
     bridged : bool array, shape (T,)
         Frames without a person, interpolated from their neighbours.
     silhouette_frames : intp array, shape (K,)
-        Frames of which the model's mask is kept.
+        Frames whose mask is kept.
     silhouettes : uint8 array, shape (K, h, w)
-        How sure the model is that a pixel shows the person, 0 to 255, of the whole
-        picture made smaller.
+        Confidence that a pixel shows the person, 0 to 255, of the whole picture made smaller.
     notes : tuple of str
-        What was found and repaired: swapped sides, outliers, gaps.
+        Sentences about repairs: swapped sides, outliers, gaps.
     """
 
     timebase: Timebase

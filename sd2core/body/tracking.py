@@ -46,7 +46,7 @@ def signature(crop: Pixels, pose: Pose) -> Signature:
 
 
 def similarity(one: Signature, two: Signature) -> float:
-    """From 0, nothing in common, to 1, the same colours."""
+    """Similarity of colours, from 0 (nothing in common) to 1 (the same)."""
     both = (one.any(axis=1)) & (two.any(axis=1))
     if not both.any():
         return 0.0
@@ -74,7 +74,7 @@ Seen = Callable[[int, Pose | None], None]
 """``seen(frame, pose)``, None where the person was not found; may raise ``Cancelled``."""
 
 _STEP_S = 1.0 / 15.0
-"""How often to look: what is between follows from the path, which is smooth."""
+"""Time between frames that are searched; the path in between is smooth."""
 _LOOK_ROUND_S = 0.5
 _MAX_CANDIDATES = 4
 _SMALL = 0.6
@@ -83,13 +83,7 @@ _BLOCK_BYTES = 192 * 2**20
 
 @dataclass(eq=False)
 class PersonTracker:
-    """Follows one person from picture to picture; times only ever increase.
-
-    Parameters
-    ----------
-    detector : PoseDetector
-    landmarker : PoseLandmarker
-    """
+    """Follows one person from picture to picture; times only ever increase."""
 
     detector: PoseDetector
     landmarker: PoseLandmarker
@@ -102,7 +96,7 @@ class PersonTracker:
     looked_round_s: float = -np.inf
 
     def begin(self, roi: Roi, time_s: float) -> None:
-        """The person is in this square; what they look like is still to be learnt."""
+        """Start at a square with the person, whose colours are still to be learnt."""
         self.roi, self.time_s, self.lost = roi, time_s, False
         self.velocity = np.zeros(2)
         self.looked_round_s = -np.inf
@@ -136,17 +130,17 @@ class PersonTracker:
         return Roi(roi.centre_x_px + move[0], roi.centre_y_px + move[1], roi.size_px, roi.angle_rad)
 
     def _away(self, roi: Roi, time_s: float) -> float:
-        """How far a square is from where the person should be, in squares."""
+        """Distance of a square from the predicted one, in squares."""
         predicted = self._predicted(time_s)
         return _apart(predicted, roi) / predicted.size_px
 
     def _jumped(self, pose: Pose) -> bool:
-        """Whether somebody else in the square, or nobody, was taken for the person."""
+        """True if another person in the square, or none, was taken for the person."""
         ratio = pose.next_roi.size_px / pose.roi.size_px
         return _apart(pose.roi, pose.next_roi) > 0.35 * pose.roi.size_px or not 0.4 < ratio < 2.0
 
     def _is_other(self, picture: Pixels, pose: Pose) -> bool:
-        """Whether the colours are those of somebody else that was seen beside the person."""
+        """True if the colours are rather those of another person seen before."""
         if self.own is None or not self.others:
             return False
         mine, theirs = self._likeness(signature(pose.roi.cut(picture), pose))
@@ -178,7 +172,7 @@ class PersonTracker:
         return best
 
     def _people(self, picture: Pixels, near: Roi) -> list[Detection]:
-        """People in the picture; where they are small, those around a place."""
+        """People in the picture; if the person is small, also those around a place."""
         if near.size_px > _SMALL * max(picture.shape[:2]):
             return self.detector.people(picture)
         around = Roi(near.centre_x_px, near.centre_y_px, 1.5 * near.size_px)
@@ -203,7 +197,7 @@ class PersonTracker:
             self.own = self.own + np.float32(0.05) * (looks - self.own)
 
     def _look_round(self, picture: Pixels, pose: Pose) -> None:
-        """Learn what others look like while they stand apart."""
+        """Learn the colours of others while they stand apart."""
         for found in self._people(picture, pose.next_roi)[: _MAX_CANDIDATES + 1]:
             if _apart(found.roi, pose.next_roi) < 0.2 * pose.next_roi.size_px:
                 continue
@@ -217,7 +211,7 @@ class PersonTracker:
             self.others = [*self.others, looks][-_MAX_CANDIDATES:]
 
     def state(self) -> dict[str, NDArray[np.generic]]:
-        """Everything that the next step depends on, as arrays."""
+        """State that the next step depends on, as arrays."""
         assert self.roi is not None
         assert self.own is not None
         return {
@@ -244,15 +238,7 @@ def _apart(one: Roi, two: Roi) -> float:
 
 
 class Search:
-    """The first pass: the person in every fifteenth of a second, from the start both ways.
-
-    Parameters
-    ----------
-    video : VideoReader
-    start : Start
-        Who, and in which frame.
-    follower : PersonTracker
-    """
+    """First pass: the person in every fifteenth of a second, from the start both ways."""
 
     def __init__(self, video: VideoReader, start: Start, follower: PersonTracker) -> None:
         self._video = video
@@ -269,11 +255,11 @@ class Search:
 
     @property
     def done(self) -> tuple[int, int]:
-        """Frames looked at, and how many are to be."""
+        """Number of frames searched, and of all to be searched."""
         return self._done, len(self._order)
 
     def run(self, seen: Seen) -> Sightings:
-        """Look at what has not been looked at yet."""
+        """Search the frames that are left."""
         times = self._video.timebase.times_s
         first = self._start.frame
         for picture in self._pictures():
@@ -292,7 +278,7 @@ class Search:
         return Sightings(self._order[rank], self._rois[rank], self._confidence[rank])
 
     def _pictures(self) -> Iterator[Pixels]:
-        """The pictures still to be looked at, in that order."""
+        """Pictures still to be searched, in that order."""
         for number in range(self._done, self._turn):
             yield self._video.read(int(self._order[number]))
         # Backwards in blocks: a video decodes forwards only.
@@ -305,7 +291,7 @@ class Search:
                 yield pictures.pop()
 
     def state(self) -> dict[str, NDArray[np.generic]]:
-        """All that was found, and what the next step depends on."""
+        """Results so far, and the state that the next step depends on."""
         return self._follower.state() | {
             "rois": self._rois[: self._done],
             "confidence": self._confidence[: self._done],

@@ -1,4 +1,4 @@
-"""What ``sd2 fit --progress-json`` prints; ``docs/formats.md`` says what the lines mean."""
+"""Output of ``sd2 fit --progress-json``; see ``docs/formats.md``."""
 
 from __future__ import annotations
 
@@ -24,25 +24,20 @@ _UNITS = {"models": "byte", "fit": "step"}
 
 
 class FitLines:
-    """Prints one JSON object per line, at once.
-
-    Parameters
-    ----------
-    video, out : Path
-    """
+    """Prints one JSON object per line, at once."""
 
     def __init__(self, video: Path, out: Path) -> None:
         self._video, self._out = video, out
         self._last_landmarks_s = -1.0
 
     def report(self) -> FitReport:
-        """What prints the lines of a fit under way."""
+        """Callbacks that print the lines of a running fit."""
         from sd2core.body.fit_video import FitReport
 
         return FitReport(self._progress_of, self._started, self._landmarks)
 
     def error(self, error: Exception) -> None:
-        """Say why nothing comes of it."""
+        """Print the reason of a failure."""
         from sd2core.errors import Sd2Error
 
         text = str(error)
@@ -55,7 +50,7 @@ class FitLines:
         _say("error", text=text)
 
     def done(self, made: FittedVideo, seconds: float) -> None:
-        """Say what was noticed, and that the mesh is written."""
+        """Print the notes, and that the mesh is written."""
         for note in made.notes:
             _say("note", text=note)
         _say(

@@ -1,4 +1,4 @@
-"""``sd2 ladder``: measured cost and error of every rung, and what a scene requires."""
+"""``sd2 ladder``: measured cost and error of every accuracy setting, and a scene's needs."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ def chosen(
     *,
     dragging: bool = True,
 ) -> Choice:
-    """What a scene requires, with bars; arguments as for :func:`sd2core.accuracy.choose`."""
+    """Choose a plan with progress bars; arguments as for :func:`sd2core.accuracy.choose`."""
     from sd2core.accuracy.choosing import choose
     from sd2core.numerics.compiled import warm_up
 

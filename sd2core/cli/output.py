@@ -1,4 +1,4 @@
-"""What commands print: facts for people, JSON for programs, bars for long work."""
+"""Output of commands: facts for people, JSON for programs, bars for long work."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def counted(number: int, what: str) -> str:
 
 
 def duration(seconds: float) -> str:
-    """How long something takes: seconds, minutes, or hours and minutes."""
+    """Duration as text: seconds, minutes, or hours and minutes."""
     if seconds < 60:
         return f"{seconds:.2g} s" if seconds < 10 else f"{seconds:.0f} s"
     minutes = round(seconds / 60)
@@ -64,7 +64,7 @@ def print_rows(rows: Sequence[Sequence[str]], *, right: Collection[int] = ()) ->
 
 
 def finite(value: Any) -> Any:
-    """The same for JSON: NaN and infinities become None."""
+    """Replace NaN and infinities by None, for JSON."""
     if isinstance(value, Mapping):
         return {str(key): finite(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple):

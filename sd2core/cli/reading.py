@@ -1,4 +1,4 @@
-"""Reading what the command line names."""
+"""Reading of the files that the command line names."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _BODY_MODEL_SUFFIXES = {".pkl", ".pickle", ".joblib"}
 
 
 def mesh_reading(options: argparse.Namespace) -> MeshReading:
-    """How to read a mesh, as far as the command line says it."""
+    """Options for reading a mesh from the command line."""
     from sd2core.recording.recording import MeshReading
 
     return MeshReading(
@@ -37,7 +37,7 @@ def mesh_reading(options: argparse.Namespace) -> MeshReading:
 
 
 def load_mesh_from_options(path: Path, options: argparse.Namespace) -> MeshSequence:
-    """Load a mesh with ``--faces`` and what else is given on the command line."""
+    """Load a mesh with the options on how to read it."""
     from sd2core.io.mesh import load_mesh
 
     refuse_unused_mesh_options(options, path, path)
@@ -48,7 +48,7 @@ def load_mesh_from_options(path: Path, options: argparse.Namespace) -> MeshSeque
 
 
 def mesh_and_sensor(options: argparse.Namespace) -> tuple[MeshSequence, VirtualSensor]:
-    """The mesh, and the sensor of the recording or the camera with ``--sensor`` in its place."""
+    """Mesh, and sensor of the recording or the camera, with ``--sensor`` in its place."""
     from sd2core.recording.recording import is_recording
     from sd2core.sensor import VirtualSensor
 
@@ -66,7 +66,7 @@ def mesh_and_sensor(options: argparse.Namespace) -> tuple[MeshSequence, VirtualS
 
 
 def open_recording_from_options(path: Path, options: argparse.Namespace) -> Recording:
-    """Open a recording; of its mesh, what the command line says holds before what is stored."""
+    """Open a recording; options on how to read its mesh replace the stored ones."""
     from sd2core.recording.recording import open_recording
 
     recording = open_recording(path)
@@ -84,7 +84,7 @@ def open_recording_from_options(path: Path, options: argparse.Namespace) -> Reco
 def refuse_unused_mesh_options(
     options: argparse.Namespace, path: Path, mesh: Path | None, *, but: tuple[str, ...] = ()
 ) -> None:
-    """Refuse options on how to read a mesh that would change nothing, ``but`` these."""
+    """Refuse options on how to read a mesh that would change nothing, except ``but``."""
     if mesh is None:
         for name in _given(options, _OF_THE_MESH, but):
             raise Sd2Error(f"{name} is given, and {path} holds no mesh", f"{name} for a mesh only")

@@ -1,4 +1,4 @@
-"""The Doppler maps of a recording, computed where that is needed."""
+"""Doppler maps of a recording, computed where needed."""
 
 from __future__ import annotations
 
@@ -18,19 +18,13 @@ MAP_NAMES: tuple[MapName, ...] = get_args(MapName)
 
 
 def usual_maps(recording: Recording) -> tuple[MapName, ...]:
-    """Those that a recording has without a model being asked: of its mesh and of its radar."""
+    """Maps that a recording has without a model: of its mesh and of its radar."""
     there: dict[MapName, object] = {"synthetic": recording.mesh, "radar": recording.radar}
     return tuple(name for name, part in there.items() if part is not None)
 
 
 def parsed_maps(text: str) -> tuple[MapName, ...]:
-    """Names such as ``synthetic,radar``, in the order given.
-
-    Raises
-    ------
-    Sd2Error
-        For another name, or none.
-    """
+    """Parse names such as ``synthetic,radar``; Sd2Error for another name, or none."""
     names = tuple(name for name in MAP_NAMES if name in text.replace(" ", "").split(","))
     if not names or len(names) < len(text.split(",")):
         raise Sd2Error(f"The maps are {text!r}", f"some of {', '.join(MAP_NAMES)}, each once")
@@ -45,19 +39,8 @@ def maps_of(
 ) -> dict[MapName, DopplerMap]:
     """Maps on the recording's clock, from top to bottom.
 
-    Parameters
-    ----------
-    recording : Recording
-    names : tuple of str
-    mesh : MeshSequence, optional
-        Its mesh, where that has been read already.
-    axis : VelocityAxis, optional
-        Of the radar's map; its own limits where none is given.
-
-    Raises
-    ------
-    Sd2Error
-        When the recording does not have what one is made of.
+    ``mesh`` is its mesh, where that has been read already; ``axis`` that of the radar's map, by
+    default its own. Raises Sd2Error if the recording lacks the source of a map.
     """
     made: dict[MapName, DopplerMap] = {}
     if {"synthetic", "denoised"} & {*names}:

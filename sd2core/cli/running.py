@@ -15,13 +15,10 @@ _STARTS_WITH_NEGATIVE_NUMBER = re.compile(r"-\.?\d")
 
 
 def run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
-    """Parse, call the handler and turn what goes wrong into a sentence.
+    """Parse, call the handler and turn errors into a sentence on standard error.
 
-    Returns
-    -------
-    int
-        0, or what the handler returned; 1 for an error, which is explained on
-        standard error; 130 when interrupted. argparse itself exits with 2.
+    Returns 0, or the handler's code; 1 for an error; 130 when interrupted. argparse itself exits
+    with 2.
     """
     options = parser.parse_args(attach_negative_values(arguments))
     try:
@@ -82,7 +79,7 @@ def _flush_output() -> None:
 
 
 def _output_fails() -> bool:
-    """Whether standard output is what could not be written: what it holds back still cannot."""
+    """True if standard output is what could not be written: what it holds back still cannot."""
     try:
         _flush_output()
     except OSError:

@@ -38,7 +38,7 @@ _RUNGS = (
     "beyond",
     "oversampling",
 )
-"""What a plan chooses."""
+"""Options that a plan sets."""
 
 _COUNTING_ONLY = (
     "depth_resolution",
@@ -246,7 +246,7 @@ def _check_wish(options: argparse.Namespace) -> None:
 def _as_chosen(
     options: argparse.Namespace, mesh: MeshSequence, sensor: VirtualSensor
 ) -> DopplerMap:
-    """The map of the plan that the scene requires; plan and reasons go into its provenance."""
+    """Map by the plan that the scene requires; plan and reasons go into its provenance."""
     from sd2core.accuracy.synthesizers import synthesizer_for
 
     base = synthesis_options(options)
@@ -304,7 +304,7 @@ def _by_fmcw(options: argparse.Namespace, mesh: MeshSequence, sensor: VirtualSen
 
 
 def synthesis_options(options: argparse.Namespace) -> SynthesisOptions:
-    """The preset with what is given on the command line in its place."""
+    """The preset, with options of the command line in its place."""
     from sd2core.doppler.options import chosen_options
 
     names = ("visibility", *_COUNTING_ONLY)

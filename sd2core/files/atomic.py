@@ -1,4 +1,4 @@
-"""Files that are either the old version or the new one, never half of it."""
+"""Writing files in one step: a reader finds the old version or the new one, never half of it."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def atomic_write_text(path: Path, text: str) -> None:
 
 
 def remove_leftovers(folder: Path) -> None:
-    """Delete what killed writes left in a folder; nobody may be writing there."""
+    """Delete temporary files of killed writes in a folder; no process may be writing there."""
     for path in Path(folder).glob(f"{_PREFIX}*{_SUFFIX}"):
         path.unlink(missing_ok=True)
 

@@ -1,4 +1,4 @@
-"""Hashes of what files hold, taken once and kept until a file changes."""
+"""Hashes of files' contents, kept until a file changes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Signature = list[list[Any]]
 """Per file or folder: path, size, time of the last change in ns, inode."""
 
 _WORTH_KEEPING_BYTES = 4 << 20
-"""What is smaller is hashed in less time than it takes to look its hash up safely."""
+"""Size below which hashing takes less time than looking a hash up safely."""
 
 
 def file_digest(path: Path) -> str:
@@ -30,7 +30,7 @@ def file_digest(path: Path) -> str:
 
 
 def signature(paths: Iterable[Path | str]) -> Signature:
-    """By which it is told whether files have changed; what is not there has size -1."""
+    """Signature by which changes of files are noticed; a missing file has size -1."""
     entries: Signature = []
     for path in paths:
         try:
@@ -43,21 +43,10 @@ def signature(paths: Iterable[Path | str]) -> Signature:
 
 
 class Digests:
-    """Hashes of some files, of which those that have not changed are not read again.
+    """Hashes of some files; those that have not changed are not read again.
 
-    Parameters
-    ----------
-    before : list
-        Their signature when they were last hashed.
-    known : mapping of str to str
-        What was found then, by path.
-
-    Attributes
-    ----------
-    files : list
-        Signature of all that was asked for.
-    digests : dict
-        Their hashes, by path.
+    ``before`` is the signature of the last time, ``known`` the hashes of then, by path. ``files``
+    and ``digests`` are those of all that was asked for.
     """
 
     def __init__(self, before: Signature, known: Mapping[str, str]) -> None:
@@ -67,7 +56,7 @@ class Digests:
         self.digests: dict[str, str] = {}
 
     def of(self, path: Path) -> str:
-        """Of a file, or of a folder with all that is in it."""
+        """Hash of a file, or of a folder with all files in it."""
         entries = self.look_at(path)
         known = self._known.get(str(path))
         if known is None or any(self._before.get(entry[0]) != entry for entry in entries):
@@ -85,7 +74,7 @@ class Digests:
 def cached_digest(path: Path) -> str:
     """Hash of a file or folder, kept in the user's cache folder until it changes.
 
-    Empty where nothing is there. Where nothing can be written it is taken anew every time.
+    Empty where nothing is there. Where nothing can be written it is computed every time.
     """
     if not path.exists():
         return ""
@@ -105,7 +94,7 @@ def cached_digest(path: Path) -> str:
 
 
 def _tree(path: Path) -> Iterable[Path]:
-    """A file; or a folder with all that is in it, whose own time tells when something goes."""
+    """A file; or a folder and all in it, as its own time tells when something is deleted."""
     yield path
     if path.is_dir():
         yield from sorted(path.rglob("*"))

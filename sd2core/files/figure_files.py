@@ -1,4 +1,4 @@
-"""Figures as files: what they may be called, and what is written into them."""
+"""Saving figures, with their provenance."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _RULES: Any = {"svg.fonttype": "none", "svg.hashsalt": "sd2", "pdf.fonttype": 42
 
 
 def check_figure(path: Path) -> None:
-    """Refuse a name that no figure can have."""
+    """Raise Sd2Error for a name that no figure can have."""
     if path.suffix.lower() not in SUFFIXES:
         raise Sd2Error(f"The figure is to be {path}", f"a name that ends in {', '.join(SUFFIXES)}")
     if not path.absolute().parent.is_dir():
@@ -36,20 +36,9 @@ def save_figure(
 ) -> None:
     """Write a figure as PNG, SVG or PDF, by the name's ending.
 
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-    path : Path
-    provenance : mapping, optional
-        Fit for JSON. Goes into the file with the version of the program; words of SVG and
-        PDF are then text, and the same figure gives the same bytes.
-    pixels_per_inch : float, optional
-        The figure's own where none is given.
-
-    Raises
-    ------
-    Sd2Error
-        For another ending, or a folder that does not exist.
+    Provenance, fit for JSON, goes into the file with the version of the program; words of SVG
+    and PDF are then text, and the same figure gives the same bytes. Raises Sd2Error for another
+    ending, or a folder that does not exist.
     """
     from matplotlib import rc_context
 

@@ -1,7 +1,7 @@
-"""A file that a process holds for as long as it lives.
+"""Lock on a file that ends with the process that holds it.
 
-The system lets go of it whatever ends the process, and no later process inherits it, as
-one may inherit a number: so it tells a run under way from one that died.
+The system releases it however the process ends, and no later process inherits it, as one may
+inherit a number: so it tells a running process from one that died.
 """
 
 from __future__ import annotations
@@ -49,20 +49,14 @@ else:
 
 
 class FileLock:
-    """Exclusive hold on a file, once taken.
-
-    Parameters
-    ----------
-    path : Path
-        Made when it is not there.
-    """
+    """Exclusive lock on a file, which is made if it is not there."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
         self._stream: IO[bytes] | None = None
 
     def take(self) -> bool:
-        """Whether it could be taken; False when another process, or this one, holds it."""
+        """Try to lock; False if another process, or this one, holds the lock."""
         stream = self._path.open("ab")
         if not _grab(stream):
             stream.close()
@@ -71,14 +65,14 @@ class FileLock:
         return True
 
     def release(self) -> None:
-        """Let go."""
+        """Unlock."""
         if self._stream is not None:
             self._stream.close()
             self._stream = None
 
 
 def is_locked(path: Path) -> bool:
-    """Whether a process holds the file."""
+    """True if a process holds the lock."""
     if not path.exists():
         return False
     try:

@@ -1,4 +1,4 @@
-"""Lists of numbers as people type them: ``1, 2.5, 4`` and ``-60:60:30``."""
+"""Lists of numbers as text: ``1, 2.5, 4`` and ``-60:60:30``."""
 
 from __future__ import annotations
 
@@ -9,16 +9,13 @@ from sd2core.errors import Sd2Error
 
 _MOST = 10_000
 _AS_RANGE = 3
-"""So many evenly spaced numbers are shorter as a range."""
+"""Count of evenly spaced numbers from which a range is shorter."""
 
 
 def parse_numbers(text: str) -> tuple[float, ...]:
-    """Parse numbers and ranges ``from:to:step``, which hold both ends, set apart by commas.
+    """Parse numbers and ranges ``from:to:step`` (both ends included), separated by commas.
 
-    Raises
-    ------
-    Sd2Error
-        When it is neither, or there are more than 10000.
+    Raises Sd2Error for anything else, and for more than 10,000 numbers.
     """
     found: list[float] = []
     for part in text.replace("−", "-").split(","):
@@ -36,13 +33,7 @@ def parse_numbers(text: str) -> tuple[float, ...]:
 
 
 def parse_interval(text: str) -> tuple[float, float]:
-    """Parse ``from:to``; a single number is both.
-
-    Raises
-    ------
-    Sd2Error
-        When it is neither.
-    """
+    """Parse ``from:to``, or a single number, which is both; Sd2Error for anything else."""
     try:
         values = [float(word) for word in text.replace("−", "-").split(":")]
     except ValueError:
@@ -53,7 +44,7 @@ def parse_interval(text: str) -> tuple[float, float]:
 
 
 def format_numbers(numbers: Sequence[float]) -> str:
-    """What :func:`parse_numbers` reads; evenly spaced numbers as a range."""
+    """Write numbers for :func:`parse_numbers`; evenly spaced ones as a range."""
     first, last = numbers[0], numbers[-1]
     step = (last - first) / (len(numbers) - 1) if len(numbers) > 1 else 0.0
     if len(numbers) >= _AS_RANGE and step:

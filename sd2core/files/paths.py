@@ -33,12 +33,12 @@ def located_path(stored: str | None, folder: Path) -> Path | None:
 
 
 def is_pattern(path: Path) -> bool:
-    """Whether a name such as ``*.obj`` stands for several files, and is not one file's own."""
+    """True if a name such as ``*.obj`` stands for several files, and is not one file's own."""
     return glob.has_magic(path.name) and not path.exists()
 
 
 def files_of_pattern(path: Path) -> list[Path]:
-    """Files that a pattern stands for, which is in the name alone: ``[`` in a folder is a ``[``."""
+    """Files that match a pattern in the name; ``[`` in a folder is a ``[``."""
     return [path.parent / name for name in glob.glob(path.name, root_dir=path.parent)]
 
 
@@ -48,12 +48,12 @@ def files_at(path: Path) -> list[Path]:
 
 
 def is_there(path: Path) -> bool:
-    """Whether a file, a folder, or any file of a pattern exists."""
+    """True if a file, a folder, or any file of a pattern exists."""
     return bool(files_of_pattern(path)) if is_pattern(path) else path.exists()
 
 
 def is_absolute(stored: str) -> bool:
-    """Whether a stored path is written in full, on whatever system it was written."""
+    """True if a stored path is absolute, on whatever system it was written."""
     return PurePosixPath(stored).is_absolute() or PureWindowsPath(stored).is_absolute()
 
 
@@ -73,7 +73,7 @@ def paths_named(names: set[str], folder: Path, progress: Progress) -> dict[str, 
 
 
 def common_suffix_length(a: Path, b: Path) -> int:
-    """How many trailing parts two paths share."""
+    """Number of trailing parts that two paths share."""
     count = 0
     for part_a, part_b in zip(reversed(a.parts), reversed(b.parts), strict=False):
         if part_a != part_b:
@@ -83,7 +83,7 @@ def common_suffix_length(a: Path, b: Path) -> int:
 
 
 def free_path(folder: Path, name: str, prefix: str, *, reserved: str) -> Path:
-    """Where ``name`` can be put, with a prefix and a number if need be, replacing nothing."""
+    """Free path for ``name`` in a folder, with a prefix and a number if it is taken."""
     names = chain((name, f"{prefix}-{name}"), (f"{prefix}-{n}-{name}" for n in count(2)))
     return next(
         folder / free

@@ -64,7 +64,7 @@ class SensorEntry(BaseModel):
 
 
 class MeshReading(BaseModel):
-    """What a mesh file does not say about itself; see :func:`sd2core.io.mesh.load_mesh`."""
+    """Options for reading a mesh file; see :func:`sd2core.io.mesh.load_mesh`."""
 
     model_config = ConfigDict(extra="allow", frozen=True)
 
@@ -76,30 +76,20 @@ class MeshReading(BaseModel):
     distance_m: FiniteFloat | None = None
 
     def options(self) -> dict[str, Any]:
-        """Arguments for ``load_mesh``: what is given, and known to this version."""
+        """Arguments for ``load_mesh``: those that are given."""
         values = {name: getattr(self, name) for name in type(self).model_fields}
         return {name: value for name, value in values.items() if value is not None}
 
 
 class CameraEntry(BaseModel):
-    """The camera that took the video; where there is none, nothing is known of it.
-
-    Parameters
-    ----------
-    focal_px : float
-        Focal length in pixels of a picture of ``width`` × ``height``.
-    width, height : int or None
-        Pixels; None: those of the recording's video.
-    source : str
-        How the focal length is known: ``user``, ``metadata``, ``default`` or ``simulated``.
-    """
+    """The camera that took the video."""
 
     model_config = ConfigDict(extra="allow", frozen=True)
 
-    focal_px: PositiveFinite
-    width: PositiveInt | None = None
+    focal_px: PositiveFinite  # in pixels of a picture of width × height
+    width: PositiveInt | None = None  # None: that of the recording's video
     height: PositiveInt | None = None
-    source: str = ""
+    source: str = ""  # of the focal length: user, metadata, default or simulated
 
     def focal_for(self, width: int, height: int) -> float:
         """Focal length in pixels of a picture of another size."""
@@ -109,7 +99,7 @@ class CameraEntry(BaseModel):
 
 
 class Document(BaseModel):
-    """``recording.json`` as it is written; what this version does not know is kept."""
+    """Content of ``recording.json``; fields that this version does not know are kept."""
 
     model_config = ConfigDict(extra="allow")
 
@@ -134,10 +124,7 @@ class Document(BaseModel):
 def read_document(file: Path) -> Document:
     """Read and check a ``recording.json``.
 
-    Raises
-    ------
-    Sd2Error
-        When it is not there, is damaged, or was written by a newer version.
+    Raises Sd2Error if it is not there, is damaged, or was written by a newer version.
     """
     try:
         content = json.loads(file.read_text(encoding="utf-8"))

@@ -1,4 +1,4 @@
-"""Where the files that come with the program are, in a checkout and in a wheel."""
+"""Files that come with the program, in a checkout and in a wheel."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _FOLDERS = (_PACKAGE / "resources", _PACKAGE.parent / "resources")
 
 
 def is_bundled(path: Path) -> bool:
-    """Whether a path belongs to the program and must not be written to."""
+    """True if a path belongs to the program and must not be written to."""
     return any(Path(path).resolve().is_relative_to(folder) for folder in _FOLDERS)
 
 
@@ -53,19 +53,9 @@ def open_bundled_arrays(
 ) -> Iterator[tuple[dict[str, Any], Mapping[str, NDArray[Any]]]]:
     """Open an ``.npz`` whose ``meta`` tells its format; arrays are read where asked for.
 
-    Parameters
-    ----------
-    path : Path
-    kind, version
-        The format that is wanted, up to this version.
-    what, command : str
-        What it holds and what writes it, for the error.
-
-    Raises
-    ------
-    Sd2Error
-        When the file is missing, damaged, of a later version, or lacks an array that
-        is asked for while it is open.
+    ``kind`` and ``version`` are the format that is wanted, up to this version; ``what`` it holds
+    and the ``command`` that writes it are for the error. Raises Sd2Error if the file is missing,
+    damaged, of a later version, or lacks an array that is asked for while it is open.
     """
     import numpy as np
 

@@ -1,4 +1,4 @@
-"""Values as TOML writes them; Python reads TOML and does not write it."""
+"""Writing values as TOML, which Python only reads."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from sd2core.files.paths import stored_path
 
 
 def toml_value(value: Any, folder: Path) -> str:
-    """A flag, number, text, path or list; paths relative to a folder."""
+    """Write a flag, number, text, path or list; paths relative to a folder."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, list | tuple):
@@ -32,7 +32,7 @@ def toml_lines(table: Mapping[str, Any], folder: Path) -> list[str]:
 
 
 def _text(value: str) -> str:
-    """As a basic string of TOML: JSON's, but for one character."""
+    """Write a basic string of TOML: JSON's, but for one character."""
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 

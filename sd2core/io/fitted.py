@@ -1,4 +1,4 @@
-"""What a mesh made by ``sd2 fit`` says about where it is from."""
+"""Provenance of meshes made by ``sd2 fit``."""
 
 from __future__ import annotations
 
@@ -14,18 +14,7 @@ from sd2core.files.recording_json import CameraEntry
 
 
 def fitted_camera(mesh: Path) -> CameraEntry | None:
-    """The camera that a body was fitted with.
-
-    Parameters
-    ----------
-    mesh : Path
-        ``.zarr``, ``.zarr.zip`` or ``.npz``; any other file says nothing.
-
-    Returns
-    -------
-    CameraEntry or None
-        None where the mesh is not from ``sd2 fit``, or cannot be read.
-    """
+    """Camera that a body was fitted with; None for a mesh that is not from ``sd2 fit``."""
     try:
         return CameraEntry.model_validate(_said(mesh)["camera"])
     except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile, ValidationError):

@@ -1,4 +1,4 @@
-"""What kind of thing a path is, by a cheap look at its name and first entries."""
+"""Recognising files by their names and first entries, at little cost."""
 
 from __future__ import annotations
 
@@ -21,13 +21,7 @@ MESH_SUFFIXES = frozenset({".obj", ".ply", ".glb", ".pkl", ".pickle", ".joblib"}
 
 
 def kind_of(path: Path) -> Kind:
-    """Recognise what a path is.
-
-    Raises
-    ------
-    Sd2Error
-        When the path does not exist or is none of these.
-    """
+    """Recognise a file or folder; Sd2Error if it does not exist or is of no known kind."""
     path = Path(path)
     if is_pattern(path):
         return "mesh"
@@ -58,7 +52,7 @@ def kind_of(path: Path) -> Kind:
 
 
 def is_dataset(path: Path) -> bool:
-    """Whether a path looks like a data set of ``sd2 export``, finished or not; reads little."""
+    """True if a path looks like a data set of ``sd2 export``, finished or not; reads little."""
     suffix = path.suffix.lower()
     try:
         if path.is_dir():

@@ -1,4 +1,4 @@
-"""Files that cannot be trusted: decompressed as they are read, up to a limit."""
+"""Reading of untrusted files: decompressed as they are read, up to a limit."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ _PIECE = 16 * 2**20
 
 
 class Refused(Exception):
-    """What a file asked for and does not get; the text follows the file's name."""
+    """Request of a file that is refused; the text follows the file's name."""
 
 
 class LimitedFile:
-    """A file that gives no more than so many bytes in all."""
+    """A file of which no more than so many bytes can be read."""
 
     def __init__(self, stream: Any, limit_bytes: int) -> None:
         self._stream = stream
         self.left = limit_bytes
 
     def read(self, size: int) -> bytes:
-        """Up to ``size`` bytes."""
+        """Read up to ``size`` bytes."""
         return bytes(self._upto(size))
 
     def read_exactly(self, size: int) -> bytearray:
-        """``size`` bytes; an error when the file ends before."""
+        """Read ``size`` bytes; EOFError if the file ends before."""
         content = self._upto(size)
         if len(content) < size:
             raise EOFError("the file ends inside an array")
@@ -41,7 +41,7 @@ class LimitedFile:
         return len(content)
 
     def readline(self) -> bytes:
-        """Up to the next line break."""
+        """Read up to the next line break."""
         line: bytes = self._stream.readline(min(_PIECE, self.left))
         self.left -= len(line)
         return line
@@ -68,7 +68,7 @@ class _ZlibFile(io.RawIOBase):
         self._machine = zlib.decompressobj()
 
     def readable(self) -> bool:
-        """Say that it can be read."""
+        """True."""
         return True
 
     def readinto(self, buffer: Any) -> int:
@@ -85,7 +85,7 @@ class _ZlibFile(io.RawIOBase):
 
 
 def decompressed(file: Any) -> Any:
-    """A binary file as it was before zlib, gzip, bz2, xz or lzma."""
+    """Open a binary file that may be compressed with zlib, gzip, bz2, xz or lzma."""
     start = file.read(6)
     file.seek(0)
     if start[:2] == b"\x1f\x8b":

@@ -235,14 +235,14 @@ def _place(raw: RawMesh, scale: float, distance_m: float) -> None:
 def _velocity_factor(
     given_s: NDArray[np.float64] | None, times_s: NDArray[np.float64], scale: float | None
 ) -> float:
-    """How much faster everything is than the file has it."""
+    """Ratio of velocities to those by the file's own times and unit."""
     factor = 1.0 if scale is None else scale
     step_s = 0.0 if given_s is None or len(times_s) < 2 else float(np.median(np.diff(given_s)))
     return factor * step_s / float(np.median(np.diff(times_s))) if step_s > 0 else factor
 
 
 def _times(raw: RawMesh, frames_per_s: float | None, source: str) -> NDArray[np.float64]:
-    """Times of all frames: as told, as in the file, or assumed."""
+    """Times of all frames: from options, from the file, or assumed."""
     count = int(raw.vertices.shape[0])
     if frames_per_s is not None and not (np.isfinite(frames_per_s) and frames_per_s > 0):
         raise Sd2Error(f"The frame rate is {frames_per_s}", "a positive number of frames per s")

@@ -46,7 +46,7 @@ _FORMAT = "sd2-mesh"
 
 @dataclass
 class RawMesh:
-    """What a file holds, before times are completed and anything is checked."""
+    """Content of a file, before times are completed and anything is checked."""
 
     vertices: VertexArray  # (T, V, 3)
     faces: NDArray[Any] | None = None
@@ -61,14 +61,7 @@ class RawMesh:
 
 
 class StoredVertices:
-    """Vertices that stay on disk; scaled, moved and checked when they are read.
-
-    Parameters
-    ----------
-    array : chunked array, shape (T, V, 3)
-    source : str
-        For messages.
-    """
+    """Vertices (T, V, 3) that stay on disk; scaled, moved and checked when they are read."""
 
     def __init__(self, array: Any, source: str) -> None:
         self._array = array
@@ -86,7 +79,7 @@ class StoredVertices:
 
     @property
     def chunk_bytes(self) -> int:
-        """Memory that those frames take."""
+        """Memory of those frames."""
         return self.frames_per_chunk * int(np.prod(self.shape[1:])) * self.dtype.itemsize
 
     def __getitem__(self, key: Any) -> NDArray[Any]:
@@ -281,7 +274,7 @@ def write_zarr(mesh: MeshSequence, path: Path, progress: Progress = silent) -> N
 
 
 def small_arrays(mesh: MeshSequence) -> dict[str, NDArray[Any]]:
-    """The numbers of a mesh but its vertices, under the names that files have for them."""
+    """Arrays of a mesh without its vertices, under their names in files."""
     arrays: dict[str, NDArray[Any] | None] = {
         "faces": mesh.faces,
         "times_s": mesh.times_s,
@@ -309,7 +302,7 @@ def _block(mesh: MeshSequence, start: int, step: int) -> NDArray[Any]:
 
 
 def create_vertices(group: Any, shape: tuple[int, ...], dtype: Any) -> Any:
-    """An array for vertices (T, V, 3) in a Zarr group, to be filled chunk by chunk."""
+    """Create an array for vertices (T, V, 3) in a Zarr group, to be filled chunk by chunk."""
     from zarr.codecs import BloscCodec
 
     return group.create_array(

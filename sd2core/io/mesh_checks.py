@@ -1,4 +1,4 @@
-"""What is wrong with a mesh, said in a sentence, and repaired where that is safe."""
+"""Checks of meshes that are read, and safe repairs."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def mark_empty_frames(raw: RawMesh, source: str) -> None:
 
 
 def uncertainty_of(raw: RawMesh, source: str) -> VelocityUncertainty | None:
-    """What the file says of how well velocities are known."""
+    """Uncertainty of velocities that a file states, or None."""
     if raw.uncertainty is None:
         return None
     vertex_limb, along, across = raw.uncertainty
@@ -90,10 +90,7 @@ def uncertainty_of(raw: RawMesh, source: str) -> VelocityUncertainty | None:
 def check_mesh(raw: RawMesh, times_s: NDArray[np.float64], source: str, check_size: bool) -> None:
     """Check size, place, rounding and faces on a few frames; flip faces that look inwards.
 
-    Raises
-    ------
-    Sd2Error
-        For a size that no body has, or faces that cannot belong to the mesh.
+    Raises Sd2Error for a size that no body has, or faces that cannot belong to the mesh.
     """
     count = int(raw.vertices.shape[0])
     chosen = np.unique(np.linspace(0, count - 1, _SAMPLE_FRAMES).astype(int))
@@ -138,7 +135,7 @@ def _check_size(raw: RawMesh, sample: list[NDArray[np.float64]], source: str) ->
 def _note_rounding(
     raw: RawMesh, sample: list[NDArray[np.float64]], times_s: NDArray[np.float64]
 ) -> None:
-    """Say so when single precision in the file itself spoils the velocities."""
+    """Note if single precision in the file itself spoils the velocities."""
     if np.dtype(raw.vertices.dtype) != np.float32 or len(times_s) < 2:
         return
     duration_s = 2.0 * float(np.median(np.diff(times_s)))

@@ -81,7 +81,7 @@ def read_surface(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64] | N
 
 
 def _geometry_of_obj(path: Path) -> io.BytesIO:
-    """Only the vertices of an OBJ file and the vertex numbers of its faces.
+    """Vertices of an OBJ file and the vertex numbers of its faces, nothing else.
 
     Materials, groups and texture coordinates would split one surface into
     several and double, reorder or drop its vertices.
@@ -97,13 +97,7 @@ def _geometry_of_obj(path: Path) -> io.BytesIO:
 
 
 def read_faces(path: Path) -> NDArray[Any]:
-    """Triangles from a ``.npy``, a ``.npz`` or a mesh file.
-
-    Raises
-    ------
-    Sd2Error
-        When the file is missing or holds none.
-    """
+    """Read triangles of a ``.npy``, ``.npz`` or mesh file; Sd2Error if it has none."""
     if not path.is_file():
         raise Sd2Error(
             f"The faces file {path} does not exist", "a .npy, .npz or .obj file", "Check the path"

@@ -1,4 +1,4 @@
-"""What body-estimation tools write: VIBE, WHAM, 4D-Humans, and pickles with ``verts``.
+"""Output of body-estimation tools: VIBE, WHAM, 4D-Humans, and pickles with ``verts``.
 
 The first two store, per person, SMPL vertices and the numbers of the video
 frames they belong to. WHAM's stand in the camera's frame. VIBE's are centred
@@ -36,22 +36,8 @@ def read_model_output(
 ) -> RawMesh:
     """Read vertices from a pickle or joblib file without executing anything in it.
 
-    Parameters
-    ----------
-    path : Path
-    person : optional
-        Key of the person; by default the one with the most frames.
-    image_size : (width, height), optional
-        Of the video; with VIBE's camera it places the body.
-    focal_px : float, optional
-        Focal length for that; by default the image's diagonal.
-    distance_m : float, optional
-        Where the caller moves a root-centred body instead.
-
-    Raises
-    ------
-    Sd2Error
-        When the file holds no vertices, or something that is not plain data.
+    Options as for :func:`sd2core.io.mesh.load_mesh`. Raises Sd2Error if the file holds no vertices,
+    or something that is not plain data.
     """
     content = read_pickle(path)
     if not isinstance(content, dict):
@@ -87,7 +73,7 @@ def weak_perspective_shift(
     image_size: tuple[int, int],
     focal_px: float,
 ) -> NDArray[np.float64]:
-    """Where a root-centred body stands so that a real camera sees it in its box.
+    """Shift (T, 3) in metres of a root-centred body by which a real camera sees it in its box.
 
     VIBE's camera (s, t_x, t_y) maps a point X of the body to s·(X + t_x) in its
     box, which spans -1 to 1; the box is h pixels wide and centred on c_x. In
@@ -105,11 +91,6 @@ def weak_perspective_shift(
     image_size : (width, height)
         Pixels.
     focal_px : float
-
-    Returns
-    -------
-    array, shape (T, 3)
-        Metres, to be added to every vertex.
     """
     metres_per_pixel = 2.0 / (camera[:, 0] * boxes[:, 2])
     width, height = image_size
@@ -190,7 +171,7 @@ def _number_frames(raw: RawMesh, entry: dict[Any, Any], path: Path) -> None:
 
 
 def _mark_gaps(raw: RawMesh) -> None:
-    """Where video frames are missing, one frame without a person that lasts as long."""
+    """Put one frame without a person where video frames are missing, lasting as long."""
     numbers = raw.frame_numbers
     if numbers is None or not (np.diff(numbers) > 0).all():
         return  # what does not increase is said when times are made of it

@@ -1,9 +1,9 @@
-"""Plain data out of pickle and joblib files, executing nothing that is in them.
+"""Reading plain data out of pickle and joblib files without executing anything.
 
 A pickle is a program for a small machine that may call anything it can name.
-Here the machine finds only the names in an explicit list, and what stands
-behind them is our own code, which builds arrays of numbers and the simple
-containers around them. Every other name ends the reading.
+Here the machine finds only the names in an explicit list, which stand for our
+own code, which builds arrays of numbers and the simple containers around them.
+Every other name ends the reading.
 """
 
 from __future__ import annotations
@@ -31,26 +31,11 @@ _REMEDY = (
 
 
 def read_pickle(path: Path, limit_bytes: int = LIMIT_BYTES) -> Any:
-    """Read arrays and containers from a pickle or joblib file.
+    """Read arrays and containers from a pickle or joblib file, also a compressed one.
 
-    Parameters
-    ----------
-    path : Path
-        Written by ``pickle.dump`` or ``joblib.dump``, also compressed with
-        zlib, gzip, bz2, xz or lzma.
-    limit_bytes : int
-        Most that may be read after decompression.
-
-    Returns
-    -------
-    object
-        Dictionaries, lists, tuples, sets, numbers, text and NumPy arrays of
-        numbers.
-
-    Raises
-    ------
-    Sd2Error
-        When the file names anything else, is damaged or too large.
+    Gives dictionaries, lists, tuples, sets, numbers, text and NumPy arrays of numbers; at most
+    ``limit_bytes`` are read after decompression. Raises Sd2Error if the file names anything else,
+    is damaged or too large.
     """
     try:
         with path.open("rb") as file:
@@ -254,7 +239,7 @@ _Machine: Any = pickle._Unpickler
 
 
 class _DataUnpickler(_Machine):
-    """The pickle machine without the power to name, call or build on its own."""
+    """Pickle machine that cannot name, call or build anything on its own."""
 
     dispatch: ClassVar[dict[int, Any]] = dict(_Machine.dispatch)
 
@@ -292,7 +277,7 @@ class _DataUnpickler(_Machine):
         super().load_reduce()
 
     def load_newobj(self) -> None:
-        """Make the one kind of object that joblib makes this way."""
+        """Make a :class:`_JoblibArray`, the only object that joblib makes in this form."""
         kind, arguments = self.stack[-2:]
         if kind is not _JoblibArray or arguments:
             raise Refused(f"makes {_named(kind)} without its constructor, which is forbidden")

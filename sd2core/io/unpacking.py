@@ -1,4 +1,4 @@
-"""A large ``.npz`` mesh turned into a Zarr store without ever being in memory as a whole."""
+"""Conversion of a large ``.npz`` mesh to a Zarr store, block by block."""
 
 from __future__ import annotations
 
@@ -23,13 +23,7 @@ Header = tuple[tuple[int, ...], bool, np.dtype[Any]]
 
 
 def npz_bytes(path: Path) -> int:
-    """Bytes that the arrays of an ``.npz`` take in memory.
-
-    Raises
-    ------
-    Sd2Error
-        When it is no ``.npz``.
-    """
+    """Bytes of an ``.npz``'s arrays in memory; Sd2Error if it is no ``.npz``."""
     try:
         with zipfile.ZipFile(path) as archive:
             return sum(member.file_size for member in archive.infolist())
@@ -38,13 +32,7 @@ def npz_bytes(path: Path) -> int:
 
 
 def npz_vertices(path: Path) -> tuple[int, int]:
-    """Frames and vertices of the mesh in an ``.npz``; nothing but a header is read.
-
-    Raises
-    ------
-    Sd2Error
-        When there are no vertices in it.
-    """
+    """Frames and vertices of the mesh in an ``.npz``, read from a header; Sd2Error without any."""
     try:
         with (
             zipfile.ZipFile(path) as archive,
@@ -59,12 +47,8 @@ def npz_vertices(path: Path) -> tuple[int, int]:
 def unpack_npz(path: Path, out: Path) -> None:
     """Write the arrays of an ``.npz`` mesh to a Zarr folder, which takes its name when complete.
 
-    Nothing is checked, completed or placed: that is done when the store is read.
-
-    Raises
-    ------
-    Sd2Error
-        When it cannot be read.
+    Nothing is checked, completed or placed: that is done when the store is read. Raises
+    Sd2Error if it cannot be read.
     """
     import zarr
 

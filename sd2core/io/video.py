@@ -83,12 +83,12 @@ class VideoReader:
 
     @property
     def metadata(self) -> Mapping[str, str]:
-        """What the file says of itself: names and texts of the container, then of the stream."""
+        """Metadata of the file: names and texts of the container, then of the stream."""
         return self._metadata
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the reader found in the file and the user may want to know."""
+        """Oddities of the file, for the user."""
         return tuple(self._notes)
 
     def __len__(self) -> int:
@@ -178,7 +178,7 @@ class VideoReader:
         return max(int(np.searchsorted(self._index.entry_keys, key, side="right")) - 1, 0)
 
     def _is_ahead(self, frame: int, entry: int) -> bool:
-        """Whether decoding on reaches ``frame`` sooner than a seek."""
+        """True if decoding on reaches ``frame`` sooner than a seek."""
         if self._frames is None or frame < self._next:
             return False
         if self._index.counted or not self._index.entry_keys.size:

@@ -1,4 +1,4 @@
-"""Which frames of a video file really decode, and when each is shown.
+"""Index of a video file's frames that really decode, and of their times.
 
 A container's own frame count and duration are claims. Its packets are better:
 reading them without decoding lists 162,000 presentation times in about a
@@ -46,31 +46,14 @@ _LONG_STEP = 10
 
 @dataclass(frozen=True, eq=False)
 class FrameIndex:
-    """Every frame that decodes, in the order shown.
+    """Every frame that decodes, in the order shown."""
 
-    Attributes
-    ----------
-    keys : int64 array, shape (T,)
-        What identifies a decoded frame: its presentation time in ticks, or its
-        place in the file when the file holds no usable times (``counted``).
-    times_s : float64 array, shape (T,)
-        Seconds, the first frame at 0.
-    entry_keys : int64 array, shape (E,)
-        Frames at which decoding can begin, by their keys; also the time to seek to.
-    counted : bool
-        Frames can only be found by counting from the start.
-    late : int
-        Frames that the decoder may show ahead of one: 0, unless the file is damaged.
-    notes : tuple of str
-        What differs from what the file says of itself.
-    """
-
-    keys: NDArray[np.int64]
-    times_s: NDArray[np.float64]
-    entry_keys: NDArray[np.int64]
-    counted: bool
-    late: int
-    notes: tuple[str, ...]
+    keys: NDArray[np.int64]  # (T,) presentation time in ticks, or place in the file if counted
+    times_s: NDArray[np.float64]  # (T,) seconds, the first frame at 0
+    entry_keys: NDArray[np.int64]  # (E,) keys at which decoding can begin, also times to seek to
+    counted: bool  # frames can only be found by counting from the start
+    late: int  # frames that the decoder may show ahead of one: 0, unless the file is damaged
+    notes: tuple[str, ...]  # contradictions to the file's own claims
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,10 +67,7 @@ class _Packets:
 def open_stream(path: Path) -> tuple[Any, Any]:
     """Open a video file; return PyAV's container and its video stream.
 
-    Raises
-    ------
-    Sd2Error
-        When the file is missing, is no video or holds no moving picture.
+    Raises Sd2Error if the file is missing, is no video or holds no moving picture.
     """
     if not path.exists():
         raise Sd2Error(f"{path} does not exist", "a video file", "Check the path")
@@ -151,13 +131,7 @@ def decoded_frames(container: Any, stream: Any, packets: int | None = None) -> I
 
 
 def build_index(path: Path, progress: Progress = silent) -> FrameIndex:
-    """Find the frames of a video file that decode, and their times.
-
-    Raises
-    ------
-    Sd2Error
-        When not one frame decodes.
-    """
+    """Find the frames of a video file that decode, and their times; Sd2Error if none does."""
     container, stream = open_stream(path)
     with container:
         claimed = int(stream.frames)
@@ -314,7 +288,7 @@ def _shown_times(frames: Iterator[Any], expected: int, progress: Progress) -> li
 
 
 def _stated_seconds(container: Any, stream: Any) -> float:
-    """How long the video lasts by what the file says; 0 when it does not say."""
+    """Duration of the video by the file's own claim; 0 without one."""
     if stream.duration is not None:
         return float(stream.duration * stream.time_base)
     # What Matroska states is when the video ends, not how long it lasts.

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 
 _TICKS_PER_S = 90_000
-"""Of videos with times of their own: 11 microseconds, which every player knows."""
+"""Clock of videos with explicit times: 11 microseconds, which every player knows."""
 
 
 def write_video(

@@ -12,22 +12,14 @@ from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence, VertexArray, refuse_missing
 
 _FEWEST_FACES = 4
-"""Of a surface that encloses anything."""
+"""Least number of faces that enclose anything."""
 
 _SIZE = 100.0
 """Size that a surface is brought to: the library's thresholds are absolute, and finer there."""
 
 
 class _Columns:
-    """Some of the vertices of a moving mesh, picked when frames are read.
-
-    Parameters
-    ----------
-    vertices : array, shape (T, V, 3)
-        In memory or on disk.
-    columns : int array, shape (K,)
-        Vertex numbers.
-    """
+    """Some of the vertices of a moving mesh, picked when frames are read."""
 
     def __init__(self, vertices: VertexArray, columns: NDArray[np.intp]) -> None:
         self._vertices = vertices
@@ -170,6 +162,6 @@ def _collapse(
 
 
 def _proper(triangles: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Those with three different corners."""
+    """Triangles with three different corners."""
     one, two, three = triangles.T
     return triangles[(one != two) & (two != three) & (three != one)]

@@ -1,4 +1,4 @@
-"""In which frames of a clip there is somebody, and which of them belong together."""
+"""Presence of a person in the frames of a clip."""
 
 from __future__ import annotations
 
@@ -14,28 +14,19 @@ from sd2core.errors import Sd2Error
 
 @dataclass(frozen=True, eq=False)
 class Presence:
-    """Frames with a person, in stretches that are parted by frames without.
+    """Frames with a person, in stretches separated by frames without.
 
-    What is known of a motion ends where the person does. So every stretch is treated
-    as a clip of its own: no velocity is measured and nothing is smoothed from one to
-    another (docs/decisions/0021).
-
-    Parameters
-    ----------
-    there : bool array, shape (T,)
-        Frames with a person.
-    first, last : int64 array, shape (T,)
-        First and last frame of the stretch that each frame belongs to. A frame without
-        a person stands alone.
+    Nothing is known of the motion in between. So every stretch is treated as a clip of its own:
+    no velocity is measured and nothing is smoothed from one to another (docs/decisions/0021).
     """
 
-    there: NDArray[np.bool_]
-    first: NDArray[np.int64]
-    last: NDArray[np.int64]
+    there: NDArray[np.bool_]  # (T,) frames with a person
+    first: NDArray[np.int64]  # (T,) first frame of the stretch; itself without a person
+    last: NDArray[np.int64]  # (T,) last frame of that stretch
 
     @classmethod
     def of(cls, there: ArrayLike | None, frames: int) -> Presence:
-        """Of a mask (frames,); None means everywhere."""
+        """Presence by a mask (frames,); None means everywhere."""
         mask = np.ones(frames, bool) if there is None else checked(there, frames)
         numbers = np.arange(frames)
         # A stretch begins at every frame that does not go on from the one before.
@@ -52,7 +43,7 @@ class Presence:
 
     @cached_property
     def whole(self) -> bool:
-        """Whether the person is there in every frame."""
+        """True if the person is there in every frame."""
         return bool(self.there.all())
 
     @cached_property
@@ -80,13 +71,7 @@ def runs(mask: NDArray[np.bool_]) -> tuple[tuple[int, int], ...]:
 
 
 def checked(there: ArrayLike, frames: int) -> NDArray[np.bool_]:
-    """A mask as a bool array of its own.
-
-    Raises
-    ------
-    Sd2Error
-        When it has not one truth value (or 0 and 1) per frame.
-    """
+    """Mask as a bool array of its own; Sd2Error without one truth value (or 0 and 1) per frame."""
     mask = np.array(there)
     if mask.shape != (frames,) or not (
         mask.dtype.kind == "b" or (mask.dtype.kind in "iu" and np.isin(mask, (0, 1)).all())
@@ -101,16 +86,7 @@ def checked(there: ArrayLike, frames: int) -> NDArray[np.bool_]:
 def gaps_in_words(
     gaps: Sequence[tuple[int, int]], times_s: NDArray[np.float64], frame_duration_s: float
 ) -> str:
-    """How much is missing: ``34 of 450 frames (1.13 s)``.
-
-    Parameters
-    ----------
-    gaps : sequence of (int, int)
-        Half-open runs of frames.
-    times_s : float64 array, shape (T,)
-    frame_duration_s : float
-        Of the last frame.
-    """
+    """Amount that is missing: ``34 of 450 frames (1.13 s)``; gaps are half-open runs of frames."""
     ends_s = np.append(times_s, times_s[-1] + frame_duration_s)
     frames = sum(stop - start for start, stop in gaps)
     missing_s = sum(float(ends_s[stop] - ends_s[start]) for start, stop in gaps)

@@ -16,7 +16,7 @@ from sd2core.timebase import Timebase
 
 
 class VertexArray(Protocol):
-    """What vertices need: a NumPy array, or a chunked array that stays on disk."""
+    """Interface of vertices: a NumPy array, or a chunked array that stays on disk."""
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -156,7 +156,7 @@ class MeshSequence:
 
     @cached_property
     def presence(self) -> Presence:
-        """In which frames there is a person."""
+        """Frames with a person."""
         return Presence.of(self.present, self.frame_count)
 
     def read(self, start: int, stop: int) -> NDArray[Any]:
@@ -183,19 +183,9 @@ class MeshSequence:
 
 
 def refuse_missing(vertices: NDArray[Any], first_frame: int, source: str) -> None:
-    """Stop at a coordinate that is NaN or infinite.
+    """Raise Sd2Error for a coordinate that is NaN or infinite, naming frame and vertex.
 
-    Parameters
-    ----------
-    vertices : float array, shape (n, V, 3)
-    first_frame : int
-        Number of the first of these frames.
-    source : str
-
-    Raises
-    ------
-    Sd2Error
-        Names file, frame, vertex and the three numbers.
+    ``vertices`` (n, V, 3) are those from ``first_frame`` on.
     """
     finite = np.isfinite(vertices)
     if finite.all():

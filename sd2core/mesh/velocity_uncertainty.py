@@ -1,4 +1,4 @@
-"""How well the velocities of a fitted mesh are known, limb by limb."""
+"""Uncertainty of the velocities of a fitted mesh, limb by limb."""
 
 from __future__ import annotations
 
@@ -74,15 +74,15 @@ class VelocityUncertainty:
         return len(self.along_mps)
 
     def of_vertices(self, columns: NDArray[np.integer[Any]]) -> VelocityUncertainty:
-        """For some of the vertices."""
+        """Uncertainty of some of the vertices."""
         return replace(self, vertex_limb=self.vertex_limb[columns])
 
     def of_frames(self, frames: NDArray[np.integer[Any]] | slice) -> VelocityUncertainty:
-        """For some of the frames."""
+        """Uncertainty in some of the frames."""
         return replace(self, along_mps=self.along_mps[frames], across_mps=self.across_mps[frames])
 
     def times(self, factor: float) -> VelocityUncertainty:
-        """For a mesh whose velocities are so many times as large."""
+        """Uncertainty of a mesh whose velocities are ``factor`` times as large."""
         return replace(self, along_mps=self.along_mps * factor, across_mps=self.across_mps * factor)
 
     def towards(

@@ -1,4 +1,4 @@
-"""Compiling numerical kernels so that nobody ever waits for it.
+"""Compilation of numerical kernels, kept on disk and done in the background.
 
 Kernels are serial and release the GIL; callers split their frames over threads
 (see docs/decisions/0002). The machine code is kept on disk. While it is not
@@ -139,7 +139,7 @@ def _fingerprint() -> str:
 
 
 def kernels_ready() -> bool:
-    """Whether calling the kernels causes no pause: they are on disk or in memory."""
+    """True if calling the kernels causes no pause: they are on disk or in memory."""
     global _ready
     if not _ready:
         directory = cache_directory()
@@ -161,16 +161,10 @@ def warm_up(progress: Progress = silent) -> None:
 
 
 def compile_in_background() -> subprocess.Popen[bytes] | None:
-    """Start compiling in another process, at low priority, unless it is done or under way.
+    """Start compiling in another process, at low priority; None if it is done or impossible.
 
     A process, because the compiler holds the GIL: in a thread it would freeze
-    the window. Asked again after a failure it does not start again.
-
-    Returns
-    -------
-    subprocess.Popen or None
-        The process, or None when the kernels are ready, cannot be kept, or no
-        process can be started.
+    the window. After a failure it is not started again.
     """
     global _background
     with _lock:

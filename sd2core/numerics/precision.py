@@ -1,4 +1,4 @@
-"""Where single precision is enough, and where it is not (docs/decisions/0013)."""
+"""Limits of single precision for positions and velocities (docs/decisions/0013)."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ ROUNDING = 2.0**-24
 """Half the distance of 1 to the next number in single precision."""
 
 SHARE_OF_A_BIN = 0.01
-"""So much of a Doppler bin may a velocity be wrong by rounding."""
+"""Allowed rounding error of a velocity, as a share of a Doppler bin."""
 
 SHARE_OF_THE_BODY = 1e-5
-"""So much of a body's size may its shape be wrong by rounding: 0.02 mm of a person."""
+"""Allowed rounding error of a body's shape, as a share of its size: 0.02 mm of a person."""
 
 SHARE_OF_A_WEIGHT = 0.01
-"""So much of the weight that the range law gives a vertex may be wrong by rounding."""
+"""Allowed rounding error of a vertex's weight by the range law, as a share of it."""
 
 _STEPS = 12.0
 """Roundings that add up in the difference of two ranges, in parts of the largest
@@ -20,48 +20,25 @@ coordinate. Seen: up to 8.3 among 10^6 random places, 1.3 in the root mean squar
 
 
 def velocity_error_mps(extent_m: float, duration_s: float) -> float:
-    """How wrong single precision may make a radial velocity.
+    """Error of a radial velocity by single precision.
 
-    A range worked out from coordinates of up to ``extent_m`` is wrong by a few
-    roundings of that size, wherever the sensor is: the distance to it changes by
-    no more than the coordinates do, and what a far sensor adds is taken off before
-    (:func:`sd2core.doppler.histogram.relative_range`).
-
-    Parameters
-    ----------
-    extent_m : float
-        Largest coordinate, counted from the origin that positions are kept around.
-    duration_s : float
-        Time between the two ranges.
+    A range computed from coordinates of up to ``extent_m``, counted from the origin that positions
+    are kept around, is wrong by a few roundings of that size, wherever the sensor is: the distance
+    to it changes by no more than the coordinates do, and what a far sensor adds is taken off before
+    (:func:`sd2core.doppler.histogram.relative_range`). ``duration_s`` lies between the two ranges.
     """
     return _STEPS * ROUNDING * extent_m / duration_s
 
 
 def stored_velocity_error_mps(reach_m: float, duration_s: float) -> float:
-    """How wrong velocities are because a file holds coordinates in single precision.
-
-    Each of the two positions is rounded when it is written, before anything here
-    can help.
-
-    Parameters
-    ----------
-    reach_m : float
-        Largest coordinate in the file.
-    duration_s : float
-        Time between the two positions.
-    """
+    """Error of a velocity if coordinates of up to ``reach_m`` are stored in single precision."""
     return 2.0 * ROUNDING * reach_m / duration_s
 
 
 def keeps_shape(extent_m: float, size_m: float) -> bool:
-    """Whether single precision keeps the shape of a body of ``size_m`` so far from the origin.
+    """True if single precision keeps the shape of a body so far from the origin.
 
-    Parameters
-    ----------
-    extent_m : float
-        Largest coordinate.
-    size_m : float
-        Largest extent of the body itself; 0 for a point, which has no shape.
+    ``size_m`` is the largest extent of the body itself; 0 for a point, which has no shape.
     """
     return size_m == 0 or ROUNDING * extent_m <= SHARE_OF_THE_BODY * size_m
 
@@ -74,7 +51,7 @@ def single_is_enough(
     range_exponent: float,
     nearest_range_m: float,
 ) -> bool:
-    """Whether positions may be kept, and vertices counted, in single precision.
+    """True if positions may be kept, and vertices counted, in single precision.
 
     Parameters
     ----------

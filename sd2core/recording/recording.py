@@ -59,7 +59,7 @@ _AIDS: set[Role] = {"faces", "denoiser"}
 
 @dataclass(eq=False)
 class Recording:
-    """What belongs together; change the fields, then :meth:`save`.
+    """A recording and its settings; change the fields, then :meth:`save`.
 
     Parameters
     ----------
@@ -68,30 +68,29 @@ class Recording:
     video, mesh, faces, radar : Path or None
         Absolute paths, which need not exist (see :meth:`missing`).
     mesh_reading : MeshReading
-        How to read a mesh that does not say its frame rate, unit or place.
+        Options for a mesh that does not state its frame rate, unit or place.
     radar_offset_s : float
         Time on the recording's clock at which the first radar frame was taken.
         The clock is the video's, or the mesh's where there is no video.
     denoiser : Path or None
         Model file that the synthetic map is denoised with.
     bundled_denoiser : str or None
-        The same by the name of a model that comes with the program; empty where the map
-        is not to be denoised. Neither: nobody has chosen.
+        Name of a model that comes with the program, instead; empty if the map is not to be
+        denoised. None: not chosen.
     sensor : VirtualSensor
     placements : PlacementGrid, PlacementCloud or None
-        Where else sensors are planned, around the body.
+        Planned sensors around the body.
     spans : tuple of Span
-        Labels as ``recording.json`` itself can hold them: those of a recording that nobody
-        has labelled here.
+        Labels in ``recording.json`` itself, of a recording that was not labelled here.
     labels : Labels or None
-        Those in ``labels.json``, which then stand for ``spans``; see :attr:`labelled`.
+        Those in ``labels.json``, which replace ``spans``; see :attr:`labelled`.
     labels_elsewhere : bool
-        Whether somebody else edits them now: ``labels.json`` is then left as it is.
+        True while another process edits them: ``labels.json`` is then left as it is.
     title : str
     simulated : bool
-        True when no camera and no radar was there.
+        True for a recording without a real camera and radar.
     camera : CameraEntry or None
-        What is known of the camera; see :meth:`focal_px`.
+        See :meth:`focal_px`.
 
     Examples
     --------
@@ -222,7 +221,7 @@ class Recording:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a user should know about where the files are."""
+        """Hints for the user on the places of the files."""
         return tuple(
             f"The {role} {path} is on another drive than the recording: its path is stored in"
             " full and does not move with the recording."
@@ -232,16 +231,16 @@ class Recording:
 
     @property
     def labelled(self) -> Labels:
-        """The labels, wherever they are kept."""
+        """The labels, wherever they are stored."""
         return labels_of(self.spans) if self.labels is None else self.labels
 
     @property
     def unlabelled(self) -> bool:
-        """Whether nobody has labelled it; a radar file's own labels may then stand for it."""
+        """True if it was not labelled here; a radar file's own labels may then stand for it."""
         return self.labels is None and not self.spans
 
     def effective_labels(self) -> Labels:
-        """The labels; where nobody has labelled it, those of its radar's file."""
+        """The labels; if it was not labelled here, those of its radar's file."""
         if self.unlabelled and self.holds_radar_map:
             return self.load_radar_map().labels.shifted(self.radar_offset_s)
         return self.labelled
@@ -253,12 +252,7 @@ class Recording:
     def relink(self, folder: Path, progress: Progress = silent) -> Relinked:
         """Find all missing files by name under one folder, and save where it was saved before.
 
-        Parameters
-        ----------
-        folder : Path
-            Searched as :func:`~sd2core.recording.relinking.find_again` does.
-        progress : Progress
-            Called with (folders searched, 0), as the total is not known.
+        See :func:`~sd2core.recording.relinking.find_again`.
         """
         relinked = find_again(self.missing(), Path(folder), progress)
         for role, path in relinked.found.items():
@@ -301,21 +295,15 @@ class Recording:
         atomic_write_text(self.folder / FILE_NAME, text + "\n")
 
     def read_labels_again(self) -> None:
-        """Take over what ``labels.json`` holds by now, where there is one.
-
-        Raises
-        ------
-        Sd2Error
-            When it is damaged; the labels are then as they were.
-        """
+        """Read ``labels.json`` again, if there is one; Sd2Error if it is damaged."""
         labels = self.folder / LABELS_NAME
         if labels.exists():
             self.labels = read_labels(labels).labels
 
     def focal_px(self, width: int, height: int) -> float | None:
-        """Focal length in pixels of pictures of this size, None where nobody said.
+        """Focal length in pixels of pictures of this size, None if unknown.
 
-        What is known of the camera holds before what a mesh was placed with.
+        The camera's, if known, rather than the one that a mesh was placed with.
         """
         if self.camera is not None:
             return self.camera.focal_for(width, height)
@@ -360,7 +348,7 @@ class Recording:
 
     @property
     def holds_radar_map(self) -> bool:
-        """Whether its radar file holds a map: :meth:`load_radar_map`, not a capture."""
+        """True if its radar file holds a map: :meth:`load_radar_map`, not a capture."""
         from sd2core.io.radar import holds_map
 
         return self.radar is not None and holds_map(self.radar)
@@ -390,7 +378,7 @@ class Recording:
 
 
 def is_recording(path: Path) -> bool:
-    """Whether ``path`` is a recording's folder or its ``recording.json``."""
+    """True if ``path`` is a recording's folder or its ``recording.json``."""
     path = Path(path)
     return path.name == FILE_NAME or path.suffix == SUFFIX or (path / FILE_NAME).is_file()
 

@@ -1,4 +1,4 @@
-"""Files of a recording that are no longer where it says, found again by their names."""
+"""Finding moved files of a recording by their names."""
 
 from __future__ import annotations
 
@@ -12,49 +12,26 @@ from sd2core.files.paths import common_suffix_length, is_pattern, is_there, path
 from sd2core.progress import Progress
 
 Role = Literal["video", "mesh", "faces", "radar", "denoiser"]
-"""What a file is to a recording."""
+"""Role of a file in a recording."""
 
 ROLES: tuple[Role, ...] = get_args(Role)
 
 
 @dataclass(frozen=True)
 class Relinked:
-    """Which files were found, by role.
+    """Result of a search for files, by role."""
 
-    Parameters
-    ----------
-    found : dict
-        New path of every file that was found.
-    ambiguous : dict
-        Candidates that fit equally well; nothing was changed for these.
-    missing : tuple of Role
-        Files that no name under the folder fits.
-    """
-
-    found: dict[Role, Path]
-    ambiguous: dict[Role, tuple[Path, ...]]
-    missing: tuple[Role, ...]
+    found: dict[Role, Path]  # new paths
+    ambiguous: dict[Role, tuple[Path, ...]]  # candidates that fit equally well; nothing was changed
+    missing: tuple[Role, ...]  # no name under the folder fits
 
 
 def find_again(missing: Mapping[Role, Path], folder: Path, progress: Progress) -> Relinked:
-    """Look for files by their names under a folder.
+    """Find files by their names under a folder and everything below it.
 
-    Of several files with the right name, the one whose path agrees with the stored one
-    over the most trailing parts is taken, when it is the only one.
-
-    Parameters
-    ----------
-    missing : mapping
-        Where each was.
-    folder : Path
-        Searched with everything below it.
-    progress : Progress
-        Called with (folders searched, 0), as the total is not known.
-
-    Raises
-    ------
-    Sd2Error
-        When it is no folder.
+    Of several files with the right name, the one whose path agrees with the stored one over the
+    most trailing parts is taken, if it is the only one. ``progress`` is called with (folders
+    searched, 0), as the total is not known. Raises Sd2Error if ``folder`` is none.
     """
     if not folder.is_dir():
         raise Sd2Error(f"{folder} is not a folder", "the folder to search for missing files")
@@ -84,10 +61,10 @@ def find_again(missing: Mapping[Role, Path], folder: Path, progress: Progress) -
 
 
 def is_many(role: Role, path: Path) -> bool:
-    """Whether a path stands for many files; only a mesh is made of them."""
+    """True if a path stands for many files; only a mesh is made of them."""
     return role == "mesh" and is_pattern(path)
 
 
 def exists(role: Role, path: Path) -> bool:
-    """Whether what a path stands for is there."""
+    """True if the file or files of a path are there."""
     return is_there(path) if role == "mesh" else path.exists()

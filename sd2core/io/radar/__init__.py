@@ -1,4 +1,4 @@
-"""Radar recordings: one file per maker's format."""
+"""Radar recordings: one module per maker's format, and radars by name."""
 
 from __future__ import annotations
 
@@ -73,16 +73,13 @@ def load_capture(path: Path | str) -> RadarCapture:
 
 
 def holds_map(path: Path | str) -> bool:
-    """Whether a radar recording is, by its name, of maps: to be read by `load_recorded_map`."""
+    """True if a radar recording, by its name, holds maps: read it by `load_recorded_map`."""
     return Path(path).suffix.lower() in RADAR_MAP_SUFFIXES
 
 
 def load_recorded_map(path: Path | str) -> RecordedMap:
     """Open a radar recording that holds a Doppler map and labels instead of samples.
 
-    Raises
-    ------
-    Sd2Error
-        When it is none that is known (:mod:`sd2core.io.radar.kkt`), or is damaged.
+    Raises Sd2Error if it is none that is known (:mod:`sd2core.io.radar.kkt`), or is damaged.
     """
     return load_kkt(Path(path).expanduser())

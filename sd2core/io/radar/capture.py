@@ -1,4 +1,4 @@
-"""A radar recording as it came out of the converter."""
+"""Raw radar samples."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class RadarCapture:
 
     @property
     def present(self) -> NDArray[np.bool_] | None:
-        """Of a simulation: False in frames without a person, (frames,); None when not said."""
+        """Presence of a person per frame, (frames,), in simulations that state it; else None."""
         found = self.meta.get("simulation")
         gaps = found.get("without_person") if self.simulated and isinstance(found, dict) else None
         if not isinstance(gaps, list):
@@ -126,13 +126,7 @@ class RadarCapture:
 
 
 def check_cube(samples: NDArray[np.uint16], config: RadarConfig, source: str) -> None:
-    """Refuse samples that cannot be what this radar recorded.
-
-    Raises
-    ------
-    Sd2Error
-        When the shape contradicts the configuration or the type is another one.
-    """
+    """Raise Sd2Error for samples whose shape or type contradicts the configuration."""
     shape = tuple(samples.shape)
     cube = (config.receivers, config.chirps_per_frame, config.samples_per_chirp)
     if len(shape) != 4 or shape[0] == 0 or shape[1:] != cube:

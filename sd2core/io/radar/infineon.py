@@ -72,13 +72,7 @@ class _Meta(BaseModel):
 
 
 def find_recording(path: Path) -> Path | None:
-    """Folder with ``radar.npy`` that the user meant, or None when there is none.
-
-    Raises
-    ------
-    Sd2Error
-        When a folder holds several recordings.
-    """
+    """Find the folder with ``radar.npy`` in or at a path, or None; Sd2Error for several."""
     if path.is_file():
         return path.parent if path.name == _DATA else None
     if (path / _DATA).is_file():
@@ -99,10 +93,7 @@ def find_recording(path: Path) -> Path | None:
 def load_infineon(folder: Path) -> RadarCapture:
     """Read one recording folder; the samples are mapped, not loaded.
 
-    Raises
-    ------
-    Sd2Error
-        When a file is missing or damaged, or when the files contradict each other.
+    Raises Sd2Error if a file is missing or damaged, or the files contradict each other.
     """
     meta = _read_meta(folder / _META)
     config = _read_config(folder / _CONFIG, meta)
@@ -124,12 +115,9 @@ def load_infineon(folder: Path) -> RadarCapture:
 
 
 def read_radar_config(path: Path) -> RadarConfig:
-    """Radar of a config.json; the meta.json beside it is heeded where there is one.
+    """Read the radar of a config.json, and of the meta.json beside it where there is one.
 
-    Raises
-    ------
-    Sd2Error
-        When the file is missing, damaged or describes no possible radar.
+    Raises Sd2Error if the file is missing, damaged or describes no possible radar.
     """
     if not path.is_file():
         raise Sd2Error(f"There is no file {path}", "the config.json of a radar recording")
@@ -206,7 +194,7 @@ def write_capture(
 
 
 def check_replaceable(folder: Path) -> None:
-    """Refuse a folder that holds something else than a radar recording."""
+    """Raise Sd2Error for a folder that holds something else than a radar recording."""
     if folder.exists() and not (folder.is_dir() and _replaceable(folder)):
         raise Sd2Error(
             f"{folder} exists and is not a radar recording",

@@ -50,27 +50,13 @@ _COLOUR = "#009e73"
 
 @dataclass(frozen=True, eq=False)
 class RecordedMap:
-    """A recording that holds maps and labels, and no raw samples.
+    """A recording that holds maps and labels, and no raw samples."""
 
-    Parameters
-    ----------
-    doppler : DopplerMap
-        Of kind ``"real"``; its clock begins at 0 s.
-    labels : Labels
-        Of the file, of origin ``"import"``; perhaps none.
-    gesture : str
-        Class of what is labelled, as the file calls it.
-    source : str
-        Where it came from, for provenance.
-    notes : tuple of str
-        What is assumed, and what the reader found odd.
-    """
-
-    doppler: DopplerMap
-    labels: Labels
-    gesture: str
-    source: str
-    notes: tuple[str, ...]
+    doppler: DopplerMap  # of kind "real"; its clock begins at 0 s
+    labels: Labels  # of the file, of origin "import"; perhaps none
+    gesture: str  # class of the labels, as the file calls it
+    source: str  # for provenance
+    notes: tuple[str, ...]  # assumptions, and oddities of the file
 
     @property
     def timebase(self) -> Timebase:
@@ -83,13 +69,8 @@ def load_kkt(path: Path | str) -> RecordedMap:
 
     The map's value is map 0 squared and summed over range. Doppler bin 0, whose sign is
     ambiguous, is left out: 31 bins remain, with zero velocity in the middle of the
-    middle one. Bins are turned so that approaching is positive.
-
-    Raises
-    ------
-    Sd2Error
-        When the file is no HDF5, is damaged or cut off, holds something else, or holds
-        values that no such recording has.
+    middle one. Bins are turned so that approaching is positive. Raises Sd2Error if the file is no
+    HDF5, is damaged or cut off, holds something else, or values that no such recording has.
     """
     path = Path(path)
     import h5py
@@ -176,7 +157,7 @@ def _labels(marks: NDArray[np.bool_], timebase: Timebase, gesture: str) -> Label
 
 
 def _clock(counts: NDArray[np.int64] | None, frames: int) -> tuple[Timebase, tuple[str, ...]]:
-    """Times by the sensor's counter, where that counts; from 0 s on."""
+    """Times from 0 s on by the sensor's counter, or evenly spaced where it does not count."""
     regular = np.arange(frames)
     if counts is None:
         return Timebase(regular * FRAME_S), ()
@@ -232,7 +213,7 @@ def _marks(file: h5py.File, path: Path, frames: int) -> NDArray[np.bool_]:
 
 
 def _counts(file: h5py.File, path: Path, frames: int) -> NDArray[np.int64] | None:
-    """The sensor's counter, (T,); None where there is none that fits."""
+    """Frame counter of the sensor, (T,); None if there is none that fits."""
     if "FRAME_COUNT" not in file:
         return None
     dataset = _dataset(file, path, "FRAME_COUNT")
@@ -260,10 +241,7 @@ def _dataset(file: h5py.File, path: Path, name: str) -> h5py.Dataset:
 
 
 def _attributes(file: h5py.File) -> dict[str, str]:
-    """What the recorder noted of the recording, as text, but for ``Description``.
-
-    That one is the same in all known files, whatever they hold.
-    """
+    """Notes of the recorder as text, but for ``Description``, which is the same in all files."""
     group = file.get(_GROUP)
     if group is None:
         return {}

@@ -53,7 +53,7 @@ JOINTS = (
 """The Kinect's joints; left and right are the person's own."""
 
 FRAMES_PER_S = 10.0
-"""Of the radar; the files' own times are too coarse to tell."""
+"""Frame rate of the radar; the files' own times are too coarse."""
 DOPPLER_STEP_MPS = 0.356
 """Velocities of points are multiples of it: the radar's resolution."""
 
@@ -65,27 +65,13 @@ _KINECT, _RADAR = "kinect_data_{}.csv", "radar_data_{}.csv"
 
 @dataclass(frozen=True, eq=False)
 class MarsStretch:
-    """One uninterrupted stretch: n rows, in which the radar detected something.
+    """One uninterrupted stretch: n rows, in which the radar detected something."""
 
-    Parameters
-    ----------
-    frames : int64 array, shape (n,)
-        The radar's frame number of each row, counted from the first; frames that are
-        left out had no points.
-    joints_m : float64 array, shape (n, 25, 3)
-        :data:`JOINTS` in the camera frame with the radar at the origin.
-    point_rows : intp array, shape (P,)
-        Row of each of the radar's points; ascending.
-    point_mps : float64 array, shape (P,)
-        Its radial velocity, positive when approaching.
-    point_intensity : float64 array, shape (P,)
-    """
-
-    frames: NDArray[np.int64]
-    joints_m: NDArray[np.float64]
-    point_rows: NDArray[np.intp]
-    point_mps: NDArray[np.float64]
-    point_intensity: NDArray[np.float64]
+    frames: NDArray[np.int64]  # (n,) radar's frame number from the first; gaps: no points
+    joints_m: NDArray[np.float64]  # (n, 25, 3) JOINTS in the camera frame, radar at the origin
+    point_rows: NDArray[np.intp]  # (P,) row of each of the radar's points; ascending
+    point_mps: NDArray[np.float64]  # (P,) radial velocity, positive when approaching
+    point_intensity: NDArray[np.float64]  # (P,)
 
     @property
     def frame_count(self) -> int:
@@ -106,33 +92,16 @@ class MarsStretch:
 
 @dataclass(frozen=True, eq=False)
 class MarsPart:
-    """One part of one person's recording.
+    """One part of one person's recording."""
 
-    Parameters
-    ----------
-    subject : str
-        ``"1"`` for a folder ``mars_subject1``.
-    name : str
-        ``"test"`` for ``kinect_data_test.csv``.
-    stretches : tuple of MarsStretch
-    source : str
-        The folder, for provenance.
-    """
-
-    subject: str
-    name: str
+    subject: str  # "1" for a folder mars_subject1
+    name: str  # "test" for kinect_data_test.csv
     stretches: tuple[MarsStretch, ...]
-    source: str
+    source: str  # the folder, for provenance
 
 
 def mars_parts(folder: Path | str) -> tuple[str, ...]:
-    """Names of the parts in a folder, in alphabetical order.
-
-    Raises
-    ------
-    Sd2Error
-        When it is no folder, holds no part, or half of one.
-    """
+    """Names of the parts in a folder, sorted; Sd2Error if there is none, or half of one."""
     folder = Path(folder)
     wanted = f"a folder with {_KINECT.format('PART')} and {_RADAR.format('PART')}"
     if not folder.is_dir():
@@ -155,11 +124,8 @@ def mars_parts(folder: Path | str) -> tuple[str, ...]:
 def read_mars(folder: Path | str, part: str) -> MarsPart:
     """Read one part.
 
-    Raises
-    ------
-    Sd2Error
-        When a file is missing or empty, lacks a column, holds what is not a finite
-        number, or when the two files do not match.
+    Raises Sd2Error if a file is missing or empty, lacks a column, holds what is not a finite
+    number, or if the two files do not match.
     """
     folder = Path(folder)
     if part not in (names := mars_parts(folder)):
