@@ -40,11 +40,6 @@ def denoise(maps: Sequence[Path], model: str, digest: str, outs: Sequence[Path])
         Its file, and the hash of that.
     outs : sequence of Path
         One per stretch; written in order.
-
-    Raises
-    ------
-    Sd2Error
-        When the map is not what the model was trained on.
     """
     trained = _model(model, digest)
     outs[0].parent.mkdir(parents=True, exist_ok=True)

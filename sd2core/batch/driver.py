@@ -1,74 +1,52 @@
-"""Gives tasks to processes, few at a time, and follows what becomes of them."""
+"""Submission of tasks, a few at a time, and the count of their outcomes."""
 
 from __future__ import annotations
 
-import time
-from collections import Counter, OrderedDict, defaultdict, deque
+from collections import Counter, defaultdict, deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from sd2core.batch.pool import Ending, Pool
-from sd2core.batch.task_graph import Flow
-from sd2core.batch.tasks import Task, TaskFailed, killed_in
+from sd2core.batch.task_graph import TaskGraph
+from sd2core.batch.tasks import Outcome, Task, deaths_during, error_fields, too_many_deaths
 from sd2core.errors import Sd2Error
 
 AHEAD = 4
-"""Bundles that each process is given before it has done the first: it never waits for the
-next, and a million tasks do not wait in the scheduler."""
+"""Bundles in flight per worker thread: no worker waits for its next one, and a million tasks
+do not fill the scheduler's memory."""
 
 _BUNDLE_S = 1.0
 _LARGEST_BUNDLE = 32
-"""Tasks of one recording that take little are given out together, for about a second: to give
-out anything takes some milliseconds."""
+"""Short tasks of one recording are submitted together, for about a second's work: every
+submission costs some milliseconds."""
 
 _POLL_S = 0.2
-_MOST_RETURNS = 20
-_HOMES = 1000
+_MOST_RESUBMISSIONS = 20
+_REMEMBERED_HOMES = 1000
 
 
 @dataclass
 class Tally:
-    """What has become of the tasks, per step.
-
-    Parameters
-    ----------
-    there : Counter
-        Made already, by an earlier run.
-    done : Counter
-        Made by this one.
-    failed : Counter
-    waiting : Counter
-        Not done because of those.
-    seconds : mapping
-    frames : Counter
-        That those done took and held.
-    """
+    """Counts per step: tasks that were there, done, failed, or waiting for failed ones."""
 
     there: Counter[str] = field(default_factory=Counter)
     done: Counter[str] = field(default_factory=Counter)
     failed: Counter[str] = field(default_factory=Counter)
     waiting: Counter[str] = field(default_factory=Counter)
+    # Seconds and frames of the tasks done.
     seconds: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
     frames: Counter[str] = field(default_factory=Counter)
 
     def settled(self, step: str) -> int:
-        """Tasks of a step that nothing is to be done for any more."""
+        """Number of tasks of a step that need no more work."""
         return self.there[step] + self.done[step] + self.failed[step] + self.waiting[step]
 
 
 @dataclass(frozen=True)
 class Failure:
-    """A task that cannot be done.
-
-    Parameters
-    ----------
-    task : Task
-    error : dict
-        ``found``, ``expected``, ``remedy``.
-    worker_died : bool
-    """
+    """Failed task with its error (``found``, ``expected``, ``remedy``)."""
 
     task: Task
     error: dict[str, str]
@@ -76,124 +54,115 @@ class Failure:
 
 
 class Stopped(Exception):
-    """Somebody asked for the end."""
+    """Raised by ``tick`` when the user asked for the end."""
 
 
 class Driver:
-    """One run over all tasks of a flow.
+    """One run over all tasks of a graph.
+
+    The pool (Dask) queues, distributes, and repeats what a lost worker had; here it is
+    decided what is submitted next, and outcomes are counted.
 
     Parameters
     ----------
-    flow : Flow
     open_pool : callable
-        Gives what carries out tasks; called when the first one is to be done.
-    on_failure : callable
-        Told every failure.
-    on_note : callable
-        Told what the user should know.
+        Called when the first task is to be done.
+    on_failure, on_note : callable
+        Receive every failure, and every sentence for the user.
     tick : callable
         Called several times a second; may raise :class:`Stopped`.
     """
 
     def __init__(
         self,
-        flow: Flow,
+        graph: TaskGraph,
         open_pool: Callable[[], Pool],
         *,
         on_failure: Callable[[Failure], None],
         on_note: Callable[[str], None],
         tick: Callable[[], None],
     ) -> None:
-        self._flow, self._open_pool = flow, open_pool
+        self._graph, self._open_pool = graph, open_pool
         self._pool: Pool | None = None
         self._on_failure, self._on_note, self._tick = on_failure, on_note, tick
         self.tally = Tally()
         self.last: Task | None = None
-        self.running: dict[str, _Running] = {}
-        self._load: Counter[str] = Counter()
-        self._again: deque[Task] = deque()
-        # Newest first: a recording is brought to its end before another is begun, so what
-        # waits here does not grow with their number.
+        # Tasks in flight by key, each with others that have the same content.
+        self.running: dict[str, list[Task]] = {}
+        self._bundles = 0
+        self._ready: deque[Task] = deque()
+        # Newest first: one recording is finished before another is begun, so the list does
+        # not grow with the number of recordings.
         self._sources: list[Iterator[Task]] = []
-        self._deaths: Counter[str] = Counter()
-        self._returns: Counter[str] = Counter()
-        self._homes: OrderedDict[str, set[str]] = OrderedDict()
-        self._ended_s: dict[str, float] = {}
+        self._resubmissions: Counter[str] = Counter()
+        # The worker that has a recording's mesh open.
+        self._homes: dict[str, str] = {}
+        self._freed: str | None = None
 
     @property
     def workers(self) -> int:
-        """Processes that are there."""
+        """Number of worker processes."""
         return 0 if self._pool is None else len(self._pool.workers())
 
     def run(self, tasks: Iterator[Task]) -> None:
-        """Do these tasks and all that follows from them.
-
-        Raises
-        ------
-        Sd2Error
-            When nothing more can be done at all.
-        Stopped
-        """
+        """Do these tasks and all that follow from them."""
         self._sources.append(tasks)
         while True:
             self._tick()
             self._fill()
-            if not self.running and not self._again:
+            if not self.running and not self._ready:
                 return
             assert self._pool is not None
             for ending in self._pool.ended(_POLL_S):
                 self._take(ending)
+                self._fill()
 
     def _fill(self) -> None:
-        """Give out tasks as long as there are any and somebody has room."""
+        """Submit tasks while there are any and the pool has room."""
         while (task := self._next()) is not None:
-            free = self._free()
-            if not free:
-                self._again.appendleft(task)
+            if self._pool is None:
+                self._pool = self._open_pool()
+            if self._bundles >= AHEAD * sum(self._pool.workers().values()):
+                self._ready.appendleft(task)
                 return
-            self._submit(self._bundle(task), free)
+            self._submit(self._bundle(task))
 
     def _bundle(self, first: Task) -> tuple[Task, ...]:
-        """A task and those after it that are like it."""
+        """Return a task and the next ones of the same step and recording."""
         bundle, most = [first], self._most_in_bundle(first)
-        # Until they are given out others may turn out to be the same.
-        self.running[first.key] = _Running("", 0.0)
+        self.running[first.key] = []
         while len(bundle) < most and (task := self._next()) is not None:
-            alike = (task.step, task.group) == (first.step, first.group)
-            if not alike or self._returns[task.key]:
-                self._again.appendleft(task)
+            if (task.step, task.group) != (first.step, first.group):
+                self._ready.appendleft(task)
                 break
             bundle.append(task)
-            self.running[task.key] = _Running("", 0.0)
+            self.running[task.key] = []
         return tuple(bundle)
 
     def _most_in_bundle(self, task: Task) -> int:
         done = self.tally.done[task.step]
-        # One that was lost goes alone.
-        if not done or self._returns[task.key]:
+        if not done or self._resubmissions[task.key]:
             return 1
         each_s = max(self.tally.seconds[task.step] / done, 1e-3)
         return min(max(int(_BUNDLE_S / each_s), 1), _LARGEST_BUNDLE)
 
     def _next(self) -> Task | None:
-        """The next task that is to be done; what is there already is passed over."""
+        """Return the next task to do; tasks whose result is there are counted and skipped."""
         while True:
-            task = self._again.popleft() if self._again else self._of_sources()
+            task = self._ready.popleft() if self._ready else self._from_sources()
             if task is None:
                 return None
             if task.key in self.running:
-                # Of two recordings with the same content: it goes on when that is there.
-                self.running[task.key].others.append(task)
-            elif self._flow.is_done(task):
-                if self._go_on(task):
-                    self.tally.there[task.step] += 1
+                # The same content in another recording: it follows when that is done.
+                self.running[task.key].append(task)
+            elif self._graph.is_done(task):
+                self._found(task)
                 if self.tally.there[task.step] % 256 == 0:
                     self._tick()
             else:
                 return task
 
-    def _of_sources(self) -> Task | None:
-        """The next one of the newest source that has one."""
+    def _from_sources(self) -> Task | None:
         while self._sources:
             task = next(self._sources[-1], None)
             if task is not None:
@@ -201,99 +170,82 @@ class Driver:
             self._sources.pop()
         return None
 
-    def _free(self) -> dict[str, int]:
-        """Processes that have room, and for how many tasks."""
-        if self._pool is None:
-            self._pool = self._open_pool()
-        workers = self._pool.workers()
-        free = {one: AHEAD * threads - self._load[one] for one, threads in workers.items()}
-        return {one: room for one, room in free.items() if room > 0}
-
-    def _submit(self, bundle: tuple[Task, ...], free: dict[str, int]) -> None:
-        """To who has worked on the same recording, else to who has most room."""
-        group = bundle[0].group
-        homes = self._homes.setdefault(group, set())
-        self._homes.move_to_end(group)
-        if len(self._homes) > _HOMES:
-            self._homes.popitem(last=False)
-        known = [one for one in homes if one in free]
-        worker = max(known or free, key=lambda one: free[one])
-        homes.add(worker)
-        self._load[worker] += 1
-        for task in bundle:
-            running = self.running[task.key]
-            running.worker, running.since_s = worker, time.monotonic()
+    def _submit(self, bundle: tuple[Task, ...]) -> None:
+        """Submit to the worker that has the recording open, else to the one just freed."""
+        home = self._homes.get(bundle[0].group, self._freed)
+        if home is not None:
+            self._remember_home(bundle[0].group, home)
         assert self._pool is not None
-        self._pool.submit(bundle, worker)
+        self._pool.submit(bundle, home)
+        self._bundles += 1
+
+    def _remember_home(self, group: str, worker: str) -> None:
+        self._homes.pop(group, None)
+        self._homes[group] = worker
+        if len(self._homes) > _REMEMBERED_HOMES:
+            del self._homes[next(iter(self._homes))]
 
     def _take(self, ending: Ending) -> None:
-        tasks = ending.tasks
-        running = [self.running.pop(task.key) for task in tasks]
-        worker = running[0].worker
-        self._load[worker] -= 1
-        now_s = time.monotonic()
-        begun_s = max(self._ended_s.get(worker, 0.0), running[0].since_s)
-        each_s = (now_s - begun_s) / len(tasks)
-        self._ended_s[worker] = now_s
-        failures = ending.failures or (None,) * len(tasks)
-        for task, own, failure in zip(tasks, running, failures, strict=True):
-            if ending.killed and not self._flow.is_done(task):
-                self._return(task)
-                self._again.extend(own.others)
-            elif failure is None:
-                self._done(task, each_s)
-                for other in own.others:
-                    if self._go_on(other):
-                        self.tally.there[task.step] += 1
-            elif failure.fatal:
-                raise Sd2Error(**failure.error)
+        self._bundles -= 1
+        if ending.worker is not None:
+            self._freed = ending.worker
+            self._remember_home(ending.tasks[0].group, ending.worker)
+        outcomes = ending.outcomes or [self._lost(task, ending) for task in ending.tasks]
+        for task, outcome in zip(ending.tasks, outcomes, strict=True):
+            alike = self.running.pop(task.key)
+            for _ in range(outcome.deaths if outcome else 0):
+                self._on_note(f"A worker died during {task_text(task)}")
+            if outcome is None:
+                self._resubmissions[task.key] += 1
+                self._ready.extend((task, *alike))
+            elif outcome.error is None:
+                self._done(task, outcome.seconds)
+                for other in alike:
+                    self._found(other)
+            elif outcome.fatal:
+                raise Sd2Error(**outcome.error)
             else:
-                for one in (task, *own.others):
-                    self._fail(one, failure)
+                for one in (task, *alike):
+                    self._fail(one, outcome.error, outcome.worker_died)
+
+    def _lost(self, task: Task, ending: Ending) -> Outcome | None:
+        """Outcome of a task whose bundle did not return; None where it is submitted again."""
+        if self._graph.is_done(task):
+            return Outcome()
+        deaths = deaths_during(self._graph.folder.path, task.key) if ending.killed else 0
+        if deaths or self._resubmissions[task.key] >= _MOST_RESUBMISSIONS:
+            return too_many_deaths(max(deaths, 1))
+        return None
 
     def _done(self, task: Task, seconds: float) -> None:
-        if self._go_on(task):
+        if self._follow(task):
             self.tally.done[task.step] += 1
             self.tally.seconds[task.step] += seconds
             self.tally.frames[task.step] += task.frames
             self.last = task
 
-    def _return(self, task: Task) -> None:
-        """A process is gone: its task is done again, unless it is what ends them."""
-        self._returns[task.key] += 1
-        if killed_in(self._flow.folder.path, task.key):
-            self._deaths[task.key] += 1
-            self._on_note(f"A worker died during {words_of(task)}")
-        assert self._pool is not None
-        dead = self._deaths[task.key] >= self._pool.most_deaths
-        if dead or self._returns[task.key] > _MOST_RETURNS:
-            failure = TaskFailed(
-                f"Its worker died {max(self._deaths[task.key], 1)} times",
-                "a task that its process survives",
-                "It may have needed more memory than there is: see log.txt",
-            )
-            self._fail(task, failure, worker_died=True)
-        else:
-            self._again.append(task)
+    def _found(self, task: Task) -> None:
+        if self._follow(task):
+            self.tally.there[task.step] += 1
 
-    def _go_on(self, task: Task) -> bool:
-        """Queue what follows a task; False where its result is of no use, which is a failure."""
+    def _follow(self, task: Task) -> bool:
+        """Queue the tasks after this one; False where its result is unusable (a failure)."""
         try:
-            self._sources.append(self._flow.after(task))
+            self._sources.append(self._graph.after(task))
         except Sd2Error as error:
-            self._fail(task, TaskFailed(error.found, error.expected, error.remedy))
+            self._fail(task, error_fields(error))
             return False
         return True
 
-    def _fail(self, task: Task, failure: TaskFailed, worker_died: bool = False) -> None:
+    def _fail(self, task: Task, error: dict[str, str], worker_died: bool = False) -> None:
         self.tally.failed[task.step] += 1
-        self.tally.waiting += Counter(self._flow.lost_with(task))
-        self._on_failure(Failure(task, failure.error, worker_died))
+        self.tally.waiting += Counter(self._graph.lost_with(task))
+        self._on_failure(Failure(task, error, worker_died))
 
     def left_s(self) -> float | None:
-        """Seconds of work that are left, as far as steps have been timed by now."""
+        """Estimated seconds to the end; None while a step has not been timed."""
         seconds, workers = 0.0, self.workers
-        for step, total in self._flow.total.items():
+        for step, total in self._graph.total.items():
             left = total - self.tally.settled(step)
             if left <= 0 or step == "export":
                 continue
@@ -303,21 +255,14 @@ class Driver:
         return seconds / workers if workers else None
 
 
-@dataclass
-class _Running:
-    worker: str
-    since_s: float
-    others: list[Task] = field(default_factory=list)
-
-
-def words_of(task: Task) -> str:
-    """A task in words, such as ``synthesise of walk.sd2 from place 3``."""
+def task_text(task: Task) -> str:
+    """Return such as ``synthesise of walk.sd2 from place 3``."""
     place = f" from place {task.placement}" if task.placement else ""
     return f"{task.step} of {task.origin.name}{place}"
 
 
 def event_of(task: Task, folder: Path) -> dict[str, Any]:
-    """A task as the lines of the progress have it."""
+    """Return the fields of a task in a line of the progress."""
     out = Path(task.out).relative_to(folder).as_posix() if task.out else None
     return {
         "step": task.step,

@@ -1,11 +1,14 @@
-"""What a batch would do, how long it would take and how much it would write."""
+"""Estimate of a batch before it runs: tasks, hours and bytes, from tasks timed on few frames."""
 
 from __future__ import annotations
 
 import hashlib
+import json
+import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,45 +25,64 @@ from sd2core.batch.inputs import (
     known_inspection,
 )
 from sd2core.batch.plan import BatchPlan
-from sd2core.batch.probing import TaskRate, export_s, task_rates
-from sd2core.batch.rates import known_fit_rate
-from sd2core.batch.task_graph import Flow
+from sd2core.batch.task_graph import TaskGraph, simulation_of
 from sd2core.batch.tasks import Task
+from sd2core.body.model import Resolution
 from sd2core.errors import Sd2Error
-from sd2core.maps import MapKind
+from sd2core.files.atomic import atomic_write_text
+from sd2core.maps import DopplerMap, MapKind
 from sd2core.progress import Progress, silent
+from sd2core.sensor import VirtualSensor
+from sd2core.timebase import Timebase
 
 if TYPE_CHECKING:
-    pass
+    from sd2core.batch.synthesis import Choosing
 
-_LOOKED_AT = 100
+_INSPECTED = 100
 _TIMED_MESHES = 2
 _FIT_S_PER_FRAME = 0.08
 """Where nothing has been fitted on this machine yet: processor time in docs/fitting.md."""
 _MESH_BYTES_PER_FRAME = {"low": 11_000, "medium": 42_000, "high": 112_000}
-"""Of fitted meshes, compressed: some three quarters of 12 bytes per vertex."""
+"""Size of fitted meshes, compressed: some three quarters of 12 bytes per vertex."""
 _TASK_S = 0.005
-"""What giving a task out costs at most, besides: docs/scale.md."""
+"""Overhead of submitting a task, at most: docs/scale.md."""
+
+_SHORT_FRAMES, _LONG_FRAMES = 120, 480
+_SIMULATED_FRAMES = 60
+_FEW_SOURCES, _MANY_SOURCES = 4, 24
+_MOST_SOURCE_FRAMES = 3_600
+_FEWEST_FIT_FRAMES = 100
+"""Shortest fit whose rate is kept."""
+
+
+@dataclass(frozen=True)
+class TaskRate:
+    """Seconds and bytes of a task: fixed, and per frame."""
+
+    seconds: float
+    frame_s: float
+    bytes: float
+    frame_bytes: float
 
 
 @dataclass
 class StepEstimate:
-    """What one step would take.
+    """Estimate of one step.
 
     Parameters
     ----------
     there, to_do : int
         Tasks that are done already, and that are not.
     frames : int
-        Of those to do.
+        Frames of the tasks to do.
     seconds : float
-        Of one process, for those to do.
+        Time of one process for the tasks to do.
     bytes : int
-        That they would write.
+        Size of their results.
     basis : str
-        How the seconds are known.
+        Origin of the seconds, in words.
     assumed : bool
-        Whether they are of another machine, and neither measured now nor before.
+        True where the rate is of another machine.
     """
 
     there: int = 0
@@ -72,24 +94,32 @@ class StepEstimate:
     assumed: bool = False
 
     def add(self, rate: TaskRate, frames: int, tasks: int) -> None:
-        """Add so many tasks, which work on so many frames altogether."""
+        """Add so many tasks with so many frames altogether."""
         self.seconds += tasks * (rate.seconds + _TASK_S) + frames * rate.frame_s
         self.bytes += round(tasks * rate.bytes + frames * rate.frame_bytes)
+
+    def count(self, task: Task, done: bool, weight: float) -> None:
+        """Count a task that stands for ``weight`` tasks."""
+        if done:
+            self.there += 1
+        else:
+            self.to_do += round(weight)
+            self.frames += round(weight * task.frames)
 
 
 @dataclass
 class BatchEstimate:
-    """What a batch would take.
+    """Estimate of a whole batch.
 
     Parameters
     ----------
     recordings : int
     looked_at : int
-        Recordings that the figures rest on; the others are taken to be like them.
+        Recordings that were inspected; the others are assumed to be alike.
     workers : int
     steps : dict
     unusable : list of str
-        Why some of those looked at cannot be used.
+        Inspected recordings that cannot be used, each with its reason.
     """
 
     recordings: int
@@ -100,38 +130,31 @@ class BatchEstimate:
 
     @property
     def hours(self) -> float:
-        """Of work on all processes."""
+        """Duration on all processes."""
         return sum(one.seconds for one in self.steps.values()) / self.workers / 3600
 
     @property
     def assumed_share(self) -> float:
-        """Of the hours: what rests on figures of another machine."""
+        """Share of the hours that rests on another machine's rates."""
         assumed = sum(one.seconds for one in self.steps.values() if one.assumed)
         return assumed / self.workers / 3600 / self.hours if assumed else 0.0
 
     @property
     def bytes(self) -> int:
-        """That would be written."""
+        """Size of all results."""
         return sum(one.bytes for one in self.steps.values())
 
     def to_json(self) -> dict[str, Any]:
-        """As JSON can hold it."""
+        """Return all figures as JSON can hold them."""
         return asdict(self) | {"hours": self.hours, "bytes": self.bytes} | {
             "assumed_share": self.assumed_share, "estimate": True
         }  # fmt: skip
 
 
 def estimate(plan: BatchPlan, workers: int, progress: Progress = silent) -> BatchEstimate:
-    """Look at some recordings, time what would be done to them, and add up.
+    """Inspect some recordings, time their tasks on few frames, and add up.
 
-    Nothing is written but to temporary files. What is there already is not counted in
-    seconds and bytes.
-
-    Parameters
-    ----------
-    plan : BatchPlan
-    workers : int
-    progress : Progress
+    Writes temporary files only. Results that are there add no seconds and bytes.
 
     Raises
     ------
@@ -140,57 +163,35 @@ def estimate(plan: BatchPlan, workers: int, progress: Progress = silent) -> Batc
     """
     folder = BatchFolder(Path(plan.out))
     origins = find_origins(plan.recordings, folder.path)
-    flow = Flow(plan, folder, origins)
-    steps: dict[str, StepEstimate] = {step: StepEstimate() for step in flow.steps}
+    graph = TaskGraph(plan, folder, origins)
+    steps: dict[str, StepEstimate] = {step: StepEstimate() for step in graph.steps}
     made = BatchEstimate(len(origins), 0, workers, steps)
-    known, new = _sorted(folder, origins, progress)
+    known, new = _known_and_new(folder, origins, progress)
     for origin, found in known:
         steps["inspect"].there += 1
-        _count(flow, steps, origin, found, 1.0)
+        _count(graph, steps, origin, found, 1.0)
     glanced, hashed_s = _glances(new, made)
     weight = len(new) / max(len(glanced) + len(made.unusable), 1)
     for origin, found in glanced:
-        _count(flow, steps, origin, found, weight)
+        _count(graph, steps, origin, found, weight)
     steps["inspect"].to_do = len(new)
     steps["inspect"].seconds = hashed_s * weight + len(new) * _TASK_S
-    steps["inspect"].basis = "measured on those looked at"
+    steps["inspect"].basis = "measured on the inspected ones"
     made.looked_at = len(known) + len(glanced) + len(made.unusable)
-    meshes = [
-        found if found.mesh is not None else replace(found, mesh=_fitted(flow, origin, found))
+    inspections = [
+        found if found.mesh is not None else replace(found, mesh=_fitted(graph, origin, found))
         for origin, found in (*glanced, *known)
     ]
-    _time(flow, steps, meshes, plan)
-    if "export" in steps:
-        sources = steps["synthesise"].to_do + steps["synthesise"].there
-        frames = steps["synthesise"].frames
-        kinds = _kinds(plan)
-        assert plan.export is not None
-        assert plan.synthesise is not None
-        mean_frames = _mean_frames(meshes)
-        steps["export"].to_do = 1
-        steps["export"].seconds = sources * export_s(plan, mean_frames, kinds)
-        steps["export"].basis = f"measured on maps of {mean_frames:,} frames"
-        bins = plan.synthesise.options().axis.bins
-        steps["export"].bytes = round(frames * bins * 4 * len(kinds))
+    if plan.fit is not None:
+        _estimate_fit(steps["fit"], plan.fit.resolution)
+    if plan.synthesise is not None:
+        _estimate_maps(graph, steps, inspections)
+    if plan.export is not None:
+        _estimate_export(plan, steps, inspections)
     return made
 
 
-def _kinds(plan: BatchPlan) -> tuple[MapKind, ...]:
-    made: dict[MapKind, Any] = {
-        "synthetic": plan.synthesise,
-        "denoised": plan.denoise,
-        "simulated": plan.simulate,
-    }
-    return tuple(kind for kind, told in made.items() if told is not None)
-
-
-def _mean_frames(found: Sequence[Inspection]) -> int:
-    """Of the clips, fitted or not."""
-    clips = [one.mesh or one.video for one in found]
-    return round(np.mean([one.frames for one in clips if one is not None])) if clips else 1
-
-
-def _sorted(
+def _known_and_new(
     folder: BatchFolder, origins: Sequence[Origin], progress: Progress
 ) -> tuple[list[tuple[Origin, Inspection]], list[Origin]]:
     known, new = [], []
@@ -208,10 +209,10 @@ def _sorted(
 def _glances(
     new: Sequence[Origin], made: BatchEstimate
 ) -> tuple[list[tuple[Origin, Inspection]], float]:
-    """What some of the recordings hold, and the seconds that hashing all of theirs takes."""
+    """Inspect some recordings without hashing; also the seconds that hashing them would take."""
     if not new:
         return [], 0.0
-    chosen = np.unique(np.linspace(0, len(new) - 1, min(_LOOKED_AT, len(new))).astype(int))
+    chosen = np.unique(np.linspace(0, len(new) - 1, min(_INSPECTED, len(new))).astype(int))
     found, begun_s, size = [], time.perf_counter(), 0
     for number in chosen:
         try:
@@ -220,7 +221,9 @@ def _glances(
         except (Sd2Error, OSError) as error:
             made.unusable.append(f"{new[number].name}: {error}")
     looking_s = time.perf_counter() - begun_s
-    return found, looking_s + size / _hash_rate()
+    block = bytes(8 << 20)
+    hash_s = _seconds(lambda: hashlib.sha256(block).digest())
+    return found, looking_s + size * hash_s / len(block)
 
 
 def _size(found: Inspection) -> int:
@@ -230,83 +233,287 @@ def _size(found: Inspection) -> int:
     return path.stat().st_size if path.exists() else 0
 
 
-def _hash_rate() -> float:
-    """Bytes that are hashed in a second."""
-    block = bytes(8 << 20)
-    begun_s = time.perf_counter()
-    hashlib.sha256(block).digest()
-    return len(block) / (time.perf_counter() - begun_s)
-
-
 def _count(
-    flow: Flow, steps: dict[str, StepEstimate], origin: Origin, found: Inspection, weight: float
+    graph: TaskGraph,
+    steps: dict[str, StepEstimate],
+    origin: Origin,
+    found: Inspection,
+    weight: float,
 ) -> None:
-    """Add the tasks of one recording, which stands for ``weight`` of them."""
+    """Count the tasks of a recording that stands for ``weight`` recordings."""
     mesh = found.mesh
     if mesh is None:
         assert found.video is not None
-        if flow.plan.fit is None:
+        if graph.plan.fit is None:
             return
-        task, video = flow.fit_task(origin, found.video), found.video
-        mesh = _fitted(flow, origin, found)
-        _add(steps["fit"], task, mesh is not None, weight)
+        video, mesh = found.video, _fitted(graph, origin, found)
+        steps["fit"].count(graph.fit_task(origin, video), mesh is not None, weight)
         if mesh is None:
-            # What is made of it is all to be done.
             mesh = MeshInput("", "", video.frames, 0, video.frames_per_s, (0.0, 0.0, 0.0))
-    if flow.plan.synthesise is None:
+    if graph.plan.synthesise is None:
         return
-    for planned in flow.maps_of(origin, mesh, found.sensor):
+    for planned in graph.maps_of(origin, mesh, found.sensor):
         for task in planned.tasks:
-            _add(steps[task.step], task, bool(mesh.identity) and flow.is_done(task), weight)
+            steps[task.step].count(task, bool(mesh.identity) and graph.is_done(task), weight)
 
 
-def _fitted(flow: Flow, origin: Origin, found: Inspection) -> MeshInput | None:
-    """The mesh of a video, where it is there."""
-    if found.video is None or not found.video.identity or flow.plan.fit is None:
+def _fitted(graph: TaskGraph, origin: Origin, found: Inspection) -> MeshInput | None:
+    """Return the mesh of a video, where it is there."""
+    if found.video is None or not found.video.identity or graph.plan.fit is None:
         return None
-    return fitted(Path(flow.fit_task(origin, found.video).out))
+    return fitted(Path(graph.fit_task(origin, found.video).out))
 
 
-def _add(step: StepEstimate, task: Task, done: bool, weight: float) -> None:
-    if done:
-        step.there += 1
-    else:
-        step.to_do += round(weight)
-        step.frames += round(weight * task.frames)
+def _estimate_fit(step: StepEstimate, resolution: Resolution) -> None:
+    rate, frame_bytes = known_fit_rate(resolution), _MESH_BYTES_PER_FRAME[resolution]
+    step.add(TaskRate(1.0, rate or _FIT_S_PER_FRAME, 0.0, frame_bytes), step.frames, step.to_do)
+    step.assumed = rate is None and step.to_do > 0
+    step.basis = "assumed: nothing was fitted here yet" if step.assumed else "as fitted here"
 
 
-def _time(
-    flow: Flow, steps: dict[str, StepEstimate], found: Sequence[Inspection], plan: BatchPlan
+def _estimate_maps(
+    graph: TaskGraph, steps: dict[str, StepEstimate], found: Sequence[Inspection]
 ) -> None:
-    if "fit" in steps:
-        assert plan.fit is not None
-        rate = known_fit_rate(plan.fit.resolution)
-        each = _MESH_BYTES_PER_FRAME[plan.fit.resolution]
-        one = steps["fit"]
-        one.add(TaskRate(1.0, rate or _FIT_S_PER_FRAME, 0.0, each), one.frames, one.to_do)
-        one.assumed = rate is None and one.to_do > 0
-        one.basis = "assumed: nothing was fitted here yet" if one.assumed else "as fitted here"
-    if plan.synthesise is None:
-        return
-    timed = [task_rates(flow, one) for one in _sample(found)]
-    for step in ("synthesise", "denoise", "simulate"):
-        here = [one[step] for one in timed if step in one]
-        if step in steps and here and steps[step].to_do:
-            mean = TaskRate(*np.mean([list(asdict(one).values()) for one in here], axis=0).tolist())
-            steps[step].add(mean, steps[step].frames, steps[step].to_do)
-            if step == "synthesise":
-                opened = steps[step].to_do / max(plan.placement_count, 1)
-                steps[step].seconds += opened * float(
-                    np.mean([one["open"].seconds for one in timed])
-                )
-            steps[step].basis = f"measured on {len(here)} of the meshes"
-        elif step in steps and steps[step].to_do:
-            steps[step].basis = "nothing to measure it on: no mesh is there yet"
+    timed = [task_rates(graph, one) for one in _sample(found)]
+    for name in ("synthesise", "denoise", "simulate"):
+        if name not in steps or not steps[name].to_do:
+            continue
+        step, here = steps[name], [one[name] for one in timed if name in one]
+        if not here:
+            step.basis = "nothing to measure it on: no mesh is there yet"
+            continue
+        mean = TaskRate(*np.mean([list(asdict(one).values()) for one in here], axis=0).tolist())
+        step.add(mean, step.frames, step.to_do)
+        if name == "synthesise":
+            meshes = step.to_do / max(graph.plan.placement_count, 1)
+            step.seconds += meshes * float(np.mean([one["open"].seconds for one in timed]))
+        step.basis = f"measured on {len(here)} of the meshes"
+
+
+def _estimate_export(
+    plan: BatchPlan, steps: dict[str, StepEstimate], found: Sequence[Inspection]
+) -> None:
+    assert plan.synthesise is not None
+    made: dict[MapKind, Any] = {
+        "synthetic": plan.synthesise,
+        "denoised": plan.denoise,
+        "simulated": plan.simulate,
+    }
+    kinds = tuple(kind for kind, section in made.items() if section is not None)
+    clips = [clip for one in found if (clip := one.mesh or one.video) is not None]
+    frames = round(np.mean([clip.frames for clip in clips])) if clips else 1
+    step, maps = steps["export"], steps["synthesise"]
+    step.to_do = 1
+    step.seconds = (maps.to_do + maps.there) * export_s(plan, frames, kinds)
+    step.basis = f"measured on maps of {frames:,} frames"
+    step.bytes = round(maps.frames * plan.synthesise.options().axis.bins * 4 * len(kinds))
 
 
 def _sample(found: Sequence[Inspection]) -> list[Inspection]:
-    """Of those with a mesh that can be opened at once: the middle ones by length."""
+    """Return the meshes of middle length among those that can be opened at once."""
     usable = [one for one in found if one.mesh is not None and one.mesh.target_m != (0.0, 0.0, 0.0)]
     usable.sort(key=lambda one: one.mesh.frames if one.mesh is not None else 0)
     middle = max(0, (len(usable) - _TIMED_MESHES) // 2)
     return usable[middle : middle + _TIMED_MESHES]
+
+
+# -- Rates of tasks, by doing some on few frames in a temporary folder ---------------------------
+
+
+def task_rates(graph: TaskGraph, found: Inspection) -> dict[str, TaskRate]:
+    """Time maps of a few frames of a mesh.
+
+    Parameters
+    ----------
+    graph : TaskGraph
+        Its plan synthesises.
+    found : Inspection
+        With a mesh.
+
+    Returns
+    -------
+    dict
+        ``synthesise``, ``denoise`` and ``simulate`` per task, and ``open``, once per
+        recording.
+    """
+    from sd2core.batch.denoising import denoise
+
+    maps = _TimedMaps(graph.plan, found)
+    rates = {}
+    with tempfile.TemporaryDirectory(prefix="sd2-batch-") as name:
+        folder = Path(name)
+        choosing_s = _seconds(lambda: maps.choose(folder / "plan.json"))
+        first_s = _seconds(lambda: maps.make(maps.long, folder / "first.npz"))
+        again_s = _seconds(lambda: maps.make(maps.long, folder / "again.npz"))
+        rates["open"] = TaskRate(choosing_s + max(first_s - again_s, 0.0), 0.0, 0.0, 0.0)
+        outs = {count: folder / f"{count}.npz" for count in (maps.long, maps.short)}
+        rates["synthesise"] = _rate(lambda count: maps.make(count, outs[count]), outs)
+        if graph.plan.denoise is not None:
+            model, digest = graph.model
+            cleaned = {count: folder / f"denoised-{count}.npz" for count in outs}
+
+            def clean(count: int) -> None:
+                denoise([outs[count]], model, digest, [cleaned[count]])
+
+            for count in outs:
+                clean(count)
+            rates["denoise"] = _rate(clean, cleaned)
+        if graph.plan.simulate is not None:
+            seen = {count: folder / f"simulated-{count}.npz" for count in maps.simulated}
+            rates["simulate"] = _rate(lambda count: maps.simulate(count, seen[count]), seen)
+    return rates
+
+
+class _TimedMaps:
+    """Maps of frames in the middle of a mesh, each from another place."""
+
+    def __init__(self, plan: BatchPlan, found: Inspection) -> None:
+        assert found.mesh is not None
+        assert plan.synthesise is not None
+        self._mesh, self._section = found.mesh, plan.synthesise
+        self._sensors = list(plan.sensors(found.sensor, found.mesh.target_m).values())
+        self._sensor = self._sensors[len(self._sensors) // 2]
+        self._choosing: Choosing | None = None
+        self.long = min(_LONG_FRAMES, found.mesh.frames)
+        self.short = max(1, min(_SHORT_FRAMES, self.long // 2))
+        few = min(_SIMULATED_FRAMES, self.long)
+        self.simulated = few, max(1, few // 4)
+        self._simulation = None if plan.simulate is None else simulation_of(plan.simulate)
+        self._made = 0
+
+    def choose(self, path: Path) -> None:
+        """Choose the accuracy plan for all maps, where a tolerance is given."""
+        from sd2core.accuracy.places import spread
+        from sd2core.batch.synthesis import Choosing, chosen_plan
+
+        if self._section.tolerance is not None:
+            frames = self._mesh.frames * len(self._sensors)
+            self._choosing = Choosing(path, spread(self._sensors), frames)
+            chosen_plan(self._mesh, self._section, self._choosing)
+
+    def make(self, count: int, out: Path) -> None:
+        from sd2core.batch.synthesis import synthesise
+
+        # Moved a little: masks of a place are kept, and would cost nothing.
+        self._made += 1
+        x, y, z = self._sensor.position_m
+        sensor = replace(self._sensor, position_m=(x + 1e-3 * self._made, y, z))
+        first = (self._mesh.frames - self.long) // 2
+        frames = (first, first + count)
+        synthesise(self._mesh, sensor, self._section, frames, self._choosing, out)
+
+    def simulate(self, count: int, out: Path) -> None:
+        from sd2core.batch.synthesis import simulate
+
+        assert self._simulation is not None
+        first = (self._mesh.frames - count) // 2
+        axis = self._section.options().axis
+        simulate(self._mesh, self._sensor, self._simulation, axis, (first, first + count), out)
+
+
+def _rate(work: Callable[[int], None], outs: Mapping[int, Path]) -> TaskRate:
+    """Rate of a task from the same work on many frames and on few."""
+    long, short = outs
+    seconds = {count: min(_seconds(partial(work, count)) for _ in range(2)) for count in outs}
+    sizes = {count: out.stat().st_size for count, out in outs.items()}
+    per_frame_s, fixed_s = _line(seconds, long, short)
+    per_frame, fixed = _line(sizes, long, short)
+    return TaskRate(fixed_s, per_frame_s, fixed, per_frame)
+
+
+def _line(values: dict[int, Any], long: int, short: int) -> tuple[float, float]:
+    """Slope and start of a line, neither below 0."""
+    if long == short:
+        return values[long] / long, 0.0
+    slope = max((values[long] - values[short]) / (long - short), 0.0)
+    return slope, max(values[short] - slope * short, 0.0)
+
+
+def _seconds(work: Callable[[], Any]) -> float:
+    begun_s = time.perf_counter()
+    work()
+    return time.perf_counter() - begun_s
+
+
+def export_s(plan: BatchPlan, frames: int, kinds: tuple[MapKind, ...]) -> float:
+    """Measure the seconds that a source of a data set takes to write; radar files not included.
+
+    Parameters
+    ----------
+    plan : BatchPlan
+        With a section ``[export]``.
+    frames : int
+        Length of a source.
+    kinds : tuple of str
+        Kinds of maps that the batch makes.
+    """
+    from sd2core.batch.exporting import export_dataset
+
+    assert plan.export is not None
+    assert plan.synthesise is not None
+    export, axis = plan.export, plan.synthesise.options().axis
+    # A clip of any length is cut in segments; a very long one is taken to cost in proportion.
+    shorter = min(max(frames, export.segment_frames), _MOST_SOURCE_FRAMES)
+    values = np.random.default_rng(0).random((axis.bins, shorter), np.float32)
+    with tempfile.TemporaryDirectory(prefix="sd2-batch-") as name:
+        row: dict[str, Any] = {
+            "source": "none.npz", "subject": "none", "sensor": asdict(VirtualSensor()),
+            "target_m": (0.0, 0.0, 2.0), "about": "", "start": 0, "stop": shorter,
+            "synthetic": None, "denoised": None, "simulated": None,
+        }  # fmt: skip
+        for kind in kinds:
+            row[kind] = f"{kind}.npz"
+            clock = Timebase.regular(shorter, 30.0)
+            DopplerMap(values, axis, clock, kind).save(Path(name) / row[kind])
+
+        def work(sources: int) -> None:
+            folder = BatchFolder(Path(name) / str(sources))
+            folder.path.mkdir()
+            lines = [
+                row | {"recording": f"{k}.npz", "placement": 1}
+                | {kind: f"../{row[kind]}" for kind in kinds}
+                for k in range(sources)
+            ]  # fmt: skip
+            folder.results.write_text("".join(json.dumps(line) + "\n" for line in lines))
+            section = export.model_copy(
+                update={"validation_subjects": (), "test_subjects": (), "kinds": kinds}
+            )
+            export_dataset(folder, section, silent)
+
+        seconds = {count: _seconds(partial(work, count)) for count in (_FEW_SOURCES, _MANY_SOURCES)}
+    slope_s, _ = _line(seconds, _MANY_SOURCES, _FEW_SOURCES)
+    return slope_s * max(frames / shorter, 1.0)
+
+
+# -- Rate of fits on this machine, kept from one to the next -------------------------------------
+
+
+def known_fit_rate(resolution: Resolution) -> float | None:
+    """Return processor seconds per frame of the last fit on this machine, if there was one."""
+    return _known_rates().get(resolution)
+
+
+def remember_fit_rate(resolution: Resolution, seconds: float, frames: int) -> None:
+    """Keep the processor time of a fit, where the cache can be written."""
+    if frames < _FEWEST_FIT_FRAMES:
+        return
+    path, rates = _rates_path(), _known_rates() | {resolution: seconds / frames}
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        atomic_write_text(path, json.dumps(rates) + "\n")
+    except OSError:
+        return
+
+
+def _known_rates() -> dict[str, float]:
+    try:
+        content = json.loads(_rates_path().read_text(encoding="utf-8"))
+        return {str(name): float(rate) for name, rate in content.items()}
+    except (OSError, ValueError, TypeError, AttributeError):
+        return {}
+
+
+def _rates_path() -> Path:
+    import platformdirs
+
+    return Path(platformdirs.user_cache_dir("sd2-studio", appauthor=False)) / "fit-rates.json"

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.keys import key_of
 from sd2core.batch.plan import Export
-from sd2core.batch.stretches import LONGEST_FRAMES
+from sd2core.batch.synthesis import LONGEST_FRAMES
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.digests import file_digest
@@ -61,11 +61,6 @@ def export_dataset(folder: BatchFolder, export: Export, progress: Progress) -> N
 
     Sources that have been there stay. Where one of them has changed, or the settings have,
     it is written anew.
-
-    Raises
-    ------
-    Sd2Error
-        When nothing can be exported, or a source does not fit the others.
     """
     from sd2core.datasets.card import write_card
     from sd2core.datasets.options import DatasetOptions
@@ -195,12 +190,11 @@ def _loader(
             maps.setdefault(radar.kind, radar)
         labels = Labels() if recording is None else recording.labelled
         names, classes = labels_and_classes(labels)
-        spans = [one for one in labels.spans if one.origin != "suggestion"]
         return Source(
             *key,
             VirtualSensor(**rows[0]["sensor"]),
             maps,
-            label_per_frame(spans, names, first.times_s),
+            label_per_frame(labels.spans, names, first.times_s),
             names,
             classes,
             tuple(rows[0]["target_m"]),

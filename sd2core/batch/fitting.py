@@ -18,8 +18,6 @@ def fit_choices(fit: Fit, subject: str, focal_px: float | None) -> dict[str, Any
 
     Parameters
     ----------
-    fit : Fit
-    subject : str
     focal_px : float, optional
         As the recording knows it; what the plan says goes before.
     """
@@ -38,11 +36,6 @@ def fit_to_video(video: str, choices: dict[str, Any], models: str | None, out: s
     """Fit a body and write the mesh, and then what tasks need to know of it.
 
     A fit that was killed goes on where it was.
-
-    Raises
-    ------
-    Sd2Error
-        When there is nobody in the video, or it cannot be read.
     """
     from sd2core.body.fit_video import FitChoices, FitReport, fit_video
 

@@ -33,10 +33,8 @@ class Origin:
 
     Parameters
     ----------
-    path : str
     name : str
         Its path from the folder that holds all of them: unique within the batch.
-    subject : str
     """
 
     path: str
@@ -50,14 +48,10 @@ class MeshInput:
 
     Parameters
     ----------
-    path : str
     identity : str
         Hash of its content and of how it is read.
-    frames, vertices : int
-    frames_per_s : float
     target_m : tuple of 3 floats
         Where the body is, see :class:`~sd2core.placements.body_extent.BodyExtent`.
-    faces : str, optional
     reading : mapping
         Arguments for ``load_mesh``.
     """
@@ -80,8 +74,6 @@ class VideoInput:
     ----------
     path, identity : str
         The hash is of its content.
-    frames : int
-    frames_per_s : float
     focal_px : float, optional
         As far as the recording knows it.
     """
@@ -101,8 +93,6 @@ class Inspection:
     ----------
     sensor : VirtualSensor
         Its own one.
-    mesh : MeshInput, optional
-    video : VideoInput, optional
     about : str
         Hash of what else a data set takes from it: labels, and what its radar saw.
     """
@@ -140,11 +130,6 @@ def find_origins(recordings: Recordings, apart_from: Path) -> list[Origin]:
         With absolute patterns.
     apart_from : Path
         The folder of the batch, which is not searched for its own input.
-
-    Raises
-    ------
-    Sd2Error
-        When a pattern matches nothing.
     """
     found: set[str] = set()
     for pattern in recordings.files:
@@ -199,11 +184,6 @@ def inspect(folder: BatchFolder, origin: Origin) -> Inspection:
     """Find out what a recording holds, and keep it.
 
     Contents are hashed where size, time of change or inode are not those from before.
-
-    Raises
-    ------
-    Sd2Error
-        When it cannot be used.
     """
     before = _record(folder, origin) or {"files": [], "digests": {}}
     digests = Digests(before["files"], before["digests"])
@@ -221,13 +201,7 @@ def inspect(folder: BatchFolder, origin: Origin) -> Inspection:
 
 
 def glance(origin: Origin) -> Inspection:
-    """What a recording holds, without hashing it: its identities are empty.
-
-    Raises
-    ------
-    Sd2Error
-        When it cannot be used.
-    """
+    """What a recording holds, without hashing it: its identities are empty."""
     return _Look(None, Digests([], {})).at(Path(origin.path))
 
 
@@ -324,13 +298,7 @@ class _Look:
 
 
 def open_mesh(path: Path, faces: str | None, reading: Mapping[str, Any]) -> MeshSequence:
-    """Open a mesh that is streamed, or small enough to be in memory as a whole.
-
-    Raises
-    ------
-    Sd2Error
-        When it cannot be read, or would take too much memory.
-    """
+    """Open a mesh that is streamed, or small enough to be in memory as a whole."""
     from sd2core.io.mesh import load_mesh
 
     files = files_at(path)
@@ -367,13 +335,7 @@ def is_large_npz(path: Path) -> bool:
 def mesh_input_of(
     path: Path, identity: str, faces: str | None = None, reading: Mapping[str, Any] | None = None
 ) -> MeshInput:
-    """What tasks need to know of a mesh.
-
-    Raises
-    ------
-    Sd2Error
-        As :func:`open_mesh`, and when there is nobody in it.
-    """
+    """What tasks need to know of a mesh."""
     from sd2core.placements.body_extent import BodyExtent
 
     mesh = open_mesh(path, faces, reading or {})

@@ -23,7 +23,6 @@ _CODE: dict[Step, tuple[str, ...]] = {
     "fit": ("batch/fitting.py", "body", "io", "mesh", "timebase.py"),
     "synthesise": (
         "batch/synthesis.py",
-        "batch/stretches.py",
         "doppler",
         "io",
         "accuracy",
@@ -36,15 +35,13 @@ _CODE: dict[Step, tuple[str, ...]] = {
     ),
     "denoise": (
         "batch/denoising.py",
-        "batch/stretches.py",
         "denoise",
         "mesh/presence.py",
         "pairs/segments.py",
         "maps.py",
     ),
     "simulate": (
-        "batch/simulation.py",
-        "batch/stretches.py",
+        "batch/synthesis.py",
         "datasets/simulating.py",
         "fmcw",
         "io",
@@ -67,7 +64,6 @@ def key_of(step: Step, content: dict[str, Any]) -> str:
 
     Parameters
     ----------
-    step : Step
     content : dict
         All that the result depends on besides the code, as JSON can hold it. The order of
         keys does not matter.

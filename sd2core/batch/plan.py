@@ -77,7 +77,6 @@ class Fit(_Section):
 
     Parameters
     ----------
-    resolution : {"low", "medium", "high"}
     stature_m : float, optional
         Of everybody who is not in ``stature_of``.
     stature_of : mapping of str to float
@@ -104,7 +103,6 @@ class Synthesise(_Section):
 
     Parameters
     ----------
-    preset : {"paper", "vid2doppler"}
     tolerance : float, optional
         Error that is allowed, as a share: the cheapest plan within it is chosen once for each
         mesh, and held to from the first, the middle and the last of its placements. Without
@@ -200,15 +198,12 @@ class Export(_Section):
 
     Parameters
     ----------
-    format : {"zarr", "h5", "npz"}
     kinds : tuple of str
         Maps to take, where a recording has them; a radar's own with the recording's sensor.
-    segment_frames, overlap_frames : int
     frame_rate_hz : float, optional
         Of all segments; otherwise that of the first source.
     validation_subjects, test_subjects : tuple of str, optional
         Otherwise they are chosen.
-    title : str
     """
 
     format: Literal["zarr", "h5", "npz"] = "zarr"
@@ -234,14 +229,12 @@ class BatchPlan(_Section):
     ----------
     out : str
         Folder of the results, relative to the plan's folder.
-    recordings : Recordings
     placements : mapping
         Where the sensor is put: ``kind = "recording"`` (each recording's own sensor, the
         camera where it has none), ``kind = "positions"`` with ``positions_m``, or what
         :func:`~sd2core.placements.placements.placements_from_dict` reads (``"grid"``,
         ``"cloud"``), around the body of each recording. With ``own = true`` the recording's
         own sensor besides.
-    fit, synthesise, denoise, simulate, export : optional
     """
 
     format: Literal["sd2-batch-plan"] = FORMAT

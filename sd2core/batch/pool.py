@@ -1,21 +1,23 @@
-"""Processes that carry out tasks: Dask's, on this machine or on many."""
+"""Dask's worker processes, on this machine or on many."""
 
 from __future__ import annotations
 
-import hashlib
 import logging
 import queue
+import signal
 import time
 import uuid
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 from typing import Any, Protocol
 
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.keys import all_code_digest
-from sd2core.batch.tasks import BEGUN, SomeFailed, Task, TaskFailed, probe, run_tasks
+from sd2core.batch.plan import STEPS
+from sd2core.batch.tasks import BEGUN, Outcome, Task, error_fields, probe, run_tasks
 from sd2core.errors import Sd2Error
 from sd2core.processes import ONE_THREAD
 
@@ -24,8 +26,9 @@ _LOOK_EVERY_S = 1.0
 _CLOSE_S = 5.0
 
 _LOCAL_SETTINGS = {
-    # Which of the tasks of a lost worker ended it is found out here.
-    "distributed.scheduler.allowed-failures": 0,
+    # A task counts the workers that died during it by itself (`sd2core.batch.tasks`); Dask also
+    # counts those that it only waited for.
+    "distributed.scheduler.allowed-failures": 20,
     # Results are files: nothing is kept that could be spilt to disk.
     "distributed.worker.memory.target": False,
     "distributed.worker.memory.spill": False,
@@ -41,41 +44,33 @@ _LOCAL_SETTINGS = {
 
 @dataclass(frozen=True, eq=False)
 class Ending:
-    """How tasks that were given out together came to their end.
+    """End of a bundle of tasks.
 
     Parameters
     ----------
-    tasks : tuple of Task
-    failures : tuple
-        One per task; None for those that were done.
+    outcomes : sequence of Outcome, optional
+        One per task; None where the bundle did not return.
     killed : bool
-        The process that they were given to is gone; some of them may have been done.
+        True where it did not return because workers died too often.
     """
 
     tasks: tuple[Task, ...]
-    failures: tuple[TaskFailed | None, ...] = ()
+    outcomes: Sequence[Outcome] | None = None
+    worker: str | None = None
     killed: bool = False
 
 
 class Pool(Protocol):
-    """What carries out tasks.
-
-    Attributes
-    ----------
-    most_deaths : int
-        How often a task may end its process before it is given up.
-    """
-
-    most_deaths: int
+    """Processes that do tasks, and repeat those of a process that died."""
 
     def workers(self) -> Mapping[str, int]:
-        """Names of the processes that are there now, and how many tasks each does at once."""
+        """Return the addresses of the workers with their numbers of threads."""
 
-    def submit(self, tasks: tuple[Task, ...], worker: str) -> None:
-        """Have tasks done one after the other, by this process if it stays."""
+    def submit(self, tasks: tuple[Task, ...], worker: str | None) -> None:
+        """Have tasks done one after the other, by this worker if it is there and not busy."""
 
     def ended(self, timeout_s: float) -> list[Ending]:
-        """What came to its end since the last call; waits for the first."""
+        """Return what has ended since the last call; waits for the first."""
 
 
 class DaskPool:
@@ -83,79 +78,71 @@ class DaskPool:
 
     Parameters
     ----------
-    client : distributed.Client
-    folder : BatchFolder
     most_deaths : int
+        Number of workers that a task may end before it is given up.
     """
 
     def __init__(self, client: Any, folder: BatchFolder, most_deaths: int) -> None:
-        self.most_deaths = most_deaths
-        self._client = client
-        self._folder = folder
-        # Two batches may share a scheduler; what they do has different names.
-        place = str(folder.path.absolute())
-        self._name = hashlib.sha256(f"{place}{uuid.uuid4()}".encode()).hexdigest()[:8]
-        self._tries = 0
-        self._endings: queue.SimpleQueue[tuple[tuple[Task, ...], Any]] = queue.SimpleQueue()
+        self._client, self._folder, self._most_deaths = client, folder, most_deaths
+        # Two batches may share a scheduler; their tasks have different names.
+        self._name = uuid.uuid4().hex[:8]
+        self._submissions = count()
+        self._ended: queue.SimpleQueue[tuple[tuple[Task, ...], Any]] = queue.SimpleQueue()
         self._futures: dict[str, Any] = {}
         self._workers: dict[str, int] = {}
         self._checked: set[str] = set()
         self._looked_s = float("-inf")
 
     def workers(self) -> Mapping[str, int]:
-        """See :class:`Pool`; looked up once a second.
-
-        Raises
-        ------
-        Sd2Error
-            When one of them is of another version or does not see the folder, or the
-            scheduler is gone.
-        """
+        """See :class:`Pool`; asked of the scheduler once a second."""
         now_s = time.monotonic()
         if now_s - self._looked_s >= _LOOK_EVERY_S or not self._workers:
             self._looked_s = now_s
             self._look()
         return self._workers
 
-    def submit(self, tasks: tuple[Task, ...], worker: str) -> None:
+    def submit(self, tasks: tuple[Task, ...], worker: str | None) -> None:
         """See :class:`Pool`."""
-        self._tries += 1
-        name = f"{tasks[0].step}-{self._name}-{self._tries}"
         folder = self._folder.path.absolute()
         future = self._client.submit(
-            run_tasks,
-            [task.record(folder) for task in tasks],
-            key=name,
+            _run_here,
+            [task.record(folder, self._most_deaths) for task in tasks],
+            key=f"{tasks[0].step}-{self._name}-{next(self._submissions)}",
             pure=False,
-            workers=[worker],
-            allow_other_workers=True,
+            workers=None if worker is None else [worker],
+            allow_other_workers=worker is not None,
+            # What is nearest to its end goes first.
+            priority=STEPS.index(tasks[0].step),
         )
-        self._futures[name] = future
-        future.add_done_callback(lambda ended: self._endings.put((tasks, ended)))
+        self._futures[future.key] = future
+        future.add_done_callback(lambda ended: self._ended.put((tasks, ended)))
 
     def ended(self, timeout_s: float) -> list[Ending]:
         """See :class:`Pool`."""
         endings: list[Ending] = []
-        try:
-            endings.append(self._ending(*self._endings.get(timeout=timeout_s)))
+        with suppress(queue.Empty):
+            endings.append(self._ending(*self._ended.get(timeout=timeout_s)))
             while True:
-                endings.append(self._ending(*self._endings.get_nowait()))
-        except queue.Empty:
-            return endings
+                endings.append(self._ending(*self._ended.get_nowait()))
+        return endings
 
     def _ending(self, tasks: tuple[Task, ...], future: Any) -> Ending:
+        from distributed import CancelledError
         from distributed.scheduler import KilledWorker
 
         self._futures.pop(future.key, None)
-        if future.status == "finished":
-            return Ending(tasks, (None,) * len(tasks))
-        error = future.exception() if future.status == "error" else None
-        if isinstance(error, SomeFailed):
-            return Ending(tasks, error.failures)
-        if error is None or isinstance(error, KilledWorker):
+        try:
+            worker, outcomes = future.result(timeout=_CONNECT_S)
+            return Ending(tasks, outcomes, worker)
+        except KilledWorker:
             return Ending(tasks, killed=True)
-        words = f"The worker cannot carry it out ({type(error).__name__}: {error})"
-        return Ending(tasks, (TaskFailed(words, "", ""),) * len(tasks))
+        except (OSError, CancelledError):  # the scheduler or the result is gone
+            return Ending(tasks)
+        except Exception as failure:
+            error = failure
+        found = f"The worker cannot run it ({type(error).__name__}: {error})"
+        failed = Outcome(error=error_fields(Sd2Error(found)))
+        return Ending(tasks, [failed] * len(tasks))
 
     def _look(self) -> None:
         try:
@@ -192,6 +179,21 @@ class DaskPool:
         # One that has gone meanwhile is none.
         gone = (CommClosedError, ConnectionError, TimeoutError)
         return {one: about for one, about in told.items() if not isinstance(about, gone)}
+
+
+def _run_here(records: Sequence[Mapping[str, Any]]) -> tuple[str, list[Outcome]]:
+    """Do tasks in a worker; returns its address as well."""
+    from distributed import get_worker
+
+    return get_worker().address, run_tasks(records)
+
+
+def dask_setup(worker: Any) -> None:
+    """Ignore Ctrl-C: the terminal sends it to all processes, and the parent decides.
+
+    Dask calls it when a local worker starts (``preload``).
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _check_worker(address: str, about: Any, folder: Path) -> None:
@@ -234,7 +236,6 @@ def local_client(scratch: Path, processes: int) -> Iterator[Any]:
     ----------
     scratch : Path
         Where Dask may put files.
-    processes : int
     """
     import dask
     from distributed import Client, LocalCluster
@@ -247,7 +248,7 @@ def local_client(scratch: Path, processes: int) -> Iterator[Any]:
             host="127.0.0.1",
             dashboard_address="127.0.0.1:0",
             scheduler_kwargs={"dashboard": False},
-            preload=["sd2core.batch.interrupts"],
+            preload=["sd2core.batch.pool"],
             silence_logs=logging.CRITICAL,
             security=_security(),
             local_directory=str(scratch),
@@ -279,13 +280,7 @@ def _security() -> Any:
 
 @contextmanager
 def scheduler_pool(folder: BatchFolder, address: str) -> Iterator[DaskPool]:
-    """Workers of a ``dask-scheduler`` that runs already.
-
-    Raises
-    ------
-    Sd2Error
-        When it does not answer.
-    """
+    """Workers of a ``dask-scheduler`` that runs already."""
     from distributed import Client
 
     with _dask_log(folder):
@@ -298,8 +293,8 @@ def scheduler_pool(folder: BatchFolder, address: str) -> Iterator[DaskPool]:
                 "Start one with `dask scheduler`",
             ) from error
         try:
-            # The scheduler has tried it on several workers by then.
-            yield DaskPool(client, folder, most_deaths=1)
+            # Workers of a cluster may be taken away at any time.
+            yield DaskPool(client, folder, most_deaths=4)
         finally:
             client.close(timeout=_CLOSE_S)
 

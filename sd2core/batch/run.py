@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import time
 from collections.abc import Callable, Iterator
@@ -12,15 +13,14 @@ from pathlib import Path
 from typing import Any, Literal
 
 from sd2core.batch.driver import Driver, Failure, Stopped, event_of
+from sd2core.batch.estimate import remember_fit_rate
 from sd2core.batch.exporting import dataset_path
 from sd2core.batch.folder import PROGRESS_FORMAT, PROGRESS_VERSION, BatchFolder
 from sd2core.batch.inputs import find_origins
-from sd2core.batch.leftovers import remove_old_leftovers
 from sd2core.batch.plan import BatchPlan
 from sd2core.batch.plan_file import plan_text
 from sd2core.batch.pool import Pool, local_pool, scheduler_pool
-from sd2core.batch.rates import remember_fit_rate
-from sd2core.batch.task_graph import Flow
+from sd2core.batch.task_graph import TaskGraph
 from sd2core.batch.tasks import BEGUN
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
@@ -32,6 +32,10 @@ Outcome = Literal["finished", "stopped"]
 Watch = Callable[[Event], None]
 
 _LINE_EVERY_S = 0.5
+_KINDS = ("inputs", "meshes", "plans", "synthetic", "denoised", "simulated")
+_OLD_S = 3600.0
+"""A write takes seconds. What is older belongs to nobody, also where a worker of an earlier run
+may still be at its last task on another machine."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +44,6 @@ class BatchEnd:
 
     Parameters
     ----------
-    outcome : {"finished", "stopped"}
     failed : int
         Tasks that cannot be done.
     interrupted : bool
@@ -74,7 +77,6 @@ def run_batch(
         The file of the plan.
     scheduler : str, optional
         Address of a dask-scheduler; otherwise ``processes`` are started here.
-    processes : int
     watch : callable, optional
         Told every line of the progress.
     pool : context manager, optional
@@ -87,7 +89,7 @@ def run_batch(
     """
     folder = BatchFolder(Path(plan.out))
     origins = find_origins(plan.recordings, folder.path)
-    flow = Flow(plan, folder, origins)
+    graph = TaskGraph(plan, folder, origins)
     folder.prepare()
     lock = folder.lock()
     try:
@@ -105,7 +107,7 @@ def run_batch(
                     else scheduler_pool(folder, scheduler)
                 )
             with ProgressWriter(folder.progress, watch) as lines:
-                run = _Run(flow, lines, control, scheduler)
+                run = _Run(graph, lines, control, scheduler)
                 return run.through(pool, source)
     except BaseException:
         folder.set_state("failed")
@@ -119,11 +121,11 @@ class _Run:
     """What is said while a batch runs, and at its end."""
 
     def __init__(
-        self, flow: Flow, lines: ProgressWriter, control: Control, scheduler: str | None
+        self, graph: TaskGraph, lines: ProgressWriter, control: Control, scheduler: str | None
     ) -> None:
-        self._flow, self._lines, self._control = flow, lines, control
+        self._graph, self._lines, self._control = graph, lines, control
         self._scheduler = scheduler
-        self._folder = flow.folder
+        self._folder = graph.folder
         self._begun_s = time.monotonic()
         self._said_s = float("-inf")
         self._workers = -1
@@ -137,7 +139,7 @@ class _Run:
         try:
             with self._failures_file() as failures, ExitStack() as stack:
                 self._driver = Driver(
-                    self._flow,
+                    self._graph,
                     lambda: stack.enter_context(pool),
                     on_failure=lambda one: self._failed(one, failures),
                     on_note=self._note,
@@ -157,9 +159,9 @@ class _Run:
 
     def _drive(self, driver: Driver) -> Outcome:
         try:
-            driver.run(self._flow.first())
+            driver.run(self._graph.first())
             self._write_results()
-            driver.run(self._flow.last())
+            driver.run(self._graph.last())
         except Stopped:
             return "stopped"
         return "finished"
@@ -171,9 +173,9 @@ class _Run:
             version=PROGRESS_VERSION,
             out=str(self._folder.path),
             plan=None if source is None else str(source),
-            recordings=len(self._flow.origins),
-            placements=self._flow.plan.placement_count,
-            steps=list(self._flow.steps),
+            recordings=len(self._graph.origins),
+            placements=self._graph.plan.placement_count,
+            steps=list(self._graph.steps),
             scheduler=self._scheduler,
             unix_s=time.time(),
         )
@@ -201,13 +203,13 @@ class _Run:
 
     def _counts(self) -> dict[str, Any]:
         tally = None if self._driver is None else self._driver.tally
-        steps = self._flow.steps
+        steps = self._graph.steps
 
         def of(counts: Any) -> dict[str, int]:
             return {step: counts[step] if counts else 0 for step in steps}
 
         return {
-            "total": of(self._flow.total),
+            "total": of(self._graph.total),
             "there": of(tally and tally.there),
             "done": of(tally and tally.done),
             "failed": sum(tally.failed.values()) if tally else 0,
@@ -245,7 +247,7 @@ class _Run:
         """Every map that is there, recording by recording, in the order of the plan."""
         root = self._folder.path
         with atomic_write(self._folder.results) as stream:
-            for number, (origin, about, mesh, planned) in enumerate(self._flow.all_maps()):
+            for number, (origin, about, mesh, planned) in enumerate(self._graph.all_maps()):
                 if number % 256 == 0:
                     self._tick()
                 for index, task in enumerate(planned.synthesis):
@@ -277,7 +279,7 @@ class _Run:
         if error is not None:
             told = {"found": error.found, "expected": error.expected, "remedy": error.remedy}
             self._log(str(error))
-        export = self._flow.plan.export
+        export = self._graph.plan.export
         dataset = None if export is None else dataset_path(self._folder, export)
         facts = {
             "outcome": outcome,
@@ -293,7 +295,7 @@ class _Run:
         return facts
 
     def _remember_rate(self) -> None:
-        fit = self._flow.plan.fit
+        fit = self._graph.plan.fit
         if self._driver is not None and fit is not None and self._scheduler is None:
             tally = self._driver.tally
             remember_fit_rate(fit.resolution, tally.seconds["fit"], tally.frames["fit"])
@@ -332,3 +334,39 @@ def _clear(folder: BatchFolder) -> None:
     shutil.rmtree(begun, ignore_errors=True)
     begun.mkdir()
     remove_old_leftovers(folder.path)
+
+
+def remove_old_leftovers(folder: Path, old_s: float = _OLD_S) -> None:
+    """Delete temporary files and folders that nobody writes to any more.
+
+    Parameters
+    ----------
+    folder : Path
+        Of a batch.
+    """
+    before_s = time.time() - old_s
+    for kind in _KINDS:
+        for shelf in _entries(folder / kind):
+            for entry in _entries(Path(shelf.path)):
+                if entry.name.startswith(".") and entry.name.endswith(".tmp"):
+                    _remove(entry, before_s)
+
+
+def _remove(entry: os.DirEntry[str], before_s: float) -> None:
+    try:
+        if entry.stat(follow_symlinks=False).st_mtime > before_s:
+            return
+        if entry.is_dir(follow_symlinks=False):
+            shutil.rmtree(entry.path, ignore_errors=True)
+        else:
+            os.unlink(entry.path)
+    except OSError:  # somebody else's, or gone meanwhile
+        return
+
+
+def _entries(folder: Path) -> list[os.DirEntry[str]]:
+    try:
+        with os.scandir(folder) as entries:
+            return list(entries)
+    except OSError:
+        return []

@@ -1,4 +1,4 @@
-"""The task that makes a synthetic Doppler map of a stretch of a mesh."""
+"""Tasks that make synthetic and simulated Doppler maps of a mesh, in stretches of frames."""
 
 from __future__ import annotations
 
@@ -12,17 +12,31 @@ from typing import TYPE_CHECKING, Any
 
 from sd2core.batch.inputs import MeshInput, open_mesh
 from sd2core.batch.plan import Synthesise
-from sd2core.batch.stretches import Stretch
 from sd2core.errors import Sd2Error
-from sd2core.sensor import VirtualSensor
+from sd2core.sensor import VelocityAxis, VirtualSensor
 
 if TYPE_CHECKING:
+    from sd2core.datasets.simulating import Simulation
     from sd2core.doppler import Synthesizer
     from sd2core.mesh.sequence import MeshSequence
     from sd2core.placements.body_extent import BodyExtent
 
 PREPARED_BYTES = 128 << 20
-"""For what is prepared of a mesh; with less a block would be made twice."""
+"""Memory for the prepared part of a mesh; with less a block would be prepared twice."""
+
+LONGEST_FRAMES = 18_000
+"""Longest stretch: ten minutes at 30 frames/s, whose maps are a few MB, so that memory does not
+grow with the length of a clip."""
+
+Stretch = tuple[int, int]
+"""Half-open range of frames of a clip."""
+
+
+def stretches_of(frames: int, longest: int = LONGEST_FRAMES) -> list[Stretch]:
+    """Cut a clip into as few stretches as possible, of nearly equal lengths."""
+    count = max(1, -(-frames // longest))
+    edges = [frames * number // count for number in range(count + 1)]
+    return [(edges[number], edges[number + 1]) for number in range(count)]
 
 
 @dataclass(frozen=True)
@@ -67,7 +81,7 @@ _kept = _Kept()
 def synthesise(
     mesh: MeshInput,
     sensor: VirtualSensor,
-    told: Synthesise,
+    section: Synthesise,
     stretch: Stretch,
     choosing: Choosing | None,
     out: Path,
@@ -76,24 +90,15 @@ def synthesise(
 
     Parameters
     ----------
-    mesh : MeshInput
-    sensor : VirtualSensor
-    told : Synthesise
     stretch : (int, int)
         Equal to these columns of the map of the whole clip: smoothing and the reuse of
         masks look beyond the stretch.
     choosing : Choosing, optional
-        Where the plan is told a tolerance.
-    out : Path
-
-    Raises
-    ------
-    Sd2Error
-        When the mesh cannot be read, or the sensor stands in the body.
+        Where the plan is section a tolerance.
     """
     refuse_inside(mesh, sensor)
-    plan = None if choosing is None else chosen_plan(mesh, told, choosing)
-    synthesizer = _synthesizer(mesh, told, plan)
+    plan = None if choosing is None else chosen_plan(mesh, section, choosing)
+    synthesizer = _synthesizer(mesh, section, plan)
     doppler = synthesizer.map(sensor, frames=stretch)
     if plan is not None:
         doppler = replace(doppler, meta=doppler.meta | plan["provenance"])
@@ -101,13 +106,31 @@ def synthesise(
     doppler.save(out)
 
 
-def refuse_inside(mesh: MeshInput, sensor: VirtualSensor) -> None:
-    """Refuse a sensor that stands in the body.
+def simulate(
+    mesh: MeshInput,
+    sensor: VirtualSensor,
+    simulation: Simulation,
+    axis: VelocityAxis,
+    stretch: Stretch,
+    out: Path,
+) -> None:
+    """Make the map that a radar would show of some frames and write it.
 
-    Raises
-    ------
-    Sd2Error
+    Parameters
+    ----------
+    stretch : (int, int)
+        Equal to these columns of the map of the whole clip.
     """
+    from sd2core.datasets.simulating import simulated_map
+
+    refuse_inside(mesh, sensor)
+    doppler = simulated_map(kept_mesh(mesh), sensor, simulation, axis, stretch)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    doppler.save(out)
+
+
+def refuse_inside(mesh: MeshInput, sensor: VirtualSensor) -> None:
+    """Refuse a sensor that stands in the body."""
     from sd2core.placements.body_extent import BodyExtent
 
     opened = kept_mesh(mesh)
@@ -123,13 +146,7 @@ def refuse_inside(mesh: MeshInput, sensor: VirtualSensor) -> None:
 
 
 def kept_mesh(wanted: MeshInput) -> MeshSequence:
-    """The mesh, which this process keeps open until it is asked for another one.
-
-    Raises
-    ------
-    Sd2Error
-        When it cannot be read.
-    """
+    """The mesh, which this process keeps open until it is asked for another one."""
     if _kept.mesh is None or _kept.mesh_of != wanted:
         # Before another one is opened, so that there are never two.
         _kept.mesh, _kept.body, _kept.synthesizer, _kept.made_for = None, None, None, ()
@@ -140,16 +157,16 @@ def kept_mesh(wanted: MeshInput) -> MeshSequence:
     return _kept.mesh
 
 
-def _synthesizer(mesh: MeshInput, told: Synthesise, plan: dict[str, Any] | None) -> Synthesizer:
+def _synthesizer(mesh: MeshInput, section: Synthesise, plan: dict[str, Any] | None) -> Synthesizer:
     from sd2core.accuracy.plans import AccuracyPlan
     from sd2core.doppler import Synthesizer
     from sd2core.mesh.decimation import decimate
 
     opened = kept_mesh(mesh)
-    wanted = (told, None if plan is None else json.dumps(plan["plan"], sort_keys=True))
+    wanted = (section, None if plan is None else json.dumps(plan["plan"], sort_keys=True))
     if _kept.synthesizer is None or _kept.made_for != wanted:
         _kept.synthesizer = None
-        options, share = told.options(), told.vertices_kept or 1.0
+        options, share = section.options(), section.vertices_kept or 1.0
         if plan is not None:
             rungs = AccuracyPlan.from_json(plan["plan"])
             options, share = rungs.options(options), rungs.vertices_kept
@@ -160,22 +177,16 @@ def _synthesizer(mesh: MeshInput, told: Synthesise, plan: dict[str, Any] | None)
     return _kept.synthesizer
 
 
-def chosen_plan(mesh: MeshInput, told: Synthesise, choosing: Choosing) -> dict[str, Any]:
-    """The plan that was chosen, by whoever was first: costs are measured, and never twice alike.
-
-    Raises
-    ------
-    Sd2Error
-        When the mesh cannot be read.
-    """
+def chosen_plan(mesh: MeshInput, section: Synthesise, choosing: Choosing) -> dict[str, Any]:
+    """The plan that was chosen, by whoever was first: costs are measured, and never twice alike."""
     path = choosing.path
     if (known := read_plan_of(path)) is not None:
         return known
     from sd2core.accuracy.places import choose_for_places
 
-    assert told.tolerance is not None
+    assert section.tolerance is not None
     found = choose_for_places(
-        kept_mesh(mesh), choosing.places, choosing.frames, told.tolerance, told.options()
+        kept_mesh(mesh), choosing.places, choosing.frames, section.tolerance, section.options()
     )
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(prefix=".sd2-", suffix=".tmp", dir=path.parent)

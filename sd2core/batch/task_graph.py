@@ -15,7 +15,7 @@ from sd2core.batch.folder import BatchFolder
 from sd2core.batch.inputs import Inspection, MeshInput, Origin, VideoInput, known_inspection
 from sd2core.batch.keys import key_of
 from sd2core.batch.plan import STEPS, BatchPlan, Simulate, Step
-from sd2core.batch.stretches import Stretch, stretches_of
+from sd2core.batch.synthesis import Stretch, stretches_of
 from sd2core.batch.tasks import Task
 from sd2core.errors import Sd2Error
 from sd2core.files.digests import file_digest
@@ -35,8 +35,6 @@ class PlannedMap:
     ----------
     placement : int
         0 is the recording's own sensor; 1 and up are the places of the plan.
-    sensor : VirtualSensor
-    stretches : tuple of (int, int)
     synthesis : tuple of Task
         One per stretch.
     denoising : Task, optional
@@ -64,26 +62,19 @@ class PlannedMap:
         return [] if self.denoising is None else list(self.denoising.details["outs"])
 
 
-class Flow:
+class TaskGraph:
     """The tasks of a batch, each known as soon as what it depends on is done.
 
     Parameters
     ----------
     plan : BatchPlan
         With absolute paths.
-    folder : BatchFolder
-    origins : sequence of Origin
 
     Attributes
     ----------
     total : Counter
         Tasks per step that are known of so far; a map counts once until it is known into
         how many stretches it is cut.
-
-    Raises
-    ------
-    Sd2Error
-        When the model or the radar of the plan cannot be used.
     """
 
     def __init__(self, plan: BatchPlan, folder: BatchFolder, origins: Sequence[Origin]) -> None:
@@ -149,13 +140,7 @@ class Flow:
         return os.path.exists(task.out)
 
     def after(self, task: Task) -> Iterator[Task]:
-        """What can be done once a task is.
-
-        Raises
-        ------
-        Sd2Error
-            When the plan has no step for what was found.
-        """
+        """What can be done once a task is."""
         if task.step == "inspect":
             found = known_inspection(self.folder, task.origin)
             if found is None:
@@ -238,14 +223,7 @@ class Flow:
         return iter((self._denoising.pop(where),))
 
     def maps_of(self, origin: Origin, mesh: MeshInput, own: VirtualSensor) -> Iterator[PlannedMap]:
-        """All maps of one recording.
-
-        Parameters
-        ----------
-        origin : Origin
-        mesh : MeshInput
-        own : VirtualSensor
-        """
+        """All maps of one recording."""
         stretches = tuple(stretches_of(mesh.frames))
         sensors = self.plan.sensors(own, mesh.target_m)
         choosing = self._choosing(mesh, list(sensors.values()))

@@ -1,11 +1,12 @@
-"""Tasks: small records that a worker carries out on paths, and that may be done again."""
+"""Tasks: small records that a worker applies to paths, and that may be done again."""
 
 from __future__ import annotations
 
 import os
 import platform
+import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -21,32 +22,28 @@ from sd2core.radar_config import RadarConfig
 from sd2core.sensor import VelocityAxis, VirtualSensor
 
 BEGUN = "begun"
-"""Folder of what is under way; it is there only while a batch runs."""
+"""Folder of the tasks under way; it exists only while a batch runs."""
 
-_MARKER = "task-"
 _ONE_FILE = ("synthesise", "denoise", "simulate")
 """Steps that are done when their last file is there."""
 
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """One thing to do: a function of paths and small values, whose result is a file.
+    """Function of paths and small values whose result is a file.
 
     Parameters
     ----------
-    step : Step
     key : str
-        Names the result; what has the same key is the same.
-    origin : Origin
+        Name of the result: tasks of one key have the same result.
     details : mapping
         Arguments, as JSON can hold them.
-    placement : int, optional
     frames : int
-        How many are worked on, for rates.
+        Number of frames to work on, for rates.
     group : str
         Tasks of one group are best done by one process.
     out : str
-        What is written last; empty where that is not a file of its own.
+        File that is written last; empty where that is not a file of its own.
     """
 
     step: Step
@@ -58,120 +55,137 @@ class Task:
     group: str = ""
     out: str = ""
 
-    def record(self, folder: Path) -> dict[str, Any]:
-        """What is sent to a worker."""
+    def record(self, folder: Path, most_deaths: int = 2) -> dict[str, Any]:
+        """Return what is sent to a worker."""
         return {
             "step": self.step,
             "key": self.key,
             "out": self.out,
             "folder": str(folder),
+            "most_deaths": most_deaths,
             "origin": asdict(self.origin),
             "details": dict(self.details),
         }
 
 
-class TaskFailed(Exception):
-    """A task cannot be done; what a worker says of it.
+@dataclass(frozen=True)
+class Outcome:
+    """Result of one task, as the worker sends it back.
 
     Parameters
     ----------
-    found, expected, remedy : str
-        As of an :class:`~sd2core.errors.Sd2Error`.
+    seconds : float
+        Time that the task took.
+    error : mapping, optional
+        ``found``, ``expected`` and ``remedy`` of a failed task.
     fatal : bool
-        Whether no other task can be done either.
+        True where no other task can be done either.
+    deaths : int
+        Workers that died during earlier attempts.
+    worker_died : bool
+        True where the task is given up because of that.
     """
 
-    def __init__(self, found: str, expected: str, remedy: str, fatal: bool = False) -> None:
-        self.error = {"found": found, "expected": expected, "remedy": remedy}
-        self.fatal = fatal
-        super().__init__(found, expected, remedy, fatal)
+    seconds: float = 0.0
+    error: dict[str, str] | None = None
+    fatal: bool = False
+    deaths: int = 0
+    worker_died: bool = False
 
 
-class SomeFailed(Exception):
-    """Of some tasks that were given out together, some cannot be done.
-
-    Parameters
-    ----------
-    failures : tuple
-        One per task; None for those that were done.
-    """
-
-    def __init__(self, failures: tuple[TaskFailed | None, ...]) -> None:
-        self.failures = failures
-        super().__init__(failures)
+def error_fields(error: Sd2Error) -> dict[str, str]:
+    """Return the parts of an error as JSON can hold them."""
+    return {"found": error.found, "expected": error.expected, "remedy": error.remedy}
 
 
-def run_tasks(records: Sequence[Mapping[str, Any]]) -> None:
-    """Carry out tasks in this process, one after the other.
+def _failed(found: str, expected: str = "", remedy: str = "", **more: Any) -> Outcome:
+    return Outcome(error={"found": found, "expected": expected, "remedy": remedy}, **more)
 
-    Raises
-    ------
-    SomeFailed
-        When not all could be done; after a failure that is fatal the others are not tried.
-    """
-    failures: list[TaskFailed | None] = []
+
+def too_many_deaths(deaths: int) -> Outcome:
+    """Return the failure of a task that ended its worker so many times."""
+    return _failed(
+        f"Its worker died {deaths} times",
+        "a task that its process survives",
+        "It may have needed more memory than there is: see log.txt",
+        deaths=deaths,
+        worker_died=True,
+    )
+
+
+def run_tasks(records: Sequence[Mapping[str, Any]]) -> list[Outcome]:
+    """Do tasks in this process, one after the other; after a fatal failure none."""
+    outcomes: list[Outcome] = []
     for record in records:
-        fatal = failures[-1] if failures and failures[-1] and failures[-1].fatal else None
-        try:
-            if fatal is None:
-                run_task(record)
-            failures.append(fatal)
-        except TaskFailed as failure:
-            failures.append(failure)
-    if any(failures):
-        raise SomeFailed(tuple(failures))
+        if outcomes and outcomes[-1].fatal:
+            outcomes.append(outcomes[-1])
+        else:
+            outcomes.append(run_task(record))
+    return outcomes
 
 
-def run_task(record: Mapping[str, Any]) -> None:
-    """Carry out a task in this process.
+def run_task(record: Mapping[str, Any]) -> Outcome:
+    """Do a task in this process.
 
-    Raises
-    ------
-    TaskFailed
-        Whatever goes wrong.
+    A marker file holds one line per attempt; it stays where an attempt ends the process, so
+    the next one knows of it.
     """
     folder = BatchFolder(Path(record["folder"]))
-    marker = folder.path / BEGUN / _process_name()
+    marker = _marker(folder.path, record["key"])
+    begun_s = time.perf_counter()
     try:
-        marker.write_text(record["key"], encoding="ascii")
+        deaths = deaths_during(folder.path, record["key"])
+        if deaths >= record["most_deaths"]:
+            marker.unlink(missing_ok=True)
+            return too_many_deaths(deaths)
+        with marker.open("a", encoding="utf-8") as stream:
+            stream.write(f"{platform.node()} {os.getpid()}\n")
+        outcome = _attempt(folder, record)
+        marker.unlink(missing_ok=True)
+    except OSError as error:
+        return _os_failure(error)
+    return replace(outcome, seconds=time.perf_counter() - begun_s, deaths=deaths)
+
+
+def _attempt(folder: BatchFolder, record: Mapping[str, Any]) -> Outcome:
+    try:
         if record["out"] and os.path.exists(record["out"]) and record["step"] in _ONE_FILE:
-            return  # a worker that was lost had just written it
+            return Outcome()  # a worker that was lost had just written it
         _compile_once()
         _WORK[record["step"]](folder, Origin(**record["origin"]), **record["details"])
     except Sd2Error as error:
-        raise TaskFailed(error.found, error.expected, error.remedy) from None
+        return Outcome(error=error_fields(error))
     except MemoryError as error:
-        raise TaskFailed(f"There is not enough memory for this ({error})", "", "") from None
+        return _failed(f"There is not enough memory for this ({error})")
     except OSError as error:
-        about = f"{error.filename}: {error.strerror}" if error.filename else str(error)
-        raise TaskFailed(about, "", "", fatal=error.errno in DISK_FULL) from None
+        return _os_failure(error)
     except Exception as error:
         about = f"This should not happen ({type(error).__name__}: {error})"
-        raise TaskFailed(about, "", "Please report it") from error
-    finally:
-        marker.unlink(missing_ok=True)
+        return _failed(about, remedy="Please report it")
+    return Outcome()
 
 
-def killed_in(folder: Path, key: str) -> bool:
-    """Whether a process had begun this task, and never came to its end."""
-    for marker in (folder / BEGUN).glob(f"{_MARKER}*"):
-        try:
-            if marker.read_text(encoding="ascii") == key:
-                marker.unlink(missing_ok=True)
-                return True
-        except OSError:
-            continue
-    return False
+def _os_failure(error: OSError) -> Outcome:
+    about = f"{error.filename}: {error.strerror}" if error.filename else str(error)
+    return _failed(about, fatal=error.errno in DISK_FULL)
+
+
+def deaths_during(folder: Path, key: str) -> int:
+    """Count the processes that began this task and did not end it."""
+    try:
+        return len(_marker(folder, key).read_text(encoding="utf-8").splitlines())
+    except FileNotFoundError:
+        return 0
+
+
+def _marker(folder: Path, key: str) -> Path:
+    return folder / BEGUN / f"task-{key}"
 
 
 def probe(folder: str, token: str) -> dict[str, Any]:
-    """What a worker says of itself: the code it has, and whether it sees the folder."""
+    """Return the code digest of a worker, its host, and whether it sees the folder."""
     path = Path(folder) / BEGUN / token
     return {"code": all_code_digest(), "sees": path.exists(), "host": platform.node()}
-
-
-def _process_name() -> str:
-    return f"{_MARKER}{platform.node()}-{os.getpid()}"
 
 
 @lru_cache(maxsize=1)
@@ -238,7 +252,7 @@ def _simulate(
     stretch: list[int],
     out: str,
 ) -> None:
-    from sd2core.batch.simulation import simulate
+    from sd2core.batch.synthesis import simulate
     from sd2core.datasets.simulating import Simulation
 
     simulate(

@@ -139,13 +139,7 @@ class ClassifierCard:
 
     @classmethod
     def from_json(cls, content: dict[str, Any], path: Path | None = None) -> ClassifierCard:
-        """Read what :meth:`to_json` gave.
-
-        Raises
-        ------
-        Sd2Error
-            When it is something else, or of a newer version.
-        """
+        """Read what :meth:`to_json` gave."""
         where = "The classifier" if path is None else str(path)
         try:
             if content["format"] != FORMAT or not isinstance(content["version"], int):

@@ -86,8 +86,6 @@ class Run:
 
     Parameters
     ----------
-    condition : Condition
-    seed : int
     subjects : tuple of str
         Who was judged.
     real, added : dict
@@ -152,11 +150,8 @@ class Table:
 
     Parameters
     ----------
-    classes : tuple of str
     kind : str
         ``simulated`` or ``real``: what the radar was.
-    options : TableOptions
-    runs : tuple of Run
     by_movement : bool
         One subject only: nothing is said about other people.
     """
@@ -182,8 +177,6 @@ def conditions_of(known: ClipSet, options: TableOptions, denoised: bool) -> list
 
     Parameters
     ----------
-    known : ClipSet
-    options : TableOptions
     denoised : bool
         Whether there is a denoiser for these maps.
     """
@@ -218,15 +211,8 @@ def make_table(
         One small file per run; those of other data or settings are not looked at.
     known : ClipSet
         Radar's and synthetic maps.
-    options : TableOptions
-    denoiser : TrainedDenoiser, optional
     progress : callable
         Called with runs.
-
-    Raises
-    ------
-    Sd2Error
-        When the data cannot be split or hold no radar's map.
     """
     folder.mkdir(parents=True, exist_ok=True)
     conditions = conditions_of(known, options, denoiser is not None)

@@ -30,11 +30,8 @@ class Clip:
 
     Parameters
     ----------
-    subject : str
     movement : str
         The same for all maps of one movement: kinds, and places of the sensor.
-    kind : {"synthetic", "denoised", "simulated", "real"}
-    energies : float32 array, shape (frames, bins)
     label : int8 array, shape (frames,)
         Index into the classes, or :data:`UNKNOWN`.
     placement : int
@@ -80,12 +77,8 @@ class ClipSet:
 
     Parameters
     ----------
-    axis : VelocityAxis
-    null_bins : tuple of int
-    frame_rate_hz : float
     classes : tuple of str
         The background first, where there is one.
-    clips : tuple of Clip
     provenance : dict
         Where they are from; fits into JSON.
     """
@@ -144,7 +137,6 @@ def clips_of_pairs(
 
     Parameters
     ----------
-    pairs : PairSet
     kind : {"simulated", "real", "synthetic", "denoised"}
         The radar's are simulated or real, as the pairs say.
     denoiser : TrainedDenoiser, optional
@@ -201,7 +193,6 @@ def clips_of_map(
         On the clock of the labels.
     labels : Labels
         Suggestions do not count.
-    subject, movement : str
     frame_rate_hz : float, optional
         Brought to that rate where it is another; its own by default.
 

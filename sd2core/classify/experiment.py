@@ -45,8 +45,6 @@ class Network:
 
     Parameters
     ----------
-    model : {"lstm", "s4"}
-    features : {"peak", "columns"}
     width : int
         Units or channels of its layers.
     delay_s : float
@@ -87,7 +85,6 @@ class Condition:
         is what synthetic maps are at best.
     moved : bool
         Range synthesis: the added ones also as other placements of the sensor see them.
-    network : Network
     """
 
     share: float = 1.0
@@ -145,15 +142,8 @@ def choose(known: ClipSet, condition: Condition, seed: int, denoise: Denoise) ->
     ----------
     known : ClipSet
         Radar's and synthetic maps of the same movements.
-    condition : Condition
     seed : int
         Also says who is judged.
-    denoise : callable
-
-    Raises
-    ------
-    Sd2Error
-        When there is nothing of what is to be added.
     """
     parts = fold(known, seed)
     real_pool, added_pool = _pools(known, parts, seed)

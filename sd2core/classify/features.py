@@ -72,11 +72,8 @@ class Features:
 
     Parameters
     ----------
-    kind : {"peak", "columns"}
-    axis : VelocityAxis
     null_bins : tuple of int
         Bins that do not count.
-    frame_rate_hz : float
     """
 
     kind: Kind

@@ -37,7 +37,6 @@ class TrainedClassifier:
     ----------
     network : Classifier
         Put into evaluation mode.
-    card : ClassifierCard
     """
 
     def __init__(self, network: Classifier, card: ClassifierCard) -> None:

@@ -57,7 +57,6 @@ class Score:
 
     Parameters
     ----------
-    classes : tuple of str
     frames : int64 array, shape (classes, classes)
         Confusion matrix of frames.
     gestures : int64 array, shape (classes, classes)
@@ -141,8 +140,6 @@ def score(
     ----------
     truths, answers : sequence of int array, shape (frames,)
         Of one clip each.
-    classes : tuple of str
-    frame_rate_hz : float
     background : int or None
         The class that is no gesture.
     delay_s : float

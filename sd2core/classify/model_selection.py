@@ -18,16 +18,8 @@ def judge(classifier: TrainedClassifier, clips: Sequence[Clip], known: ClipSet) 
 
     Parameters
     ----------
-    classifier : TrainedClassifier
-    clips : sequence of Clip
     known : ClipSet
         What the clips are of.
-
-    Raises
-    ------
-    Sd2Error
-        When there is no clip, or they are of other classes, another axis or another frame
-        rate than the classifier knows.
     """
     card = classifier.card
     strange = [name for name in known.classes if name not in card.classes]

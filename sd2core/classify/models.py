@@ -26,8 +26,6 @@ class Classifier(nn.Module):
     ----------
     width : int
         Numbers per frame that the layers along time give.
-    classes : int
-    dropout : float
     """
 
     whole: bool = False
@@ -67,11 +65,8 @@ class LstmClassifier(Classifier):
     ----------
     size : int
         Features per frame.
-    classes : int
     width : int
         Units of each layer.
-    depth : int
-    dropout : float
     """
 
     def __init__(
@@ -107,10 +102,8 @@ class S4Classifier(Classifier):
     ----------
     size : int
         Features per frame.
-    classes : int
     width : int
         Channels of the layers.
-    depth : int
     state_size : int
         Numbers that each channel remembers.
     dropout : float
@@ -194,7 +187,6 @@ def build(name: str, size: int, classes: int, **given: Any) -> Classifier:
         One of :data:`MODELS`.
     size : int
         Features per frame.
-    classes : int
     **given
         Options in place of :func:`options`.
 

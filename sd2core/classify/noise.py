@@ -24,7 +24,6 @@ def with_noise_floor(clip: Clip, null_bins: Sequence[int], rng: np.random.Genera
 
     Parameters
     ----------
-    clip : Clip
     null_bins : sequence of int
         Stay empty.
     rng : Generator

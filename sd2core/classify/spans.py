@@ -67,7 +67,6 @@ def predicted_spans(
         Of the frames.
     classes : sequence of str
         Names of the columns; they become labels.
-    options : SpanOptions, optional
     present : bool array, shape (frames,), optional
         False in frames without a person: no span reaches across them, nor across a
         pause of the recording.
@@ -83,12 +82,6 @@ def predicted_spans(
     tuple of Span
         Of origin ``"suggestion"``; they do not overlap. The confidence is the mean
         probability of the span's class over its frames.
-
-    Raises
-    ------
-    Sd2Error
-        When the probabilities are not one row per frame and one column per class, or no
-        probabilities.
     """
     options = options or SpanOptions()
     values = _checked(probabilities, len(timebase), len(classes))

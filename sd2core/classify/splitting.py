@@ -25,7 +25,6 @@ class Parts:
 
     Parameters
     ----------
-    training, validation, test : tuple of Clip
     by_movement : bool
         True with one subject: then movements are kept apart, not people, and what is
         measured says nothing about other people.
@@ -58,17 +57,11 @@ def split_clips(
 
     Parameters
     ----------
-    known : ClipSet
     validation, test : sequence of str, optional
         As :func:`sd2core.train.data.split_subjects` has them.
     first_only : bool
         Learn only from what every movement's own sensor saw, or the first one where it was
         not its own; validation and test always do.
-
-    Raises
-    ------
-    Sd2Error
-        When a subject is unknown, or there is too little to split.
     """
     split = split_subjects(known.subjects, validation, test)
     parts = {name: known.of(getattr(split, name)) for name in ("training", "validation", "test")}
@@ -87,11 +80,6 @@ def fold(known: ClipSet, number: int) -> Parts:
     With three subjects or more the list of subjects is turned by ``number``, and split as
     by default. With two, one is learnt from and one judged. With one, every class gives
     every second of its movements to the test, or the others in the next fold.
-
-    Raises
-    ------
-    Sd2Error
-        When one subject has no class with two movements.
     """
     subjects = list(known.subjects)
     turned = number % len(subjects)

@@ -35,8 +35,6 @@ class TrainOptions:
 
     Parameters
     ----------
-    model : {"lstm", "s4"}
-    features : {"peak", "columns"}
     delay_s : float
         So much of what follows a frame is seen before it is answered.
     options : mapping
@@ -55,12 +53,10 @@ class TrainOptions:
         another (truncated backpropagation); the state is kept between them.
     learning_rate, ssm_learning_rate : float
         At their highest; they rise for a tenth of the steps and fall along a cosine.
-    weight_decay : float
     check_steps : int
         Between looks at the validation subjects.
     patience : int
         Looks without a better one after which it ends; the best is kept.
-    seed : int
     """
 
     model: str = "lstm"
@@ -106,7 +102,6 @@ class Trained(NamedTuple):
         The best one on validation, or the last where nothing validates.
     events : list of dict
         What was told while training.
-    interrupted : bool
     """
 
     classifier: TrainedClassifier
@@ -162,10 +157,8 @@ def train(
         Without validation the last one is taken.
     known : ClipSet
         Axis, frame rate and classes of the clips.
-    chosen : TrainOptions, optional
     about : mapping, optional
         For the card.
-    watch : callable
 
     Raises
     ------

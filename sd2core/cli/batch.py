@@ -11,16 +11,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.options import add_command, add_json, positive_int
-from sd2core.cli.output import counted, duration, print_facts, print_json
+from sd2core.cli.output import counted, duration, print_facts, print_json, print_rows
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
+    from sd2core.batch.estimate import BatchEstimate
     from sd2core.batch.folder import BatchStatus
     from sd2core.batch.plan import BatchPlan
     from sd2core.batch.run import BatchEnd, Watch
 
 _INTERRUPTED = 130
 _LISTED_FAILURES = 10
+_LISTED_UNUSABLE = 5
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
@@ -45,9 +47,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "  sd2 batch --status made"
         ),
     )
-    parser.add_argument(
-        "plan", type=Path, nargs="?", metavar="PLAN.toml", help="what is to be done"
-    )
+    parser.add_argument("plan", type=Path, nargs="?", metavar="PLAN.toml", help="plan of the batch")
     where = parser.add_mutually_exclusive_group()
     where.add_argument(
         "--workers",
@@ -56,24 +56,27 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         help="processes on this machine (default: one per core)",
     )
     where.add_argument(
-        "--scheduler", metavar="ADDRESS", help="a dask-scheduler, whose workers do the work"
+        "--scheduler", metavar="ADDRESS", help="use the workers of this dask-scheduler"
     )
     what = parser.add_mutually_exclusive_group()
     what.add_argument(
-        "--dry-run", action="store_true", help="say what would be done, and do none of it"
+        "--dry-run", action="store_true", help="print tasks, hours and bytes, and do nothing"
     )
     what.add_argument(
-        "--status", type=Path, metavar="FOLDER", help="how the batch in this folder stands"
+        "--status", type=Path, metavar="FOLDER", help="print the state of the batch in this folder"
     )
     what.add_argument(
-        "--stop", type=Path, metavar="FOLDER", help="stop the batch in this folder; it can go on"
+        "--stop",
+        type=Path,
+        metavar="FOLDER",
+        help="stop the batch in this folder; the same command resumes it",
     )
     shown = parser.add_mutually_exclusive_group()
     add_json(shown)
     shown.add_argument(
         "--progress-json",
         action="store_true",
-        help="print what is done as JSON lines, for other programs (docs/formats.md)",
+        help="print progress as JSON lines, for other programs (docs/formats.md)",
     )
 
 
@@ -81,12 +84,12 @@ def _batch(options: argparse.Namespace) -> int:
     from sd2core.batch.folder import BatchFolder
 
     if options.plan is not None and (options.status or options.stop):
-        raise Sd2Error("A plan is given with --status or --stop", "one of them")
+        raise Sd2Error("A plan is given with --status or --stop", "only one of them")
     if options.status is not None:
         return _show_status(options.status, options.json)
     if options.stop is not None:
         BatchFolder(options.stop).tell("stop")
-        print(f"{options.stop} is told to stop")
+        print(f"Stopping {options.stop}")
         return 0
     if options.plan is None:
         raise Sd2Error("No plan is given", "PLAN.toml, or --status FOLDER")
@@ -143,21 +146,21 @@ def _watching(options: argparse.Namespace) -> Iterator[Watch]:
             elif event["event"] == "workers" and not event["workers"]:
                 bar.set_postfix_str("waiting for workers")
             elif event["event"] == "failed":
-                bar.write(_failure_words(event), file=sys.stderr)
+                bar.write(_failure_text(event), file=sys.stderr)
             elif event["event"] == "note":
                 bar.write(f"  {event['text']}", file=sys.stderr)
 
         yield watch
 
 
-def _failure_words(event: dict[str, Any]) -> str:
+def _failure_text(event: dict[str, Any]) -> str:
     place = f" from place {event['placement']}" if event["placement"] else ""
     return f"  {event['recording']}: {event['step']}{place}: {Sd2Error(**event['error'])}"
 
 
 def _print_end(plan: BatchPlan, end: BatchEnd) -> None:
     facts = end.facts
-    stopped = "" if end.outcome == "finished" else "; the same command goes on"
+    stopped = "" if end.outcome == "finished" else "; the same command resumes it"
     print_facts(
         f"{plan.out}: {end.outcome} after {duration(facts['elapsed_s'])}{stopped}",
         _count_facts(facts) | {"data set": facts["dataset"] or ""},
@@ -167,7 +170,7 @@ def _print_end(plan: BatchPlan, end: BatchEnd) -> None:
     print(f"  {counted(end.failed, 'task')} cannot be done:")
     report = json.loads(Path(facts["report"]).read_text(encoding="utf-8"))
     for failure in report["failures"][:_LISTED_FAILURES]:
-        print("  " + _failure_words(failure))
+        print("  " + _failure_text(failure))
     if end.failed > _LISTED_FAILURES:
         print(f"    and {end.failed - _LISTED_FAILURES:,} more, in {facts['report']}")
 
@@ -209,7 +212,6 @@ def _times(status: BatchStatus) -> dict[str, str]:
 
 def _dry_run(plan: BatchPlan, options: argparse.Namespace) -> int:
     from sd2core.batch.estimate import estimate
-    from sd2core.cli.batch_text import print_estimate
     from sd2core.cli.output import progress_bar
     from sd2core.numerics.compiled import worker_count
 
@@ -221,3 +223,49 @@ def _dry_run(plan: BatchPlan, options: argparse.Namespace) -> int:
     else:
         print_estimate(made, plan)
     return 0
+
+
+def print_estimate(made: BatchEstimate, plan: BatchPlan) -> None:
+    """Print tasks, hours and bytes of a batch."""
+    print(
+        f"{plan.out}: {counted(made.recordings, 'recording')},"
+        f" {counted(plan.placement_count, 'placement')} each"
+    )
+    rows = [("step", "to do", "there", "one process", "written", "basis of the time")]
+    for step, one in made.steps.items():
+        rows.append(
+            (
+                step,
+                f"{one.to_do:,}",
+                f"{one.there:,}",
+                duration(one.seconds),
+                bytes_words(one.bytes),
+                one.basis if one.to_do else "",
+            )
+        )
+    print_rows(rows, right=(1, 2, 3, 4))
+    workers = "1 process" if made.workers == 1 else f"{made.workers} processes"
+    print(
+        f"Estimated: {duration(made.hours * 3600)} on {workers}, {bytes_words(made.bytes)};"
+        " some seconds more to start them"
+    )
+    if made.assumed_share > 0:
+        print(
+            f"{made.assumed_share:.0%} of that rests on another machine's figures: `sd2 fit` on a"
+            " video of yours gives your own."
+        )
+    if made.looked_at < made.recordings:
+        print(f"Estimated from {made.looked_at:,} recordings; the others are assumed to be alike.")
+    if made.unusable:
+        print(f"{counted(len(made.unusable), 'recording')} of the inspected ones cannot be used:")
+        for words in made.unusable[:_LISTED_UNUSABLE]:
+            print(f"  {words}")
+
+
+def bytes_words(size: float) -> str:
+    """Return such as ``1.2 GB``."""
+    for unit in ("B", "kB", "MB", "GB"):
+        if size < 1000:
+            return f"{size:.3g} {unit}"
+        size /= 1000
+    return f"{size:,.3g} TB"

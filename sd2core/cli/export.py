@@ -25,8 +25,8 @@ from sd2core.cli.output import counted, duration, print_facts, print_json, progr
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
+    from sd2core.datasets.forecast import Forecast
     from sd2core.datasets.options import DatasetOptions
-    from sd2core.datasets.planning import Forecast
     from sd2core.datasets.recording_sources import Making
     from sd2core.datasets.source import LazySource
     from sd2core.datasets.writing import Written
@@ -180,8 +180,8 @@ def _export(options: argparse.Namespace) -> int:
 
 
 def _exported(options: argparse.Namespace, lines: _Lines | None) -> int:
-    from sd2core.datasets.inputs import gather
     from sd2core.datasets.layout import format_of
+    from sd2core.datasets.sources import gather
 
     format_of(options.out)
     wanted = _dataset_options(options)
@@ -250,7 +250,7 @@ def _making(options: argparse.Namespace) -> Making:
 def _dry_run(
     options: argparse.Namespace, sources: list[LazySource], wanted: DatasetOptions, making: Making
 ) -> int:
-    from sd2core.datasets.planning import Counting
+    from sd2core.datasets.forecast import Counting
 
     with progress_bar("Counting", "source") as progress:
         counting = Counting.of(sources, progress)
@@ -287,8 +287,8 @@ def _simulating_s(options: argparse.Namespace, making: Making) -> float | None:
     """How long simulating radars would take; None where nobody asked for it."""
     if making.simulation is None:
         return None
-    from sd2core.datasets.cost import simulation_s
-    from sd2core.datasets.inputs import recordings_of
+    from sd2core.datasets.forecast import simulation_s
+    from sd2core.datasets.sources import recordings_of
 
     return simulation_s(recordings_of(options.inputs), making)
 

@@ -155,7 +155,7 @@ def _make(options: argparse.Namespace, lines: FitLines | None) -> None:
         from sd2core.cli.reading import check_output
 
         check_output(options.landmarks, ".npz")
-    from sd2core.batch.rates import remember_fit_rate
+    from sd2core.batch.estimate import remember_fit_rate
     from sd2core.body.fit_folder import PARTIAL, check_fit_output
     from sd2core.body.fit_video import fit_video
 

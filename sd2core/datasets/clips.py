@@ -22,16 +22,6 @@ def clips_of_dataset(dataset: Dataset, kind: MapKind) -> ClipSet:
 
     Segments of a source that overlap or touch become one clip again, so that a frame
     counts once and a classifier that remembers sees whole movements.
-
-    Parameters
-    ----------
-    dataset : Dataset
-    kind : {"synthetic", "denoised", "simulated", "real"}
-
-    Raises
-    ------
-    Sd2Error
-        When no segment has such a map.
     """
     header = dataset.header
     if kind not in header.kinds:

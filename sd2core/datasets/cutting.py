@@ -60,12 +60,10 @@ def clips_of(
 
     Parameters
     ----------
-    times_s : float64 array, shape (frames,)
     present : bool array, shape (frames,), optional
         Frames with a person; None: all.
     frame_rate_hz : float
         Of the segments.
-    length, overlap : int
     """
     there = np.ones(len(times_s), bool) if present is None else present
     found = []
@@ -111,13 +109,10 @@ def cut_source(
 
     Parameters
     ----------
-    source : Source
-    frame_rate_hz : float
     null_bins : sequence of int
         Set to zero.
     label_numbers : int16 array, shape (labels,)
         What each label of the source is in the data set.
-    options : DatasetOptions
 
     Yields
     ------
@@ -169,7 +164,6 @@ def label_of_segments(
         Labels of the frames; 0 is background.
     labels : int
         How many there are.
-    options : DatasetOptions
     """
     counts = np.stack([(windows == number).sum(axis=1) for number in range(labels)], axis=1)
     if options.label_rule == "majority" or labels == 1:

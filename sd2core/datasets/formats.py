@@ -31,12 +31,7 @@ META, SOURCES = "meta", "sources"
 
 
 def refuse_large_npz(out: Path, segments: int, header: Header) -> None:
-    """Refuse an NPZ that nobody could open.
-
-    Raises
-    ------
-    Sd2Error
-    """
+    """Refuse an NPZ that nobody could open."""
     size = segments * bytes_per_segment(header.length, header.axis.bins, len(header.kinds))
     if size > NPZ_LIMIT_BYTES:
         raise Sd2Error(
@@ -58,12 +53,8 @@ def write_packed(
 
     Parameters
     ----------
-    out : Path
-    form : {"hdf5", "npz"}
-    header : Header
     arrays : dict of str to array
         As Zarr or h5py has them: read in parts.
-    sources : iterable of dict
     progress : Progress
         Counts segments.
     """
@@ -74,13 +65,7 @@ def write_packed(
 
 
 def open_hdf5(path: Path) -> tuple[Header, dict[str, Any], Any]:
-    """Header and arrays of an HDF5 data set, and the open file.
-
-    Raises
-    ------
-    Sd2Error
-        When it is none, or damaged.
-    """
+    """Header and arrays of an HDF5 data set, and the open file."""
     import h5py
 
     try:
@@ -100,13 +85,7 @@ def open_hdf5(path: Path) -> tuple[Header, dict[str, Any], Any]:
 
 
 def open_npz(path: Path) -> tuple[Header, dict[str, Any], list[dict[str, Any]]]:
-    """Header, arrays and sources of an NPZ data set, all of it read.
-
-    Raises
-    ------
-    Sd2Error
-        When it is none, or damaged.
-    """
+    """Header, arrays and sources of an NPZ data set, all of it read."""
     try:
         with np.load(path, allow_pickle=False) as data:
             found = {name: data[name] for name in data.files}

@@ -29,7 +29,6 @@ class LabelledSource(NamedTuple):
 
     Parameters
     ----------
-    path : Path
     subject : str
         Empty where nothing was said.
     """
@@ -52,8 +51,6 @@ class LabelledFacts:
 
     Parameters
     ----------
-    path : Path
-    kind : {"pairs", "data set", "recording", "radar file"}
     subjects : tuple of str
         As the source itself calls them.
     maps : tuple of str
@@ -62,7 +59,6 @@ class LabelledFacts:
         Of the movements, each counted once; None where only reading the maps would tell.
     simulated : bool
         Whether its radar is.
-    placements : int
     spans : int
         Labelled ones; 0 where labels stand by frames.
     grid : Grid or None
@@ -84,13 +80,7 @@ class LabelledFacts:
 
 
 def unfolded(sources: Sequence[LabelledSource]) -> list[LabelledSource]:
-    """Folders of recordings or radar files as what they hold.
-
-    Raises
-    ------
-    Sd2Error
-        When one is not there.
-    """
+    """Folders of recordings or radar files as what they hold."""
     found: list[LabelledSource] = []
     for one in sources:
         if not one.path.exists():
@@ -112,13 +102,7 @@ def inside_of(folder: Path) -> list[Path]:
 
 
 def labelled_facts(source: LabelledSource) -> LabelledFacts:
-    """Look into one that is no folder of several.
-
-    Raises
-    ------
-    Sd2Error
-        When it cannot be read, holds no labels, or is nothing to learn from.
-    """
+    """Look into one that is no folder of several."""
     path = source.path
     kind = kind_of(path)
     if kind == "pairs":

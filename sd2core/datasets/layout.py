@@ -53,10 +53,8 @@ class Header:
     ----------
     length, overlap : int
         Frames of a segment, and how many neighbours share.
-    axis : VelocityAxis
     null_bins : tuple of int
         Zero on purpose, in all kinds.
-    frame_rate_hz : float
     label_rule, min_share
         As :class:`~sd2core.datasets.options.DatasetOptions` has them.
     kinds_wanted, kinds : tuple of str
@@ -71,10 +69,8 @@ class Header:
         Subjects of each split.
     units : dict of str to tuple of str
         What 1 means in each kind; several where sources differ.
-    title : str
     made_by : str
         Program and version.
-    provenance : dict
     """
 
     length: int
@@ -128,13 +124,7 @@ class Header:
 
     @classmethod
     def from_dict(cls, entry: dict[str, Any], path: Path) -> Header:
-        """Read what :meth:`as_dict` made; ``path`` is for messages.
-
-        Raises
-        ------
-        Sd2Error
-            When it is of another format or version, or damaged.
-        """
+        """Read what :meth:`as_dict` made; ``path`` is for messages."""
         check_format(entry, path)
         try:
             return cls(
@@ -177,13 +167,7 @@ def check_format(entry: Any, path: Path) -> None:
 
 
 def format_of(path: Path) -> FileFormat:
-    """Format of a data set by the ending of its name.
-
-    Raises
-    ------
-    Sd2Error
-        For another ending.
-    """
+    """Format of a data set by the ending of its name."""
     found = SUFFIXES.get(path.suffix.lower())
     if found is None:
         raise Sd2Error(f"The data set is to be {path}", f"a name ending in {', '.join(SUFFIXES)}")

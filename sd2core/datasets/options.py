@@ -43,7 +43,6 @@ class DatasetOptions:
     validation, test : tuple of str, optional
         Subjects that validate and test; None: chosen by their names, see
         :mod:`sd2core.datasets.splitting`.
-    title : str
     provenance : dict
         How the data set was made; kept as JSON.
 

@@ -66,13 +66,7 @@ class Example:
 
 
 def write_preview(path: Path) -> Path:
-    """Draw the sheet of a finished data set beside it; where it is.
-
-    Raises
-    ------
-    Sd2Error
-        When the path holds no finished data set.
-    """
+    """Draw the sheet of a finished data set beside it; where it is."""
     with open_dataset(path) as dataset:
         name = dataset.path.name
         title = dataset.header.title or name

@@ -23,10 +23,6 @@ class Dataset:
 
     Parameters
     ----------
-    path : Path
-    form : {"zarr", "hdf5", "npz"}
-    header : Header
-    arrays : dict of str to array
     sources : list of dict, optional
         As an NPZ holds them.
     file : object, optional

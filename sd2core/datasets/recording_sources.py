@@ -8,14 +8,13 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.accuracy.places import choose_for_places, spread
 from sd2core.accuracy.synthesizers import synthesizer_for
-from sd2core.datasets.denoising import Denoising
 from sd2core.datasets.simulating import CLUTTER, Simulation, simulated_map
 from sd2core.datasets.source import (
     BACKGROUND,
@@ -27,6 +26,8 @@ from sd2core.datasets.source import (
     label_per_frame,
     plain_name,
 )
+from sd2core.denoise.files import DEFAULT_NAME, describe_model, find_model
+from sd2core.denoise.resample_to_model import check_map
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.files.digests import cached_digest
@@ -42,6 +43,9 @@ from sd2core.progress import Progress
 from sd2core.recording.recording import Recording, open_recording
 from sd2core.sensor import Vector, VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase
+
+if TYPE_CHECKING:
+    from sd2core.denoise.live import TrainedDenoiser
 
 _STEPS = 1000
 _COUNTED_SHARE = 0.05
@@ -89,15 +93,8 @@ def recording_sources(
 
     Parameters
     ----------
-    paths : sequence of Path
     subjects : sequence of str
         Who each recording is of.
-    making : Making
-
-    Raises
-    ------
-    Sd2Error
-        When one is no recording, or holds neither a mesh nor a radar file.
     """
     shared = _Shared(making)
     found = []
@@ -133,7 +130,6 @@ def radar_map(recording: Recording, axis: VelocityAxis) -> DopplerMap:
 
     Parameters
     ----------
-    recording : Recording
     axis : VelocityAxis
         Of a capture's map; a file that holds a map keeps its own.
     """
@@ -185,7 +181,7 @@ class _Opened:
         self._radar: DopplerMap | None = None
         labels = recording.effective_labels()
         self._names, self._classes = labels_and_classes(labels)
-        self._spans = [span for span in labels.spans if span.origin != "suggestion"]
+        self._spans = labels.spans
 
     def outline(self, placement: int) -> Outline:
         timebase, present, radar_kind = self._clock
@@ -363,8 +359,6 @@ def _fingerprint(recording: Recording, key: SourceKey, making: Making) -> str:
 
 def _model_of(recording: Recording, making: Making) -> Path | None:
     """The denoiser's file; None where the recording is to be shown without."""
-    from sd2core.denoise.files import DEFAULT_NAME, find_model
-
     if making.model is not None:
         return find_model(making.model)
     if recording.denoiser is not None:
@@ -372,3 +366,26 @@ def _model_of(recording: Recording, making: Making) -> Path | None:
     if recording.bundled_denoiser == "":
         return None
     return find_model(recording.bundled_denoiser or DEFAULT_NAME)
+
+
+class Denoising:
+    """Denoises one map after another."""
+
+    def __init__(self) -> None:
+        self._path: Path | None = None
+        self._model: TrainedDenoiser | None = None
+
+    def denoised(self, synthetic: DopplerMap, path: Path) -> DopplerMap:
+        """What a radar would show in place of a synthetic map.
+
+        Parameters
+        ----------
+        path : Path
+            Model file.
+        """
+        if self._model is None or path != self._path:
+            from sd2core.denoise.files import load_model
+
+            check_map(synthetic, describe_model(path))  # before torch is loaded: it takes seconds
+            self._model, self._path = load_model(path), path
+        return self._model.denoise(synthetic)

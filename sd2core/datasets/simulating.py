@@ -40,7 +40,6 @@ class Simulation:
 
     Parameters
     ----------
-    radar : RadarConfig
     seed : int
         Of phases and noise; every mesh and place has its own from it, see :func:`seed_of`.
     """
@@ -79,17 +78,8 @@ def simulated_map(
     ----------
     mesh : MeshSequence
         With faces.
-    sensor : VirtualSensor
-    simulation : Simulation
-    axis : VelocityAxis
     frames : (int, int), optional
         Only these frames of the mesh, the last excluded: columns of the whole map.
-    progress : Progress
-
-    Raises
-    ------
-    Sd2Error
-        When the mesh has no faces, or the radar cannot be simulated.
     """
     start_s = mesh.timebase.start_s
     # As a capture says it, whose clock begins with its first frame.

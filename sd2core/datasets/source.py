@@ -52,7 +52,6 @@ class Outline:
     ----------
     kinds : tuple of str
         Of its maps.
-    times_s : float64 array, shape (frames,)
     present : bool array, shape (frames,), optional
         Frames with a person; None: all.
     label : int array, shape (frames,)
@@ -78,7 +77,6 @@ class Source:
         Whose, and which; ``recording`` is unique within the subject.
     placement : int
         0 for the recording's own sensor; 1 and up are the same movement seen from elsewhere.
-    sensor : VirtualSensor
     maps : mapping of kind to DopplerMap
         On one axis and one clock. A map's ``present`` is False in frames of which it says
         nothing: in a synthetic or denoised map those without a person, in a radar's map
@@ -204,7 +202,6 @@ class LazySource:
 
     Parameters
     ----------
-    key : SourceKey
     load : callable
         Makes the source; may raise ``Sd2Error``, which leaves out this source alone.
     fingerprint : callable
@@ -234,13 +231,14 @@ def label_per_frame(
     Parameters
     ----------
     spans : sequence of Span
-        Later ones lie over earlier ones.
+        Later ones lie over earlier ones; suggestions are left out.
     labels : tuple of str
         The first is :data:`BACKGROUND`.
-    times_s : float64 array, shape (frames,)
     """
     label = np.zeros(len(times_s), np.int16)
     for span in spans:
+        if span.origin == "suggestion":
+            continue
         label[(times_s >= span.start_s) & (times_s < span.end_s)] = labels.index(
             plain_name(span.label)
         )

@@ -23,13 +23,7 @@ def split_people(
     validation: Sequence[str] | None = None,
     test: Sequence[str] | None = None,
 ) -> Split:
-    """Who is learnt from and who is kept out; :data:`RULE` says how those not named are chosen.
-
-    Raises
-    ------
-    Sd2Error
-        As :func:`~sd2core.train.data.split_subjects`, which does it for trainings.
-    """
+    """Who is learnt from and who is kept out; :data:`RULE` says how those not named are chosen."""
     free = [name for name in subjects if name not in {*(validation or ()), *(test or ())}]
     most = max(1, len(subjects) // 3)
     if test is None:
@@ -65,16 +59,7 @@ def _own(name: str) -> str:
 
 
 def _chosen(people: Sequence[str], away: Callable[[float], float], most: int) -> list[str]:
-    """Those within a sixth; at least the nearest one, at most the ``most`` nearest.
-
-    Parameters
-    ----------
-    people : sequence of str
-    away : callable
-        How far a number is from a split's far end, counted so that who is learnt from comes
-        before the other split that is kept out.
-    most : int
-    """
+    """Those within a sixth; at least the nearest one, at most the ``most`` nearest."""
     far = {name: away(number_of(name)) for name in people}
     count = max(sum(one < _SHARE for one in far.values()), 1)
     chosen = sorted(people, key=far.__getitem__)[: max(0, min(count, most))]

@@ -162,13 +162,7 @@ class SegmentStore:
         yield from read_sources(self.path / SOURCES_NAME)
 
     def finish(self, header: Header, split_of_subject: np.ndarray) -> None:
-        """Write the split of every segment and the header: the data set is complete.
-
-        Parameters
-        ----------
-        header : Header
-        split_of_subject : int8 array, shape (subjects,)
-        """
+        """Write the split of every segment and the header: the data set is complete."""
         self.flush()
         for name in [one for one in KINDS if one in self._arrays and one not in header.kinds]:
             del self._group[name], self._arrays[name]
@@ -209,13 +203,7 @@ class SegmentStore:
 
 
 def open_arrays(path: Path) -> tuple[Header, dict[str, Any]]:
-    """Header and arrays of a finished store; nothing is read but descriptions.
-
-    Raises
-    ------
-    Sd2Error
-        When it is none, or not finished.
-    """
+    """Header and arrays of a finished store; nothing is read but descriptions."""
     import zarr
 
     if not is_dataset(path):

@@ -51,12 +51,10 @@ class Written:
 
     Parameters
     ----------
-    path : Path
     segments, sources : int
         In the data set now.
     added : int
         Sources that were not there before.
-    failed : tuple of Failed
     """
 
     path: Path
@@ -84,8 +82,6 @@ def write_dataset(
     ----------
     out : Path
         Its ending says the format: ``.zarr``, ``.h5``, ``.hdf5`` or ``.npz``.
-    sources : iterable of Source or LazySource
-    options : DatasetOptions, optional
     progress : Progress
         Of all sources where their number is known; it may raise ``Cancelled``.
 

@@ -50,10 +50,8 @@ def join(
 
     Parameters
     ----------
-    windows : float32 array, shape (windows, length, bins)
     starts : int array, shape (windows,)
         They cover every frame.
-    frames : int
 
     Returns
     -------

@@ -45,7 +45,6 @@ class Take:
 
     Parameters
     ----------
-    subject : str
     name : str
         Unique within the subject.
     synthetic : float32 array, shape (frames, bins)
@@ -110,14 +109,10 @@ class PairSet:
 
     Parameters
     ----------
-    kind : {"simulated", "real"}
-    axis : VelocityAxis
     null_bins : tuple of int
         Bins that are zero on purpose, in input and target.
-    frame_rate_hz : float
     labels : tuple of str
         The first is the background.
-    takes : tuple of Take
     provenance : dict
         How it was made; kept as JSON.
     """

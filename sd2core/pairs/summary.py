@@ -22,16 +22,7 @@ class TakeFacts:
 
 @dataclass(frozen=True)
 class PairFacts:
-    """A store of pairs, but for its values.
-
-    Parameters
-    ----------
-    path : Path
-    kind : {"simulated", "real"}
-    bins : int
-    v_max_mps, frame_rate_hz : float
-    takes : tuple of TakeFacts
-    """
+    """A store of pairs, but for its values."""
 
     path: Path
     kind: PairKind

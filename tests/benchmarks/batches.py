@@ -198,18 +198,16 @@ def _in_this_process(bodies: Path, how: str) -> None:
     class Here:
         """Does what it is given at once."""
 
-        most_deaths = 1
-
         def __init__(self) -> None:
             self._ended: list[Any] = []
 
         def workers(self) -> dict[str, int]:
             return {"here": 1}
 
-        def submit(self, tasks: tuple[Any, ...], worker: str) -> None:
-            run_tasks([task.record(out) for task in tasks])
+        def submit(self, tasks: tuple[Any, ...], worker: str | None) -> None:
+            outcomes = run_tasks([task.record(out) for task in tasks])
             peaks[tasks[0].step] = peak_mb()
-            self._ended.append(Ending(tasks, (None,) * len(tasks)))
+            self._ended.append(Ending(tasks, outcomes, "here"))
 
         def ended(self, timeout_s: float) -> list[Any]:
             ended, self._ended = self._ended, []

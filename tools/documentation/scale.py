@@ -20,9 +20,9 @@ from sd2core.batch.estimate import task_rates
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.inputs import find_origins, glance
 from sd2core.batch.plan_file import plan_from_text
-from sd2core.batch.stretches import LONGEST_FRAMES
-from sd2core.batch.task_graph import Flow
-from sd2core.cli.batch_text import bytes_words
+from sd2core.batch.synthesis import LONGEST_FRAMES
+from sd2core.batch.task_graph import TaskGraph
+from sd2core.cli.batch import bytes_words
 from sd2core.files.resources import resource_path
 from sd2core.numerics.compiled import warm_up
 from sd2core.recording.recording import open_recording
@@ -349,7 +349,7 @@ def _costs(folder: Path, fits: list[Fitted]) -> list[Cost]:
         )
         plan = plan_from_text(text, folder)
         origins = find_origins(plan.recordings, Path(plan.out))
-        flow = Flow(plan, BatchFolder(Path(plan.out)), origins)
+        flow = TaskGraph(plan, BatchFolder(Path(plan.out)), origins)
         rates = task_rates(flow, glance(origins[0]))
         for step in ("synthesise", "denoise"):
             if step == "synthesise" or not how:

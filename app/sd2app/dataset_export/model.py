@@ -14,10 +14,10 @@ from sd2app.background.run_folder import COMMAND, CommandFolder, folders_in
 from sd2app.dataset_export.messages import Exported
 from sd2app.dataset_export.run import ExportRun, user_exports_folder
 from sd2app.session.tasks import Job, JobsModel
-from sd2core.datasets.inputs import gather, recordings_in
+from sd2core.datasets.forecast import Counting, Forecast
 from sd2core.datasets.options import DatasetOptions
-from sd2core.datasets.planning import Counting, Forecast
 from sd2core.datasets.recording_sources import Making
+from sd2core.datasets.sources import gather, recordings_in
 from sd2core.errors import Sd2Error
 from sd2core.maps import MapKind
 from sd2core.pairs.segments import LENGTH, OVERLAP

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sd2core.datasets.planning import Forecast
+from sd2core.datasets.forecast import Forecast
 
 
 def size_words(forecast: Forecast, length: int) -> str:

@@ -72,16 +72,10 @@ def clips_of(
 
     Parameters
     ----------
-    sources : sequence of LabelledSource
     maps : sequence of str, optional
         None: the radar's and, where there are some, synthetic ones.
     denoiser : TrainedDenoiser, optional
         For denoised maps of pairs.
-
-    Raises
-    ------
-    Sd2Error
-        When one cannot be read, holds no labels, or they cannot be mixed.
     """
     from sd2core.classify.data import clips_of_pairs, merged
     from sd2core.datasets.labelled import unfolded

@@ -6,8 +6,7 @@ from pathlib import Path
 
 from sd2core.cli.info.description import Description, bins_in_words
 from sd2core.cli.output import counted
-from sd2core.datasets.card import describe_dataset
-from sd2core.datasets.card_text import duration_words, limits
+from sd2core.datasets.card import describe_dataset, duration_text, limits
 from sd2core.datasets.reading import open_dataset
 
 
@@ -27,7 +26,7 @@ def describe_dataset_at(path: Path) -> Description:
         "classes": _listed(card["segments_of_class"]),
         "splits": _listed(card["segments_of_split"]),
         "from": f"{counted(card['recordings'], 'recording')} of"
-        f" {counted(len(card['subjects']), 'subject')}, {duration_words(card)}, up to"
+        f" {counted(len(card['subjects']), 'subject')}, {duration_text(card)}, up to"
         f" {counted(card['placements'], 'placement')} each",
         "range": "" if ranges_m is None else f"{ranges_m[0]:g} to {ranges_m[1]:g} m",
         "velocity": f"{axis.bins} bins of {axis.bin_width_mps:g} m/s over ±{axis.v_max_mps:g} m/s,"

@@ -10,12 +10,17 @@ from moving_spheres import save_spheres
 from numbered_videos import write_video
 
 from sd2core.batch import estimate as module
-from sd2core.batch.estimate import BatchEstimate, estimate
+from sd2core.batch.estimate import (
+    BatchEstimate,
+    TaskRate,
+    estimate,
+    export_s,
+    known_fit_rate,
+    remember_fit_rate,
+)
 from sd2core.batch.plan import BatchPlan
 from sd2core.batch.plan_file import plan_from_text
-from sd2core.batch.probing import TaskRate, export_s
-from sd2core.batch.rates import known_fit_rate, remember_fit_rate
-from sd2core.cli.batch_text import print_estimate
+from sd2core.cli.batch import print_estimate
 
 PLAN = """
 out = "made"

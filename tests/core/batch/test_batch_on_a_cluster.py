@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import os
 import platform
@@ -68,6 +69,9 @@ def test_a_killed_worker_loses_its_current_task_only(tmp_path: Path) -> None:
     for path, changed_ns in killer.there.items():
         assert path.stat().st_mtime_ns == changed_ns
     assert end.facts["done"]["synthesise"] == 18
+    notes = [one["text"] for one in said if one["event"] == "note"]
+    assert len(notes) == 1
+    assert notes[0].startswith("A worker died during synthesise of m")
 
 
 def test_other_users_of_the_machine_cannot_connect_to_a_local_batch(tmp_path: Path) -> None:
@@ -112,14 +116,22 @@ class _Killer(threading.Thread):
         self.there: dict[Path, int] = {}
 
     def run(self) -> None:
-        marker = self._out / BEGUN / f"task-{platform.node()}-{self._worker.pid}"
+        process = f"{platform.node()} {self._worker.pid}"
+
+        def at_work() -> Path | None:
+            for marker in self._out.glob(f"{BEGUN}/task-*"):
+                with contextlib.suppress(FileNotFoundError):
+                    if process in marker.read_text().splitlines():
+                        return marker
+            return None
+
         until_s = time.monotonic() + 60
         while time.monotonic() < until_s:
-            if marker.exists() and len(list(self._out.glob("synthetic/*/*.npz"))) >= 4:
+            if at_work() and len(list(self._out.glob("synthetic/*/*.npz"))) >= 4:
                 os.kill(self._worker.pid, signal.SIGSTOP)
                 # It may have come to its end just before it was stopped.
-                if marker.exists():
-                    self.during = marker.read_text()
+                if (marker := at_work()) is not None:
+                    self.during = marker.name
                     self.there = {
                         path: path.stat().st_mtime_ns
                         for path in self._out.glob("synthetic/*/*.npz")

@@ -18,7 +18,7 @@ from sd2core.batch.estimate import estimate
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.plan_file import plan_from_text, plan_text
 from sd2core.batch.run import BatchEnd, run_batch
-from sd2core.batch.stretches import stretches_of
+from sd2core.batch.synthesis import stretches_of
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.simulating import Simulation, simulated_map
 from sd2core.errors import Sd2Error

@@ -15,8 +15,7 @@ from moving_spheres import swinging_sphere
 from sd2core.batch.denoising import denoise
 from sd2core.batch.inputs import mesh_input_of
 from sd2core.batch.plan import Synthesise
-from sd2core.batch.stretches import LONGEST_FRAMES, stretches_of
-from sd2core.batch.synthesis import synthesise
+from sd2core.batch.synthesis import LONGEST_FRAMES, stretches_of, synthesise
 from sd2core.denoise.files import find_model, load_model
 from sd2core.doppler import Synthesizer
 from sd2core.io.mesh import load_mesh, save_mesh

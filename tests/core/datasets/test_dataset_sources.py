@@ -14,12 +14,12 @@ from swinging_recordings import FRAMES, RATE_HZ, recording
 from sd2core.accuracy.places import PlacedPlan
 from sd2core.accuracy.plans import AccuracyPlan
 from sd2core.accuracy.synthesizers import synthesizer_for
-from sd2core.datasets.inputs import gather
+from sd2core.datasets.forecast import Counting
 from sd2core.datasets.options import DatasetOptions
-from sd2core.datasets.planning import Counting
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.recording_sources import Making
 from sd2core.datasets.source import Source
+from sd2core.datasets.sources import gather
 from sd2core.datasets.writing import write_dataset
 from sd2core.denoise.files import find_model, load_model
 from sd2core.doppler import PRESETS, Synthesizer

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from swinging_recordings import FRAMES, recording
 
-from sd2core.datasets.cost import simulation_s
-from sd2core.datasets.inputs import gather
+from sd2core.datasets.forecast import simulation_s
 from sd2core.datasets.recording_sources import Making
 from sd2core.datasets.simulating import Simulation, seed_of, simulated_map
 from sd2core.datasets.source import Source
+from sd2core.datasets.sources import gather
 from sd2core.errors import Sd2Error
 from sd2core.fmcw import LinkBudget, SignalOptions, WaveOptions, simulate_radar
 from sd2core.io.radar import write_capture
@@ -138,7 +138,7 @@ def test_what_it_costs_grows_with_frames_and_places(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folders = [recording(tmp_path / f"{name}.sd2", radar=False).folder for name in ("a", "b")]
-    monkeypatch.setattr("sd2core.datasets.cost._timed_s", lambda *scene: 0.5)
+    monkeypatch.setattr("sd2core.datasets.forecast._timed_s", lambda *scene: 0.5)
     assert simulation_s(folders, SIMULATED) == 0.5 * FRAMES * 3 * 2
     assert simulation_s(folders, replace(SIMULATED, placements=None)) == 0.5 * FRAMES * 2
     assert simulation_s(folders, replace(SIMULATED, simulation=None)) == 0.0

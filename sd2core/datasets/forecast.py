@@ -1,36 +1,42 @@
-"""What an export would write: counts and bytes, before any map is made."""
+"""Forecast of an export: segments, bytes and time, before any map is made."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import time
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from sd2core.datasets.cutting import count_segments
 from sd2core.datasets.layout import bytes_per_segment
 from sd2core.datasets.options import DatasetOptions
+from sd2core.datasets.recording_sources import Making, places_of
+from sd2core.datasets.simulating import simulated_map
 from sd2core.datasets.source import KINDS, LazySource, Outline, Source
 from sd2core.datasets.splitting import split_people
 from sd2core.errors import Sd2Error
 from sd2core.maps import MapKind
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Progress, silent
+from sd2core.recording.recording import open_recording
+from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 from sd2core.train.data import Split
+
+_TIMED_FRAMES = 60
+_WARMING_FRAMES = 4
 
 
 @dataclass(frozen=True)
 class Forecast:
-    """What would be written.
+    """Size of the data set that would be written.
 
     Parameters
     ----------
-    sources : int
-    segments : int
     of_subject, of_label : dict of str to int
         Segments.
     of_kind : dict of str to int
         Segments that have it; where a radar missed frames it may be fewer.
-    split : Split
-    frame_rate_hz : float
     total_bytes : int
         Of the arrays before compression.
     failed : tuple of str
@@ -59,13 +65,12 @@ class Forecast:
 
 @dataclass
 class Counting:
-    """Sources whose outlines were read once, to be counted with other options again and again.
+    """Outlines of sources, read once and counted with several options.
 
     Parameters
     ----------
     outlines : list of (str, Outline)
         With the subject of each.
-    failed : list of str
     """
 
     outlines: list[tuple[str, Outline]] = field(default_factory=list)
@@ -88,18 +93,12 @@ class Counting:
         return found
 
     def forecast(self, options: DatasetOptions, bins: int) -> Forecast:
-        """What these options would give of them.
+        """Count the segments that these options give.
 
         Parameters
         ----------
-        options : DatasetOptions
         bins : int
             Of the velocity axis.
-
-        Raises
-        ------
-        Sd2Error
-            When nothing could be read, or the subjects cannot be split so.
         """
         if not self.outlines:
             raise Sd2Error(
@@ -113,7 +112,7 @@ class Counting:
         of_kind: dict[MapKind, int] = {}
         for subject, outline in self.outlines:
             total, labels = count_segments(outline, rate_hz, options)
-            if total:  # who has no segment is in no split
+            if total:
                 of_subject[subject] = of_subject.get(subject, 0) + total
             for name, count in labels.items():
                 of_label[name] = of_label.get(name, 0) + count
@@ -135,3 +134,44 @@ class Counting:
             total_bytes=segments * bytes_per_segment(options.length, bins, len(of_kind)),
             failed=tuple(self.failed),
         )
+
+
+def simulation_s(recordings: Sequence[Path], making: Making) -> float:
+    """Estimate the seconds that simulating all recordings from all places takes.
+
+    Timed on some frames of the first recording that can be simulated; the others are assumed
+    to cost the same per frame.
+
+    Parameters
+    ----------
+    recordings : sequence of Path
+        Those that cannot be read are left out.
+    """
+    if making.simulation is None or "simulated" not in making.kinds:
+        return 0.0
+    frames, each_s = 0, 0.0
+    for path in recordings:
+        try:
+            recording = open_recording(path)
+            mesh = recording.load_mesh() if recording.mesh is not None else None
+        except Sd2Error:
+            continue  # the counting says it
+        if mesh is None or mesh.faces is None:
+            continue
+        if not frames:
+            each_s = _timed_s(mesh, recording.sensor, making)
+        frames += mesh.frame_count * (1 + len(places_of(recording, making)))
+    return frames * each_s
+
+
+def _timed_s(mesh: MeshSequence, sensor: VirtualSensor, making: Making) -> float:
+    """Measure the seconds per frame in the middle of the clip."""
+    assert making.simulation is not None
+    middle = mesh.frame_count // 2
+    begun_s = 0.0
+    for count in (_WARMING_FRAMES, _TIMED_FRAMES):
+        start = max(middle - count // 2, 0)
+        stop = min(start + count, mesh.frame_count)
+        begun_s = time.perf_counter()
+        simulated_map(mesh, sensor, making.simulation, making.synthesis.axis, (start, stop))
+    return (time.perf_counter() - begun_s) / (stop - start)

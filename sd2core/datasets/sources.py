@@ -1,0 +1,278 @@
+"""Sources of all that can be exported: recordings, pairs, Doppler maps and radar files."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sd2core.datasets.recording_sources import (
+    Denoising,
+    Making,
+    labels_and_classes,
+    recording_sources,
+)
+from sd2core.datasets.source import KINDS, LazySource, Outline, Source, SourceKey, label_per_frame
+from sd2core.denoise.files import DEFAULT_NAME, find_model
+from sd2core.errors import Sd2Error
+from sd2core.files.digests import cached_digest
+from sd2core.io.kinds import kind_of
+from sd2core.io.radar import holds_map, load_recorded_map
+from sd2core.labels.files import read_labels as read_own
+from sd2core.labels.formats import read_labels
+from sd2core.labels.label_set import GESTURES
+from sd2core.labels.spans import Labels
+from sd2core.maps import DopplerMap, MapKind
+from sd2core.pairs.store import open_takes
+from sd2core.progress import Progress
+from sd2core.recording.recording import SUFFIX, is_recording
+from sd2core.sensor import VelocityAxis, VirtualSensor
+from sd2core.timebase import Timebase
+
+_EXPECTED = "recordings (.sd2), pairs (.zarr), Doppler maps (.npz), or folders of recordings"
+_PAIR_ARRAYS = ("synthetic", "radar", "times_s", "label")
+
+
+def gather(
+    paths: Sequence[Path],
+    making: Making,
+    *,
+    subjects: Sequence[str] | None = None,
+    label_files: Sequence[Path] = (),
+) -> list[LazySource]:
+    """Return the sources of all files named, in their order.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Recordings, folders of recordings, pairs, Doppler maps.
+    making : Making
+        Options for the maps of recordings.
+    subjects : sequence of str, optional
+        Subject of each recording and each map, in their order; by default each shows another
+        person, named like the file. Pairs name their subjects themselves.
+    label_files : sequence of Path
+        One for each map (``.npz``), or none.
+
+    Raises
+    ------
+    Sd2Error
+        When a path is something else, or their numbers do not fit.
+    """
+    files = [one for path in paths for one in _expanded(Path(path))]
+    pairs = [path for path in files if not is_recording(path) and kind_of(path) == "pairs"]
+    single = [path for path in files if path not in pairs]
+    names = [path.stem for path in single] if subjects is None else list(subjects)
+    if len(names) != len(single):
+        raise Sd2Error(
+            f"{len(names)} people are named for {len(single)} recordings and maps",
+            "one for each, in their order",
+        )
+    maps = [path for path in single if not is_recording(path)]
+    if label_files and len(label_files) != len(maps):
+        raise Sd2Error(
+            f"{len(label_files)} label files are given for {len(maps)} maps", "one for each map"
+        )
+    labelled = dict(zip(maps, label_files, strict=False))
+    found = pair_sources(pairs, making.kinds, making.model) if pairs else []
+    recordings = {path: name for path, name in zip(single, names, strict=True) if path not in maps}
+    found += recording_sources(list(recordings), list(recordings.values()), making)
+    for path, name in zip(single, names, strict=True):
+        if path in maps:
+            found.append(map_source(path, name, labelled.get(path)))
+    return found
+
+
+def recordings_of(paths: Sequence[Path]) -> list[Path]:
+    """Return the recordings among inputs and in folders of them."""
+    return [one for path in paths for one in _expanded(Path(path)) if is_recording(one)]
+
+
+def recordings_in(folder: Path) -> list[Path]:
+    """Return the recordings directly in a folder, by name."""
+    return sorted(path for path in folder.glob(f"*{SUFFIX}") if is_recording(path))
+
+
+def _expanded(path: Path) -> list[Path]:
+    """Return the path, or the recordings in it where it is a folder of them."""
+    if is_recording(path):
+        return [path]
+    if path.is_dir():
+        inside = recordings_in(path)
+        if inside:
+            return inside
+    kind = kind_of(path)
+    if kind in ("pairs", "map") or (kind == "radar" and holds_map(path)):
+        return [path]
+    raise Sd2Error(f"{path} is of kind {kind}", _EXPECTED)
+
+
+# -- Doppler maps: files of `sd2 synth` and the like, and radars' own recordings -----------------
+
+
+def map_source(path: Path, subject: str, label_file: Path | None = None) -> LazySource:
+    """Return the source of one Doppler map.
+
+    Parameters
+    ----------
+    path : Path
+        Map (``.npz``), or radar file that holds one with labels of its own.
+    subject : str
+        Person in the map.
+    label_file : Path, optional
+        On the map's clock, in any format that `sd2 labels convert` reads. None: the labels
+        of the radar's file, otherwise nothing is labelled.
+    """
+    key = SourceKey(subject, path.stem, 0)
+
+    def fingerprint() -> str:
+        sums = hashlib.blake2b(digest_size=16)
+        for one in (path, label_file):
+            sums.update(b"" if one is None else cached_digest(one).encode())
+        return sums.hexdigest()
+
+    def load(_: Progress) -> Source:
+        doppler, labels = _read_map(path, label_file)
+        names, classes = labels_and_classes(labels)
+        return Source(
+            *key,
+            _sensor(doppler.meta),
+            {doppler.kind: doppler},
+            label_per_frame(labels.spans, names, doppler.times_s),
+            names,
+            classes,
+            None,
+            {"file": path.name, "labels": None if label_file is None else label_file.name},
+        )
+
+    return LazySource(key, load, fingerprint, lambda: load(lambda *_: None).outline())
+
+
+def _read_map(path: Path, label_file: Path | None) -> tuple[DopplerMap, Labels]:
+    labels = Labels()
+    if holds_map(path):
+        recorded = load_recorded_map(path)
+        doppler, labels = recorded.doppler, recorded.labels
+    else:
+        doppler = DopplerMap.load(path)
+    if label_file is not None:
+        labels = (
+            read_own(label_file).labels
+            if label_file.suffix.lower() == ".json"
+            else read_labels(label_file, doppler.timebase)
+        )
+    return doppler, labels
+
+
+def _sensor(meta: dict[str, Any]) -> VirtualSensor:
+    """Return the sensor that a map names; otherwise the camera."""
+    found = meta.get("sensor")
+    if not isinstance(found, dict):
+        return VirtualSensor()
+    known = asdict(VirtualSensor())
+    return VirtualSensor(**{name: value for name, value in found.items() if name in known})
+
+
+# -- Pairs: synthetic Doppler beside a radar's, take by take -------------------------------------
+
+
+def pair_sources(
+    paths: Sequence[Path], kinds: tuple[MapKind, ...] = KINDS, model: str | None = None
+) -> list[LazySource]:
+    """Return one source per take.
+
+    Subjects of the same name in different stores are different people: they are then called
+    ``STORE:NAME``.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Stores of pairs.
+    kinds : tuple of str
+        Wanted kinds. Denoised maps are made from the synthetic ones.
+    model : str, optional
+        Denoiser, by file or name; None: the bundled one.
+    """
+    stores = [_PairStore(path, kinds, model) for path in paths]
+    people = Counter(name for one in stores for name in {take["subject"] for take in one.takes})
+    return [
+        one.lazy(number, f"{one.path.stem}:{name}" if people[name] > 1 else name)
+        for one in stores
+        for number, name in enumerate(take["subject"] for take in one.takes)
+    ]
+
+
+class _PairStore:
+    def __init__(self, path: Path, kinds: tuple[MapKind, ...], model: str | None) -> None:
+        self.path = path
+        self._header, self.takes, self._arrays = open_takes(path)
+        self._radar: MapKind = self._header["kind"]
+        possible: tuple[MapKind, ...] = ("synthetic", "denoised", self._radar)
+        self._kinds = tuple(kind for kind in possible if kind in kinds)
+        self._axis = VelocityAxis(int(self._header["bins"]), float(self._header["v_max_mps"]))
+        self._null_bins = tuple(self._header["null_bins"])
+        self._labels = tuple(self._header["labels"])
+        self._model = find_model(model or DEFAULT_NAME) if "denoised" in self._kinds else None
+        self._denoising = Denoising()
+
+    def lazy(self, number: int, subject: str) -> LazySource:
+        take = self.takes[number]
+        key = SourceKey(subject, take["name"], take["placement"])
+        return LazySource(
+            key,
+            lambda progress: self._source(key, take),
+            lambda: self._fingerprint(take),
+            lambda: self._outline(take),
+        )
+
+    def _fingerprint(self, take: dict[str, Any]) -> str:
+        """Hash of the take's own rows, as a store may grow."""
+        model = "" if self._model is None else cached_digest(self._model)
+        about = {name: value for name, value in take.items() if name not in ("start", "stop")}
+        sums = hashlib.blake2b(
+            json.dumps([about, self._header["kind"], self._kinds, model]).encode(), digest_size=16
+        )
+        for name in _PAIR_ARRAYS:
+            sums.update(np.ascontiguousarray(self._part(name, take)).data)
+        return sums.hexdigest()
+
+    def _part(self, name: str, take: dict[str, Any]) -> Any:
+        return np.asarray(self._arrays[name][take["start"] : take["stop"]])
+
+    def _outline(self, take: dict[str, Any]) -> Outline:
+        label = self._part("label", take)
+        return Outline(self._kinds, self._part("times_s", take), None, label, self._labels)
+
+    def _source(self, key: SourceKey, take: dict[str, Any]) -> Source:
+        clock = Timebase(self._part("times_s", take))
+        sensor = VirtualSensor(tuple(take["sensor_position_m"]))
+        meta = {"sensor": {"position_m": list(sensor.position_m)}}
+
+        def as_map(name: str, kind: MapKind, unit: str) -> DopplerMap:
+            values = self._part(name, take).T
+            return DopplerMap(values, self._axis, clock, kind, unit, self._null_bins, meta=meta)
+
+        maps: dict[MapKind, DopplerMap] = {}
+        if {"synthetic", "denoised"} & {*self._kinds}:
+            maps["synthetic"] = as_map("synthetic", "synthetic", "share of vertices")
+        if self._model is not None:
+            maps["denoised"] = self._denoising.denoised(maps["synthetic"], self._model)
+        if self._radar in self._kinds:
+            maps[self._radar] = as_map("radar", self._radar, "power")
+        known = {one.name: one.gesture_class for one in GESTURES.labels}
+        return Source(
+            *key,
+            sensor,
+            {kind: maps[kind] for kind in self._kinds},
+            self._part("label", take).astype(np.int16),
+            self._labels,
+            {name: known[name] for name in self._labels if known.get(name)},
+            None,
+            {"pairs": self.path.name, "take": take["name"]},
+        )
