@@ -26,8 +26,8 @@ from sd2core.classify.experiment import (
     digest,
     has_synthetic,
 )
+from sd2core.classify.live import judge
 from sd2core.classify.metrics import Score
-from sd2core.classify.model_selection import judge
 from sd2core.classify.training import TrainOptions, train
 from sd2core.denoise import resample_to_model as matching
 from sd2core.denoise.live import TrainedDenoiser

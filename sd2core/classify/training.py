@@ -15,14 +15,12 @@ import torch
 from numpy.typing import NDArray
 from torch.nn import functional
 
-from sd2core.classify.card import ClassifierCard
-from sd2core.classify.data import UNKNOWN, Clip, ClipSet, frame_counts
-from sd2core.classify.defaults import DELAY_S, LONGEST_DELAY_S
+from sd2core.classify.card import DELAY_S, LONGEST_DELAY_S, ClassifierCard
+from sd2core.classify.data import UNKNOWN, Clip, ClipSet, frame_counts, some_noisy
 from sd2core.classify.features import Features, Kind
 from sd2core.classify.live import TrainedClassifier
 from sd2core.classify.metrics import confusion_of, mean_recall
 from sd2core.classify.models import Classifier, build, options, parameter_groups
-from sd2core.classify.noise import some_noisy
 from sd2core.errors import Sd2Error
 
 Watch = Callable[[dict[str, Any]], None]
@@ -41,7 +39,7 @@ class TrainOptions:
         Of the model, in place of its own.
     noisy_share : float
         Of the clips that are learnt from, so many get a noise floor
-        (:mod:`sd2core.classify.noise`).
+        (:mod:`sd2core.classify.data`).
     steps : int
         Batches that are learnt from.
     batch : int

@@ -24,7 +24,7 @@ from sd2app.training.text import division_text, steps_text
 from sd2app.widgets.inputs import Choice, NumberBox
 from sd2app.widgets.panel import data_row, outlined, rule, sentence, side_by_side, title
 from sd2app.widgets.typed_line import TypedLine
-from sd2core.classify.defaults import LONGEST_DELAY_S
+from sd2core.classify.card import LONGEST_DELAY_S
 from sd2core.train.data import Split
 
 _MAP_TIPS = {

@@ -82,7 +82,7 @@ def _shares(text: str) -> tuple[float, ...]:
 
 def _table(options: argparse.Namespace) -> None:
     from sd2core.classify.comparison import make_table
-    from sd2core.classify.comparison_text import as_json, as_text
+    from sd2core.classify.comparison_report import as_json, as_text
 
     known = clips_of(options.data, ("radar",) if options.radar_only else None)
     chosen = _options(options)
@@ -147,8 +147,12 @@ def _denoiser(options: argparse.Namespace, known: ClipSet) -> TrainedDenoiser | 
 
 
 def _write(folder: Path, table: Table, content: dict[str, Any]) -> None:
-    from sd2core.classify.comparison_plots import draw_confusions, draw_curve
-    from sd2core.classify.comparison_text import as_markdown, curve_conditions
+    from sd2core.classify.comparison_report import (
+        as_markdown,
+        curve_conditions,
+        draw_confusions,
+        draw_curve,
+    )
     from sd2core.files.atomic import atomic_write_text
     from sd2core.files.figure_files import save_figure
 

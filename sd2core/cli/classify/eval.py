@@ -63,7 +63,7 @@ def add_eval(kinds: argparse._SubParsersAction) -> None:
 
 def _eval(options: argparse.Namespace) -> None:
     from sd2core.classify.files import load_classifier
-    from sd2core.classify.model_selection import judge
+    from sd2core.classify.live import judge
     from sd2core.cli.reading import check_output
     from sd2core.files.atomic import atomic_write_text
     from sd2core.files.figure_files import SUFFIXES, save_figure
@@ -95,7 +95,7 @@ def _eval(options: argparse.Namespace) -> None:
     if options.json not in (None, _STANDARD_OUTPUT):
         atomic_write_text(options.json, content + "\n")
     if options.plot is not None:
-        from sd2core.classify.comparison_plots import confusion_figure
+        from sd2core.classify.comparison_report import confusion_figure
         from sd2core.classify.metrics import shares
 
         figure = confusion_figure(

@@ -9,7 +9,7 @@ import pytest
 from class_tables import CLASSES, a_score, a_table
 
 from sd2app.classify.result import Spread, read_result
-from sd2core.classify.comparison_text import as_json, mean_confusion
+from sd2core.classify.comparison_report import as_json, mean_confusion
 from sd2core.classify.experiment import Condition
 from sd2core.classify.metrics import shares
 from sd2core.cli.output import finite

@@ -13,8 +13,14 @@ from hypothesis import strategies as st
 from labelled_clips import clip_set
 
 from sd2core.classify.comparison import TableOptions, conditions_of, gains, make_table
-from sd2core.classify.comparison_plots import draw_confusions, draw_curve
-from sd2core.classify.comparison_text import as_json, as_markdown, as_text, frame_recall
+from sd2core.classify.comparison_report import (
+    as_json,
+    as_markdown,
+    as_text,
+    draw_confusions,
+    draw_curve,
+    frame_recall,
+)
 from sd2core.classify.experiment import AMOUNT, PAPER, Condition, Network, choose, digest
 from sd2core.classify.splitting import movements, split_clips
 from sd2core.classify.training import TrainOptions

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from labelled_clips import clip_set
 
-from sd2core.classify.model_selection import judge
-from sd2core.classify.noise import BELOW_LOUDEST_DB, some_noisy, with_noise_floor
+from sd2core.classify.data import BELOW_LOUDEST_DB, some_noisy, with_noise_floor
+from sd2core.classify.live import judge
 from sd2core.classify.training import TrainOptions, train
 
 KNOWN = clip_set(4, 4, kinds=("synthetic",))

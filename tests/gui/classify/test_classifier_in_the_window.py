@@ -346,7 +346,7 @@ def test_stopped_by_a_click(trainable, qtbot):
 
 
 def test_a_result_is_opened_and_looked_at(window, tmp_path, qtbot, monkeypatch):
-    from sd2core.classify.comparison_text import as_json
+    from sd2core.classify.comparison_report import as_json
     from sd2core.cli.output import finite
 
     path = tmp_path / "table.json"
