@@ -1,1 +1,1 @@
-"""How far one moving mesh is from another, and a fit from what is known to be true."""
+"""Comparison of moving meshes of one video."""

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLOURS = ("#222222", "#b35806", "#2166ac", "#1b7837", "#7b3294", "#c51b7d")
-"""Of the meshes in order; the reference is drawn in the first, whatever its number."""
+"""Colours of the meshes in order; the reference is drawn in the first, whatever its number."""
 
 _CURVES = ("hands", "elbows", "torso")
 

@@ -1,4 +1,4 @@
-"""Where the joints of a surface are: the mean of a small patch of its vertices.
+"""Joints of a surface, each the weighted mean of a small patch of vertices.
 
 A surface of ours is known by its faces, and carries fixed patches: all vertices within
 a radius of the joint on the bundled body at rest, of the limbs that meet there. Their
@@ -111,7 +111,7 @@ class JointPatches:
 
 
 def own_resolution(mesh: MeshSequence) -> Resolution | None:
-    """Which of our surfaces a mesh is, by its faces; None for any other."""
+    """Resolution of the bundled surface that a mesh is, by its faces; None for any other."""
     if mesh.faces is None:
         return None
     for resolution, faces in _own_faces():
@@ -225,7 +225,7 @@ def carried_over(
 
 
 def _shift(points: Floats, others: Floats, tree: object) -> Floats:
-    """What brings one surface onto the other: boxes first, then nearest vertices thrice."""
+    """Shift of one surface onto the other: boxes first, then nearest vertices three times."""
     shift: Floats = 0.5 * (
         others.min(axis=0) + others.max(axis=0) - points.min(axis=0) - points.max(axis=0)
     )

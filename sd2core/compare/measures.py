@@ -1,4 +1,4 @@
-"""What a comparison is made of: distances, velocities along the line of sight, jitter.
+"""Measures of a comparison: distances, velocities along the line of sight, jitter.
 
 Pure functions of arrays. Velocities are what the Doppler chain takes them to be: the
 exact change of range over the central difference, one-sided at the two ends.

@@ -34,7 +34,7 @@ Alignment = Literal["none", "root"]
 
 @dataclass(frozen=True, eq=False)
 class Difference:
-    """How far one mesh is from the reference.
+    """Differences of one mesh from the reference.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class Difference:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """What :func:`compare_meshes` found.
+    """Result of :func:`compare_meshes`.
 
     Parameters
     ----------

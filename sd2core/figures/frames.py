@@ -1,4 +1,4 @@
-"""Which frames a figure shows."""
+"""Choice of the frames of a figure."""
 
 from __future__ import annotations
 

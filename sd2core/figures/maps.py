@@ -29,7 +29,7 @@ _NOTHING, _MUTED = "#e9ebee", "#5a6370"
 
 @dataclass(frozen=True)
 class Levels:
-    """What the colours mean: levels relative to the reference of each map.
+    """Colour scale: levels relative to the reference of each map.
 
     Parameters
     ----------
@@ -47,14 +47,14 @@ class Levels:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Of the colour bar: dB, or per cent of the reference."""
+        """Ends of the colour bar: dB, or per cent of the reference."""
         if self.scale == "dB":
             return self.low_db, self.high_db
         return 0.0, 100.0 * 10.0 ** (self.high_db / 10.0)
 
     @property
     def unit(self) -> str:
-        """Of the colour bar."""
+        """Unit of the colour bar."""
         return "dB" if self.scale == "dB" else "% of 0 dB"
 
     def of(self, values: NDArray[np.float32], reference: float) -> NDArray[np.float64]:

@@ -25,7 +25,7 @@ _LETTER_IN = 0.062
 def lanes_of(labels: Labels, start_s: float, end_s: float) -> list[tuple[str, list[Span]]]:
     """Spans in view, in lanes without overlaps, each with the name of its track.
 
-    Suggestions that nobody has accepted are no labels yet and are left out.
+    Suggestions that are not accepted are no labels yet and are left out.
     """
     lanes = []
     for track in labels.tracks:

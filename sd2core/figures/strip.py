@@ -93,7 +93,7 @@ def save_strip(
 
 
 class _Layout:
-    """Where everything is, in inches from the top left."""
+    """Layout of the strip, in inches from the top left."""
 
     def __init__(self, count: int, options: StripOptions, box: Frame) -> None:
         self._columns = min(count, options.columns)

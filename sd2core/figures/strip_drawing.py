@@ -24,7 +24,7 @@ MUTED = "#5a6370"
 _PLAIN = "#9fb4cc"
 _OVERLAY, _OVERLAY_SHARE = "#2fc6a8", 0.5
 _MARGIN = 0.1
-"""Of the body's extent, around it."""
+"""Margin around the body, as a share of its extent."""
 _SURFACE_PIXELS = 800
 """Across a picture: twice what is shown, for smooth outlines."""
 _MOST_PIXELS = 800
@@ -109,7 +109,8 @@ def draw_picture(
     if row == "video":
         return
     if body is None:
-        axes.text(0.5, 0.5, "nobody", transform=axes.transAxes, fontsize=7, color=MUTED, **_CENTRED)
+        where = axes.transAxes
+        axes.text(0.5, 0.5, "no person", transform=where, fontsize=7, color=MUTED, **_CENTRED)
         return
     over = row == "overlay"
     mesh = source.mesh

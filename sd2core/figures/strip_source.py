@@ -1,4 +1,4 @@
-"""What a strip of frames is drawn of, and how it is to look."""
+"""Source and options of a strip of frames."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MOST_FRAMES = 100
 
 @dataclass(frozen=True)
 class StripOptions:
-    """What a strip shows.
+    """Options of a strip.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class StripOptions:
 
 @dataclass(frozen=True, eq=False)
 class StripSource:
-    """What is drawn.
+    """Video and mesh that a strip is drawn of.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ class StripSource:
         mesh: MeshSequence | None,
         name: str,
     ) -> StripSource:
-        """What a recording holds, its parts opened by the caller."""
+        """Source from a recording, its parts opened by the caller."""
         width, height = (video.width, video.height) if video is not None else (640, 480)
         focal_px = recording.focal_px(width, height)
         camera = PinholeCamera.default(width, height)

@@ -46,7 +46,7 @@ class Frame:
         return cls(0.0, 0.0, camera.width, camera.height)
 
     def place(self, pixels: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Where pixels (..., 2) of the picture are in the part."""
+        """Coordinates within the part of pixels (..., 2) of the picture."""
         return (np.asarray(pixels, np.float64) - (self.left, self.top)) * self.zoom
 
 
@@ -61,7 +61,7 @@ def projected(
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """Which triangle each pixel shows.
+    """Triangle that each pixel shows.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def seen(
 
 
 def lightness(vertices_m: NDArray[np.floating], faces: NDArray[np.int32]) -> NDArray[np.float32]:
-    """How squarely the camera sees the surface at each vertex, (V,): a third edge-on, 1 square on.
+    """Lightness of each vertex by a lamp at the camera, (V,): a third edge-on, 1 square on.
 
     Area-weighted normals: smooth where the surface is.
     """
@@ -143,7 +143,7 @@ def shaded(
     camera: PinholeCamera,
     frame: Frame | None = None,
 ) -> NDArray[np.float32]:
-    """What a lamp at the camera makes of a mesh.
+    """Shade a mesh by a lamp at the camera.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ from sd2core.timebase import Timebase
 _STILLS = 150
 _ROUNDS = 3
 _PLACE_SD_M = 0.005
-"""How well the place of a joint on the body is told by a sample of frames."""
+"""Standard deviation of a joint's place on the body, measured on a sample of frames."""
 _AT = {name: row for row, name in enumerate(LANDMARKS)}
 
 

@@ -44,7 +44,7 @@ _SYNTHESIS = replace(PRESETS["paper"], visibility="facing", null_bins=())
 
 @dataclass(frozen=True)
 class MarsChoices:
-    """How MARS recordings become pairs.
+    """Options of making pairs from MARS recordings.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class MarsChoices:
 
 @dataclass(frozen=True)
 class MadePairs:
-    """What came of it.
+    """Result of :func:`make_mars_pairs`.
 
     Parameters
     ----------

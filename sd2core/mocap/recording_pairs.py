@@ -28,12 +28,12 @@ TAKE_S = 15.0
 _BACKGROUND = "background"
 _SAME_RATE = 0.01
 _STEPS = 1000
-"""Of progress per recording."""
+"""Steps of progress per recording."""
 
 
 @dataclass(frozen=True)
 class PairsMade:
-    """What came of it.
+    """Result of :func:`make_recording_pairs`.
 
     Parameters
     ----------
@@ -225,7 +225,7 @@ def on_clock(radar: DopplerMap, timebase: Timebase) -> DopplerMap:
     -------
     DopplerMap
         ``present`` is False where the radar recorded no frame near enough, or says itself
-        that its frame shows nobody.
+        that its frame shows no person.
     """
     nearest, seen = _nearest(timebase.times_s, radar.times_s)
     if radar.present is not None:

@@ -1,4 +1,4 @@
-"""What the body wears: colour regions as signed distances on its rest shape.
+"""Clothes of the simulated body: colour regions as signed distances on its rest shape.
 
 A border is where a field changes sign; interpolated within triangles it is a
 smooth line, however coarse the surface.
@@ -34,7 +34,7 @@ Pattern = Literal["plain", "stripes", "checks"]
 
 @dataclass(frozen=True)
 class Outfit:
-    """What the body wears; colours are sRGB from 0 to 1, lengths those of the bundled body.
+    """Colours (sRGB, 0 to 1) and lengths of clothes, on the bundled body.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ class Clothes:
 
     @property
     def attributes(self) -> Singles:
-        """What is interpolated within triangles for :meth:`colours`, (V, K)."""
+        """Vertex attributes that :meth:`colours` takes interpolated within triangles, (V, K)."""
         if self.outfit.pattern == "plain":
             return self.fields
         return np.concatenate([self.fields, self.places_m], axis=1)
@@ -160,7 +160,7 @@ class Clothes:
         return colours, gloss
 
     def _in_second(self, places_m: Singles) -> NDArray[np.bool_]:
-        """Where a pattern shows its second colour, (N,)."""
+        """Share of a pattern's second colour at each point, (N,)."""
         halves = np.floor(places_m * np.float32(2.0 / self.outfit.period_m)).astype(np.int64)
         cells = halves[:, 1] if self.outfit.pattern == "stripes" else halves.sum(axis=1)
         odd: NDArray[np.bool_] = cells % 2 == 1

@@ -44,7 +44,7 @@ _ACROSS = np.array([1.0, 0.0, 0.0])
 
 
 class Path(NamedTuple):
-    """Where the body's middle goes on the floor, at any times.
+    """Path of the body's middle over the floor, at any times.
 
     Parameters
     ----------
@@ -240,7 +240,7 @@ def _pelvis_way(
     lead: Floats,
     leg_m: float,
 ) -> Floats:
-    """Where the root goes, (T, 3): as high as both legs allow, a little over the standing foot."""
+    """Path of the root, (T, 3): as high as both legs allow, a little over the standing foot."""
     translation = np.zeros((len(forward), 3))
     loads = np.stack([-foot.ankle_m[:, 1] for foot in feet])
     # The lower ankle carries: towards its side by up to 2 cm.

@@ -26,7 +26,7 @@ DURATION_S = 15.0
 
 
 class GestureSpan(NamedTuple):
-    """When a gesture is made: half-open ``[start_s, end_s)``."""
+    """Time span of one gesture: half-open ``[start_s, end_s)``."""
 
     start_s: float
     end_s: float
@@ -34,7 +34,7 @@ class GestureSpan(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """What :meth:`sd2core.body.model.Body.pose` takes: (T, B, 3, 3) and (T, 3)."""
+    """Rotations (T, B, 3, 3) and translation (T, 3) for :meth:`sd2core.body.model.Body.pose`."""
 
     rotations: Floats
     translation_m: Floats
@@ -42,7 +42,7 @@ class Motion(NamedTuple):
 
 @dataclass(frozen=True)
 class ArmPose:
-    """Where the wrist is, seen from the shoulder, and what goes with it.
+    """Pose of one arm: place of the wrist seen from the shoulder, elbow, hand, torso.
 
     Parameters
     ----------

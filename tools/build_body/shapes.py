@@ -1,4 +1,4 @@
-"""How bodies differ, boiled down from Anny's phenotypes to a few directions of shape.
+"""Directions of shape: principal components of bodies of random Anny phenotypes.
 
 Anny's phenotypes act through products of blend shapes. Bodies of random phenotypes,
 scaled to one stature, are well described by a few directions (principal components):
@@ -87,7 +87,7 @@ def shape_directions(
 
 
 def directions_of(coefficients: Floats, offsets_m: Floats) -> Floats:
-    """What one unit of each coefficient moves, (K, points, 3), by least squares."""
+    """Displacement by one unit of each coefficient, (K, points, 3), by least squares."""
     count, points, _ = offsets_m.shape
     solved = np.linalg.lstsq(coefficients, offsets_m.reshape(count, -1), rcond=None)[0]
     return np.asarray(solved.reshape(-1, points, 3))

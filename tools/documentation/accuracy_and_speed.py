@@ -85,7 +85,7 @@ def _scenes() -> Iterator[tuple[str, str, MeshSequence, VirtualSensor]]:
 
 
 def _tolerances(mesh: MeshSequence, sensor: VirtualSensor) -> Iterator[str]:
-    """What each tolerance costs here, and why."""
+    """Cost of each tolerance on one scene, with reasons."""
     survey = survey_scene(mesh, sensor, PAPER)
     yield "What a tolerance costs (error on frames that were not used to choose):\n"
     yield "| tolerance | plan | L1 | raw L1 | ms per frame |"
@@ -139,7 +139,7 @@ def _scaling() -> Iterator[str]:
     yield "## Ten times as much\n"
     yield f"![cost and memory against size]({IMAGES.name}/scaling.png)\n"
     yield (
-        "A swaying ellipsoid that is worked out as it is read, so that any size fits. Memory is the"
+        "A swaying ellipsoid that is computed as it is read, so that any size fits. Memory is the"
         " most that was allocated at once, the result included; the budget for prepared frames was"
         f" {BUDGET_BYTES >> 20} MiB.\n"
     )
@@ -156,7 +156,7 @@ def _scaling() -> Iterator[str]:
 
 
 def _precision() -> Iterator[str]:
-    """What single precision gets wrong far out, and what double costs, on the sample."""
+    """Errors of single precision far from the origin, and the cost of double, on the sample."""
     mesh = open_recording(resource_path("swipes.sd2")).load_mesh()
     yield "## Single and double precision\n"
     yield (

@@ -153,7 +153,7 @@ def _head(options: argparse.Namespace, campaign: Path, told: dict, made: str) ->
 
 
 def _findings(told: dict) -> str:
-    """What the table says, in a sentence each, from its numbers."""
+    """Sentences about the table, from its numbers."""
     conditions = told["conditions"]
 
     def of(**wanted: object) -> dict:

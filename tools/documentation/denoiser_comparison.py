@@ -46,7 +46,7 @@ ALL = {
     "s4-both": ("s4", *settings({"bidirectional": "true"})),
     "s4-range": ("s4", "--range-factor", "2"),
 }
-"""What follows ``--model`` of every run."""
+"""Arguments after ``--model`` of every run."""
 SERIAL = "s4-serial"
 DROPOUT = 0.1
 
@@ -200,12 +200,12 @@ def _mars(folder: Path) -> Path | None:
 def _real_jobs(folder: Path, mars: Path, options: argparse.Namespace) -> dict[str, list[Job]]:
     """For every part the runs that have seen neither its person nor its part."""
     jobs: dict[str, list[Job]] = {}
-    everybody = read_pairs(mars).subjects
-    for judged in everybody:
-        others = [name for name in everybody if _strange(name, judged)]
+    people = read_pairs(mars).subjects
+    for judged in people:
+        others = [name for name in people if _strange(name, judged)]
         if not others:
             continue
-        kept_out = [name for name in everybody if name not in others]
+        kept_out = [name for name in people if name not in others]
         for model, given in (("s4", {"dt_min": 0.2, "dt_max": 2.0}), ("gru", {})):
             how = (
                 *("--model", model, *settings({"dropout": 0.3, **given}), "--batch-size", "16"),
@@ -217,7 +217,7 @@ def _real_jobs(folder: Path, mars: Path, options: argparse.Namespace) -> dict[st
 
 
 def _strange(name: str, judged: str) -> bool:
-    """Whether two parts share neither person nor part, e.g. ``1-test`` and ``4-validate``."""
+    """True if two parts share neither person nor part, e.g. ``1-test`` and ``4-validate``."""
     return not set(name.split("-")) & set(judged.split("-"))
 
 

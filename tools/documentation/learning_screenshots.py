@@ -110,7 +110,7 @@ def export(application: QApplication, sample: Path) -> None:
 
 
 def batch(application: QApplication, sample: Path) -> None:
-    """What became of the sample, seen from nine places."""
+    """The batch window after a batch of the sample, seen from nine places."""
     window = opened(application, [sample])
     model = window.context.batch
     grid = PlacementGrid((1.5, 2.2, 3.0), (-30.0, 0.0, 30.0))

@@ -87,7 +87,7 @@ def row(part: MarsPart, name: str, maps: Maps, radar: Maps) -> str:
 
 
 def residuals(driven: list[DrivenClip]) -> str:
-    """How far the body's joints are from the skeleton's, in words."""
+    """Sentence on the distance of the body's joints from the skeleton's."""
     values = np.concatenate([clip.residual_m.ravel() for clip in driven]) * 100.0
     values = values[np.isfinite(values)]
     stature = driven[0].puppet.shape.stature_m

@@ -61,12 +61,12 @@ def campaign_of(folder: Path, minutes: float, *options: object) -> Path:
 
 
 def timed(folder: Path, job: Job, minutes: float) -> TimedJob:
-    """As many epochs as take these minutes of processor time, by a short run."""
+    """Run with the number of epochs that take these minutes of processor time, by a short run."""
     pilots = folder / "pilots"
     train(pilots, [replace(job, options=(*job.options, "--epochs", str(PILOT_EPOCHS)))])
     ends_s = epoch_ends_s(pilots / job.name)
     # The first epoch has the start in it; the shortest has least of what else went on.
-    # Where it was broken off and went on, the processor time began anew.
+    # Where it was broken off and went on, the processor time began again.
     epoch_s = min(after - before for before, after in pairwise(ends_s) if after > before)
     return TimedJob(job, epoch_s, max(1, round(60.0 * minutes / epoch_s)))
 
@@ -89,7 +89,7 @@ def train(folder: Path, jobs: Iterable[Job]) -> None:
 
 
 def tables(folder: Path, models: Sequence[Path], data: Path, *options: object) -> str:
-    """What ``sd2 eval`` says of models, in Markdown."""
+    """Tables of ``sd2 eval`` for some models, in Markdown."""
     written = folder / "tables.md"
     sd2("eval", *models, "--data", data, "--markdown", written, *options)
     return written.read_text("utf-8")

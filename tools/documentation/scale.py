@@ -42,7 +42,7 @@ from batches import (
 from long_fits import LongFit, long_fit, sample_landmarks
 
 RECORDINGS, FRAMES, PLACES = 1_000_000, 1800, 8
-"""What is reckoned for: a minute each at 30 frames/s."""
+"""Size of the estimated batch: recordings of a minute each at 30 frames/s."""
 
 INTRODUCTION = """\
 # Batches at scale
@@ -66,7 +66,7 @@ LITTLE = """
 
 @dataclass(frozen=True)
 class Sizes:
-    """How much is measured."""
+    """Amounts that are measured."""
 
     recordings: int
     places: int
@@ -86,7 +86,7 @@ QUICK = Sizes(2, 5, 60, 1, 2, 3, (0.2, 0.5), 2, (20, 40), (60, 120))
 
 @dataclass(frozen=True)
 class Cost:
-    """Of one step, on one process."""
+    """Cost of one step, on one process."""
 
     step: str
     frame_s: float
@@ -95,7 +95,7 @@ class Cost:
     task_bytes: float
 
     def seconds(self, frames: int) -> float:
-        """Of one task."""
+        """Cost of one task."""
         return self.task_s + frames * self.frame_s
 
     def bytes(self, frames: int) -> float:
@@ -367,7 +367,7 @@ def _costs(folder: Path, fits: list[Fitted]) -> list[Cost]:
 
 
 def _fits(folder: Path, frames: tuple[int, ...]) -> list[Fitted]:
-    """Of the sample's video; none where the landmark models are not there."""
+    """Fits of the sample's video; none where the landmark models are missing."""
     video = open_recording(resource_path("swipes.sd2")).video
     assert video is not None
     fits = []

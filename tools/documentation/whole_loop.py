@@ -23,7 +23,7 @@ from sd2core.files.resources import resource_path
 from tools.documentation.places import BUILD, DOCS, IMAGES, REPOSITORY
 
 LINES = 12
-"""Of what a command prints."""
+"""Longest output of a command that is shown."""
 
 PLAN = """\
 out = "made"
@@ -80,7 +80,7 @@ class Step:
     title: str
     command: str
     window: str
-    """Where the same is done in the window."""
+    """Place in the window where the same is done."""
 
 
 STEPS = (
@@ -116,7 +116,7 @@ STEPS = (
         "*Train* page, *Classifier*.",
     ),
     Step(
-        "Judge it on somebody it has not seen",
+        "Judge it on a person it has not seen",
         "sd2 classify eval campaign.zarr --model gestures.safetensors",
         "*Train* page, *Classifier*: *Open a result…* shows what `--json` wrote.",
     ),
@@ -163,7 +163,7 @@ def main() -> None:
 
 
 def _run(command: str, folder: Path) -> tuple[str, float]:
-    """What a command printed, and how long it took; what fails ends the program."""
+    """Output of a command and its seconds; a command that fails ends the program."""
     words = [sys.executable, "-m", "sd2core.cli", *shlex.split(command)[1:]]
     print(f"$ {command}", flush=True)
     path = os.pathsep.join(filter(None, [str(REPOSITORY), os.environ.get("PYTHONPATH")]))

@@ -1,4 +1,4 @@
-"""Who is filmed, and where: shapes, clothes, rooms and light of the clips of known truth."""
+"""People and rooms of the clips of known motion: shapes, clothes, light."""
 
 from __future__ import annotations
 

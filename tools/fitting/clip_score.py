@@ -1,4 +1,4 @@
-"""How good one fitted mesh is, measured against a clip whose motion is known."""
+"""Score of one fitted mesh, measured against a clip whose motion is known."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from tools.fitting.truth import Stroke, Truth
 Floats = NDArray[np.float64]
 
 LIMBS = ("hand", "wrist", "elbow")
-"""What is measured during strokes: of the arm that makes them."""
+"""Parts of the moving arm that are measured during strokes."""
 
 _MASK = (160, 120)
 _MASK_STEP = 5

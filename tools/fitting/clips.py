@@ -41,10 +41,10 @@ from tools.fitting.truth import FORMAT, VERSION, read_truth
 
 FRAMES_PER_S = 30
 RESOLUTION: Resolution = "medium"
-"""Of the surface that is kept; the picture is drawn from the finest."""
+"""Resolution of the surface that is kept; the picture is drawn from the finest."""
 
 NOISE = 0.012
-"""Of the camera, before the video is compressed: a still room must not be perfectly still."""
+"""Noise of the camera before compression: a still room must not be perfectly still."""
 
 _HORIZONTAL = ("left-to-right", "right-to-left")
 _VERTICAL = ("up-to-down", "down-to-up")
@@ -103,7 +103,7 @@ CLIPS = (
         "turn-other", Action("turn", turn_deg=(-85.0, 60.0)), "dora", "office", 2.6, 1.2, 26, -0.1
     ),
 )
-"""What ``python -m tools.fitting clips`` makes; the weights of the fit were chosen by others."""
+"""Clips that fits are scored on; the weights of the fit were chosen by others."""
 
 TUNING = (
     Clip("tune-1", _swipes(_ALL, "fast"), "ada", "window", 2.4, 1.2, 101, 0.1),
@@ -203,7 +203,7 @@ class Scene:
         return KeypointSpace(space).of(self.shape).positions(self.transforms)
 
     def joints_m(self) -> NDArray[np.float64]:
-        """Where every bone turns, (T, B, 3)."""
+        """Joints of all bones, (T, B, 3)."""
         heads = self.skeleton.heads_m[..., None]
         turned: NDArray[np.float64] = (self.transforms[..., :3] @ heads)[..., 0]
         return turned + self.transforms[..., 3]

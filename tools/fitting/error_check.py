@@ -1,4 +1,4 @@
-"""Whether drawn errors are like measured ones: disturbed clips, scored as fits are."""
+"""Comparison of drawn errors with measured ones: disturbed clips, scored as fits are."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ _VELOCITY_LAGS = slice(0, 3)
 _LENGTHS = np.geomspace(0.02, 3.0, 41)
 _MIXINGS = (0.3, 0.5, 1.0, 2.0, 5.0)
 _RIDGE = 0.02
-"""Of the features' variance: what hardly varies in the clips explains nothing."""
+"""Ridge, as a share of the features' variance: what hardly varies explains nothing."""
 
 
 class Sample(NamedTuple):
@@ -86,7 +86,7 @@ def measure_errors(truths: Sequence[Truth], fits: Path, progress: Progress = sil
 
 
 class ClipSamples(NamedTuple):
-    """What one clip tells."""
+    """Poses and errors of one clip."""
 
     samples: dict[tuple[Group, str], Sample]
     shape_error: Floats

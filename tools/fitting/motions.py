@@ -33,7 +33,7 @@ Speed = Literal["slow", "normal", "fast"]
 Swipe = Literal["left-to-right", "right-to-left", "up-to-down", "down-to-up"]
 
 STROKE_S: dict[Speed, float] = {"slow": 1.25, "normal": 0.72, "fast": 0.42}
-"""How long a stroke takes."""
+"""Shortest and longest duration of a stroke."""
 
 _RAISE_S, _LOWER_S, _HOLD_S = 0.65, 0.7, 0.2
 _START_S = 0.25
@@ -49,7 +49,7 @@ _PRESENTED = ArmPose(-8.0, -14.0, 0.36, 0.6, 1.0, 0.1, 30.0, -20.0, 2.0)
 
 @dataclass(frozen=True)
 class Action:
-    """What one simulated person does.
+    """Action of one simulated person.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ class Performance(NamedTuple):
 
 
 def duration_s(action: Action, seed: int) -> float:
-    """How long an action takes, before it is rounded to whole frames; see :func:`perform`."""
+    """Duration of an action, before it is rounded to whole frames; see :func:`perform`."""
     if action.kind == "swipes":
         return _moves(action, np.random.default_rng(seed))[-1].end_s + 0.25
     if action.kind == "walk":
@@ -152,7 +152,7 @@ _BACK: dict[str, str] = {
 
 
 def _ends(swipe: Swipe, hand: str) -> tuple[ArmPose, ArmPose]:
-    """Where a stroke begins and ends. The camera's left is the body's right."""
+    """Poses in which a stroke begins and ends. The camera's left is the body's right."""
     if swipe in ("left-to-right", "right-to-left"):
         outward = (swipe == "left-to-right") == (hand == "L")
         return (_ACROSS, _OUTSIDE) if outward else (_OUTSIDE, _ACROSS)

@@ -1,4 +1,4 @@
-"""How well a fitted mesh lies on the person of a real video, whose motion nobody knows."""
+"""Agreement of a fitted mesh with the person in a real video, whose motion is not known."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def score_real(
 def reprojection(
     mesh: MeshSequence, track: LandmarkTrack, camera: PinholeCamera
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """How far joints are from their landmarks in the picture.
+    """Distances of joints from their landmarks in the picture.
 
     Parameters
     ----------

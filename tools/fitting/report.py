@@ -1,4 +1,4 @@
-"""What the scores of many clips say together: a table, and whether it is within reach."""
+"""Tables of the scores of many clips, each figure beside its target."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Row:
 
     @property
     def met(self) -> bool | None:
-        """Whether the value is within reach; None when there is none, or nothing to judge."""
+        """True if the value meets its target; None without a target or a value."""
         if self.reach is None or not math.isfinite(self.value):
             return None
         sign, wanted = self.reach

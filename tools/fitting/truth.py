@@ -46,7 +46,7 @@ class Truth:
 
     @property
     def name(self) -> str:
-        """Of the clip."""
+        """Name of the clip."""
         return str(self.meta["clip"]["name"])
 
     @property
@@ -56,7 +56,7 @@ class Truth:
 
     @property
     def speed(self) -> str:
-        """Of the swipes: ``slow``, ``normal`` or ``fast``."""
+        """Speed of the swipes: ``slow``, ``normal`` or ``fast``."""
         return str(self.meta["clip"]["action"]["speed"])
 
     @property
@@ -71,7 +71,7 @@ class Truth:
 
     @property
     def stature_m(self) -> float:
-        """Of the person, without shoes."""
+        """Stature of the person, without shoes."""
         return float(self.meta["stature_m"])
 
     @property

@@ -117,7 +117,7 @@ class CropPainter:
         self._srgb = (255.0 * shade ** (1.0 / 2.2)).astype(np.uint8)
 
     def crop(self, vertices_m: Singles, roi: Roi) -> Pixels:
-        """What the landmark network would see of one frame, (256, 256, 3) RGB.
+        """Crop of one frame as the landmark network sees it, (256, 256, 3) RGB.
 
         Parameters
         ----------

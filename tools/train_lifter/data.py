@@ -71,7 +71,7 @@ def make_lifter_data(
 
 
 def take_path(folder: Path, number: int) -> Path:
-    """Of one take."""
+    """Path of one take."""
     return folder / f"take-{number:05d}.npz"
 
 

@@ -1,4 +1,4 @@
-"""What the landmark network would say of people who are not drawn.
+"""Emulated output of the landmark network for people who are not drawn.
 
 Measured on drawn takes: where each landmark lies beside our keypoint, fixed to its
 bone; how the network's metres and depth follow the truth; and what is left over. What
@@ -29,14 +29,14 @@ _SHOULDERS = [LANDMARKS.index("shoulder.L"), LANDMARKS.index("shoulder.R")]
 _WRISTS = [LANDMARKS.index("wrist.L"), LANDMARKS.index("wrist.R")]
 _WALK = 2  # takes have 0 and 1 in this place
 _MANNERS: tuple[Manner, ...] = ("any", "natural", "gestures", "gestures")
-"""Of the motions, in turn."""
+"""Manners of the motions, in turn."""
 _CANDIDATES = 24
 _ROBUST = 0.06
 """Statures; residuals beyond count less."""
 
 
 def landmark_offsets(takes: Sequence[Take]) -> Floats:
-    """Where the landmarks lie beside our keypoints, at rest, in statures, (33, 3).
+    """Offsets of the landmarks from our keypoints, at rest, in statures, (33, 3).
 
     A robust fit to what is seen across the view while the bones turn.
     """
@@ -66,7 +66,7 @@ def _across(take: Take) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Walk:
-    """A motion before a camera that nobody has drawn.
+    """Motion before a camera, without pictures of it.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ class Emulator:
         return Walk(places.astype(np.float32), (places + moved).astype(np.float32))
 
     def seen(self, rng: np.random.Generator, walk: Walk) -> Seen:
-        """What the network might say of a motion."""
+        """Plausible output of the network for a motion."""
         drawn = rng.integers(0, len(self._marks), _CANDIDATES)
         far = (((self._marks[drawn] - _marks(walk.places)) / self._spread) ** 2).sum(axis=1)
         donor = int(drawn[np.argmin(far)])
@@ -154,7 +154,7 @@ def random_walks(emulator: Emulator, count: int, seed: int) -> list[Walk]:
 
 
 def _regressors(places: Singles) -> Singles:
-    """What the network's metres are predicted from: place from the hips, way of the trunk."""
+    """Predictors of the network's metres: place from the hips, direction of the trunk."""
     hips = places[:, _HIPS].mean(axis=1, keepdims=True)
     shoulders = places[:, _SHOULDERS]
     across = np.broadcast_to((shoulders[:, :1] - shoulders[:, 1:]), places.shape)

@@ -36,7 +36,7 @@ class Example(NamedTuple):
 
 
 class Batch(NamedTuple):
-    """What goes in and what should come out.
+    """Input and wanted output of the network.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class Batch(NamedTuple):
 
 
 def example(take: Take) -> Example:
-    """Of a drawn take."""
+    """Example from a drawn take."""
     camera = take.camera
     seen = Seen(
         camera.slopes(take.image_px.astype(np.float64)).astype(np.float32),
@@ -69,7 +69,7 @@ def example(take: Take) -> Example:
 
 
 def emulated(rng: np.random.Generator, emulator: Emulator, walk: Walk) -> Example:
-    """Of a motion that nobody has drawn."""
+    """Example from a motion without pictures."""
     seen = emulator.seen(rng, walk)
     return Example(Seen(*(np.asarray(part, np.float32) for part in seen)), walk.places[..., 2])
 

@@ -1,4 +1,4 @@
-"""How good a lifter is on takes whose truth is known."""
+"""Score of a lifter on takes whose truth is known."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ GROUPS = {
 
 
 class JointScore(NamedTuple):
-    """Of one joint, both sides, over all frames in which it is inside the picture.
+    """Errors of one joint, both sides, over all frames in which it is inside the picture.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class JointScore(NamedTuple):
 
 
 class Score(NamedTuple):
-    """Of a lifter.
+    """Errors of a lifter.
 
     Parameters
     ----------

@@ -189,7 +189,7 @@ class TakeMaker:
         vertices: NDArray[np.float32],
         places_px: Floats,
     ) -> dict[str, NDArray[np.float32]]:
-        """What the network says about every frame, the square following the person."""
+        """Output of the network for every frame, the square following the person."""
         roi = self._landmarker.on_crop(*_first(rng, painter, vertices[0], places_px[0])).next_roi
         poses = []
         for frame, surface in enumerate(vertices):

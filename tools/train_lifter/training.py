@@ -50,7 +50,7 @@ _FACE_WEIGHT = 0.5
 
 @dataclass(frozen=True)
 class Recipe:
-    """How the lifter is trained.
+    """Settings of the training.
 
     Parameters
     ----------
@@ -219,13 +219,13 @@ def losses(
 
 
 def landmark_weights() -> Singles:
-    """How much each landmark counts, mean 1."""
+    """Weights of the landmarks, mean 1."""
     weights = [_WEIGHTS.get(name.split(".")[0], _FACE_WEIGHT) for name in LANDMARKS]
     return np.array(weights, np.float32) / np.float32(np.mean(weights))
 
 
 def _rate(values: torch.Tensor) -> torch.Tensor:
-    """Of (N, T, n), as :func:`sd2core.body.lifter_features.rate`."""
+    """Rate of change of (N, T, n), as :func:`sd2core.body.lifter_features.rate`."""
     inner = (values[:, 2:] - values[:, :-2]) / 2.0
     ends = values[:, 1:2] - values[:, :1], values[:, -1:] - values[:, -2:-1]
     return RATE_HZ * torch.cat([ends[0], inner, ends[1]], dim=1)
@@ -250,7 +250,7 @@ def _follow(mean: LifterNetwork, network: LifterNetwork, inertia: float) -> None
 
 
 def calibration(network: Network, kept: Sequence[Example]) -> Singles:
-    """What to add to logarithms of spreads so that 68 % of errors lie within."""
+    """Offsets of the logarithms of spreads with which 68 % of errors lie within."""
     ratios = []
     for one in kept:
         truth = batch([one])

@@ -1,4 +1,4 @@
-"""Where a random camera stands: a person in a random part of its picture."""
+"""Random cameras that see a person in a random part of their picture."""
 
 from __future__ import annotations
 

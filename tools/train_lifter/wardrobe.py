@@ -1,4 +1,4 @@
-"""What random people wear: regions of the body's surface, and their colours."""
+"""Random clothes: regions of the body's surface, and their colours."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sd2core.simulate.clothing import EYES, LIPS, WHITES, Clothes, linear
 Singles = NDArray[np.float32]
 
 REGIONS = ("skin", "trousers", "shirt", "shoes", "hair", "brows", "whites", "eyes", "lips")
-"""What is painted later covers what is painted earlier."""
+"""Regions in order of painting: later ones cover earlier ones."""
 
 _SKINS = ((0.95, 0.80, 0.72), (0.86, 0.68, 0.56), (0.70, 0.50, 0.38), (0.48, 0.33, 0.25))
 _HAIRS = ((0.10, 0.08, 0.07), (0.30, 0.20, 0.14), (0.62, 0.48, 0.30), (0.65, 0.65, 0.65))

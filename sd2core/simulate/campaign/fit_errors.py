@@ -1,4 +1,4 @@
-"""What is known of how fits from video err, on disk, and errors drawn anew from it.
+"""Statistics of the errors that fits from video make, on disk, and errors drawn from them.
 
 A fit errs as its evidence does: the same pose is misread in the same way, another pose
 in another, so that who stands still has no false velocity and who moves faster has more
@@ -96,7 +96,7 @@ class ErrorFunction:
 
 @dataclass(frozen=True, eq=False)
 class FitErrors:
-    """How fits err.
+    """Statistics of the errors of fits, from which those of one clip are drawn.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ class FitErrors:
             ) from error
 
     def as_dict(self) -> dict[str, Any]:
-        """What the file holds."""
+        """Content of the file, fit for JSON."""
         return {
             "format": FORMAT,
             "version": VERSION,

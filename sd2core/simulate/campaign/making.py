@@ -44,7 +44,7 @@ def make_campaign(
     """Make the takes of a campaign that are not there yet.
 
     Takes are written in order, one of each subject in turn, so that a campaign that is
-    stopped has as much of everybody; started again it goes on, and comes out as if it
+    stopped has equally much of every subject; started again it goes on, as if it
     had not been stopped. A longer one begins with a shorter one's takes.
 
     Parameters

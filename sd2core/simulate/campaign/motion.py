@@ -1,4 +1,4 @@
-"""What people do in one take of a campaign: gestures in random order, and everything else.
+"""Motion of one take of a campaign: gestures in random order, other movements, rest.
 
 Gestures are strokes of an arm between two sides of the body, or between above and below,
 as in :mod:`~sd2core.simulate.gestures`, but none like another: poses, speed, path, evenness
@@ -33,11 +33,11 @@ from sd2core.simulate.people.motion import Deed, random_motion
 from sd2core.simulate.people.signals import wander
 
 LABELS = ("background", "left-to-right", "right-to-left", "up-to-down", "down-to-up")
-"""As the camera sees them; its left is the body's right."""
+"""Directions as the camera sees them; its left is the body's right."""
 
 Kind = Literal["gestures", "moving", "pacing"]
 KINDS: dict[Kind, float] = {"gestures": 0.74, "moving": 0.18, "pacing": 0.08}
-"""What a take may hold, and how often."""
+"""Contents of a take, each with its probability."""
 
 # Written for the right arm of the bundled body; see ArmPose.
 _ENDS: dict[str, tuple[ArmPose, ArmPose]] = {
@@ -66,7 +66,7 @@ _REACH_M = (0.23, 0.528)
 _STROKES_S = (0.42, 1.35)
 _MOVES_S = (0.5, 1.2)
 _SWIPE, _ELSE, _SINK = 0.72, 0.15, 0.07
-"""How often the next thing is a gesture, another movement, letting the hand sink; else rest."""
+"""Probability that a gesture, another movement or a sinking hand comes next; otherwise rest."""
 _SMALL = Deed("stand", ("rest", "rest"), False, natural=True)
 _ARMS = ("talk", "slow", "strokes", "rest", "up and aside")
 _STEPS_M, _STEPS_MPS = (0.15, 0.6), (0.35, 0.9)
@@ -110,7 +110,7 @@ def perform(
     times_s: Floats,
     kind: Kind | None = None,
 ) -> Performance:
-    """What one person does in one take, standing on the floor's origin, facing -z.
+    """Motion of one person in one take, on the floor's origin, facing -z.
 
     Parameters
     ----------
@@ -198,7 +198,7 @@ _HANGS = np.array(astuple(HANGING))
 def _stroke(
     rng: np.random.Generator, subject: Subject, hand: str, label: int
 ) -> tuple[Floats, Floats]:
-    """Where a stroke begins and ends."""
+    """Poses in which a stroke begins and ends."""
     name = LABELS[label]
     sideways = name in ("left-to-right", "right-to-left")
     first, last = (np.array(astuple(pose)) for pose in _ENDS["across" if sideways else "down"])
@@ -235,7 +235,7 @@ def _gesturing(
     rotations = np.tile(np.eye(3), (len(times_s), len(skeleton), 1, 1))
     poses = {side: arm_through_time(moves, times_s) for side, moves in arms.items()}
     for pose in poses.values():
-        # A hand is never quite still, raised less than hanging.
+        # Hands are never quite still, raised less than hanging.
         raised = np.clip((pose[:, 1] + 80.0) / 60.0, 0.2, 1.0)[:, None]
         pose[:, :3] += raised * [0.5, 0.5, 0.002] * wander(rng, times_s, 2.0, 3)
     across_deg = subject.follow * (poses["R"][:, 8] - poses["L"][:, 8])

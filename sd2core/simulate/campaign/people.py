@@ -1,4 +1,4 @@
-"""Who takes part in a simulated campaign, and how each of them moves."""
+"""People of a simulated campaign: their shapes and habits of movement."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ class Subject:
     other_hand : float
         Share of the gestures that the other one makes.
     tempo : float
-        Time for a stroke over everybody's.
+        Time for a stroke, 1 on average.
     size : float
-        Width of a stroke over everybody's.
+        Width of a stroke, 1 on average.
     held_deg : (float, float)
         Azimuth and elevation that are added to every pose of the arms.
     follow : float

@@ -1,4 +1,4 @@
-"""How a body is held, by the few vectors in which a fit errs, and bodies held otherwise.
+"""Posture of a body as the few vectors in which fits err, and bodies in a changed posture.
 
 Three turns (pelvis, chest, head) and fourteen directions (shoulder, upper arm, forearm and
 hand; thigh, shank and foot; left and right), all in the axes of the line of sight to
@@ -44,7 +44,7 @@ _TURNED_LEAST = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Posture:
-    """How one body is held in every frame.
+    """Posture of one body in every frame.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class Posture:
     limbs: Mapping[tuple[Group, str], Floats]
 
     def features(self, group: Group, side: str = "") -> Floats:
-        """What the errors of one group may depend on, (T, n)."""
+        """Features of the pose on which the errors of one group depend, (T, n)."""
         frames = len(self.axes)
         if group == "place":
             return self.place_m
@@ -117,7 +117,7 @@ def sight_axes(target_m: Floats) -> Floats:
 
 
 def errors(fitted: Posture, true: Posture, group: Group, side: str = "") -> Floats:
-    """What has to be added to the true posture to get the fitted one, (T, n).
+    """Difference of the fitted posture from the true one, (T, n).
 
     For the place metres along the axes of the line of sight, for the trunk rotation
     vectors in them, for limbs differences of directions.

@@ -6,8 +6,8 @@ the peak of every eighth moving frame (decision 11); a radar averages over recei
 frequencies, here over looks. Noise comes from a link budget, rounding from the converter's
 bits at one fixed gain, and the samples go through the chain that real captures go through.
 Then the mean power of noise is taken off and what does not rise above it is emptied, as a
-radar's detection does with a recording of an empty room: or the peak of a frame in which
-nobody moves would be anywhere.
+radar's detection does with a recording of an empty room: or the peak of a frame without
+motion would be anywhere.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ _EMPTY_FRAMES, _EMPTY_ROOM = 128, 2026
 
 @dataclass(frozen=True)
 class TargetOptions:
-    """How targets are simulated.
+    """Options of the simulated radar.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Where a take happens: the camera, the sensors, what stands around."""
+"""Random scenes of takes: place of the person, camera, sensors, static reflectors."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from sd2core.radar_config import RadarConfig
 from sd2core.sensor import Vector, VirtualSensor, aimed_at, position_from_spherical
 
 RANGES_M = (1.5, 4.0)
-"""Of the person from the camera, and of the person's chest from the other sensors."""
+"""Distances of the person from the camera, and of the chest from the other sensors."""
 
 _CAMERA_M = (0.8, 1.6)
 _BESIDE_M = 0.25
@@ -26,7 +26,7 @@ _CROSS_SECTION_M2 = (0.05, 5.0)
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """Where one take happens.
+    """Scene of one take.
 
     Parameters
     ----------

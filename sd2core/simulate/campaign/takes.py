@@ -38,7 +38,7 @@ _MOTION, _SETTING, _FIT, _RADAR = range(4)
 
 @dataclass(frozen=True)
 class Campaign:
-    """What all takes of a campaign share.
+    """Settings that all takes of a campaign share.
 
     Parameters
     ----------
@@ -62,11 +62,11 @@ class Campaign:
 
     @property
     def frames(self) -> int:
-        """Of one take."""
+        """Number of radar frames in one take."""
         return round(self.take_seconds / self.radar.frame_repetition_s)
 
     def provenance(self) -> dict[str, Any]:
-        """How takes are made, without how many there are."""
+        """Settings that determine the takes, without their number."""
         return {
             "made_by": "sd2 simulate campaign",
             "simulated": True,

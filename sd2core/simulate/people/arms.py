@@ -11,8 +11,8 @@ from sd2core.simulate.gestures import elbow_position
 from sd2core.simulate.people.signals import Moves, envelope, follow, wander
 
 PARAMETERS = 11
-"""Of an arm: place of the wrist (3), where the elbow bends to (3), pronation, flexion
-and deviation of the hand in degrees, curl of the fingers and of the thumb (0 to 1)."""
+"""Parameters of an arm: place of the wrist (3), direction in which the elbow bends (3),
+pronation, flexion and deviation of the hand in degrees, curl of fingers and thumb (0 to 1)."""
 
 _TURN = ([25.0, 0.0, 0.0], [50.0, 22.0, 9.0])
 """Mean and spread of pronation, flexion and deviation."""
@@ -24,10 +24,10 @@ _SWEEPS = 0.7
 _ELBOW_RESTS = 0.6
 
 _UPPER = 0.54
-"""Of an arm's length, its upper arm."""
+"""Share of the upper arm in an arm's length."""
 
 _NATURAL = {"any": 0.35}
-"""How much rarer a zone is in natural motion."""
+"""Factor on the probability of a zone in natural motion."""
 
 _FASTEST = 7.0
 """Arm lengths per second; 4 to 5 m/s."""
@@ -35,7 +35,7 @@ _FASTEST = 7.0
 
 @dataclass(frozen=True)
 class ArmStyle:
-    """How an arm moves.
+    """Style of an arm's motion.
 
     Parameters
     ----------
@@ -89,20 +89,20 @@ TRAINING_STYLES = {
     "across": ArmStyle(0.3, 1.0, 0.4, 0.5, (("across", 0.4), ("aside", 0.4), ("front", 0.2))),
     "rest": ArmStyle(0.6, 1.5, 0.9, 3.0, (("hang", 0.8), ("any", 0.2)), 0.02),
 }
-"""What the lifter is trained on, by name."""
+"""Styles that the lifter is trained on, by name."""
 
 GESTURE_STYLES = {
     "gestures": ArmStyle(0.3, 1.3, 0.75, 0.5, (("reach", 0.88), ("hang", 0.12)), 0.05),
     "out and back": ArmStyle(0.3, 1.3, 0.75, 0.5, (("reach", 0.95), ("hang", 0.05)), 0.0, True),
 }
-"""How the arm moves of somebody who gestures before a sensor; trained on too."""
+"""Styles of a person who gestures before a sensor; trained on too."""
 
 HELD_OUT_STYLES = {
     "boxing": ArmStyle(0.25, 0.5, 0.4, 0.5, (("forward", 0.6), ("guard", 0.4)), 0.0, True),
     "directing": ArmStyle(0.45, 1.1, 0.6, 0.8, (("low", 0.4), ("up", 0.3), ("aside", 0.3)), 0.0),
     "signing": ArmStyle(0.25, 0.6, 0.3, 0.4, (("chest", 0.4), ("face", 0.4), ("across", 0.2)), 0.5),
 }
-"""What it is tested on: these never occur in training."""
+"""Styles that the lifter is tested on: these never occur in training."""
 
 
 def still_arm(rng: np.random.Generator, times_s: Floats) -> Floats:

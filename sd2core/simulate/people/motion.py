@@ -26,10 +26,10 @@ _SPINE = ("spine05", "spine04", "spine03", "spine02", "spine01")
 _NECK = ("neck01", "neck02", "neck03", "head")
 _FASTEST_MPS = {"lowerarm01": 4.5, "wrist": 6.5, "foot": 6.0}
 _STILL = 0.14
-"""Share of takes in which nobody moves."""
+"""Share of takes without motion."""
 
 Manner = Literal["any", "natural", "gestures"]
-"""How people move: with elbows any way they can be, as people have them, or standing or
+"""Manner of motion: elbows any way they can be, elbows as people have them, or standing or
 sitting before the camera and making strokes with one hand or both."""
 
 MANNERS: tuple[Manner, ...] = get_args(Manner)
@@ -39,7 +39,7 @@ _ARMS = TRAINING_STYLES | GESTURE_STYLES | HELD_OUT_STYLES
 
 @dataclass(frozen=True)
 class Deed:
-    """What a person does in one take.
+    """Action of a person in one take.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class Deed:
 def random_deed(
     rng: np.random.Generator, *, held_out: bool = False, manner: Manner = "any"
 ) -> Deed:
-    """What to do; ``held_out`` takes the arms' styles from those kept for testing."""
+    """Random action; ``held_out`` takes the arms' styles from those kept for testing."""
     if manner == "gestures" and not held_out:
         return _gestures(rng)
     styles = list(HELD_OUT_STYLES if held_out else TRAINING_STYLES)
@@ -113,7 +113,7 @@ def random_motion(
 
 
 def _speed(skeleton: Skeleton, transforms: Floats, times_s: Floats, bone: str) -> Floats:
-    """Of the heads of a bone on both sides, (2, T - 1), metres per second."""
+    """Speeds of the heads of a bone on both sides, (2, T - 1), metres per second."""
     rows = [skeleton.index[f"{bone}.{side}"] for side in "LR"]
     moved = transforms[:, rows]
     places = applied(moved[..., :3], skeleton.heads_m[rows]) + moved[..., 3]
@@ -277,7 +277,7 @@ def _outside_trunk(skeleton: Skeleton, points: Floats) -> Floats:
     x, z = points[:, 0] / wide, (points[:, 2] - middle[2]) / deep
     radius = np.sqrt(x**2 + z**2 + 1e-6)
     below_chin = 0.5 + 0.5 * np.tanh((points[:, 1] - shoulder[1] + 0.08) / 0.08)
-    # A soft maximum with 1: no kink where a hand touches the column.
+    # A soft maximum with 1: no kink where the wrist touches the column.
     wanted = 0.5 * (radius + 1.0 + np.sqrt((radius - 1.0) ** 2 + 0.02))
     push = 1.0 + below_chin * (wanted / radius - 1.0)
     pushed = points.copy()

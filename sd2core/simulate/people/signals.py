@@ -12,7 +12,7 @@ _WAVES = 9
 
 
 class Moves(NamedTuple):
-    """When to go from each pose to the next, and how.
+    """Moves from each pose to the next.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Where a person's pelvis and feet go: standing, stepping, walking, turning, sitting."""
+"""Paths of a person's pelvis and feet: standing, stepping, walking, turning, sitting."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from sd2core.body.rotations import Floats
 from sd2core.simulate.people.signals import Moves, follow, smooth_share, wander
 
 MODES = {"stand": 0.56, "shift": 0.18, "walk": 0.14, "turn": 0.05, "sit": 0.07}
-"""What a person may do with their legs, and how often."""
+"""Actions of the legs, each with its probability."""
 
 _STEP = 0.36
 """Statures."""
@@ -98,7 +98,7 @@ def _walk(rng: np.random.Generator, times_s: Floats) -> tuple[Floats, Floats]:
 
 
 def _busy(times_s: Floats, place: Floats, heading_deg: Floats) -> Floats:
-    """How much the feet have to step, 0 to 1, smooth, (T,)."""
+    """Need for steps, 0 to 1, smooth, (T,)."""
     speed = np.linalg.norm(np.gradient(place, times_s, axis=0), axis=1)
     turning = np.abs(np.gradient(heading_deg, times_s)) / 90.0
     return smooth_share((speed / 0.35 + turning - 0.15) / 0.85, np.ones(()))
@@ -138,7 +138,7 @@ def _feet(
 
 
 def _beyond(phase: Floats, times_s: Floats, place: Floats, wanted: Floats) -> Floats:
-    """What to add to places held at the ends of a take, so that they go straight on."""
+    """Offsets that let places held at the ends of a take go straight on."""
     result = np.zeros((len(wanted), 2))
     for end, step in ((0, 1), (-1, -1)):
         rate = (phase[end + step] - phase[end]) * step

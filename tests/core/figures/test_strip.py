@@ -135,7 +135,7 @@ def test_a_frame_in_which_nobody_was_found_says_so(source, ball, tmp_path) -> No
     frames = [2, 4, 6]
     path = tmp_path / "gap.svg"
     save_strip(plot_strip(gap, frames, options), path, gap, frames, options)
-    assert path.read_text().count("nobody") == 1
+    assert path.read_text().count("no person") == 1
 
 
 def text_of(path: Path) -> list[str]:
