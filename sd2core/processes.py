@@ -73,10 +73,6 @@ class ProcessId:
             and abs(self.started_unix_s - other.started_unix_s) < _START_TOLERANCE_S
         )
 
-    def started_by(self, launched: ProcessId) -> bool:
-        """True if this is the launched process, or one that it began: Windows starts two."""
-        return self.started_unix_s > launched.started_unix_s - _START_TOLERANCE_S
-
     def terminate(self, *, at_once: bool = False) -> None:
         """Ask the process to end, or end it at once; a process that reuses its number is spared."""
         if self.is_alive:
@@ -85,24 +81,24 @@ class ProcessId:
                 os.kill(self.pid, kill if at_once else signal.SIGTERM)
 
 
-def lower_priority(nice: int = 10) -> None:
+def lower_priority(nice: int | None = None) -> None:
     """Let other programs go first; where the system refuses, the priority stays.
 
     Parameters
     ----------
-    nice : int
-        0 to 19; Windows knows one step below the normal priority.
+    nice : int, optional
+        0 to 19; by default 10 more than now. Windows knows one step below the normal priority.
     """
     import psutil
 
-    if nice <= 0:
-        return
     process = psutil.Process()
     with suppress(psutil.Error, OSError):
         if sys.platform == "win32":
-            process.nice(psutil.BELOW_NORMAL_PRIORITY_CLASS)
-        elif nice > (process.nice() or 0):
-            process.nice(nice)
+            if nice != 0:
+                process.nice(psutil.BELOW_NORMAL_PRIORITY_CLASS)
+            return
+        now = int(process.nice())
+        process.nice(min(now + 10, 19) if nice is None else max(nice, now))
 
 
 def end_with_parent() -> None:

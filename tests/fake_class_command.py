@@ -1,4 +1,4 @@
-"""Keeps a folder as ``sd2app.background.run_in_folder`` does, and learns nothing.
+"""Keeps a folder as ``sd2app.background.run_command --folder`` does, and learns nothing.
 
 ``fake_class_command.py [--step-s S] [--fail TEXT] [--die-at N] FOLDER classify train|table
 DATA… --out OUT …``.
@@ -13,7 +13,7 @@ import sys
 import time
 from pathlib import Path
 
-from sd2app.background.run_folder import CommandFolder
+from sd2app.background.run_command import CommandFolder
 
 STEPS = 6
 
@@ -38,7 +38,7 @@ def main() -> int:
     options = parser.parse_args()
     folder = CommandFolder(options.folder)
     lock = folder.lock()
-    assert lock.take()
+    folder.set_state("running")
     code = work(options, folder)
     folder.note_end(code)
     lock.release()

@@ -12,7 +12,7 @@ import sys
 import time
 from pathlib import Path
 
-from sd2app.background.run_folder import CommandFolder
+from sd2app.background.run_command import CommandFolder
 
 
 def say(**content: object) -> None:
@@ -22,7 +22,7 @@ def say(**content: object) -> None:
 def main() -> int:
     how, folder, words = sys.argv[1], CommandFolder(Path(sys.argv[2])), sys.argv[3:]
     lock = folder.lock()
-    assert lock.take()
+    folder.set_state("running")
     folder.note_end(code := work(how, folder, words))
     lock.release()
     return code

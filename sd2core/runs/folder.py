@@ -34,7 +34,7 @@ ENDED: dict[State, str] = {
 }
 """States of a run without a process, as ``it has …``."""
 
-_PATIENCE_S = 0.5
+_PATIENCE_S = 2.0
 
 
 class RunFolder:
@@ -203,6 +203,9 @@ class RunFolder:
             )
         write_control(self.control, word)
 
+    def discard(self) -> None:
+        """Delete what the run made; by default it is left to the user."""
+
     def _how_to_resume(self, state: State) -> str:
         return ""
 
@@ -211,11 +214,3 @@ class RunFolder:
         content = {"format": self.format, "version": self.version, **before, **about}
         text = json.dumps(content | {"state": state}, indent=2, ensure_ascii=False)
         atomic_write_text(self.description, text + "\n")
-
-
-def folders_in(place: Path, kind: type[RunFolder]) -> list[RunFolder]:
-    """Runs of a kind in a folder, by name; none where there is no such folder."""
-    if not place.is_dir():
-        return []
-    found = [kind(path) for path in sorted(place.iterdir()) if path.is_dir()]
-    return [one for one in found if one.exists]

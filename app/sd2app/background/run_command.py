@@ -1,37 +1,237 @@
-"""One ``sd2`` command with less claim to the processors than the window has.
+"""``sd2`` commands in background processes, which may outlive the window.
 
-Run as ``python -u -m sd2app.background.run_command COMMAND …``.
+``python -u -m sd2app.background.run_command COMMAND …`` runs a command at a lower priority;
+with ``--folder FOLDER`` in front it works in a :class:`CommandFolder`.
 """
 
 from __future__ import annotations
 
+import _thread
+import json
 import os
+import shutil
+import signal
+import subprocess
 import sys
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
 
-_NICE = 10
-_BELOW_NORMAL = 0x4000  # Windows' BELOW_NORMAL_PRIORITY_CLASS
+from sd2core.errors import Sd2Error
+from sd2core.processes import ONE_THREAD, ProcessId, lower_priority
+from sd2core.runs.control import read_control, write_control
+from sd2core.runs.folder import RunFolder, State
+
+COMMAND = (sys.executable, "-u", "-m", "sd2app.background.run_command")
+COMMAND_IN_FOLDER = (*COMMAND, "--folder")
+
+_KEPT_BYTES = 16 * 1024
+_POLL_S = 0.2
+_INTERRUPTED = 130
+_STATES: dict[int | None, State] = {None: "starting", 0: "finished", _INTERRUPTED: "stopped"}
+_WINDOWS_FLAGS = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0) | getattr(
+    subprocess, "CREATE_NO_WINDOW", 0
+)
 
 
-def give_way() -> None:
-    """Let every other program go first; where that is refused, go on as before."""
+def launch(
+    command: Sequence[str], output: Path, environment: Mapping[str, str] | None = None
+) -> ProcessId:
+    """Start a program that outlives this process; what it prints goes to a file.
+
+    Raises
+    ------
+    Sd2Error
+        When it cannot be started.
+    """
+    with output.open("ab") as stream:
+        try:
+            process = subprocess.Popen(
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=stream,
+                stderr=stream,
+                env={**os.environ, "PYTHONIOENCODING": "utf-8", **(environment or {})},
+                # No terminal that is closed takes it along.
+                start_new_session=True,
+                creationflags=_WINDOWS_FLAGS,
+            )
+        except OSError as error:
+            stream.write(str(error).encode())
+            raise Sd2Error(
+                f"{command[0]} cannot be started", remedy="Look whether it is installed"
+            ) from error
+    # It is not waited for: it may outlive this process.
+    process.returncode = 0
+    return ProcessId.of(process.pid) or ProcessId(process.pid, time.time())
+
+
+def last_output(output: Path) -> str:
+    """End of what a program printed; empty where there is nothing."""
     try:
-        if sys.platform == "win32":
-            import ctypes
-
-            kernel = ctypes.windll.kernel32
-            kernel.SetPriorityClass(kernel.GetCurrentProcess(), _BELOW_NORMAL)
-        else:
-            os.nice(_NICE)
+        content = output.read_bytes()[-_KEPT_BYTES:]
     except OSError:
-        pass
+        return ""
+    return content.decode("utf-8", "replace").strip()
+
+
+class CommandFolder(RunFolder):
+    """Folder of one ``sd2`` command that the window has started."""
+
+    format = "sd2-command"
+    file_name = "about.json"
+    noun = "folder of a command"
+    maker = "SD² Studio"
+    look = "the window"
+
+    @property
+    def output(self) -> Path:
+        """File with what the process prints."""
+        return self.path / "output.txt"
+
+    @property
+    def progress(self) -> Path:
+        """The same file: lines of JSON stand between the sentences."""
+        return self.output
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """Content of the description; empty where it cannot be read."""
+        try:
+            return self.about()
+        except Sd2Error:
+            return {}
+
+    @property
+    def code(self) -> int | None:
+        """Exit code; None while the command runs, and where it was killed."""
+        code = self.facts.get("code")
+        return code if isinstance(code, int) else None
+
+    @property
+    def stop_wanted(self) -> bool:
+        """True once the command was told to end."""
+        return read_control(self.control) in ("stop", "cancel")
+
+    def start(
+        self,
+        arguments: Sequence[str],
+        about: Mapping[str, Any],
+        command: Sequence[str] = COMMAND_IN_FOLDER,
+        environment: Mapping[str, str] = ONE_THREAD,
+    ) -> ProcessId:
+        """Start a command, or start it again in the same folder.
+
+        Parameters
+        ----------
+        arguments : sequence of str
+            Arguments of ``sd2``.
+        about : mapping
+            Facts to be kept with it; fit into JSON.
+        command : sequence of str
+            Program that runs it.
+        environment : mapping
+            Variables besides those of this process. By default it uses one processor:
+            what moves on the screen comes first.
+
+        Raises
+        ------
+        Sd2Error
+            When it cannot be started.
+        OSError
+            When the folder cannot be made.
+        """
+        self.path.mkdir(parents=True, exist_ok=True)
+        for path in (self.description, self.output, *self._of_yesterday):
+            path.unlink(missing_ok=True)
+        write_control(self.control, "run")
+        told = {"started_unix_s": time.time(), "arguments": list(arguments), **about}
+        self._describe("starting", **told)
+        return launch([*command, str(self.path), *arguments], self.output, environment)
+
+    def about(self) -> dict[str, Any]:
+        """Content of the description; that of an earlier version has its state elsewhere."""
+        try:
+            return super().about()
+        except Sd2Error:
+            end = self._of_yesterday[1]
+            with suppress(OSError, ValueError, KeyError, TypeError):
+                about = json.loads(self.description.read_text(encoding="utf-8"))
+                if about["format"] == self.format and "state" not in about:
+                    code = int(json.loads(end.read_text("utf-8"))["code"]) if end.exists() else None
+                    state = _STATES.get(code, "failed")
+                    return {**about, "version": self.version, "state": state, "code": code}
+            raise
+
+    def discard(self) -> None:
+        """Delete the folder with all that the command made."""
+        shutil.rmtree(self.path, ignore_errors=True)
+
+    def note_end(self, code: int) -> None:
+        """Note the exit code of the command, which this process has run."""
+        with suppress(OSError, Sd2Error):  # deleted meanwhile
+            self.set_state(_STATES.get(code, "failed"), code=code)
+
+    @property
+    def _of_yesterday(self) -> tuple[Path, Path]:
+        return self.path / "stop", self.path / "end.json"
+
+
+def commands_in(place: Path) -> list[CommandFolder]:
+    """Folders of commands in a folder, the newest first."""
+    if not place.is_dir():
+        return []
+    found = [CommandFolder(path) for path in place.iterdir() if path.is_dir()]
+    known = [one for one in found if one.exists]
+    return sorted(known, key=lambda one: one.facts.get("started_unix_s", 0.0), reverse=True)
 
 
 def main() -> int:
-    """Give way, then run the command."""
-    give_way()
-    from sd2app.command_line import main as run
+    """Run the command of the command line."""
+    lower_priority()
+    words = sys.argv[1:]
+    folder = None
+    if words[:1] == ["--folder"]:
+        folder, words = CommandFolder(Path(words[1])), words[2:]
+    sys.argv[1:] = words  # files say how they were made
+    if folder is None:
+        from sd2app.command_line import main as run
 
-    return run()
+        return run()
+    # What was started in the background of a script has Ctrl-C switched off.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.default_int_handler)
+    try:
+        lock = folder.lock()
+    except Sd2Error as error:
+        print(f"sd2: {error}", file=sys.stderr)
+        return 1
+    over = threading.Event()
+    try:
+        folder.set_state("running")
+        threading.Thread(target=_watch, args=(folder, over), daemon=True).start()
+        from sd2app.command_line import main as run
+
+        code = run(words)
+    except KeyboardInterrupt:
+        code = _INTERRUPTED
+    except SystemExit as error:  # what was typed wrong
+        code = error.code if isinstance(error.code, int) else 1
+    over.set()
+    folder.note_end(code)
+    lock.release()
+    return code
+
+
+def _watch(folder: CommandFolder, over: threading.Event) -> None:
+    """Interrupt the command as Ctrl-C does, once it is told to stop."""
+    while not over.wait(_POLL_S):
+        if folder.stop_wanted:
+            _thread.interrupt_main()
+            return
 
 
 if __name__ == "__main__":

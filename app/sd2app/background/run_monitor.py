@@ -1,194 +1,398 @@
-"""One command in a folder of its own, whoever started it, followed by that folder."""
+"""Monitor of one run: follows its folder, whoever started it, and steers its process."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Generic, Literal, NamedTuple, TypeVar
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject, QTimer, Signal
 
-from sd2app.background.detached import is_alive
-from sd2app.background.poller import RepeatedLook
-from sd2app.background.run_folder import CommandFolder
+from sd2app.background.latest import LatestRunner
+from sd2app.background.run_command import last_output
+from sd2core.errors import Sd2Error
+from sd2core.processes import ProcessId
+from sd2core.runs.control import Word, read_control, write_control
+from sd2core.runs.folder import LIVE, RunFolder, State
+from sd2core.runs.progress import ProgressTail
 
 Phase = Literal[
-    "starting", "running", "stopping", "cancelling", "finished", "stopped", "failed", "died", "gone"
-]
-"""``gone`` is one that was cancelled, or deleted by somebody else."""
-UNDER_WAY: tuple[Phase, ...] = ("starting", "running", "stopping", "cancelling")
+    "starting", "running", "pausing", "paused", "resuming", "stopping", "cancelling",
+    "finished", "stopped", "failed", "died", "gone",
+]  # fmt: skip
+"""``gone`` is a run that was cancelled, or deleted by another program."""
+
+UNDER_WAY: tuple[Phase, ...] = (
+    "starting", "running", "pausing", "paused", "resuming", "stopping", "cancelling",
+)  # fmt: skip
+"""Phases with a process."""
 
 POLL_MS = 250
-SLOW_POLL_MS = 2000
-"""Of a run that has ended; somebody may delete it."""
-_INTERRUPTED = 130
+SLOW_POLL_MS = 1000
+"""While a run rests or has ended; it may be resumed or deleted elsewhere."""
+_ASK_AGAIN_S = 15.0
+_GIVE_UP_S = 30.0
+"""After that a process that does not react to its cancellation is killed."""
+_SILENT = "It ended without saying why."
+
+T = TypeVar("T")
+F = TypeVar("F", bound=RunFolder)
+Readers = Mapping[str, Callable[[T, dict[str, Any]], None]]
+"""Method that takes a line of progress, by the name of the line's event."""
 
 
-class _Look(NamedTuple):
-    exists: bool
-    live: bool
+def take_lines(target: T, readers: Readers[T], events: Iterable[dict[str, Any]]) -> bool:
+    """Pass lines to their methods, leaving out damaged ones; True if any was of use."""
+    taken = False
+    for event in events:
+        reader = readers.get(str(event.get("event")))
+        if reader is None:
+            continue
+        try:
+            reader(target, event)
+        except (KeyError, TypeError, ValueError, OverflowError):
+            continue
+        taken = True
+    return taken
+
+
+class Poller(QObject):
+    """Calls a function in a thread at intervals and on demand, never twice at a time.
+
+    Signals
+    -------
+    found : object
+        Result of a call.
+    failed : Exception
+        Error of a call; the next one follows all the same.
+    """
+
+    found = Signal(object)
+    failed = Signal(object)
+
+    def __init__(
+        self, name: str, look: Callable[[], Any], every_ms: int, parent: QObject | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._look = look
+        self._runner = LatestRunner(name, self)
+        self._runner.finished.connect(self.found)
+        self._runner.failed.connect(self.failed)
+        self._timer = QTimer(self)
+        self._timer.setInterval(every_ms)
+        self._timer.timeout.connect(self.poll)
+        self._timer.start()
+        self.poll()
+
+    def set_interval(self, every_ms: int) -> None:
+        """Call more or less often."""
+        self._timer.setInterval(every_ms)
+
+    def poll(self) -> None:
+        """Call now, unless a call is under way."""
+        if not self._runner.busy:
+            self._runner.submit(lambda emit: self._look())
+
+    def close(self) -> None:
+        """Call no more."""
+        self._timer.stop()
+        self._runner.close()
+
+
+class _Found(NamedTuple):
+    """One look at the folder of a run."""
+
     launching: bool
-    code: int | None
-    stopping: bool
+    live: bool
+    exists: bool
+    state: State | None
+    process: ProcessId | None
+    word: Word
     events: list[dict[str, Any]]
-    words: str
-    has_result: bool
+    extra: Any
 
 
-class CommandRun(QObject):
-    """What a run told, how it stands, and how to stop it.
+class RunMonitor(QObject, Generic[F]):
+    """State and progress of one run, and orders to its process.
 
-    Who inherits reads its lines, and says whether its result is there.
+    Subclasses read its lines (:meth:`on_events`) and say what they tell.
 
     Parameters
     ----------
-    path : Path
-    pid : int, optional
-        Of the process that was just started for it.
+    folder : RunFolder
+        May not be there yet.
+    process : ProcessId, optional
+        Process that was just started for it.
 
     Signals
     -------
     changed
-        Something was told, or it stands otherwise.
+        A line was read, or the phase is another.
+    phase_changed
     ended
-        It came to its end while it was looked at.
+        The run came to its end while it was followed.
     """
 
     changed = Signal()
+    phase_changed = Signal()
     ended = Signal()
 
     def __init__(
-        self, path: Path, parent: QObject | None = None, *, pid: int | None = None
+        self,
+        folder: F,
+        parent: QObject | None = None,
+        *,
+        process: ProcessId | None = None,
+        poll_ms: int | None = None,
     ) -> None:
         super().__init__(parent)
-        self.folder = CommandFolder(path)
-        self.about = self.folder.about
-        self._pid = pid
-        self._lines = self.folder.lines()
+        self.folder: F = folder
+        self._launched = process
+        self._clock_s = time.monotonic
+        self._tail = ProgressTail(folder.progress)
         self._phase: Phase = "starting"
-        self._known = False
-        self._cancelled = self._stopped = False
+        self._loaded = self._has_begun = False
+        self._extra: Any = None
         self._text = ""
-        self._has_result = False
-        self._looking = RepeatedLook("command run", self._look, POLL_MS, self)
-        self._looking.found.connect(self._take)
+        self._wish: Word | None = None
+        self._cancelled_s: float | None = None
+        self._poll_ms = poll_ms or POLL_MS
+        self._poller = Poller("run", self._look, self._poll_ms, self)
+        self._poller.found.connect(self._take)
+        self._poller.failed.connect(self._fail)
 
-    # --- what it is about -----------------------------------------------------------------
+    # --- what subclasses say ----------------------------------------------------------------
 
-    def hear(self, events: Sequence[dict[str, Any]]) -> bool:
-        """Take new lines; whether any of them was of use."""
+    def on_events(self, events: Sequence[dict[str, Any]]) -> bool:
+        """Read new lines of progress; True if any was of use."""
         return bool(events)
 
+    def inspect(self) -> Any:
+        """Further facts that are read from disk, in the background; see :meth:`on_facts`."""
+        return None
+
+    def on_facts(self, facts: Any) -> None:
+        """Take the facts of :meth:`inspect`."""
+
     @property
-    def begun(self) -> bool:
-        """Whether it has said that it is at it."""
+    def has_started(self) -> bool:
+        """True once the process has said that it works."""
         return True
 
     @property
-    def keeping(self) -> bool:
-        """Whether it writes what would be lost if it were stopped now."""
+    def is_paused(self) -> bool:
+        """True while the process has said that it pauses."""
         return False
-
-    def has_made(self) -> bool:
-        """Whether its result is there; asked in the background."""
-        return False
-
-    # --- what is known --------------------------------------------------------------------
 
     @property
-    def known(self) -> bool:
-        """Whether the folder has been looked at."""
-        return self._known
+    def is_saving(self) -> bool:
+        """True while a result is written that a stop would lose."""
+        return False
+
+    @property
+    def error(self) -> str:
+        """Reason of a failure as the run has told it; empty where it has not."""
+        return ""
+
+    # --- what is known ----------------------------------------------------------------------
+
+    @property
+    def path(self) -> Path:
+        """Path of the folder."""
+        return self.folder.path
+
+    @property
+    def loaded(self) -> bool:
+        """True once the folder has been looked at."""
+        return self._loaded
 
     @property
     def phase(self) -> Phase:
-        """How it stands; what was just asked for counts at once."""
-        if self._phase in UNDER_WAY:
-            if self._cancelled:
-                return "cancelling"
-            if self._stopped:
-                return "stopping"
-        return self._phase
+        """Current phase; an order that was just given counts at once."""
+        if self._phase not in UNDER_WAY or self._wish is None:
+            return self._phase
+        if self._wish == "cancel":
+            return "cancelling"
+        if self._wish == "stop":
+            return "stopping"
+        if self._wish == "pause":
+            return self._phase if self._phase == "paused" else "pausing"
+        return "resuming" if self._phase in ("paused", "pausing") else self._phase
 
     @property
     def under_way(self) -> bool:
-        """Whether a process is at it."""
+        """True while a process works on it."""
         return self._phase in UNDER_WAY
 
     @property
-    def has_result(self) -> bool:
-        """Whether its result was there at the last look."""
-        return self._has_result
-
-    @property
     def text(self) -> str:
-        """Why it failed."""
+        """Reason why it failed."""
         return self._text
 
-    # --- steering -------------------------------------------------------------------------
+    # --- steering ---------------------------------------------------------------------------
+
+    def tell(self, word: Word) -> None:
+        """Give the process an order; the last one counts, and none follows a stop but a cancel.
+
+        Raises
+        ------
+        OSError
+            When it cannot be written.
+        """
+        if not self.under_way or (self._wish in ("stop", "cancel") and word != "cancel"):
+            return
+        if word == "stop" and self.is_saving:
+            return
+        self._wish = word
+        if word == "cancel" and self._cancelled_s is None:
+            self._cancelled_s = self._clock_s()
+        if self.path.is_dir():
+            write_control(self.folder.control, word)
+        elif word in ("stop", "cancel") and self._launched is not None:
+            # Not as far as its folder: there is nothing to keep.
+            self._launched.terminate()
+        self.phase_changed.emit()
+        self.changed.emit()
 
     def stop(self) -> None:
         """End it now and keep what there is."""
-        if self.under_way and not self.keeping:
-            self._stopped = True
-            self.folder.stop()
-            self.changed.emit()
+        self.tell("stop")
 
     def cancel(self) -> None:
         """End it now and delete what it made."""
-        if self.under_way:
-            self._cancelled = True
-            self.folder.stop()
-            self.changed.emit()
+        self.tell("cancel")
+
+    def delete(self) -> None:
+        """Delete what it made; only after its end."""
+        if not self.under_way:
+            self.folder.discard()
+            self.folder.output.unlink(missing_ok=True)
+
+    def poll(self) -> None:
+        """Look at the folder now, in the background."""
+        self._poller.poll()
 
     def close(self) -> None:
-        """Look no more; the process goes on."""
-        self._looking.close()
+        """Follow it no more; its process goes on."""
+        self._poller.close()
 
-    # --- looking --------------------------------------------------------------------------
+    # --- looking ----------------------------------------------------------------------------
 
-    def _look(self) -> _Look:
+    def _look(self) -> _Found:
         folder = self.folder
-        launching = self._pid is not None and is_alive(self._pid)
+        # The process first: when it is gone, all that it wrote is there to be read.
+        launching = self._launched is not None and self._launched.is_alive
         live = folder.live
-        # After that: when it is gone, all that it wrote is there to be read.
-        return _Look(
-            folder.exists, live, launching, folder.code, folder.stop_wanted,
-            self._lines.new(), folder.words, self.has_made(),
+        state: State | None = None
+        if folder.exists:
+            with suppress(Sd2Error):  # deleted meanwhile, or damaged
+                state = folder.state()
+        process = folder.process
+        # Read last: of a run that has ended, the lines are complete.
+        return _Found(
+            launching, live, folder.exists, state, process,
+            read_control(folder.control), self._tail.new(), self.inspect(),
         )  # fmt: skip
 
-    def _take(self, look: _Look) -> None:
-        told = self.hear(look.events)
-        before, self._phase = self._phase, self._phase_of(look)
-        if self._phase == "gone" and look.exists:
-            self.folder.delete()
-        self._stopped |= look.stopping
-        another = before != self._phase or not self._known or look.has_result != self._has_result
-        self._known, self._has_result = True, look.has_result
-        if self._phase not in UNDER_WAY:
-            self._looking.set_interval(SLOW_POLL_MS)
-            self._text = _reason(look) if self._phase in ("failed", "died") else ""
+    def _take(self, found: _Found) -> None:
+        told = self.on_events(found.events)
+        told |= found.extra != self._extra
+        self._extra = found.extra
+        self.on_facts(found.extra)
+        if self._launched is None or found.live or _is_begun_by(found.process, self._launched):
+            self._has_begun = True
+        before, was_loaded = self._phase, self._loaded
+        self._phase, self._loaded = self._phase_of(found), True
+        self._obey(found)
+        another = self._phase != before or not was_loaded
+        if another:
+            self._settle()
+            self.phase_changed.emit()
         if told or another:
             self.changed.emit()
         if before in UNDER_WAY and self._phase not in UNDER_WAY:
             self.ended.emit()
 
-    def _phase_of(self, look: _Look) -> Phase:
-        if not look.exists:
+    def _phase_of(self, found: _Found) -> Phase:
+        if found.live:
+            return self._phase_under_way(found.word)
+        if found.launching and not self._has_begun:
+            return "starting"
+        if self._wish == "cancel":
+            # It may have ended before it could clear up.
+            self.folder.discard()
             return "gone"
-        if look.live:
-            return "running" if self.begun else "starting"
-        if look.code is None:
-            if look.launching:
-                return "starting"
-            return "gone" if self._cancelled else "died"
-        if self._cancelled:
+        if not self._has_begun:
+            # Refused, or told to stop, before it had its folder.
+            return "stopped" if self._wish == "stop" else "failed"
+        if not found.exists or found.state == "cancelled":
             return "gone"
-        if look.code == _INTERRUPTED:
-            return "stopped"
-        return "finished" if look.code == 0 else "failed"
+        state = found.state
+        if state in LIVE:
+            return "starting"  # a process took it up between the two looks
+        if state == "finished" or state == "stopped" or state == "failed":
+            return state
+        return "died"
+
+    def _phase_under_way(self, word: Word) -> Phase:
+        if not self.has_started:
+            return "starting"
+        if word == "cancel":
+            return "cancelling"
+        if word == "stop":
+            return "stopping"
+        if self.is_paused:
+            return "paused" if word == "pause" else "resuming"
+        return "pausing" if word == "pause" else "running"
+
+    def _obey(self, found: _Found) -> None:
+        """Repeat an order that the process may not have heard; forget one that it has obeyed."""
+        if self._wish is None or not self.under_way:
+            return
+        if found.live and found.word != self._wish:
+            # It had no folder when the order was given, and may have cleared up meanwhile.
+            with suppress(FileNotFoundError):
+                write_control(self.folder.control, self._wish)
+        elif not found.live and self._wish in ("stop", "cancel") and self._launched is not None:
+            self._launched.terminate()
+        if self._phase == {"run": "running", "pause": "paused"}.get(self._wish):
+            self._wish = None
+        if self._cancelled_s is not None:
+            waited_s = self._clock_s() - self._cancelled_s
+            process = found.process if found.live else self._launched
+            if waited_s > _ASK_AGAIN_S and process is not None:
+                process.terminate(at_once=waited_s > _GIVE_UP_S)
+
+    def _settle(self) -> None:
+        """Follow another phase."""
+        under_way = self._phase in UNDER_WAY
+        rests = not under_way or self._phase == "paused"
+        self._poller.set_interval(SLOW_POLL_MS if rests else self._poll_ms)
+        if under_way:
+            return
+        self._wish = None
+        output = self.folder.output
+        lines = [line for line in last_output(output).splitlines() if not line.startswith("{")]
+        said = "\n".join(lines)
+        self._text = ""
+        if self._phase == "failed":
+            self._text = self.error or said.removeprefix("sd2: ") or _SILENT
+        elif self._phase == "died":
+            self._text = lines[-1] if lines else ""
+        if self._phase in ("finished", "stopped", "gone") and output.parent != self.path:
+            output.unlink(missing_ok=True)
+
+    def _fail(self, error: Exception) -> None:
+        # The disk is away for a moment; it is looked at again.
+        if self._text != str(error):
+            self._text = str(error)
+            self.changed.emit()
 
 
-def _reason(look: _Look) -> str:
-    said = look.words.strip()
-    return said.removeprefix("sd2: ") if said else "It ended without a word."
+def _is_begun_by(process: ProcessId | None, launched: ProcessId) -> bool:
+    """True if the process of a folder is the launched one, or one that this began: see Windows."""
+    return process is not None and (
+        launched.is_same(process) or process.started_unix_s > launched.started_unix_s
+    )

@@ -12,7 +12,7 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
-from sd2app.background.run_command import give_way
+from sd2core.processes import lower_priority
 
 CLASSIFIER = "classifier"
 _BINS = 32
@@ -22,8 +22,8 @@ _VALIDATION = 1.1
 
 
 def main() -> int:
-    """Give way, then time."""
-    give_way()
+    """Lower the priority, then time."""
+    lower_priority()
     first, *rest = sys.argv[1:]
     took_s = (
         _of_classifier(*rest[:2], int(rest[2]))

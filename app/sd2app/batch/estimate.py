@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,10 +11,9 @@ from typing import Any
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.line_process import Ending, LineProcess
+from sd2app.background.run_command import COMMAND
 from sd2core.batch.plan import BatchPlan
 from sd2core.batch.plan_file import write_plan
-
-COMMAND = (sys.executable, "-u", "-m", "sd2app.background.run_command")
 
 
 class BatchEstimateModel(QObject):

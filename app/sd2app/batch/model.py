@@ -7,10 +7,10 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.detached import launch
-from sd2app.batch.estimate import COMMAND, BatchEstimateModel
+from sd2app.background.run_command import COMMAND, launch
+from sd2app.batch.estimate import BatchEstimateModel
 from sd2app.batch.results import BatchResults
-from sd2app.batch.run import BatchFollower, output_of, plan_of
+from sd2app.batch.run import BatchMonitor, plan_of
 from sd2app.batch.setup import BatchSetupModel
 from sd2app.settings import Settings
 from sd2app.widgets.text import counted
@@ -55,7 +55,7 @@ class BatchModel(QObject):
         self.setup = BatchSetupModel(settings, self)
         self.estimate = BatchEstimateModel(self, command)
         self.results = BatchResults(self)
-        self._follower: BatchFollower | None = None
+        self._monitor: BatchMonitor | None = None
         self._was_under_way = self._taking_up = self._watched = False
         for signal in (self.setup.changed, self.estimate.changed, self.results.changed):
             signal.connect(self.changed)
@@ -63,9 +63,9 @@ class BatchModel(QObject):
     # --- what is known --------------------------------------------------------------------
 
     @property
-    def batch(self) -> BatchFollower | None:
+    def batch(self) -> BatchMonitor | None:
         """The batch in view; None while a new one is being set up."""
-        return self._follower
+        return self._monitor
 
     @property
     def why_not_start(self) -> str:
@@ -97,8 +97,8 @@ class BatchModel(QObject):
         if path is None:
             self._follow(None)
             self._settings.set_value("batch/last", "")
-        elif self._follower is None or self._follower.folder.path != path:
-            self._follow(BatchFollower(path, self))
+        elif self._monitor is None or self._monitor.path != path:
+            self._follow(BatchMonitor(path, self))
 
     def open_batch(self, path: Path) -> None:
         """Show a batch that lies elsewhere, as of a command in a terminal.
@@ -144,15 +144,15 @@ class BatchModel(QObject):
         Sd2Error
             When it cannot be started.
         """
-        run = self._follower
+        run = self._monitor
         if run is not None and run.resumable:
-            self._launch(run.folder.path, run.folder.plan)
+            self._launch(run.path, run.folder.plan)
 
     def stop(self) -> None:
         """End the batch in view; what is done stays, and it can go on later."""
-        if self._follower is not None:
+        if self._monitor is not None:
             try:
-                self._follower.stop()
+                self._monitor.stop()
             except OSError as error:
                 self.failed.emit(str(error))
 
@@ -161,54 +161,54 @@ class BatchModel(QObject):
         self.estimate.close()
         self.setup.close()
         self.results.close()
-        if self._follower is not None:
-            self._follower.close()
+        if self._monitor is not None:
+            self._monitor.close()
 
     def _launch(self, out: Path, plan: Path) -> None:
-        output = output_of(out)
+        output = BatchFolder(out).output
         # What an earlier start said is not about this one.
         output.unlink(missing_ok=True)
         words = ["batch", str(plan), "--workers", str(self.setup.workers)]
-        pid = launch([*self._command, *words], output)
+        process = launch([*self._command, *words], output)
         self.estimate.forget()  # of what is about to be done
-        self._follow(BatchFollower(out, self, pid=pid))
+        self._follow(BatchMonitor(out, self, process=process))
 
     # --- following ------------------------------------------------------------------------
 
-    def _follow(self, follower: BatchFollower | None) -> None:
-        if self._follower is not None:
-            self._follower.close()
-            self._follower.deleteLater()
-        self._follower = follower
+    def _follow(self, monitor: BatchMonitor | None) -> None:
+        if self._monitor is not None:
+            self._monitor.close()
+            self._monitor.deleteLater()
+        self._monitor = monitor
         self._was_under_way = False
         self.results.forget()
-        if follower is not None:
-            self._settings.set_value("batch/last", str(follower.folder.path))
-            follower.changed.connect(self.changed)
-            follower.phase_changed.connect(self._notice)
+        if monitor is not None:
+            self._settings.set_value("batch/last", str(monitor.path))
+            monitor.changed.connect(self.changed)
+            monitor.phase_changed.connect(self._notice)
         self.phase_changed.emit()
         self.changed.emit()
 
     def _notice(self) -> None:
-        run = self._follower
+        run = self._monitor
         if run is None:
             return
         if run.phase == "gone":
             self.select(None)
             return
-        ended = run.known and self._was_under_way and not run.under_way
-        taken_up, self._taking_up = self._taking_up and run.known, False
-        self._was_under_way = run.known and run.under_way
-        if run.known and not run.under_way:
+        ended = run.loaded and self._was_under_way and not run.under_way
+        taken_up, self._taking_up = self._taking_up and run.loaded, False
+        self._was_under_way = run.loaded and run.under_way
+        if run.loaded and not run.under_way:
             self.results.read(run.folder)
         self.phase_changed.emit()
-        name = run.folder.path.name
+        name = run.path.name
         if taken_up and run.under_way:
             self.noted.emit(f"{name} is at work. File → Batch… shows it.")
         elif ended and not self._watched:
             self._say_ended(name, run)
 
-    def _say_ended(self, name: str, run: BatchFollower) -> None:
+    def _say_ended(self, name: str, run: BatchMonitor) -> None:
         if run.phase in ("failed", "died"):
             self.failed.emit(f"{name} did not come to its end. File → Batch… says more.")
         elif run.phase == "finished":

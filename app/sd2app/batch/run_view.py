@@ -48,7 +48,7 @@ _FAILURES, _FAILURES_PAGE = "Failures", 2
 
 
 class BatchRunView(QWidget):
-    """A view of :class:`BatchFollower` and of its results."""
+    """A view of :class:`BatchMonitor` and of its results."""
 
     def __init__(self, batch: BatchModel, asks: Asks, parent: QWidget | None = None) -> None:
         super().__init__(parent)

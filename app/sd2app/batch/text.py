@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from sd2app.batch.run import BatchFollower, Failed, Phase
+from sd2app.background.run_monitor import Phase
+from sd2app.batch.run import BatchMonitor, Failed
 from sd2app.batch.setup import Entry
 from sd2app.widgets.text import about, bytes_text, counted, duration_text, exact_text
 
@@ -37,7 +38,7 @@ def entry_text(entry: Entry) -> str:
     return "" if entry.count == 1 and len(entry.patterns) == 1 else counted(entry.count, "file")
 
 
-def headline(batch: BatchFollower) -> str:
+def headline(batch: BatchMonitor) -> str:
     """How it stands."""
     status, words = batch.status, _PHASES[batch.phase]
     if batch.phase == "finished" and status is not None and status.failed:
@@ -47,7 +48,7 @@ def headline(batch: BatchFollower) -> str:
     return words
 
 
-def time_text(batch: BatchFollower) -> str:
+def time_text(batch: BatchMonitor) -> str:
     """How long it took, and what is left."""
     status = batch.status
     if status is None or status.elapsed_s is None:
@@ -61,7 +62,7 @@ def time_text(batch: BatchFollower) -> str:
     return " · ".join(parts)
 
 
-def step_facts(batch: BatchFollower) -> list[tuple[str, int, int, str]]:
+def step_facts(batch: BatchMonitor) -> list[tuple[str, int, int, str]]:
     """Per step: its name, how many tasks are settled, how many there are, and both in words."""
     status = batch.status
     if status is None:

@@ -6,7 +6,7 @@ from PySide6.QtCore import QPointF, Qt
 from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPen, QPolygonF
 from PySide6.QtWidgets import QWidget
 
-from sd2app.classify.history import CheckPoint, ClassHistory
+from sd2app.classify.run import CheckPoint, ClassHistory
 from sd2app.classify.training import ClassTraining
 from sd2app.session.display import DisplayModel
 from sd2app.widgets.plot import SteppedPlot

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.run_folder import COMMAND, CommandFolder, folders_in
+from sd2app.background.run_command import COMMAND_IN_FOLDER, CommandFolder, commands_in
 from sd2app.background.step_times import PatientTiming, StepKey, StepTime, StepTimes
 from sd2app.classify.library import user_classifiers_folder
 from sd2app.classify.run import MODEL_NAME, TABLE_NAME, ClassRun
@@ -62,7 +62,7 @@ class ClassTraining(QObject):
         use: Callable[[Path], None],
         parent: QObject | None = None,
         folder: Path | None = None,
-        command: Sequence[str] = COMMAND,
+        command: Sequence[str] = COMMAND_IN_FOLDER,
         step_times: StepTimes | None = None,
     ) -> None:
         super().__init__(parent)
@@ -107,12 +107,12 @@ class ClassTraining(QObject):
     @property
     def in_use(self) -> bool:
         """Whether the model of the run in view was put to use."""
-        return self._run is not None and self._used == self._run.folder.path
+        return self._run is not None and self._used == self._run.path
 
     @property
     def _busy_with(self) -> str:
         if self.under_way and self._run is not None:
-            return self._run.folder.path.name
+            return self._run.path.name
         return next((one.path.name for one in self._runs if one.live), "")
 
     @property
@@ -168,14 +168,14 @@ class ClassTraining(QObject):
 
     def refresh(self) -> None:
         """Look again what lies on disk."""
-        found = folders_in(self._folder / "runs")
+        found = commands_in(self._folder / "runs")
         self._runs = tuple(KnownRun(one.path, _title(one), one.live) for one in found)
         self.changed.emit()
 
     def select(self, path: Path | None) -> None:
         """Show a run; None is a new one, to be set up."""
         if self._run is not None:
-            if self._run.folder.path == path:
+            if self._run.path == path:
                 return
             self._run.close()
             self._run.deleteLater()
@@ -218,7 +218,7 @@ class ClassTraining(QObject):
             raise Sd2Error(self.why_not_compare)
         about = {"what": "table"}
         arguments = [str(word) for word in run.about.get("arguments", ())]
-        self._start(run.folder.path, arguments, about)
+        self._start(run.path, arguments, about)
 
     def use_model(self) -> None:
         """Keep the model of the run in view among the classifiers, and classify with it.
@@ -231,18 +231,18 @@ class ClassTraining(QObject):
         run = self._run
         if run is None or run.result is None or run.compares:
             return
-        kept = self._folder / f"{run.folder.path.name}.safetensors"
+        kept = self._folder / f"{run.path.name}.safetensors"
         with atomic_write(kept) as stream:
             stream.write(run.result.read_bytes())
         self._use(kept)
-        self._used = run.folder.path
+        self._used = run.path
         self.changed.emit()
 
     def delete(self) -> None:
         """Delete the run in view, which has ended."""
         run = self._run
         if run is not None and not run.under_way:
-            run.folder.delete()
+            run.delete()
             self.select(None)
             self.refresh()
 
@@ -257,9 +257,9 @@ class ClassTraining(QObject):
 
     def _start(self, path: Path, arguments: list[str], about: dict[str, Any]) -> None:
         self.step_times.stop()
-        pid = CommandFolder(path).start(arguments, about, self._command)
+        process = CommandFolder(path).start(arguments, about, self._command)
         self.select(None)
-        self._follow(ClassRun(path, self, pid=pid))
+        self._follow(ClassRun(path, self, process=process))
         self.refresh()
 
     def _follow(self, run: ClassRun) -> None:
@@ -269,7 +269,7 @@ class ClassTraining(QObject):
 
     def _tell(self) -> None:
         live = self._run is not None and self._run.phase == "running"
-        here = self._run.folder.path if self._run is not None else None
+        here = self._run.path if self._run is not None else None
         known = any(one.path == here and one.live for one in self._runs)
         if live and not known:
             self.refresh()  # it has begun
@@ -285,7 +285,7 @@ class ClassTraining(QObject):
         if run.phase == "gone":
             self.select(None)
         elif not self._watched:
-            name = run.folder.path.name
+            name = run.path.name
             if run.phase == "finished":
                 self.noted.emit(f"{name} is done. The Train panel shows what came of it.")
             elif run.phase in ("failed", "died"):
@@ -308,7 +308,7 @@ class ClassTraining(QObject):
 
 
 def _title(folder: CommandFolder) -> str:
-    about = folder.about
+    about = folder.facts
     what = "Comparison" if about.get("what") == "table" else "Training"
     state = "under way" if folder.live else _STATES.get(folder.code, "failed")
     return f"{clock_text(about.get('started_unix_s', 0.0))} · {what} · {state}"

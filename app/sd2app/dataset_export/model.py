@@ -10,9 +10,8 @@ from typing import Any, NamedTuple
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import Emit, LatestRunner
-from sd2app.background.run_folder import COMMAND, CommandFolder, folders_in
-from sd2app.dataset_export.messages import Exported
-from sd2app.dataset_export.run import ExportRun, user_exports_folder
+from sd2app.background.run_command import COMMAND_IN_FOLDER, CommandFolder, commands_in
+from sd2app.dataset_export.run import Exported, ExportRun, user_exports_folder
 from sd2app.session.tasks import Job, JobsModel
 from sd2core.datasets.forecast import Counting, Forecast
 from sd2core.datasets.options import DatasetOptions
@@ -137,7 +136,7 @@ class ExportModel(QObject):
         self,
         jobs: JobsModel,
         parent: QObject | None = None,
-        command: Sequence[str] = COMMAND,
+        command: Sequence[str] = COMMAND_IN_FOLDER,
         folder: Path | None = None,
     ) -> None:
         super().__init__(parent)
@@ -242,13 +241,13 @@ class ExportModel(QObject):
         path = self._new_folder(out)
         try:
             # It may use all processors: it gives way to whatever else wants them.
-            pid = CommandFolder(path).start(words, about, self._command, {})
+            process = CommandFolder(path).start(words, about, self._command, {})
         except (Sd2Error, OSError) as error:
-            CommandFolder(path).delete()
+            CommandFolder(path).discard()
             self.failed.emit(str(error))
             return
         self._result = None
-        self._follow(ExportRun(path, self, pid=pid))
+        self._follow(ExportRun(path, self, process=process))
 
     def stop(self) -> None:
         """Stop writing; what is complete stays, and the same export goes on from there."""
@@ -258,7 +257,7 @@ class ExportModel(QObject):
     def look_for_export(self) -> None:
         """At the start of the program: find what is being written, or has been meanwhile."""
         # One that has ended is there again where its folder could not be deleted.
-        found = [one for one in folders_in(self._folder) if one.path not in self._over]
+        found = [one for one in commands_in(self._folder) if one.path not in self._over]
         one = next((folder for folder in found if folder.live), next(iter(found), None))
         if one is None or self.exporting:
             return
@@ -355,8 +354,8 @@ class ExportModel(QObject):
             self._jobs.finish(self._job)
             self._job = None
         run.close()
-        run.folder.delete()
-        self._over.add(run.folder.path)
+        run.folder.discard()
+        self._over.add(run.path)
         run.deleteLater()
         self._say_ended(run)
         self.changed.emit()
@@ -377,7 +376,7 @@ class ExportModel(QObject):
                 " what is complete is kept."
             )
         elif run.phase not in ("stopped", "gone"):
-            self.failed.emit(run.refused or run.text.splitlines()[-1])
+            self.failed.emit(run.text.splitlines()[-1])
 
 
 def _places(place: Path | None) -> int:

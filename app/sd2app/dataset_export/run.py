@@ -1,42 +1,65 @@
-"""A data set being written by a process that outlives the window."""
+"""Monitor of one data set that is written, and the lines of ``sd2 export --progress-json``."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from PySide6.QtCore import QObject
 
-from sd2app.background.run_monitor import CommandRun
-from sd2app.dataset_export.messages import Exported, Progressed, Refused, message_of
+from sd2app.background.run_command import CommandFolder
+from sd2app.background.run_monitor import RunMonitor, take_lines
+from sd2core.processes import ProcessId
 
 
 def user_exports_folder() -> Path:
-    """Where exports under way are noted; it need not be there yet."""
+    """Folder in which exports under way are noted; it need not be there yet."""
     import platformdirs
 
     return Path(platformdirs.user_data_dir("sd2-studio", appauthor=False)) / "exports"
 
 
-class ExportRun(CommandRun):
-    """A run with how far it is, and what it has written.
+@dataclass(frozen=True)
+class Exported:
+    """A data set that is written.
 
     Parameters
     ----------
-    path : Path
-        Of the folder of the command, not of the data set.
-    pid : int, optional
-        Of the process that was just started for it.
+    path, card, sheet : Path
+    segments, sources : int
+    left_out : tuple of str
+        Sources that could not be made, each with its reason.
+    """
+
+    path: Path
+    card: Path
+    sheet: Path
+    segments: int
+    sources: int
+    left_out: tuple[str, ...] = ()
+
+
+class ExportRun(RunMonitor[CommandFolder]):
+    """An export; its folder is that of the command, not the data set.
+
+    Attributes
+    ----------
+    done, total : int
+        Steps; 0 of 0 while the preview sheet is drawn.
+    written : Exported or None
     """
 
     def __init__(
-        self, path: Path, parent: QObject | None = None, *, pid: int | None = None
+        self, path: Path, parent: QObject | None = None, *, process: ProcessId | None = None
     ) -> None:
-        super().__init__(path, parent, pid=pid)
+        folder = CommandFolder(path)
+        self.about = folder.facts
         self.done = self.total = 0
         self.written: Exported | None = None
-        self.refused = ""
+        self._refused = ""
+        super().__init__(folder, parent, process=process)
 
     @property
     def out(self) -> Path:
@@ -45,18 +68,38 @@ class ExportRun(CommandRun):
 
     @property
     def choice(self) -> Mapping[str, Any]:
-        """What it is to hold, as it was noted at the start."""
+        """Content that was chosen, as it was noted at the start."""
         choice = self.about.get("choice")
         return choice if isinstance(choice, dict) else {}
 
-    def hear(self, events: Sequence[dict[str, Any]]) -> bool:
-        """How far it is, what it has written, or why nothing."""
-        messages = [message for event in events if (message := message_of(event)) is not None]
-        for message in messages:
-            if isinstance(message, Progressed):
-                self.done, self.total = message.done, message.total
-            elif isinstance(message, Exported):
-                self.written = message
-            elif isinstance(message, Refused):
-                self.refused = message.text
-        return bool(messages)
+    @property
+    def error(self) -> str:
+        """Sentence of the command on what is wrong."""
+        return self._refused
+
+    def on_events(self, events: Sequence[dict[str, Any]]) -> bool:
+        """Read progress, the result, or a refusal."""
+        return take_lines(self, _READERS, events)
+
+    def _progress(self, event: dict[str, Any]) -> None:
+        self.done, self.total = int(event["done"]), int(event["total"])
+
+    def _done(self, event: dict[str, Any]) -> None:
+        self.written = Exported(
+            Path(event["dataset"]),
+            Path(event["card"]),
+            Path(event["sheet"]),
+            int(event["segments"]),
+            int(event["sources"]),
+            tuple(map(str, event["failed"])),
+        )
+
+    def _refuse(self, event: dict[str, Any]) -> None:
+        self._refused = str(event["text"])
+
+
+_READERS = {
+    "progress": ExportRun._progress,
+    "done": ExportRun._done,
+    "error": ExportRun._refuse,
+}

@@ -9,14 +9,10 @@ from dataclasses import fields
 from pathlib import Path
 
 from sd2core.train.config import DataConfig, TrainConfig, TrainingConfig
+from sd2core.train.folder import TrainingFolder
 
 _OPTIONS = {"early_stopping_epochs": "--early-stopping"}
 """Options that are not called as their setting is."""
-
-
-def output_of(run: Path) -> Path:
-    """What the process of a run writes besides; it may end before it has a folder."""
-    return run.with_name(f".{run.name}.out")
 
 
 def new_run_folder(folder: Path, config: TrainConfig) -> Path:
@@ -25,7 +21,7 @@ def new_run_folder(folder: Path, config: TrainConfig) -> Path:
     when = time.strftime("%Y-%m-%d %H.%M")
     name = f"{config.model.name} {pairs[:40]} {when}"
     path, number = folder / name, 2
-    while path.exists() or output_of(path).exists():
+    while path.exists() or TrainingFolder(path).output.exists():
         path, number = folder / f"{name} {number}", number + 1
     return path
 

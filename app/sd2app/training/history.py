@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
-from sd2app.background.event_lines import take_lines
+from sd2app.background.run_monitor import take_lines
 from sd2core.errors import Sd2Error
 
 Outcome = Literal["finished", "stopped", "cancelled", "failed"]

@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Literal
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from sd2app.background.detached import launch
+from sd2app.background.run_command import COMMAND, launch
 from sd2app.background.step_times import COMMAND as TIMING_COMMAND
 from sd2app.background.step_times import PatientTiming, StepKey, StepTimes
 from sd2app.settings import Settings
 from sd2app.training.command import (
     new_run_folder,
-    output_of,
     quoted,
     resume_arguments,
     train_arguments,
 )
 from sd2app.training.library import TrainingLibrary, user_runs_folder
 from sd2app.training.pair_maker import PairMaker
-from sd2app.training.run import TrainingFollower
+from sd2app.training.run import TrainingMonitor
 from sd2app.training.setup import TrainingSetupModel
 from sd2core.errors import Sd2Error
 from sd2core.processes import ONE_THREAD
@@ -30,7 +28,6 @@ from sd2core.train.folder import TrainingFolder
 
 Closing = Literal["ask", "keep", "stop"]
 
-COMMAND = (sys.executable, "-u", "-m", "sd2app.background.run_command")
 CLOSING: tuple[Closing, ...] = ("ask", "keep", "stop")
 """What happens to a run when the window is closed."""
 _LIBRARY_MS = 3000
@@ -83,7 +80,7 @@ class TrainingModel(QObject):
         self.pair_maker.changed.connect(self.changed)
         self.pair_maker.made.connect(self.setup.add_store)
         self.pair_maker.failed.connect(self.failed)
-        self._follower: TrainingFollower | None = None
+        self._monitor: TrainingMonitor | None = None
         self._was_under_way = False
         self._looking_for_runs = False
         self._watched = False
@@ -99,34 +96,34 @@ class TrainingModel(QObject):
     # --- what is known --------------------------------------------------------------------
 
     @property
-    def run(self) -> TrainingFollower | None:
+    def run(self) -> TrainingMonitor | None:
         """The run in view; None while a new one is being set up."""
-        return self._follower
+        return self._monitor
 
     @property
     def under_way(self) -> bool:
         """Whether the run in view has a process."""
-        return self._follower is not None and self._follower.known and self._follower.under_way
+        return self._monitor is not None and self._monitor.loaded and self._monitor.under_way
 
-    def to_be_left(self) -> TrainingFollower | None:
+    def to_be_left(self) -> TrainingMonitor | None:
         """The run that would go on when the window is closed, brought into view.
 
         What was started from a terminal is nobody's business here unless it is in view.
         """
         if not self.under_way:
             live = self.library.live
-            if live is None or not output_of(live.path).exists():
+            if live is None or not TrainingFolder(live.path).output.exists():
                 return None
             self.select(live.path)
-        return self._follower
+        return self._monitor
 
     @property
     def mark(self) -> str:
         """How far the run in view is, in a word; empty when none is under way."""
-        if not self.under_way or self._follower is None:
+        if not self.under_way or self._monitor is None:
             return ""
-        share = self._follower.history.share
-        if self._follower.phase == "paused":
+        share = self._monitor.history.share
+        if self._monitor.phase == "paused":
             return "paused"
         return "…" if share is None else f"{100 * share:.0f} %"
 
@@ -145,10 +142,9 @@ class TrainingModel(QObject):
     def why_not_start(self) -> str:
         """Why no run can be started; empty when it can."""
         live = self.library.live
-        path = self._follower.folder.path if self._follower and self.under_way else None
+        path = self._monitor.path if self._monitor and self.under_way else None
         if live is not None or path is not None:
-            name = (path or live.path).name  # type: ignore[union-attr]
-            return f"{name} is being trained. Wait for it, or stop it."
+            return _busy_text(path or live.path)  # type: ignore[union-attr]
         return self.setup.problem
 
     @property
@@ -172,7 +168,7 @@ class TrainingModel(QObject):
         self._timing.look()
 
     def _to_be_timed(self) -> StepKey | None:
-        wanted = self._watched and self._follower is None and not self.why_not_start
+        wanted = self._watched and self._monitor is None and not self.why_not_start
         return self.setup.step_key if wanted else None
 
     # --- one run after another ------------------------------------------------------------
@@ -188,8 +184,8 @@ class TrainingModel(QObject):
         if path is None:
             self._follow(None)
             self._settings.set_value("training/run", "")
-        elif self._follower is None or self._follower.folder.path != path:
-            self._follow(TrainingFollower(path, self))
+        elif self._monitor is None or self._monitor.path != path:
+            self._follow(TrainingMonitor(path, self))
 
     def open_run(self, path: Path) -> None:
         """Show a run that lies elsewhere.
@@ -222,17 +218,19 @@ class TrainingModel(QObject):
 
     def resume(self) -> None:
         """Go on with the run in view where it ended; raises what :meth:`start` does."""
-        run = self._follower
+        run = self._monitor
         if run is None or run.under_way:
             return
-        if self.library.live is not None:
-            raise Sd2Error(self.why_not_start)
-        self._launch(run.folder.path, resume_arguments(run.folder.path))
+        # The folders are asked: what the library found may be over by now.
+        for other in self.library.runs:
+            if other.live and TrainingFolder(other.path).live:
+                raise Sd2Error(_busy_text(other.path))
+        self._launch(run.path, resume_arguments(run.path))
 
     def _launch(self, path: Path, arguments: list[str]) -> None:
         # What moves on the screen comes first: the training gets by with one processor.
-        pid = launch([*self._command, *arguments], output_of(path), ONE_THREAD)
-        self._follow(TrainingFollower(path, self, pid=pid))
+        process = launch([*self._command, *arguments], TrainingFolder(path).output, ONE_THREAD)
+        self._follow(TrainingMonitor(path, self, process=process))
         self.library.refresh()
 
     # --- steering -------------------------------------------------------------------------
@@ -255,7 +253,7 @@ class TrainingModel(QObject):
 
     def delete(self) -> None:
         """Delete the run in view, which has ended, with its model."""
-        run = self._follower
+        run = self._monitor
         if run is not None and not run.under_way:
             self._attempt(lambda run: run.delete())
             self.select(None)
@@ -268,39 +266,39 @@ class TrainingModel(QObject):
         self.pair_maker.close()
         self.setup.close()
         self.library.close()
-        if self._follower is not None:
-            self._follower.close()
+        if self._monitor is not None:
+            self._monitor.close()
 
-    def _attempt(self, work: Callable[[TrainingFollower], None]) -> None:
-        if self._follower is not None:
+    def _attempt(self, work: Callable[[TrainingMonitor], None]) -> None:
+        if self._monitor is not None:
             try:
-                work(self._follower)
+                work(self._monitor)
             except (OSError, Sd2Error) as error:
                 self.failed.emit(str(error))
 
     # --- following ------------------------------------------------------------------------
 
-    def _follow(self, follower: TrainingFollower | None) -> None:
-        if self._follower is not None:
-            self._follower.close()
-            self._follower.deleteLater()
-        self._follower = follower
+    def _follow(self, monitor: TrainingMonitor | None) -> None:
+        if self._monitor is not None:
+            self._monitor.close()
+            self._monitor.deleteLater()
+        self._monitor = monitor
         self._was_under_way = False
-        if follower is not None:
-            self._settings.set_value("training/run", str(follower.folder.path))
-            follower.changed.connect(self._tell)
-            follower.phase_changed.connect(self._notice)
+        if monitor is not None:
+            self._settings.set_value("training/run", str(monitor.path))
+            monitor.changed.connect(self._tell)
+            monitor.phase_changed.connect(self._notice)
         self.phase_changed.emit()
         self.changed.emit()
 
     def _tell(self) -> None:
-        run = self._follower
+        run = self._monitor
         if run is not None and run.under_way and run.history.epoch_points:
             self._learn_step_time(run)
         self.changed.emit()
 
     def _notice(self) -> None:
-        run = self._follower
+        run = self._monitor
         if run is None:
             return
         if run.phase == "gone":
@@ -308,24 +306,24 @@ class TrainingModel(QObject):
             self.library.refresh()
             self.select(None)
             return
-        ended = run.known and self._was_under_way and not run.under_way
-        self._was_under_way = run.known and run.under_way
+        ended = run.loaded and self._was_under_way and not run.under_way
+        self._was_under_way = run.loaded and run.under_way
         self.library.refresh()
         self.phase_changed.emit()
         if ended:
             self._learn_step_time(run)
             self._say_ended(run)
 
-    def _say_ended(self, run: TrainingFollower) -> None:
+    def _say_ended(self, run: TrainingMonitor) -> None:
         if self._watched:
             return  # it is seen
-        name = run.folder.path.name
+        name = run.path.name
         if run.phase == "finished":
             self.noted.emit(f"{name} is trained. The Train panel puts its model to use.")
         elif run.phase in ("failed", "died"):
             self.failed.emit(f"{name} could not be trained to its end. The Train panel says more.")
 
-    def _learn_step_time(self, run: TrainingFollower) -> None:
+    def _learn_step_time(self, run: TrainingMonitor) -> None:
         """What a step takes here is the best estimate for the next run."""
         step_s, config = run.history.step_s, run.config
         if step_s is not None and config is not None:
@@ -346,3 +344,7 @@ class TrainingModel(QObject):
         # It may lie elsewhere.
         if last and TrainingFolder(Path(last)).exists:
             self.select(Path(last))
+
+
+def _busy_text(path: Path) -> str:
+    return f"{path.name} is being trained. Wait for it, or stop it."

@@ -13,11 +13,11 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from sd2app.background.run_monitor import UNDER_WAY, Phase
 from sd2app.session.display import DisplayModel
 from sd2app.training.curves import TrainingCurves
 from sd2app.training.model import CLOSING, TrainingModel
-from sd2app.training.phase import UNDER_WAY, Phase
-from sd2app.training.run import TrainingFollower
+from sd2app.training.run import TrainingMonitor
 from sd2app.training.text import (
     about_text,
     headline,
@@ -48,7 +48,7 @@ _BUTTONS: dict[Phase, tuple[str, ...]] = {
 
 
 class TrainingRunView(QWidget):
-    """A view of :class:`TrainingFollower`.
+    """A view of :class:`TrainingMonitor`.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ class TrainingRunView(QWidget):
         with QSignalBlocker(self._choice):
             self._choice.setCurrentIndex(CLOSING.index(self._training.closing))
 
-    def _refresh_buttons(self, run: TrainingFollower, phase: Phase) -> None:
+    def _refresh_buttons(self, run: TrainingMonitor, phase: Phase) -> None:
         shown = _BUTTONS[phase]
         has_model, resumable = run.has_model, run.resumable
         for name, button in self._buttons.items():

@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from sd2app.background.run_monitor import Phase
 from sd2app.training.history import EpochPoint
-from sd2app.training.phase import Phase
 from sd2app.widgets.text import about, duration_text, error_text, exact_text
 
 if TYPE_CHECKING:
     from sd2app.background.step_times import StepKey, StepTime, StepTimes
     from sd2app.training.history import TrainingHistory
     from sd2app.training.result import Gain
-    from sd2app.training.run import TrainingFollower
+    from sd2app.training.run import TrainingMonitor
     from sd2core.pairs.summary import PairFacts
     from sd2core.runs.folder import State
     from sd2core.train.data import Split
@@ -137,10 +137,10 @@ def step_text(seconds: float) -> str:
     return f"{float(f'{1000 * seconds:.2g}'):g} ms"
 
 
-def headline(run: TrainingFollower) -> str:
+def headline(run: TrainingMonitor) -> str:
     """How a run stands, and how far it is."""
     phase, history = run.phase, run.history
-    if not run.known:
+    if not run.loaded:
         return "Looking…"
     text = phase_text(phase)
     if phase in ("running", "pausing", "paused", "resuming") and history.epoch:
@@ -152,7 +152,7 @@ def headline(run: TrainingFollower) -> str:
     return text
 
 
-def time_text(run: TrainingFollower) -> str:
+def time_text(run: TrainingMonitor) -> str:
     """Time that has passed, and what is left."""
     history, parts = run.history, []
     if run.phase in ("running", "pausing", "paused", "resuming") and history.left_s is not None:
@@ -163,7 +163,7 @@ def time_text(run: TrainingFollower) -> str:
     return " · ".join(parts)
 
 
-def remedy_text(run: TrainingFollower) -> str:
+def remedy_text(run: TrainingMonitor) -> str:
     """What to do about a run that has not come to its end."""
     if run.phase == "died":
         text = "Its process is gone: it was killed, or the machine was switched off."
@@ -190,7 +190,7 @@ def metric_rows(history: TrainingHistory) -> list[tuple[str, str]]:
     return rows
 
 
-def about_text(run: TrainingFollower) -> str:
+def about_text(run: TrainingMonitor) -> str:
     """What is being trained, on what."""
     history, config = run.history, run.config
     parts = [model_name(history.model)] if history.model else []

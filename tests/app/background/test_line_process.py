@@ -107,8 +107,8 @@ def test_the_background_gives_way_and_runs_sd2(process, qtbot, tmp_path: Path) -
     other = LineProcess()
     lines: list[str] = []
     other.line.connect(lines.append)
-    program = "from sd2app.background.run_command import give_way"
-    script = f"import os; {program}; give_way(); print(os.nice(0))"
+    program = "from sd2core.processes import lower_priority"
+    script = f"import os; {program}; lower_priority(); print(os.nice(0))"
     with qtbot.waitSignal(other.ended, timeout=20_000):
         other.start([sys.executable, "-u", "-c", script])
     assert int(lines[0]) == min(os.nice(0) + 10, 19)

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sd2app.batch import run as batch_follower
+from sd2app.background import run_monitor
 from sd2app.batch.model import BatchModel
-from sd2app.batch.run import BatchFollower, output_of, plan_of
+from sd2app.batch.run import BatchMonitor, plan_of
 from sd2app.batch.setup import BatchSetupModel
 from sd2app.batch.text import (
     estimate_facts,
@@ -34,6 +34,7 @@ from sd2core.errors import Sd2Error
 from sd2core.io.mesh import save_mesh
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.placements.placements import PlacementGrid
+from sd2core.processes import ProcessId
 from sd2core.timebase import Timebase
 
 FAKE = Path(__file__).resolve().parents[2] / "fake_batch.py"
@@ -42,8 +43,8 @@ FAKE = Path(__file__).resolve().parents[2] / "fake_batch.py"
 @pytest.fixture(autouse=True)
 def quick(monkeypatch) -> None:
     """Look more often than a person would."""
-    monkeypatch.setattr(batch_follower, "POLL_MS", 30)
-    monkeypatch.setattr(batch_follower, "SLOW_POLL_MS", 30)
+    monkeypatch.setattr(run_monitor, "POLL_MS", 30)
+    monkeypatch.setattr(run_monitor, "SLOW_POLL_MS", 30)
 
 
 @pytest.fixture
@@ -90,7 +91,7 @@ def begin(qtbot, model: BatchModel, files: list[Path]) -> None:
 
 def until(qtbot, model: BatchModel, phase: str) -> None:
     qtbot.waitUntil(
-        lambda: model.batch is not None and model.batch.known and model.batch.phase == phase,
+        lambda: model.batch is not None and model.batch.loaded and model.batch.phase == phase,
         timeout=20_000,
     )
 
@@ -249,7 +250,7 @@ def test_a_batch_runs_to_its_end_and_its_results_are_listed(qtbot, made, meshes)
         "ann.npz, synthesise from place 2: It is damaged. Expected: a mesh. Make it again."
     )
     # What only served to start it is gone.
-    assert not output_of(run.folder.path).exists()
+    assert not run.folder.output.exists()
     assert not plan_of(run.folder.path).exists()
     assert run.log.splitlines() == [f"looked at {file.name}" for file in meshes]
     qtbot.waitUntil(lambda: bool(model.results.rows))
@@ -334,7 +335,7 @@ def test_a_batch_that_is_refused_says_what_it_was_told(qtbot, made, meshes, tmp_
     begin(qtbot, model, meshes)
     until(qtbot, model, "failed")
     assert "is not the folder of a batch" in model.batch.text
-    assert output_of(tmp_path / "other").exists()
+    assert BatchFolder(tmp_path / "other").output.exists()
     assert (tmp_path / "other" / "thesis.txt").read_text() == "mine"
 
 
@@ -363,7 +364,7 @@ def test_a_batch_that_was_deleted_is_looked_at_no_more(qtbot, made, meshes):
 
 
 def test_a_batch_that_was_too_quick_to_be_seen_at_work_is_told_from_one_that_was_refused(
-    qtbot, meshes, tmp_path, monkeypatch
+    qtbot, meshes, tmp_path
 ):
     out = tmp_path / "made"
     write_plan(
@@ -374,11 +375,13 @@ def test_a_batch_that_was_too_quick_to_be_seen_at_work_is_told_from_one_that_was
     )
     command = [sys.executable, str(FAKE), "batch", str(plan_of(out)), "--workers", "1"]
     process = subprocess.Popen(command)
+    started = ProcessId.of(process.pid)
     assert process.wait() == 0
-    for slack_s, phase in ((60.0, "finished"), (-60.0, "failed")):
-        monkeypatch.setattr(batch_follower, "_CLOCKS_S", slack_s)
-        follower = BatchFollower(out, pid=process.pid)
-        qtbot.waitUntil(lambda f=follower: f.known, timeout=20_000)
+    # The same number, of a process that was started later: what is there is not of it.
+    another = ProcessId(started.pid, started.started_unix_s + 60.0)
+    for launched, phase in ((started, "finished"), (another, "failed")):
+        follower = BatchMonitor(out, process=launched)
+        qtbot.waitUntil(lambda f=follower: f.loaded, timeout=20_000)
         assert follower.phase == phase
         if phase == "finished":
             shutil.move(out, tmp_path / "elsewhere")

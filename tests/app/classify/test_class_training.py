@@ -12,7 +12,7 @@ import fake_class_command
 import pytest
 from small_pairs import write_pairs
 
-from sd2app.background.run_folder import CommandFolder
+from sd2app.background.run_command import CommandFolder, last_output
 from sd2app.background.step_times import StepKey, StepTimes
 from sd2app.classify.run_text import facts, headline, note, time_text
 from sd2app.classify.training import ClassTraining
@@ -22,6 +22,7 @@ from sd2app.training.text import division_text
 from sd2core.errors import Sd2Error
 from sd2core.files.resources import resource_path
 from sd2core.recording.recording import open_recording
+from sd2core.runs.progress import ProgressTail
 
 SAMPLE = resource_path("swipes.sd2")
 TIMING = (sys.executable, "-c", "import sys; print('{\"step_s\": 0.5}')")
@@ -332,16 +333,16 @@ def test_a_real_command_is_stopped_as_by_ctrl_c(set_up, tmp_path, qtbot):
         folder.start([*words, *endless, "--progress-json"], {"what": "train"})
     finally:
         signal.signal(signal.SIGINT, heeded)
-    lines, seen = folder.lines(), []
+    lines, seen = ProgressTail(folder.progress), []
 
     def stepped() -> bool:
         seen.extend(event["event"] for event in lines.new())
         return "step" in seen or not (folder.live or folder.code is None)
 
     qtbot.waitUntil(stepped, timeout=60_000)
-    folder.stop()
+    folder.tell("stop")
     qtbot.waitUntil(lambda: folder.code is not None, timeout=60_000)
-    assert folder.code == 130, folder.words
+    assert folder.code == 130, last_output(folder.output)
     assert out.is_file()
     from sd2core.classify.files import describe_classifier
 
@@ -355,4 +356,4 @@ def test_a_command_that_is_refused_says_so(tmp_path, qtbot):
     folder.start(["info", gone], {"what": "train"})
     qtbot.waitUntil(lambda: folder.code is not None, timeout=60_000)
     assert folder.code == 1
-    assert "gone.zarr" in folder.words
+    assert "gone.zarr" in last_output(folder.output)

@@ -6,17 +6,19 @@ import json
 import os
 import signal
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QObject
 from swinging_recordings import recording
 
-from sd2app.background.run_folder import folders_in
-from sd2app.dataset_export.messages import Exported, message_of
+from sd2app.background.run_command import commands_in
 from sd2app.dataset_export.model import ExportModel
+from sd2app.dataset_export.run import Exported, ExportRun
 from sd2app.dataset_export.text import bytes_words, label_words, size_words, split_words
 from sd2app.session.tasks import JobsModel
+from sd2core.errors import Sd2Error
 from sd2core.placements.placements import PlacementGrid
 
 FAKE = Path(__file__).resolve().parents[2] / "fake_export.py"
@@ -35,8 +37,9 @@ def made(qtbot, tmp_path: Path):
     yield make
     for model in models:
         model.close()
-    for folder in folders_in(tmp_path / "exports"):
-        folder.stop()
+    for folder in commands_in(tmp_path / "exports"):
+        with suppress(Sd2Error):
+            folder.tell("stop")
         qtbot.waitUntil(lambda folder=folder: not folder.live, timeout=20_000)
     parent.deleteLater()
 
@@ -204,7 +207,7 @@ def test_what_was_written_meanwhile_is_said(made, people, qtbot, tmp_path) -> No
     begun(first, people, qtbot)
     first.close()
     (people / "set.h5.go").touch()
-    (folder,) = folders_in(tmp_path / "exports")
+    (folder,) = commands_in(tmp_path / "exports")
     qtbot.waitUntil(lambda: folder.code is not None, timeout=20_000)
     said: list[str] = []
     second.noted.connect(said.append)
@@ -216,7 +219,7 @@ def test_what_was_written_meanwhile_is_said(made, people, qtbot, tmp_path) -> No
 def test_one_that_was_killed_is_said(made, people, qtbot) -> None:
     model = made("slow")
     begun(model, people, qtbot)
-    os.kill(model._run._pid, signal.SIGKILL)
+    os.kill(model._run._launched.pid, signal.SIGKILL)
     with qtbot.waitSignal(model.failed, timeout=20_000) as failed:
         pass
     assert failed.args[0].startswith("set.h5 was not written to its end")
@@ -236,9 +239,12 @@ def test_one_that_cannot_be_started_is_said(made, people, qtbot) -> None:
     assert not model.exporting
 
 
-def test_lines_that_say_nothing_are_left_alone() -> None:
+def test_lines_that_say_nothing_are_left_alone(qtbot, tmp_path) -> None:
+    run = ExportRun(tmp_path)
     for told in ({}, {"event": "else"}, {"event": "done"}, {"event": []}):
-        assert message_of(told) is None
+        assert not run.on_events([told])
+    assert run.written is None
+    run.close()
 
 
 def test_bytes_in_words() -> None:

@@ -6,9 +6,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from sd2app.background.run_monitor import Phase, _Found
 from sd2app.training.curves import error_ticks
 from sd2app.training.history import TrainingHistory
-from sd2app.training.phase import Look, phase_of
+from sd2app.training.run import TrainingMonitor
 from sd2app.training.text import metric_rows
 from sd2app.widgets.log_axis import LogAxis
 from sd2app.widgets.text import duration_text
@@ -60,16 +61,30 @@ def test_what_is_done_again_after_a_kill_counts_once() -> None:
     assert [point.epoch for point in history.epoch_points] == [1, 2]
 
 
-def test_an_end_is_an_end_until_it_goes_on() -> None:
+@pytest.fixture
+def run(qtbot, tmp_path):
+    """A run whose folder is not looked at."""
+    made = TrainingMonitor(tmp_path / "run")
+    made.close()
+    return made
+
+
+def phase_of(run: TrainingMonitor, live: bool, state: str, word: str = "run") -> Phase:
+    run._has_begun = True
+    return run._phase_of(_Found(False, live, True, state, None, word, [], None))
+
+
+def test_an_end_is_an_end_until_it_goes_on(run) -> None:
     error = {"found": "No space", "expected": "some", "remedy": "Make room"}
-    history = told(START, {"event": "end", "outcome": "failed", "error": error})
+    run.on_events([START, {"event": "end", "outcome": "failed", "error": error}])
+    history = run.history
+    assert run.error == history.error
     assert history.error == "No space. Expected: some. Make room."
-    gone = Look(exists=True, live=False, state="failed")
-    assert phase_of(gone, history, launching=False) == "failed"
-    history.take([{**START, "resumed": True, "steps_done": 0}])
+    assert phase_of(run, False, "failed") == "failed"
+    run.on_events([{**START, "resumed": True, "steps_done": 0}])
     assert history.outcome is None
-    assert phase_of(Look(True, True), history, launching=False) == "running"
-    assert phase_of(Look(True, False, "died"), history, launching=False) == "died"
+    assert phase_of(run, True, "running") == "running"
+    assert phase_of(run, False, "died") == "died"
 
 
 @pytest.mark.parametrize(
@@ -83,9 +98,9 @@ def test_an_end_is_an_end_until_it_goes_on() -> None:
         ("cancel", False, "cancelling"),
     ],
 )
-def test_what_a_process_was_told_and_does_makes_its_phase(word, paused, phase) -> None:
-    history = told(START, *([{"event": "paused"}] if paused else []))
-    assert phase_of(Look(True, True, word=word), history, launching=False) == phase
+def test_what_a_process_was_told_and_does_makes_its_phase(run, word, paused, phase) -> None:
+    run.on_events([START, *([{"event": "paused"}] if paused else [])])
+    assert phase_of(run, True, "running", word) == phase
 
 
 json_values = st.sampled_from(

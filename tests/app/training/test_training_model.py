@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 from training_pairs import write_pairs
 
-from sd2app.background.detached import is_alive, last_words, start_detached
+from sd2app.background import run_monitor
+from sd2app.background.run_command import last_output, launch
 from sd2app.background.step_times import StepKey, StepTimes
 from sd2app.command_line import full_parser
 from sd2app.settings import Settings
-from sd2app.training import run as training_follower
 from sd2app.training.model import TrainingModel
 from sd2app.training.text import division_text
 from sd2core.cli.train import _config
@@ -31,8 +31,8 @@ TIMING = (sys.executable, "-c", "print('{\"step_s\": 0.25}')")
 @pytest.fixture(autouse=True)
 def quick(monkeypatch) -> None:
     """Look more often than a person would."""
-    monkeypatch.setattr(training_follower, "POLL_MS", 40)
-    monkeypatch.setattr(training_follower, "SLOW_POLL_MS", 40)
+    monkeypatch.setattr(run_monitor, "POLL_MS", 40)
+    monkeypatch.setattr(run_monitor, "SLOW_POLL_MS", 40)
 
 
 @pytest.fixture
@@ -129,8 +129,7 @@ def test_stopping_keeps_the_best(made, qtbot) -> None:
     wait_for(qtbot, model, "stopped")
     assert model.run.folder.best.exists()
     assert len(model.run.history.epoch_points) == 2
-    # The process lets go of the folder a moment after its last word.
-    qtbot.waitUntil(lambda: not model.run.folder.live)
+    # At once: that the process has let go of the folder is what "stopped" means.
     model.resume()
     wait_for(qtbot, model, "starting", "running")
     # It continues after the second epoch and, this time, has nothing to rest at.
@@ -255,8 +254,8 @@ def test_a_torn_line_waits_and_a_damaged_one_is_left_out(made, qtbot, tmp_path) 
     with model.run.folder.progress.open("a") as progress:
         progress.write('{"event": "epoch", "epoch": "many"}\n[1]\nnonsense\n' + line[:40])
         progress.flush()
-        with qtbot.waitSignal(model.run._looking.found):
-            model.run.look()
+        with qtbot.waitSignal(model.run._poller.found):
+            model.run.poll()
         assert len(model.run.history.epoch_points) == 1
         progress.write(line[40:])
     qtbot.waitUntil(lambda: len(model.run.history.epoch_points) == 2)
@@ -350,12 +349,13 @@ def test_a_step_that_cannot_be_timed_is_not_tried_again(qtbot) -> None:
 
 def test_a_process_outlives_who_started_it_and_is_seen_to_end(qtbot, tmp_path) -> None:
     script = "import time; print('here', flush=True); time.sleep(0.3); raise SystemExit('gone')"
-    pid = start_detached([sys.executable, "-c", script], tmp_path / "out", {"A": "1"})
-    assert is_alive(pid)
-    qtbot.waitUntil(lambda: last_words(tmp_path / "out") == "here", timeout=10_000)
+    process = launch([sys.executable, "-c", script], tmp_path / "out", {"A": "1"})
+    assert process.is_alive
+    qtbot.waitUntil(lambda: last_output(tmp_path / "out") == "here", timeout=10_000)
     if sys.platform != "win32":
-        assert os.getsid(pid) == pid
-    qtbot.waitUntil(lambda: not is_alive(pid), timeout=10_000)
-    assert last_words(tmp_path / "out") == "here\ngone"
-    assert start_detached(["/no/such/program"], tmp_path / "out") is None
-    assert last_words(tmp_path / "nothing") == ""
+        assert os.getsid(process.pid) == process.pid
+    qtbot.waitUntil(lambda: not process.is_alive, timeout=10_000)
+    assert last_output(tmp_path / "out") == "here\ngone"
+    with pytest.raises(Sd2Error, match="cannot be started"):
+        launch(["/no/such/program"], tmp_path / "out")
+    assert last_output(tmp_path / "nothing") == ""

@@ -13,8 +13,8 @@ from PySide6.QtCore import QCoreApplication, QEvent, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QCheckBox, QFileDialog, QLabel, QListWidget, QTableView, QToolButton
 
+from sd2app.background import run_monitor
 from sd2app.batch import dialog as batch_dialogs
-from sd2app.batch import run as batch_follower
 from sd2app.batch.dialog import BatchWindow
 from sd2app.batch.model import BatchModel
 from sd2app.settings import Settings
@@ -29,8 +29,8 @@ FAKE = Path(__file__).resolve().parents[2] / "fake_batch.py"
 @pytest.fixture(autouse=True)
 def quick(monkeypatch) -> None:
     """Look more often than a person would."""
-    monkeypatch.setattr(batch_follower, "POLL_MS", 40)
-    monkeypatch.setattr(batch_follower, "SLOW_POLL_MS", 40)
+    monkeypatch.setattr(run_monitor, "POLL_MS", 40)
+    monkeypatch.setattr(run_monitor, "SLOW_POLL_MS", 40)
     monkeypatch.setattr(batch_dialogs, "_ESTIMATE_MS", 20)
 
 
@@ -88,7 +88,7 @@ def ready(qtbot, batch: BatchModel) -> None:
 
 def until(qtbot, batch: BatchModel, phase: str) -> None:
     qtbot.waitUntil(
-        lambda: batch.batch is not None and batch.batch.known and batch.batch.phase == phase,
+        lambda: batch.batch is not None and batch.batch.loaded and batch.batch.phase == phase,
         timeout=20_000,
     )
 

@@ -13,9 +13,9 @@ from PySide6.QtCore import QCoreApplication, QEvent, Qt
 from PySide6.QtWidgets import QTabBar, QToolButton
 from training_pairs import write_pairs
 
+from sd2app.background import run_monitor
 from sd2app.settings import Settings
 from sd2app.shell.window import MainWindow
-from sd2app.training import run as training_follower
 from sd2app.training.pair_maker import PairMaker
 from sd2app.training.panel import TrainingPanel
 from sd2core.pairs.store import read_pairs
@@ -27,7 +27,7 @@ FAKE = Path(__file__).resolve().parents[2] / "fake_train.py"
 @pytest.fixture
 def made(qtbot, compiled_kernels, fake, fake_models, monkeypatch):
     """Makes windows whose training is pretended; options are those of ``fake_train.py``."""
-    monkeypatch.setattr(training_follower, "POLL_MS", 40)
+    monkeypatch.setattr(run_monitor, "POLL_MS", 40)
     windows: list[MainWindow] = []
 
     def make(*options: object, settings: Settings) -> MainWindow:

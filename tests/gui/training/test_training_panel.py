@@ -21,11 +21,11 @@ from PySide6.QtWidgets import (
 )
 from training_pairs import write_pairs
 
+from sd2app.background import run_monitor
 from sd2app.session.display import DisplayModel
 from sd2app.session.tracks import TrackModel
 from sd2app.settings import Settings
 from sd2app.shell.side_panel import SidePanel
-from sd2app.training import run as training_follower
 from sd2app.training.curves import TrainingCurves
 from sd2app.training.dialogs import TrainingDialogs
 from sd2app.training.model import TrainingModel
@@ -40,8 +40,8 @@ FAKE = Path(__file__).resolve().parents[2] / "fake_train.py"
 @pytest.fixture(autouse=True)
 def quick(monkeypatch) -> None:
     """Look more often than a person would."""
-    monkeypatch.setattr(training_follower, "POLL_MS", 40)
-    monkeypatch.setattr(training_follower, "SLOW_POLL_MS", 40)
+    monkeypatch.setattr(run_monitor, "POLL_MS", 40)
+    monkeypatch.setattr(run_monitor, "SLOW_POLL_MS", 40)
 
 
 class FakeDenoising(QObject):

@@ -1,0 +1,64 @@
+"""Folders of commands, also those that an earlier version made."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from sd2app.background.run_command import CommandFolder, commands_in
+from sd2app.background.run_monitor import RunMonitor
+from sd2core.errors import Sd2Error
+from sd2core.processes import ProcessId
+
+
+def of_yesterday(path: Path, code: int | None) -> CommandFolder:
+    """As it was written when the state of a command was in two more files."""
+    path.mkdir(parents=True)
+    about = {"format": "sd2-command", "started_unix_s": 5.0, "arguments": ["info"], "what": "table"}
+    (path / "about.json").write_text(json.dumps(about))
+    if code is not None:
+        (path / "end.json").write_text(json.dumps({"code": code, "pid": 1}))
+    return CommandFolder(path)
+
+
+@pytest.mark.parametrize(
+    ("code", "state"), [(0, "finished"), (130, "stopped"), (1, "failed"), (None, "died")]
+)
+def test_one_of_yesterday_is_followed(qtbot, tmp_path, code, state) -> None:
+    folder = of_yesterday(tmp_path / "runs" / "one", code)
+    assert [one.path for one in commands_in(tmp_path / "runs")] == [folder.path]
+    assert (folder.code, folder.state(), folder.facts["what"]) == (code, state, "table")
+    run = RunMonitor(folder)
+    qtbot.waitUntil(lambda: run.loaded, timeout=20_000)
+    assert run.phase == state
+    run.close()
+
+
+def test_one_of_yesterday_starts_again_in_its_folder(qtbot, tmp_path) -> None:
+    folder = of_yesterday(tmp_path / "one", 130)
+    run = RunMonitor(folder, process=folder.start(["--version"], {"what": "table"}))
+    qtbot.waitUntil(lambda: not run.under_way, timeout=60_000)
+    assert run.phase == "finished"
+    assert folder.code == 0
+    run.close()
+
+
+def test_a_damaged_description_is_said(tmp_path) -> None:
+    folder = CommandFolder(tmp_path)
+    (tmp_path / "about.json").write_text('{"format": "sd2-command", "version": 9, "state": "x"}')
+    assert folder.facts == {}
+    with pytest.raises(Sd2Error, match="does not describe"):
+        folder.state()
+
+
+def test_a_process_that_reuses_a_number_is_not_waited_for(qtbot, tmp_path) -> None:
+    folder = CommandFolder(tmp_path / "one")
+    folder.path.mkdir()
+    folder._describe("starting", started_unix_s=1.0, arguments=[])
+    this = ProcessId.current()
+    run = RunMonitor(folder, process=ProcessId(this.pid, this.started_unix_s - 3600.0))
+    qtbot.waitUntil(lambda: run.loaded, timeout=20_000)
+    assert run.phase == "failed"
+    run.close()
