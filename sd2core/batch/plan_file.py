@@ -16,7 +16,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.paths import is_absolute, located_path, stored_path
 from sd2core.files.toml import toml_lines
-from sd2core.io.radar.named import PAPER
+from sd2core.io.radar import PAPER
 
 _HEADER = re.compile(r"\s*\[+\s*([^\[\]]+?)\s*\]+")
 _KEY = re.compile(r"""\s*([A-Za-z0-9_."'* /\\-]+?)\s*=""")

@@ -352,7 +352,7 @@ def _changing(origin: Origin) -> Sd2Error:
 def simulation_of(told: Simulate) -> Simulation:
     """The radar of a plan; refused before the work begins."""
     from sd2core.datasets.simulating import Simulation
-    from sd2core.io.radar.named import named_radar
+    from sd2core.io.radar import named_radar
 
     return Simulation(named_radar(told.radar), told.seed)
 

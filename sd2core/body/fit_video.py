@@ -33,6 +33,7 @@ from sd2core.body.landmarks import DEFAULT_MAX_GAP_S, OnFrame, find_landmarks
 from sd2core.body.model import Resolution
 from sd2core.body.person_selection import Rectangle
 from sd2core.body.track import Landmarks, parts
+from sd2core.files.atomic import replace_folder
 from sd2core.files.resources import resource_path
 from sd2core.io.mesh import save_mesh
 from sd2core.io.video import VideoReader, open_video
@@ -289,12 +290,10 @@ def _take_place(partial: Path, out: Path) -> None:
     """Rename the complete mesh, replacing an earlier one."""
     new = partial / _new(out)
     if new.is_dir():
-        if out.exists():
-            replaced = partial / "replaced"
-            if replaced.exists():
-                shutil.rmtree(replaced)
-            os.rename(out, replaced)
-        os.rename(new, out)
+        replaced = partial / "replaced"
+        if replaced.exists():
+            shutil.rmtree(replaced)
+        replace_folder(new, out, replaced)
     else:
         with new.open("rb") as stream:
             os.fsync(stream.fileno())

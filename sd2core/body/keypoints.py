@@ -44,31 +44,6 @@ _ANCHORS = {
 }
 
 
-# Where the landmark model puts its landmarks beside these points, fixed to the same bone:
-# thousandths of the stature at rest, to the left, down, backwards; the left side, which
-# the right side mirrors. Mean of both sides over simulated people, measured by
-# `python -m tools.train_lifter offsets` (docs/decisions/0018).
-_SEEN_BESIDE = {
-    "nose": (0.0, -8.4, 10.3),
-    "eye_inner.L": (-1.5, -3.7, 2.5),
-    "eye.L": (-3.1, -0.7, 10.1),
-    "eye_outer.L": (-5.7, -2.1, 3.1),
-    "ear.L": (-20.4, 3.0, -21.3),
-    "mouth.L": (-3.3, -7.4, 4.8),
-    "shoulder.L": (-5.9, -6.2, -7.4),
-    "elbow.L": (-7.1, -5.8, -8.8),
-    "wrist.L": (0.1, 3.3, -7.2),
-    "pinky.L": (-10.5, -16.8, -6.9),
-    "index.L": (4.3, -4.8, 16.7),
-    "thumb.L": (24.4, 3.9, 4.9),
-    "hip.L": (-8.0, -2.8, -24.5),
-    "knee.L": (-4.1, -7.2, 4.5),
-    "ankle.L": (0.0, -15.2, -4.5),
-    "heel.L": (-6.3, -1.9, -9.7),
-    "foot_index.L": (11.7, -15.0, 20.8),
-}
-
-
 @dataclass(frozen=True, eq=False)
 class Keypoints:
     """Points fixed to the bones of one body."""
@@ -115,23 +90,6 @@ class KeypointSpace:
         """Landmarks of one body."""
         moved = self.base_m + np.tensordot(shape.coefficients, self.directions_m, 1)
         return Keypoints(self.bones, shape.stature_m / self._space.base_stature_m * moved)
-
-    def seen_on(self, shape: BodyShape) -> Keypoints:
-        """Landmarks of one body as the landmark model sees them, for comparison with pictures.
-
-        They lie up to 4 cm beside :meth:`of`: hips further forward, ears and thumbs further out.
-        """
-        points = self.of(shape)
-        return Keypoints(points.bones, points.rest_m + shape.stature_m * seen_beside())
-
-
-def seen_beside() -> Floats:
-    """Offsets of the landmark model's landmarks from our keypoints, in statures, (33, 3)."""
-    rows = []
-    for name in LANDMARKS:
-        left, down, back = _SEEN_BESIDE[name.replace(".R", ".L")]
-        rows.append((-left if name.endswith(".R") else left, down, back))
-    return np.array(rows) / 1000.0
 
 
 def _sided(name: str, mirrored: bool) -> str:

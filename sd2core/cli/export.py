@@ -231,7 +231,7 @@ def _making(options: argparse.Namespace) -> Making:
     from sd2core.datasets.recording_sources import Making
     from sd2core.datasets.simulating import Simulation
     from sd2core.doppler.options import chosen_options
-    from sd2core.io.radar.named import named_radar
+    from sd2core.io.radar import named_radar
     from sd2core.placements.placements import read_placements
 
     nulled = {} if options.null_bins is None else {"null_bins": options.null_bins}

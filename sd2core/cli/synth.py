@@ -289,7 +289,7 @@ def _check_fmcw(options: argparse.Namespace) -> None:
 
 def _by_fmcw(options: argparse.Namespace, mesh: MeshSequence, sensor: VirtualSensor) -> DopplerMap:
     from sd2core.fmcw import doppler_map
-    from sd2core.io.radar.named import named_radar
+    from sd2core.io.radar import named_radar
     from sd2core.sensor import VelocityAxis
 
     config = named_radar(options.radar)

@@ -61,6 +61,19 @@ def atomic_write_text(path: Path, text: str) -> None:
         stream.write(text.encode("utf-8"))
 
 
+def replace_folder(new: Path, path: Path, aside: Path) -> None:
+    """Rename a complete folder to ``path``; one of that name moves to ``aside`` first."""
+    if not path.exists():
+        new.rename(path)
+        return
+    path.rename(aside)
+    try:
+        new.rename(path)
+    except OSError:
+        aside.rename(path)
+        raise
+
+
 def remove_leftovers(folder: Path) -> None:
     """Delete temporary files of killed writes in a folder; no process may be writing there."""
     for path in Path(folder).glob(f"{_PREFIX}*{_SUFFIX}"):

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import atomic_write
+from sd2core.files.atomic import atomic_write, replace_folder
 from sd2core.mesh.sequence import MeshSequence, VertexArray, refuse_missing
 from sd2core.progress import Progress, silent
 
@@ -267,7 +267,11 @@ def write_zarr(mesh: MeshSequence, path: Path, progress: Progress = silent) -> N
             with atomic_write(path) as stream:
                 _zip_folder(folder, stream)
         else:
-            _take_place(folder, path, workspace / "old")
+            if path.is_file():
+                raise Sd2Error(
+                    f"{path} is a file", "a folder name for a .zarr mesh", "Remove or rename it"
+                )
+            replace_folder(folder, path, workspace / "old")
     finally:
         shutil.rmtree(workspace, ignore_errors=True)
     progress(mesh.frame_count, mesh.frame_count)
@@ -334,21 +338,6 @@ def _zip_folder(folder: Path, stream: Any) -> None:
         for file in sorted(folder.rglob("*")):
             if file.is_file():
                 archive.write(file, file.relative_to(folder).as_posix())
-
-
-def _take_place(new: Path, path: Path, aside: Path) -> None:
-    """Rename a complete folder to ``path``; a folder of that name goes first."""
-    if path.is_file():
-        raise Sd2Error(f"{path} is a file", "a folder name for a .zarr mesh", "Remove or rename it")
-    if path.is_dir():
-        path.rename(aside)
-        try:
-            new.rename(path)
-        except OSError:
-            aside.rename(path)
-            raise
-    else:
-        new.rename(path)
 
 
 def _first(arrays: dict[str, Any], names: tuple[str, ...]) -> Any | None:

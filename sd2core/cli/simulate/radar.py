@@ -187,8 +187,7 @@ def _radar(options: argparse.Namespace) -> None:
     from sd2core.cli.info.description import describe_capture, show
     from sd2core.cli.reading import mesh_and_sensor
     from sd2core.fmcw import LinkBudget, Mirror, SignalOptions, WaveOptions
-    from sd2core.io.radar import check_replaceable, write_capture
-    from sd2core.io.radar.named import named_radar
+    from sd2core.io.radar import check_replaceable, named_radar, write_capture
 
     check_replaceable(options.out)
     if not options.out.absolute().parent.is_dir():

@@ -15,8 +15,10 @@ from sd2core.io.radar.infineon import (
     write_capture,
 )
 from sd2core.io.radar.kkt import RecordedMap, load_kkt
+from sd2core.radar_config import PAPER_RADAR, RadarConfig
 
 __all__ = [
+    "PAPER",
     "SUPPORTED",
     "RadarCapture",
     "RecordedMap",
@@ -24,9 +26,13 @@ __all__ = [
     "holds_map",
     "load_capture",
     "load_recorded_map",
+    "named_radar",
     "read_radar_config",
     "write_capture",
 ]
+
+PAPER = "paper"
+"""Name of the paper's radar."""
 
 SUPPORTED = (
     "an Infineon recording: the folder with radar.npy, config.json and radar_timestamp.csv"
@@ -83,3 +89,11 @@ def load_recorded_map(path: Path | str) -> RecordedMap:
     Raises Sd2Error if it is none that is known (:mod:`sd2core.io.radar.kkt`), or is damaged.
     """
     return load_kkt(Path(path).expanduser())
+
+
+def named_radar(name: str) -> RadarConfig:
+    """Radar by its name: ``paper``, or the path of a capture's ``config.json``.
+
+    Raises Sd2Error if there is no such file, or it describes no possible radar.
+    """
+    return PAPER_RADAR if name == PAPER else read_radar_config(Path(name))

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import atomic_write, atomic_write_text
+from sd2core.files.atomic import atomic_write, atomic_write_text, replace_folder
 from sd2core.io.radar.capture import RadarCapture, check_cube
 from sd2core.radar_config import RadarConfig
 from sd2core.timebase import Timebase
@@ -179,17 +179,18 @@ def write_capture(
     }
     times = timebase.times_s + start_unix_s
     folder.parent.mkdir(parents=True, exist_ok=True)
-    new = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", suffix=".tmp", dir=folder.parent))
+    workspace = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", suffix=".tmp", dir=folder.parent))
+    new = workspace / "new"
     try:
+        new.mkdir()
         atomic_write_text(new / _CONFIG, _json({"device_config": {"fmcw_single_shape": shape}}))
         atomic_write_text(new / _META, _json(described))
         atomic_write_text(new / _TIMES, "".join(f"{time!r}\n" for time in times.tolist()))
         with atomic_write(new / _DATA) as stream:
             np.save(stream, cube, allow_pickle=False)
-        new.chmod(0o755)
-        _swap(new, folder)
+        replace_folder(new, folder, workspace / "old")
     finally:
-        shutil.rmtree(new, ignore_errors=True)
+        shutil.rmtree(workspace, ignore_errors=True)
     return folder
 
 
@@ -201,21 +202,6 @@ def check_replaceable(folder: Path) -> None:
             "a new folder, or a radar recording to replace",
             "Choose another name",
         )
-
-
-def _swap(new: Path, folder: Path) -> None:
-    if not folder.exists():
-        new.rename(folder)
-        return
-    old = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", suffix=".old", dir=folder.parent))
-    folder.rename(old / folder.name)
-    try:
-        new.rename(folder)
-    except OSError:
-        (old / folder.name).rename(folder)
-        raise
-    finally:
-        shutil.rmtree(old, ignore_errors=True)
 
 
 def _replaceable(folder: Path) -> bool:

@@ -22,8 +22,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
-from sd2core.io.limited import decompressed
-from sd2core.io.pickles import read_pickle
+from sd2core.io.pickles import decompressed, read_pickle
 
 PROTOCOLS = range(pickle.HIGHEST_PROTOCOL + 1)
 
