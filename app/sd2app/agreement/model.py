@@ -1,4 +1,4 @@
-"""Another person's labels beside those of the recording: how far the two agree, and where not."""
+"""Comparison of another person's labels with those of the recording."""
 
 from __future__ import annotations
 
@@ -64,42 +64,42 @@ class AgreementModel(QObject):
 
     @property
     def active(self) -> bool:
-        """Whether somebody else's labels are there."""
+        """True while another person's labels are open."""
         return self._path is not None
 
     @property
     def busy(self) -> bool:
-        """Whether a file is being read, or the two compared."""
+        """True while a file is read or compared."""
         return self._reader.busy or self._comparer.busy
 
     @property
     def name(self) -> str:
-        """What the other is called: the name of the file."""
+        """Name of the other person: that of the file."""
         return self._path.stem if self._path is not None else ""
 
     @property
     def path(self) -> Path | None:
-        """The other's file."""
+        """Path of the other person's file."""
         return self._path
 
     @property
     def left_out(self) -> int:
-        """How many of the other's spans lie outside the recording."""
+        """Number of the other's spans outside the recording."""
         return self._left_out
 
     @property
     def found(self) -> Agreement | None:
-        """How far the two agree; None until that is known."""
+        """Agreement of the two; None until it is computed."""
         return self._compared.found if self._compared is not None else None
 
     @property
     def disagreements(self) -> tuple[Disagreement, ...]:
-        """Where they do not, in order."""
+        """Disagreements, in order."""
         return self._compared.stretches if self._compared is not None else ()
 
     @property
     def current(self) -> int | None:
-        """Number of the disagreement at the cursor, if there is one."""
+        """Index of the disagreement at the cursor, or None."""
         now_s = self._playback.timebase.time_of(self._playback.frame)
         for number, one in enumerate(self.disagreements):
             if one.start_s <= now_s < one.end_s:
@@ -118,7 +118,7 @@ class AgreementModel(QObject):
         self._reader.submit(read)
 
     def clear(self) -> None:
-        """No more comparison."""
+        """End the comparison."""
         self._reader.cancel()
         self._comparer.cancel()
         if self._path is not None:
@@ -127,7 +127,7 @@ class AgreementModel(QObject):
             self.changed.emit()
 
     def step(self, towards: Literal[-1, 1]) -> None:
-        """Go to the start of the next disagreement, or of the one before."""
+        """Go to the start of the next disagreement, or of the previous one."""
         now_s = self._playback.timebase.time_of(self._playback.frame)
         if towards > 0:
             ahead = [one for one in self.disagreements if one.start_s > now_s]

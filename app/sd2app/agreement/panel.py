@@ -1,4 +1,4 @@
-"""The Agree panel: how far another person's labels agree with those of the recording."""
+"""Agree panel: agreement of another person's labels with those of the recording."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from sd2app.widgets.panel import rule, sentence, title
 
 _MOST_FACTS, _MOST_LABELS = 10, 12
 _NOTHING = (
-    "Who labelled the same recording besides? Choose their file: how often you agree is counted"
-    " frame by frame and span by span, and their labels are shown below yours."
+    "Choose the file of another person who labelled this recording. Agreement is measured frame by"
+    " frame and span by span, and their labels are shown below yours."
 )
 _MEANING = "1 is agreement in every frame, 0 what chance alone would give (Cohen's kappa)."
 
@@ -74,7 +74,7 @@ class AgreementPanel(QWidget):
 
     def _refresh(self) -> None:
         model = self._model
-        self._name.setText(f"With {model.name}" if model.active else "Nobody to compare with")
+        self._name.setText(f"With {model.name}" if model.active else "No comparison")
         self._name.setToolTip(str(model.path or ""))
         self._nothing.setVisible(not model.active)
         self._result.setVisible(model.active)

@@ -1,4 +1,4 @@
-"""How far two people agree, in words and numbers."""
+"""Agreement of two people in words and numbers."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from sd2core.labels.agreement import kappa_words
 
 
 def verdict(model: AgreementModel) -> str:
-    """Kappa of all frames, and what it is called."""
+    """Return the kappa of all frames, and the customary word for it."""
     if model.found is None:
         return "Comparing…"
     kappa = model.found.frames.overall.value
@@ -18,7 +18,7 @@ def verdict(model: AgreementModel) -> str:
 
 
 def facts(model: AgreementModel) -> list[tuple[str, str]]:
-    """What numbers there are of it, each with a name."""
+    """Return names and values of the measures of agreement."""
     found = model.found
     if found is None:
         return []
@@ -35,16 +35,21 @@ def facts(model: AgreementModel) -> list[tuple[str, str]]:
     if spans.mean_iou is not None:
         rows.append(("Overlap of matches", _share(spans.mean_iou)))
         rows.append(
-            ("Starts differ by", _median([one.start_difference_s for one in spans.matches]))
+            (
+                "Median difference of starts",
+                _median([one.start_difference_s for one in spans.matches]),
+            )
         )
-        rows.append(("Ends differ by", _median([one.end_difference_s for one in spans.matches])))
+        rows.append(
+            ("Median difference of ends", _median([one.end_difference_s for one in spans.matches]))
+        )
     if model.left_out:
-        rows.append(("Outside, left out", str(model.left_out)))
+        rows.append(("Left out, outside the recording", str(model.left_out)))
     return rows
 
 
 def label_facts(model: AgreementModel) -> list[tuple[str, str]]:
-    """Every label that either used, with its kappa."""
+    """Return every label that either used, with its kappa."""
     found = model.found
     if found is None:
         return []
@@ -55,7 +60,7 @@ def label_facts(model: AgreementModel) -> list[tuple[str, str]]:
 
 
 def where(model: AgreementModel) -> str:
-    """Which disagreement is looked at, and what either says there."""
+    """Describe the disagreement at the present frame, or all of them."""
     stretches, number = model.disagreements, model.current
     if model.found is None:
         return "Comparing…"
@@ -81,4 +86,4 @@ def _share(value: float) -> str:
 
 
 def _median(differences_s: Sequence[float]) -> str:
-    return f"{median(abs(value) for value in differences_s):.2f} s, median"
+    return f"{median(abs(value) for value in differences_s):.2f} s"

@@ -1,4 +1,4 @@
-"""Another person's labels under one's own, to be looked at, and where the two differ."""
+"""Read-only timeline of another person's labels, with marks where the two differ."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MARKS_PX = 7.0
 
 
 class OtherTimeline(QWidget):
-    """Hatched rows, for nothing in them can be changed; a line over them marks what differs.
+    """Hatched rows, as they cannot be edited; a line over them marks differences.
 
     A click goes to that time.
     """
@@ -42,7 +42,7 @@ class OtherTimeline(QWidget):
         self._follow()
 
     def sizeHint(self) -> QSize:
-        """As high as the other's tracks and the marks over them."""
+        """Return the height of the tracks and the marks over them."""
         return QSize(640, round(_MARKS_PX + self._rows.height_px))
 
     @property
@@ -62,7 +62,7 @@ class OtherTimeline(QWidget):
     # --- painting -------------------------------------------------------------------------
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Marks, names, spans, cursor."""
+        """Paint marks, names, spans and the cursor."""
         with QPainter(self) as painter:
             self._paint(painter)
 

@@ -1,4 +1,4 @@
-"""Spans as arrays: where thousands of them stand on their tracks, and what a pixel shows."""
+"""Spans as arrays, to draw thousands of them: lanes, colours and coverage per pixel column."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ UNKNOWN_COLOUR = "#8a8f98"
 
 @dataclass(frozen=True, eq=False)
 class SpanColumns:
-    """What of the spans is in view at some scale.
+    """Spans in view at some scale.
 
     Parameters
     ----------
     wide : int64 array
         Rows of :class:`SpanArrays` that are wide enough for a box of their own, in order.
     share : float32 array, shape (lanes, columns)
-        How much of a column narrow spans hold, 0 to 1.
+        Share of a column covered by narrow spans, 0 to 1.
     tone : int64 array, shape (lanes, columns)
-        Colour of those that hold most of it.
+        Colour of those that cover most of it.
     selected : bool array, shape (lanes, columns)
-        Where one of them is selected.
+        True where one of them is selected.
     """
 
     wide: NDArray[np.int64]
@@ -51,9 +51,9 @@ class SpanArrays:
     ids, tracks, lanes, tones : int64 array, shape (n,)
         Id, number of the track, lane within it, number of the colour.
     lanes_of_track : tuple of int
-        How many lanes a track has: more than one where spans overlap.
+        Number of lanes of each track: more than one where spans overlap.
     colours : tuple of str
-        ``#rrggbb``; the last is that of labels which the label set does not have.
+        ``#rrggbb``; the last is for labels outside the label set.
     """
 
     spans: tuple[Span, ...]
@@ -68,7 +68,7 @@ class SpanArrays:
 
     @classmethod
     def of(cls, labels: Labels) -> SpanArrays:
-        """Of labels as they are."""
+        """Make the arrays of labels."""
         offered = labels.label_set.labels
         # A class looks like the first of its labels; a label's own name goes before that.
         tone_of = {
@@ -104,7 +104,7 @@ class SpanArrays:
         return rows
 
     def within(self, start_s: float, end_s: float) -> NDArray[np.int64]:
-        """The rows of spans of which something lies between two times."""
+        """Return the rows of spans that overlap an interval."""
         return np.flatnonzero((self.starts_s < end_s) & (self.ends_s > start_s))
 
     def columns(
@@ -117,16 +117,16 @@ class SpanArrays:
         *,
         together: bool = False,
     ) -> SpanColumns:
-        """What stretch and scale show.
+        """Compute what a time window shows in so many columns.
 
         Parameters
         ----------
         columns : int
-            Into how many the stretch is parted.
+            Number of columns.
         wide_columns : float
-            Spans of so many columns get a box; narrower ones share columns.
+            Spans of this width get a box; narrower ones share columns.
         chosen : int64 array
-            Rows of the spans that are selected.
+            Rows of the selected spans.
         together : bool
             All tracks in one lane.
         """
@@ -152,7 +152,7 @@ def _held(
     rights: NDArray[np.float64],
     shape: tuple[int, int, int],
 ) -> NDArray[np.float64]:
-    """How much of every column spans hold from left to right, the sum in each row."""
+    """Share of every column that spans cover from left to right, summed in each row."""
     columns = shape[-1]
     lefts, rights = np.clip(lefts, 0.0, columns), np.clip(rights, 0.0, columns)
     first = np.minimum(lefts.astype(np.int64), columns - 1)
@@ -173,7 +173,7 @@ def _held(
 
 
 def _lanes(spans: list[Span]) -> tuple[list[int], int]:
-    """Lane of each span, and how many there are."""
+    """Lane of each span, and the number of lanes."""
     found = apart(spans, lambda span: (span.start_s, span.end_s))
     lane_of = {span.id: lane for lane, row in enumerate(found) for span in row}
     return [lane_of[span.id] for span in spans], len(found)

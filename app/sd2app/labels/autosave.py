@@ -1,4 +1,4 @@
-"""Who may edit the labels that are open, where every edit is kept, and what was left behind."""
+"""Session of the open labels: the lock against other windows, the journal, and recovery offers."""
 
 from __future__ import annotations
 
@@ -22,22 +22,15 @@ _NOTHING_OPEN = "Nothing is open: labels belong to a recording"
 
 
 class LabelSession(QObject):
-    """The labels of one recording in this window, from opening to closing.
+    """Labels of one recording in this window, from opening to closing.
 
-    One window edits; another shows why it does not. A journal begins with the first edit.
-
-    Parameters
-    ----------
-    document : DocumentModel
-    labels : LabelsModel
-        Shows them.
-    root : Path
-        Recovery folder, which all windows that are to see each other share.
+    One window edits; another is read-only and says why. A journal begins with the first edit.
+    ``root`` is the recovery folder, shared by all windows.
 
     Signals
     -------
     changed
-        Who may edit, what is offered, or what is to be known.
+        Read-only state, offers or notes.
     noted, failed : str
         Sentences for the user.
     """
@@ -67,33 +60,33 @@ class LabelSession(QObject):
 
     @property
     def refusal(self) -> str:
-        """Why labels cannot be edited here; empty where they can."""
+        """Reason why labels cannot be edited here; empty where they can."""
         return _NOTHING_OPEN if self._document.content is None else self._refusal
 
     @property
     def read_only(self) -> bool:
-        """Whether labels are on show that cannot be edited here."""
+        """True while labels are shown that cannot be edited here."""
         return self._document.content is not None and bool(self._refusal)
 
     @property
     def offer(self) -> Offer | None:
-        """What an earlier session left behind and nobody has decided about."""
+        """Unsaved labels of an earlier session that are offered, or None."""
         return self._offers[0] if self._offers else None
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What could not be read of earlier sessions, or is not kept of this one."""
+        """Notes on unreadable earlier sessions, or on a journal that cannot be written."""
         return self._notes
 
     @property
     def waiting(self) -> Found:
-        """What was found at the start, until something is open."""
+        """Unsaved labels found at the start, until a recording is open."""
         return self._waiting
 
     # --- opening and closing --------------------------------------------------------------
 
     def take_over(self) -> None:
-        """Something was opened: its labels are this window's, unless another has them."""
+        """Begin a session for the recording just opened, unless another window has its labels."""
         recording = self._document.recording
         if recording is not None and not self._document.goes_on:
             self.close()
@@ -102,7 +95,7 @@ class LabelSession(QObject):
         self._labels.open(self._document.labels)
 
     def try_again(self) -> None:
-        """Take the labels as they are now, once the other window has let go of them."""
+        """Read the labels again and edit them, if the other window has released them."""
         if self._place is None or not self.read_only:
             return
         self._take(reread=True)
@@ -112,7 +105,7 @@ class LabelSession(QObject):
             self._labels.open(self._document.labels)
 
     def close(self) -> None:
-        """End the session: all is saved, or the user wants none of it."""
+        """End the session: all is saved, or the user discards it."""
         self._go_on_in(None)
         if self._place is not None:
             self._place.release()
@@ -160,7 +153,7 @@ class LabelSession(QObject):
     # --- every edit -----------------------------------------------------------------------
 
     def keep(self, name: str, before: Labels, after: Labels) -> None:
-        """Have an edit on disk before it counts as made; where that fails, say so."""
+        """Write an edit to disk before it is shown; report a failure."""
         place = self._place
         try:
             if place is None or not place.take():
@@ -189,15 +182,15 @@ class LabelSession(QObject):
             with suppress(OSError):
                 before.close()
 
-    # --- what was left behind -------------------------------------------------------------
+    # --- recovery ----------------------------------------------------------------------
 
     def look_around(self) -> None:
-        """At the start: find out which recordings have labels that were not saved."""
+        """Find recordings with unsaved labels, at the start."""
         self._waiting = offers_in(self._root)
         self.changed.emit()
 
     def recoveries(self) -> Found:
-        """What can be recovered of all recordings, also what was declined before."""
+        """Find unsaved labels of all recordings, discarded ones included."""
         others = offers_in(self._root, declined=True)
         if self._place is None or not self._place.held:
             return others
@@ -206,11 +199,11 @@ class LabelSession(QObject):
         return Found(tuple(offers), (*own.notes, *others.notes))
 
     def is_of_open(self, offer: Offer) -> bool:
-        """Whether it is of the recording that is open."""
+        """True if the offer is for the open recording."""
         return self._place is not None and self._place.recording == offer.recording
 
     def give_up(self, offer: Offer) -> None:
-        """Decline any of the recoveries; what was declined before is deleted."""
+        """Discard an offer; one that was discarded before is deleted."""
         own = self._place if self.is_of_open(offer) else None
         place = own or RecoveryPlace(self._root, offer.recording)
         try:
@@ -226,14 +219,14 @@ class LabelSession(QObject):
         self.changed.emit()
 
     def ask_for(self, offer: Offer) -> None:
-        """Offer this one, now or when its recording is open."""
+        """Offer these labels, now or when their recording is open."""
         self._wanted = offer
         if self._place is not None and self._place.held:
             self._look_for_offers(self._place)
             self.changed.emit()
 
     def take_offer(self) -> Labels:
-        """Go on with the labels that are offered: they are on disk anew, and no longer offered."""
+        """Continue with the labels offered, in a journal of their own."""
         offer, place = self._offers[0], self._place
         assert place is not None
         try:
@@ -246,7 +239,7 @@ class LabelSession(QObject):
         return offer.labels
 
     def decline(self) -> None:
-        """Offer it no more; it is kept, and :meth:`recoveries` still has it."""
+        """Discard the present offer; :meth:`recoveries` still lists it."""
         if self._offers[0].declined:
             self.postpone()
         else:
@@ -258,7 +251,7 @@ class LabelSession(QObject):
         self.changed.emit()
 
     def dismiss(self) -> None:
-        """What was to be known was read."""
+        """Clear the notes once they were read."""
         self._notes, self._waiting = (), Found()
         self.changed.emit()
 
@@ -273,7 +266,7 @@ class LabelSession(QObject):
         self._notes = found.notes
 
     def _other_than_open(self, place: RecoveryPlace, offers: Iterable[Offer]) -> Iterable[Offer]:
-        """Those that hold something else than what is open; nothing is lost with the others."""
+        """Offers that differ from the open labels; the others are deleted as redundant."""
         for offer in offers:
             if offer.labels != self._document.labels:
                 yield offer
@@ -283,7 +276,7 @@ class LabelSession(QObject):
 
 
 def _labelled_path(recording: Recording) -> Path:
-    """What a recording's recoveries go by: its folder, or the file that it was made of so far."""
+    """Path that names a recording's recoveries: its folder, or the file it was made from."""
     if recording.folder != UNTITLED:
         return recording.folder
     parts = (recording.video, recording.mesh, recording.radar)
@@ -292,6 +285,6 @@ def _labelled_path(recording: Recording) -> Path:
 
 def _held_words(place: RecoveryPlace, title: str) -> str:
     holder = place.holder()
-    who = str(holder) if holder and holder.host else "somebody else"
+    who = str(holder) if holder and holder.host else "another user"
     since = f" since {clock_text(holder.since_unix_s)}" if holder and holder.since_unix_s else ""
     return f"The labels of {title} are edited by {who}{since}; here they can only be looked at"

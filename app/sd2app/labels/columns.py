@@ -1,4 +1,4 @@
-"""The columns of the table of spans: what they show, how they sort, what typing into them does."""
+"""Columns of the table of spans: text, order, and the edit made by typing."""
 
 from __future__ import annotations
 
@@ -21,24 +21,17 @@ When = Callable[[str, Span, Timebase], float]
 
 @dataclass(frozen=True)
 class Edge:
-    """Which edge of a span a cell moves, and to where.
-
-    Parameters
-    ----------
-    side : {"start", "end"}
-    when : callable
-        The time that was typed.
-    """
+    """Edge of a span that a cell moves, and the time parsed from typed text."""
 
     side: Side
     when: When
 
     def of(self, span: Span) -> float:
-        """Where it is."""
+        """Return the time of the edge."""
         return span.start_s if self.side == "start" else span.end_s
 
     def typed(self, text: str, spans: Sequence[Span]) -> Change:
-        """Move it there."""
+        """Make the edit that moves the edge."""
         span_id = spans[0].id
         return lambda labels, base: edits.resize(
             labels, base, span_id, self.side, self.when(text, labels.span(span_id), base)
@@ -53,21 +46,21 @@ class Column:
     ----------
     id, heading, tip : str
     text : callable
-        What the cell shows.
+        Text of a cell.
     order : callable
-        What spans are sorted by; ties stay in the order of time.
+        Sort key; ties stay in the order of time.
     typed : callable, optional
-        The edit that typing comes to; without it the column is not editable.
+        Makes the edit of a typed text; without it the column is not editable.
     listed : {"label", "track"}, optional
-        The cell is chosen from a list, and the choice goes to all spans that are selected.
+        The cell is chosen from a list, for all selected spans.
     wide : str
         A text as wide as the column is at first.
     number : bool
-        Stands at the right.
+        Aligned to the right.
     hidden : bool
-        At first.
+        Hidden at first.
     edge : Edge, optional
-        What typing moves, in a column of times.
+        Edge that typing moves, in a column of times.
     """
 
     id: str
@@ -127,22 +120,22 @@ def _confidence(text: str, spans: Sequence[Span]) -> Change:
 
 COLUMNS: tuple[Column, ...] = (
     Column(
-        "start", "Start s", f"First instant. Type {_TIMES}: the first one of the span",
+        "start", "Start s", f"Start. Type {_TIMES}: the first one of the span",
         lambda span, _: f"{span.start_s:.3f}", lambda span: span.start_s, _START.typed,
         number=True, edge=_START,
     ),
     Column(
-        "end", "End s", f"Where it ends. Type {_TIMES}: the last one of the span",
+        "end", "End s", f"End. Type {_TIMES}: the last one of the span",
         lambda span, _: f"{span.end_s:.3f}", lambda span: span.end_s, _END.typed,
         number=True, edge=_END,
     ),
     Column(
-        "label", "Label", "A label of the set; of several selected spans all get it",
+        "label", "Label", "Label of the set, given to all selected spans",
         lambda span, _: span.label, lambda span: span.label.casefold(), _label, "label",
         wide="■ right-to-left",
     ),
     Column(
-        "duration", "Length s", "How long it is. Type seconds or frames (12 f): its end moves",
+        "duration", "Length s", "Duration. Type seconds or frames (12 f): its end moves",
         lambda span, _: f"{span.duration_s:.3f}", lambda span: span.duration_s,
         _DURATION.typed, number=True, edge=_DURATION,
     ),
@@ -151,22 +144,22 @@ COLUMNS: tuple[Column, ...] = (
         _frames, lambda span: span.start_s, wide="0000–0000", number=True,
     ),
     Column(
-        "track", "Track", "A track; several selected spans all go there",
+        "track", "Track", "Track, for all selected spans",
         lambda span, _: span.track, lambda span: span.track.casefold(), _track, "track",
         wide="Gestures ▾",
     ),
     Column(
-        "note", "Note", "Any words",
+        "note", "Note", "Any text",
         lambda span, _: span.note, lambda span: span.note.casefold(), _note,
         wide="some words",
     ),
     Column(
-        "author", "Author", "Who marked it",
+        "author", "Author", "Person who marked it",
         lambda span, _: span.author, lambda span: span.author.casefold(), _author,
-        wide="somebody", hidden=True,
+        wide="some name", hidden=True,
     ),
     Column(
-        "confidence", "Sure", "How sure one is of it, 0 to 1",
+        "confidence", "Sure", "Confidence, 0 to 1",
         lambda span, _: "" if span.confidence is None else f"{span.confidence:g}",
         lambda span: -1.0 if span.confidence is None else span.confidence, _confidence,
         wide="0.00", number=True, hidden=True,

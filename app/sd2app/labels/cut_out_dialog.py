@@ -1,4 +1,4 @@
-"""Cut spans out: which ones, and what of them."""
+"""Dialog to export cut-outs: choice of spans and parts."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from sd2core.labels.spans import Span
 
 _ABOUT = (
     "Each span becomes a folder of its own, with 0 s at its first frame, and an index lists them"
-    " all. What is in the folder already and the same is left alone."
+    " all. Cut-outs that are in the folder already are kept."
 )
 
 
 class CutOutDialog(QDialog):
-    """Accepted when a folder is to be chosen for :attr:`spans` and :attr:`parts`."""
+    """Accepted to choose a folder for :attr:`spans` and :attr:`parts`."""
 
     def __init__(
         self,
@@ -82,12 +82,12 @@ class CutOutDialog(QDialog):
 
     @property
     def spans(self) -> tuple[Span, ...]:
-        """What is to be cut out."""
+        """Spans chosen."""
         return self._groups[self._which.currentIndex()][1]
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """What of it."""
+        """Parts chosen."""
         return tuple(part for part, box in self._parts.items() if box.isChecked())
 
     def _refresh(self) -> None:

@@ -1,4 +1,4 @@
-"""Spans being cut out into a folder, in the background."""
+"""Export of cut-outs into a folder, in the background."""
 
 from __future__ import annotations
 
@@ -35,19 +35,15 @@ class _Done(NamedTuple):
 
 
 class CutOutModel(QObject):
-    """Looks at the folder first; where it holds something else, somebody has to decide.
+    """Looks at the folder first; where it holds something else, the user decides.
 
-    Parameters
-    ----------
-    document : DocumentModel
-    maps : dict of str to TrackModel
-        By the name of their file.
-    jobs : JobsModel
+    ``maps`` are named by their files.
 
     Signals
     -------
     asked : int, str
-        How many folders hold something else, and one of them: :meth:`go_on` or :meth:`give_up`.
+        Number of folders that hold something else, and one of them; answered by :meth:`go_on` or
+        :meth:`give_up`.
     noted, failed : str
     """
 
@@ -73,11 +69,11 @@ class CutOutModel(QObject):
 
     @property
     def busy(self) -> bool:
-        """Whether spans are being cut out."""
+        """True while exporting."""
         return self._runner.busy
 
     def source(self, parts: Iterable[Part] = ("video", "mesh", "maps")) -> CutSource | None:
-        """What there is to cut from; maps that are still computed are not among it."""
+        """Return the parts of the recording, without maps that are still computed."""
         content = self._document.content
         if content is None:
             return None
@@ -99,7 +95,7 @@ class CutOutModel(QObject):
         return whole.only(parts)
 
     def start(self, spans: Sequence[Span], parts: Iterable[Part], folder: Path) -> None:
-        """Look what is in the folder, then cut."""
+        """Compare with the folder, then export."""
         source = self.source(parts)
         if source is None:
             return
@@ -107,7 +103,7 @@ class CutOutModel(QObject):
         self._runner.submit(lambda emit: _Plan(source, plan_cuts(source, spans, folder), folder))
 
     def go_on(self, *, replace_others: bool) -> None:
-        """Cut; what holds something else is replaced, or stays."""
+        """Export; folders that hold something else are replaced or kept."""
         plan, self._plan = self._plan, None
         if plan is None:
             return
@@ -125,7 +121,7 @@ class CutOutModel(QObject):
         self._runner.submit(cut)
 
     def give_up(self) -> None:
-        """Stop; what is complete stays, and another time goes on from there."""
+        """Stop; complete folders stay, and the next export continues from there."""
         self._runner.cancel()
         self._plan = None
         self._end()
@@ -170,7 +166,7 @@ class CutOutModel(QObject):
 
 
 def groups(labels: Labels, selected: Sequence[Span]) -> list[tuple[str, tuple[Span, ...]]]:
-    """What one may want to cut out: the selection, all, or the spans of one label."""
+    """Return choices of spans: the selection, all, or the spans of one label."""
     decided = [span for span in labels.spans if span.origin != "suggestion"]
     chosen = tuple(span for span in selected if span.origin != "suggestion")
     found = [("the selected", chosen)] if chosen else []

@@ -1,4 +1,4 @@
-"""A hand that draws, moves and shortens spans; letting go is one step in the history."""
+"""Mouse drags that draw, move and resize spans; each is one step in the history."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from sd2core.labels.spans import Labels
 
 
 class LabelDragging(QObject):
-    """What a hand holds, from taking hold to letting go.
+    """State of a mouse drag of labels, from press to release.
 
-    It is silent where something cannot be done, for the hand sees that it stops. ``changed``
-    says that a hand has taken hold or let go.
+    A refused position is not reported: the user sees that the span stops. ``changed`` is emitted
+    when a drag begins or ends.
     """
 
     changed = Signal()
@@ -40,11 +40,11 @@ class LabelDragging(QObject):
 
     @property
     def dragging(self) -> bool:
-        """Whether a hand holds something."""
+        """True during a drag."""
         return self._before is not None
 
     def begin_drag(self) -> bool:
-        """A hand takes hold of a span, an edge, or an empty place; False where it may not."""
+        """Begin a drag; False where labels cannot be edited."""
         if self._edits.refused():
             return False
         self._before, self._dragged = self._labels.labels, None
@@ -52,14 +52,14 @@ class LabelDragging(QObject):
         return True
 
     def drag_edge(self, span_id: int, side: Side, time_s: float, within_s: float) -> None:
-        """The hand has an edge of a span at a time, and spans within a distance attract it."""
+        """Move an edge of a span to a time; spans within a distance attract it."""
         place_s = self._snapped(time_s, within_s, {span_id})
         self._drag(lambda labels, base: edits.resize(labels, base, span_id, side, place_s))
 
     def drag_span(self, span_id: int, start_s: float, within_s: float) -> None:
-        """The hand has a span so that it begins at a time; either end is attracted.
+        """Move a span to a start; either end snaps.
 
-        Where it is one of several that are selected, all of them go along.
+        Where it is one of several selected spans, all of them move.
         """
         assert self._before is not None
         length_s = self._before.span(span_id).duration_s
@@ -79,13 +79,13 @@ class LabelDragging(QObject):
     def drag_new(
         self, track: str, from_s: float, to_s: float, within_s: float, *, cutting: bool = False
     ) -> None:
-        """The hand draws a span from one time to another; ``cutting`` what is in its way."""
+        """Draw a span between two times; ``cutting`` cuts away others there."""
         one_s, other_s = (self._snapped(time_s, within_s) for time_s in (from_s, to_s))
         label, make = self._labels.label, edits.overwrite if cutting else edits.create
         self._drag(lambda labels, base: make(labels, base, track, one_s, other_s, label))
 
     def end_drag(self) -> None:
-        """The hand lets go."""
+        """End the drag, as one step in the history."""
         before, self._before = self._before, None
         if before is not None and self._dragged is not None:
             self._edits.make(self._dragged, before)
@@ -93,7 +93,7 @@ class LabelDragging(QObject):
         self.changed.emit()
 
     def cancel_drag(self) -> None:
-        """Everything as it was before the hand took hold."""
+        """Restore the labels from before the drag."""
         before, self._before, self._dragged = self._before, None, None
         if before is not None:
             self._labels.set_labels(before)

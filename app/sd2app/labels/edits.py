@@ -1,4 +1,4 @@
-"""Every edit of labels: done first, then pushed to the history as one step."""
+"""Edits of labels by the user: each is applied first, then pushed to the undo history."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Change = Callable[[Labels, Timebase], Edit]
 
 
 class _Step(QUndoCommand):
-    """One edit, taken back and done again."""
+    """One edit in the undo history."""
 
     def __init__(
         self,
@@ -43,14 +43,14 @@ class _Step(QUndoCommand):
 
 
 class LabelEdits(QObject):
-    """What the user can do to labels by keys and menus.
+    """Edits of labels by keys and menus.
 
-    A hand on the timeline is :class:`sd2app.labels.dragging.LabelDragging`, marking while it
-    plays :class:`sd2app.labels.marking.LabelMarking`; both come here with what they have made.
-    Each edit is on disk when it is made (see :class:`.models.label_session.LabelSession`).
-    Times are the frames of the playback clock. What cannot be done changes nothing, and
-    ``failed`` says why. ``applying`` comes before an edit: a hand that drags is to let go.
-    ``done_at`` comes after one, also when it is taken back: from when to when spans differ.
+    Mouse drags (:class:`sd2app.labels.dragging.LabelDragging`) and marking during playback
+    (:class:`sd2app.labels.marking.LabelMarking`) also end here. Each edit is on disk when it is
+    made (see :class:`sd2app.labels.autosave.LabelSession`). Times are frames of the playback clock.
+    An impossible edit changes nothing, and ``failed`` says why. ``applying`` is emitted before an
+    edit, so that a drag in progress ends first; ``done_at`` after an edit, an undo or a redo, with
+    the earliest start and latest end of changed spans.
     """
 
     failed = Signal(str)
@@ -71,7 +71,7 @@ class LabelEdits(QObject):
 
     @property
     def refusal(self) -> str:
-        """Why nothing can be edited; empty where it can."""
+        """Reason why labels cannot be edited; empty where they can."""
         return self._session.refusal
 
     # --- keys -----------------------------------------------------------------------------
@@ -93,7 +93,7 @@ class LabelEdits(QObject):
         self.apply(lambda labels, base: edits.resize(labels, base, chosen[0].id, side, time_s))
 
     def split(self) -> None:
-        """Cut the selected span, or the one on the track, in two at the frame on screen."""
+        """Split the selected span, or the one on the track, at the frame on screen."""
         now_s = self._now_s
         here = [span for span in self._candidates() if span.start_s < now_s < span.end_s]
         if here:
@@ -105,12 +105,12 @@ class LabelEdits(QObject):
             self.apply(lambda labels, base: edits.delete(labels, ids))
 
     def merge(self) -> None:
-        """Join the selected spans."""
+        """Merge the selected spans."""
         ids = self._ids()
         self.apply(lambda labels, base: edits.merge(labels, ids))
 
     def nudge(self, frames: int) -> None:
-        """Move the selected spans by frames, as one."""
+        """Move the selected spans together by some frames."""
         ids = self._ids()
         if len(ids) == 1:
             self.apply(lambda labels, base: edits.nudge(labels, base, ids[0], frames))
@@ -118,7 +118,7 @@ class LabelEdits(QObject):
             self.apply(lambda labels, base: nudge_together(labels, base, ids, frames))
 
     def duplicate(self) -> None:
-        """Copy the selected spans to the frame on screen; behind them where that is within them."""
+        """Copy the selected spans to the frame on screen; behind them where it is within them."""
         chosen = self._labels.selected
         if not chosen:
             return
@@ -128,20 +128,20 @@ class LabelEdits(QObject):
         self.apply(lambda labels, base: duplicate_together(labels, base, ids, start_s))
 
     def meet(self) -> None:
-        """Let the two selected neighbours meet at the frame on screen."""
+        """Make the two selected neighbours meet at the frame on screen."""
         ids, now_s = self._ids(), self._now_s
         if len(ids) == 2:
             self.apply(lambda labels, base: edits.join_at(labels, base, ids[0], ids[1], now_s))
 
     def fill_gaps(self) -> None:
-        """Make a span of background in every gap of the track."""
+        """Fill every gap of the track with a span of background."""
         track = self._labels.track
         if track:
             label = self._labels.background
             self.apply(lambda labels, base: edits.fill_gaps(labels, base, track, label))
 
     def restore(self) -> None:
-        """Take over what an earlier session left behind."""
+        """Take over the labels that an earlier session left unsaved."""
         recording = self._document.recording
         if recording is None or self._session.offer is None or self.refused():
             return
@@ -185,7 +185,7 @@ class LabelEdits(QObject):
     def apply(self, change: Change) -> bool:
         """Make an edit, one step in the history; False where it was refused.
 
-        What a hand has dragged until then is a step before it.
+        A drag in progress becomes a step before it.
         """
         if self.refused():
             return False
@@ -200,13 +200,13 @@ class LabelEdits(QObject):
         return True
 
     def refused(self) -> bool:
-        """Whether nothing can be edited; says why."""
+        """True if labels cannot be edited; ``failed`` says why."""
         if self.refusal:
             self.failed.emit(self.refusal)
         return bool(self.refusal)
 
     def make(self, done: Edit, before: Labels) -> None:
-        """Let what has been worked out be so, as one step in the history."""
+        """Apply a computed edit as one step in the history."""
         if done.labels is not before:
             step = _Step(done.name, self._become, before, done.labels)
             step.redo()
@@ -215,7 +215,7 @@ class LabelEdits(QObject):
             self._labels.select(done.ids)
 
     def _become(self, name: str, before: Labels, after: Labels) -> None:
-        """The one way by which labels of a recording change: on disk first, then on screen."""
+        """Change the labels: the only place that does, on disk first, then on screen."""
         recording = self._document.recording
         if recording is None or recording.labels is after:
             return

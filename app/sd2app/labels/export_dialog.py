@@ -1,4 +1,4 @@
-"""Export labels: for which program, and what its file could not hold."""
+"""Dialog to export labels: the format and its losses."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from sd2core.labels.formats import FORMATS
 
 
 class LabelExportDialog(QDialog):
-    """A view of :class:`LabelExportModel`; accepted once the file is written."""
+    """View of :class:`LabelExportModel`; accepted once the file is written."""
 
     def __init__(self, model: LabelExportModel, name: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -57,7 +57,7 @@ class LabelExportDialog(QDialog):
         if model.problem:
             role, text = "warning", model.problem
         elif model.losses is None:
-            role, text = "muted", "Looking at what it can hold…"
+            role, text = "muted", "Computing the losses…"
         elif not model.losses:
             role, text = "muted", "It holds everything: read back, the labels are the same."
         else:

@@ -1,4 +1,4 @@
-"""Labels that are about to be written for another program: what its format cannot hold."""
+"""Export of labels to another program's format, with a preview of the losses."""
 
 from __future__ import annotations
 
@@ -16,15 +16,7 @@ from sd2core.timebase import Timebase
 
 @dataclass(frozen=True)
 class Written:
-    """A file that was written.
-
-    Parameters
-    ----------
-    path : Path
-    spans : int
-    losses : tuple of Loss
-        What it does not hold.
-    """
+    """Exported file and its losses."""
 
     path: Path
     spans: int
@@ -38,12 +30,12 @@ class Written:
 
 
 class LabelExportModel(QObject):
-    """Tells beforehand what is lost, by writing to a place that is then cleared.
+    """Computes the losses beforehand by writing to a temporary folder.
 
     Signals
     -------
     changed
-        The format, what it would lose, or what is wrong.
+        Format, losses or problem.
     written : Written
     """
 
@@ -70,22 +62,22 @@ class LabelExportModel(QObject):
 
     @property
     def format(self) -> LabelFormat:
-        """The format that is chosen."""
+        """Format chosen."""
         return self._format
 
     @property
     def losses(self) -> tuple[Loss, ...] | None:
-        """What it could not hold; None while that is not known."""
+        """Losses of the format; None while unknown."""
         return self._losses
 
     @property
     def problem(self) -> str:
-        """Why it cannot be written."""
+        """Reason why the file cannot be written, or empty."""
         return self._problem
 
     @property
     def exporting(self) -> bool:
-        """Whether it is being written."""
+        """True while writing."""
         return self._exporting
 
     def choose(self, name: str) -> None:
@@ -96,7 +88,7 @@ class LabelExportModel(QObject):
             self._look()
 
     def export(self, path: Path) -> None:
-        """Write the file, with the usual ending where the name has none."""
+        """Write the file, with the usual suffix where the name has none."""
         labels, base, chosen, media = self._labels, self._timebase, self._format, self._media
         target = path if path.suffix else path.with_suffix(chosen.suffixes[0])
         if target != path and target.exists():
@@ -117,7 +109,7 @@ class LabelExportModel(QObject):
         self.changed.emit()
 
     def close(self) -> None:
-        """Let what is being written be written."""
+        """Finish the file being written."""
         self._runner.close()
 
     def _look(self) -> None:

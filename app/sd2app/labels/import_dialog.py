@@ -1,4 +1,4 @@
-"""Import labels: what the file holds above, how it is to be taken below."""
+"""Dialog to import labels: content above, choices below."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _MOST_FACTS = 6
 
 
 class LabelImportDialog(QDialog):
-    """A view of :class:`LabelImportModel`; accepted when the labels are to be taken."""
+    """View of :class:`LabelImportModel`."""
 
     def __init__(self, model: LabelImportModel, parent: QWidget | None = None) -> None:
         super().__init__(parent)

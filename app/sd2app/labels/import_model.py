@@ -1,4 +1,4 @@
-"""A label file that is about to be imported: what it holds, and what becomes of that."""
+"""Preview of a label file to import: its content and what importing changes."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ LABEL_SUFFIXES = tuple(dict.fromkeys(suffix for one in FORMATS for suffix in one
 
 
 def is_label_file(path: Path) -> bool:
-    """Whether a file is one of labels by its name; a ``recording.json`` is not."""
+    """True for the name of a label file; a ``recording.json`` is none."""
     return path.suffix.lower() in LABEL_SUFFIXES and path.name != "recording.json"
 
 
 class LabelImportModel(QObject):
-    """Reads a file in the background, again when it is to be read otherwise.
+    """Reads a file in the background, again when its format is chosen.
 
     Signals
     -------
     changed
-        What was read, what is wrong with it, or how it is to be taken.
+        Content, problem or choices.
     """
 
     changed = Signal()
@@ -54,54 +54,54 @@ class LabelImportModel(QObject):
 
     @property
     def incoming(self) -> Incoming | None:
-        """What the recording would take; None while it is read, and where it cannot be."""
+        """Labels fitted to the recording; None while reading and after an error."""
         return self._incoming
 
     @property
     def problem(self) -> str:
-        """Why it cannot be read."""
+        """Reason why the file cannot be read, or empty."""
         return self._problem
 
     @property
     def busy(self) -> bool:
-        """Whether it is being read."""
+        """True while reading."""
         return self._runner.busy
 
     @property
     def way(self) -> Way:
-        """Whether it replaces what is there."""
+        """Replace the present labels, or add to them."""
         return self._way
 
     @property
     def observations(self) -> tuple[str, ...]:
-        """Several videos in one file: one of them has to be chosen."""
+        """Observations to choose from, where the file has several videos."""
         return self._observations
 
     @property
     def observation(self) -> str | None:
-        """The one that is chosen."""
+        """Observation chosen."""
         return self._observation
 
     def set_way(self, way: Way) -> None:
-        """Replace what is there, or add to it."""
+        """Choose to replace the present labels or to add to them."""
         if way != self._way:
             self._way = way
             self.changed.emit()
 
     def read_as(self, name: str | None) -> None:
-        """Read it as a format of this name; None: as its name and content say."""
+        """Read the file in a named format; None: by name and content."""
         if name != self._format:
             self._format, self._observation, self._observations = name, None, ()
             self._read()
 
     def set_observation(self, name: str) -> None:
-        """Read the labels of this video."""
+        """Read the labels of this observation."""
         if name != self._observation:
             self._observation = name
             self._read()
 
     def facts(self) -> list[tuple[str, str]]:
-        """What the file holds and what becomes of it, each with a name."""
+        """Return names and values on the content and what importing changes."""
         found = self._incoming
         if found is None:
             return []
@@ -135,12 +135,12 @@ class LabelImportModel(QObject):
         return facts
 
     def consequence(self) -> str:
-        """What importing does to the labels that are there."""
+        """Return a sentence on the effect on present labels."""
         count = len(self._labels.spans)
         if self._way == "add":
             return "Nothing that is there changes. Undo takes the import back."
         if not count:
-            return "There is nothing yet to be replaced. Undo takes the import back."
+            return "There are no labels to replace. Undo takes the import back."
         return f"The {_counted(self._labels.spans)} of this recording go. Undo brings them back."
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""What the page of the label set asks: a colour, a file to read or to write."""
+"""Dialogs of the label set: choice of a colour, files to read and write."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _FILES = "Label set (*.json);;All files (*)"
 
 
 class LabelSetDialogs:
-    """Asks, then makes the edit; a failure is handed to ``report`` as a sentence."""
+    """Asks, then makes the edit; ``report`` gets the sentence of a failure."""
 
     def __init__(
         self,
@@ -50,7 +50,7 @@ class LabelSetDialogs:
             self._attempt(lambda: write_label_set(Path(name), shown))
 
     def usual_set(self) -> None:
-        """Use the set that comes with the program."""
+        """Use the program's own set."""
         self._use(GESTURES)
 
     def _use(self, label_set: LabelSet) -> None:

@@ -7,13 +7,15 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from PySide6.QtCore import QAbstractTableModel, QModelIndex, QObject, QPersistentModelIndex, Qt
+from PySide6.QtCore import QObject, Qt
+from PySide6.QtGui import QIcon
 
 from sd2app.labels.columns import Change
 from sd2app.labels.model import LabelsModel
 from sd2app.shell.keys.bindings import KeyBindings
 from sd2app.widgets.icons import swatch_icon
 from sd2app.widgets.key_text import canonical, native
+from sd2app.widgets.record_table import Heading, Index, RecordTableModel
 from sd2core.labels.colours import OFFERED, Alike, alike
 from sd2core.labels.field_edits import (
     CLASSES,
@@ -29,25 +31,22 @@ from sd2core.labels.field_edits import (
 )
 from sd2core.labels.label_set import Label, LabelSet
 
-Index = QModelIndex | QPersistentModelIndex
-
 NAME, KEY, COLOUR, CLASS, SPANS = range(5)
 HEADINGS = (
-    ("Label", "Its name; spans that have it follow"),
-    ("Key", "One character that marks with it"),
-    ("Colour", "Of its spans; two that look alike are said below"),
-    ("Class", "What the classifier is to call it; – is not learnt from"),
-    ("Spans", "How many have it"),
+    Heading("Label", "Name; renaming it also renames it on its spans", editable=True),
+    Heading("Key", "Character that marks with it", editable=True),
+    Heading(
+        "Colour", "Colour of its spans; colours that look alike are noted below", editable=True
+    ),
+    Heading("Class", "Class that the classifier learns for it; – for none", editable=True),
+    Heading("Spans", "Number of spans with this label", number=True),
 )
 NO_CLASS = "–"
 _COLOURS = {colour: name for name, colour in OFFERED}
-_RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-_LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
-_NOWHERE = QModelIndex()
 
 
-class LabelSetModel(QAbstractTableModel):
-    """A row is a label. Every change is one step, and what cannot be is refused in words."""
+class LabelSetModel(RecordTableModel[Label]):
+    """A row per label. Every change is one step; an invalid one is refused with a reason."""
 
     def __init__(
         self,
@@ -56,44 +55,44 @@ class LabelSetModel(QAbstractTableModel):
         apply: Callable[[Change], bool],
         parent: QObject | None = None,
     ) -> None:
-        super().__init__(parent)
+        super().__init__(HEADINGS, parent)
         self._labels, self._keys, self._apply = labels, keys, apply
         self._set = labels.labels.label_set
+        self._rows = self._set.labels
         self._counts: Counter[str] = Counter()
         self._alike: list[Alike] = []
-        self._watched = False
         labels.changed.connect(self._follow)
 
     # --- what is there --------------------------------------------------------------------
 
     @property
     def label_set(self) -> LabelSet:
-        """The labels, in their order."""
+        """Labels in their order."""
         return self._set
 
     @property
     def warnings(self) -> str:
-        """Which labels cannot be told apart by colour; empty where all can."""
+        """Sentences on labels whose colours look alike; empty without any."""
         return " ".join(f"{one.words()}." for one in self._alike)
 
     def spans_of(self, row: int) -> int:
-        """How many spans have a label."""
+        """Return the number of spans with a label."""
         return self._counts[self._set.labels[row].name]
 
     def classes(self) -> list[str]:
-        """What a label can be to the classifier; the empty one is not learnt from."""
+        """Return the classes that a label can have; the empty one is not learnt."""
         others = sorted({one.gesture_class for one in self._set.labels}.difference(CLASSES, {""}))
         return ["", *CLASSES, *others]
 
     def colours(self) -> list[tuple[str, str]]:
-        """Colours to choose from, names first: those offered and others in use."""
+        """Return colours to choose from, names first: the palette and others in use."""
         others = sorted({one.colour for one in self._set.labels}.difference(_COLOURS))
         return [*OFFERED, *((colour, colour) for colour in others)]
 
     # --- changing -------------------------------------------------------------------------
 
     def add(self) -> bool:
-        """Add a label with a name, a colour and a key that none has yet."""
+        """Add a label with a name, a colour and a key not yet in use."""
         made = new_label(self._set)
         if made.key and self._keys.owner(made.key):
             made = replace(made, key="")
@@ -110,12 +109,12 @@ class LabelSetModel(QAbstractTableModel):
         return self._apply(lambda labels, _: remove_label(labels, name, instead))
 
     def rename_set(self, name: str) -> bool:
-        """Call the set something else."""
+        """Rename the set."""
         named = replace(self._set, name=name.strip())
         return self._apply(lambda labels, _: set_label_set(labels, named))
 
     def setData(self, index: Index, value: Any, role: int = Qt.ItemDataRole.EditRole) -> bool:
-        """Make the edit that was typed; False, with the cell as it was, where it was refused."""
+        """Make the edit typed; False, with the cell unchanged, where it was refused."""
         name, text = self._set.labels[index.row()].name, str(value).strip()
         if text == self.data(index, Qt.ItemDataRole.EditRole):
             return False
@@ -131,79 +130,37 @@ class LabelSetModel(QAbstractTableModel):
 
     # --- following ------------------------------------------------------------------------
 
-    def set_watched(self, watched: bool) -> None:
-        """Follow the labels, or leave that until somebody looks."""
-        self._watched = watched
-        self._follow()
-
-    def _follow(self) -> None:
-        if not self._watched:
-            return
+    def _refresh(self) -> None:
         labels = self._labels.labels
         count = len(labels.label_set.labels)
-        anew = count != len(self._set.labels)
-        if anew:
+        resized = count != len(self._set.labels)
+        if resized:
             self.beginResetModel()
         self._set = labels.label_set
+        self._rows = self._set.labels
         self._counts = Counter(span.label for span in labels.spans)
         self._alike = alike(self._set.labels)
-        if anew:
+        if resized:
             self.endResetModel()
         elif count:
             self.dataChanged.emit(self.index(0, 0), self.index(count - 1, SPANS))
 
-    # --- Qt's questions -------------------------------------------------------------------
+    # --- cells ----------------------------------------------------------------------------
 
-    def rowCount(self, parent: Index = _NOWHERE) -> int:
-        """Labels of the set."""
-        return 0 if parent.isValid() else len(self._set.labels)
-
-    def columnCount(self, parent: Index = _NOWHERE) -> int:
-        """Name, key, colour, class, and how many spans."""
-        return 0 if parent.isValid() else len(HEADINGS)
-
-    def headerData(
-        self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole
-    ) -> Any:
-        """Headings."""
-        if orientation != Qt.Orientation.Horizontal:
-            return None
-        if role == Qt.ItemDataRole.TextAlignmentRole:
-            return _RIGHT if section == SPANS else _LEFT
-        roles = {Qt.ItemDataRole.DisplayRole: 0, Qt.ItemDataRole.ToolTipRole: 1}
-        return HEADINGS[section][roles[Qt.ItemDataRole(role)]] if role in roles else None
-
-    def flags(self, index: Index) -> Qt.ItemFlag:
-        """What can be typed into."""
-        if not index.isValid():
-            return Qt.ItemFlag.NoItemFlags
-        read = Qt.ItemFlag.ItemIsSelectable | Qt.ItemFlag.ItemIsEnabled
-        return read if index.column() == SPANS else read | Qt.ItemFlag.ItemIsEditable
-
-    def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        """A cell."""
-        if not index.isValid():
-            return None
-        label = self._set.labels[index.row()]
-        if role == Qt.ItemDataRole.EditRole:
-            values = (label.name, label.key, label.colour, label.gesture_class, "")
-            return values[index.column()]
-        if role == Qt.ItemDataRole.DisplayRole:
-            return self._text(label, index.column(), index.row())
-        if role == Qt.ItemDataRole.TextAlignmentRole:
-            return _RIGHT if index.column() == SPANS else _LEFT
-        if role == Qt.ItemDataRole.DecorationRole and index.column() == COLOUR:
-            return swatch_icon(label.colour)
-        return None
-
-    def _text(self, label: Label, column: int, row: int) -> str:
+    def _text(self, record: Label, column: int) -> str:
         if column == COLOUR:
-            like = any(label.name in (pair.one, pair.other) for pair in self._alike)
-            return _COLOURS.get(label.colour, label.colour) + (" (alike)" if like else "")
+            like = any(record.name in (pair.one, pair.other) for pair in self._alike)
+            return _COLOURS.get(record.colour, record.colour) + (" (alike)" if like else "")
         texts = {
-            NAME: label.name,
-            KEY: native(canonical(label.key)),
-            CLASS: label.gesture_class or NO_CLASS,
-            SPANS: f"{self.spans_of(row):,}",
+            NAME: record.name,
+            KEY: native(canonical(record.key)),
+            CLASS: record.gesture_class or NO_CLASS,
+            SPANS: f"{self._counts[record.name]:,}",
         }
         return texts[column]
+
+    def _edited_text(self, record: Label, column: int) -> str:
+        return (record.name, record.key, record.colour, record.gesture_class, "")[column]
+
+    def _icon(self, record: Label, column: int) -> QIcon | None:
+        return swatch_icon(record.colour) if column == COLOUR else None

@@ -1,4 +1,4 @@
-"""The label set: its labels with name, key, colour and class, in an order of one's own."""
+"""Page of the label set: its labels with name, key, colour and class."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _OWN_KEYS = (Qt.Key.Key_Escape, Qt.Key.Key_Return, Qt.Key.Key_Enter)
 
 
 class Asks(Protocol):
-    """What the page leaves to dialogs."""
+    """Dialogs of the page."""
 
     def ask_colour(self, colour: str) -> str:
         """Let the user choose any colour; empty where there is none."""
@@ -57,7 +57,7 @@ class Asks(Protocol):
 
 
 class LabelSetPage(QWidget):
-    """The table, what was noticed about colours, and buttons."""
+    """The table, warnings about colours, and buttons."""
 
     def __init__(self, model: LabelSetModel, asks: Asks, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -129,7 +129,7 @@ class LabelSetPage(QWidget):
             self._gone(row)
 
     def menu_to_remove(self, row: int) -> QMenu:
-        """What can become of the spans of a label that is removed."""
+        """Make the menu of choices for the spans of a label to remove."""
         count = self._model.spans_of(row)
         whose = "The span keeps" if count == 1 else f"The {count:,} spans keep"
         menu = QMenu(self)
@@ -152,12 +152,12 @@ class LabelSetPage(QWidget):
     # --- following ------------------------------------------------------------------------
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Somebody looks."""
+        """Follow the labels."""
         super().showEvent(event)
         self._model.set_watched(True)
 
     def hideEvent(self, event: QHideEvent) -> None:
-        """Nobody looks."""
+        """Stop following the labels."""
         super().hideEvent(event)
         self._model.set_watched(False)
 
@@ -173,7 +173,7 @@ class LabelSetPage(QWidget):
 
 
 class NameLine(QLineEdit):
-    """Return takes what was typed, Escape takes it back; either gives the keyboard back."""
+    """Line for the name: Return accepts, Escape restores, and both leave it."""
 
     given_up = Signal()
 
@@ -183,11 +183,11 @@ class NameLine(QLineEdit):
         self.setToolTip(name)
 
     def event(self, event: QEvent) -> bool:
-        """Escape and Return are its own."""
+        """Keep Escape and Return for this line."""
         return claims(event, _OWN_KEYS) or super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Leave."""
+        """Accept or restore the name."""
         if event.key() == Qt.Key.Key_Escape:
             self.given_up.emit()
         else:
@@ -211,7 +211,7 @@ class LabelSetTable(CellTable):
             self.setColumnWidth(column, metrics.horizontalAdvance(text) + _PADDING_PX)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Delete is for labels here, not for spans."""
+        """Remove labels, not spans, with Delete."""
         if event.key() in (Qt.Key.Key_Delete, Qt.Key.Key_Backspace):
             self.removed.emit()
         else:
@@ -219,7 +219,7 @@ class LabelSetTable(CellTable):
 
 
 class _LabelSetCells(FramedCells):
-    """Colours and classes from lists, names and keys as text."""
+    """Lists for colours and classes, lines for names and keys."""
 
     def __init__(self, model: LabelSetModel, asks: Asks, parent: QWidget) -> None:
         super().__init__(parent)
@@ -228,7 +228,7 @@ class _LabelSetCells(FramedCells):
     def createEditor(
         self, parent: QWidget, option: QStyleOptionViewItem, index: QModelIndex
     ) -> QWidget:
-        """A list, or a line."""
+        """Make a list or a line."""
         if index.column() == CLASS:
             choices = [Choosable(one or NO_CLASS, one) for one in self._model.classes()]
             return self.listed(choices, "Class", parent)
@@ -244,7 +244,7 @@ class _LabelSetCells(FramedCells):
         return line
 
     def setModelData(self, editor: QWidget, model: QAbstractItemModel, index: QModelIndex) -> None:
-        """What was chosen or typed; any other colour is asked for once the list is gone."""
+        """Set the value; any other colour is asked for once the list is closed."""
         if isinstance(editor, ListedEditor) and editor.currentData() == _OTHER:
             place = QPersistentModelIndex(index)
             QTimer.singleShot(0, lambda: self._ask(place))

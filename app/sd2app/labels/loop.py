@@ -1,4 +1,4 @@
-"""The span that is played again and again."""
+"""Playback of one span in a loop."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from sd2core.labels.spans import Span
 
 
 class SpanLoop(QObject):
-    """Plays one span in a loop, also while its edges are moved, until the clock leaves it."""
+    """Plays a span in a loop, also while its edges are moved, until the user seeks elsewhere."""
 
     changed = Signal()
 
@@ -25,17 +25,17 @@ class SpanLoop(QObject):
 
     @property
     def span(self) -> Span | None:
-        """The span that is played, if one is."""
+        """Span played in a loop, or None."""
         return self._span
 
     def play(self, span: Span) -> None:
-        """Play a span from its start, again and again."""
+        """Play a span from its start in a loop."""
         self._span = span
         self._playback.play_stretch(span.start_s, span.end_s)
         self.changed.emit()
 
     def end(self) -> None:
-        """Play on beyond the span."""
+        """Leave the loop and play on."""
         self._playback.set_stretch(None)
 
     def _follow_span(self) -> None:

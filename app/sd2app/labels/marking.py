@@ -1,4 +1,4 @@
-"""Marking while it plays: a key begins a span with what is on screen, and ends it."""
+"""Marking during playback: a key begins a span at the frame on screen, and ends it."""
 
 from __future__ import annotations
 
@@ -13,10 +13,9 @@ from sd2core.labels.free_time import seen_at
 
 
 class LabelMarking(QObject):
-    """Begins and ends marks, at the frame that is on screen or that was when one reacted.
+    """Begins and ends marks, at the frame on screen or, while playing, the reaction time earlier.
 
-    A reaction takes time of the clock on the wall: played at half speed, half as much of the
-    recording goes by.
+    The reaction time is real time: played at half speed, half as much of the recording goes by.
     """
 
     def __init__(
@@ -34,7 +33,7 @@ class LabelMarking(QObject):
     def mark(self, label: str) -> None:
         """Begin a span with this label, or end the one that has begun.
 
-        On a track without overlaps what else is being marked ends where this begins.
+        On an exclusive track this also ends other marks.
         """
         track = self._labels.track
         if not track or self._edits.refused():
@@ -55,12 +54,12 @@ class LabelMarking(QObject):
             self._labels.set_marks((*self._labels.marks, Mark(track, label, seen_s)))
 
     def end_marks(self, *, cutting: bool = False) -> None:
-        """End all that is being marked; ``cutting`` what else is on the track there."""
+        """End all marks; ``cutting`` cuts away other spans of the track there."""
         for mark in self._labels.marks:
             self._end(mark, self._seen_s(mark.track), cutting=cutting)
 
     def drop_marks(self) -> None:
-        """Forget what is being marked."""
+        """Discard all marks."""
         self._labels.set_marks(())
 
     def _seen_s(self, track: str) -> float:

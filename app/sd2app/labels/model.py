@@ -1,4 +1,4 @@
-"""The labels of the recording that is open, what is selected, and what is being marked."""
+"""Labels of the open recording, with selection, current track and label, and marks in progress."""
 
 from __future__ import annotations
 
@@ -18,13 +18,7 @@ _COLUMNS_KEPT = 4
 
 @dataclass(frozen=True)
 class Mark:
-    """A span that has begun and not ended.
-
-    Parameters
-    ----------
-    track, label : str
-    start_s : float
-    """
+    """Span that has begun and not ended."""
 
     track: str
     label: str
@@ -32,16 +26,16 @@ class Mark:
 
 
 class LabelsModel(QObject):
-    """Labels as they are now; only :class:`sd2app.labels.edits.LabelEdits` changes them.
+    """Current labels; only :class:`sd2app.labels.edits.LabelEdits` changes them.
 
     Signals
     -------
     changed
         Spans, tracks or the label set.
     selection_changed
-        Which spans are selected, on which track new ones come, or with which label.
+        Selected spans, or the track or label for new ones.
     marks_changed
-        What is being marked.
+        Marks in progress.
     """
 
     changed = Signal()
@@ -60,18 +54,18 @@ class LabelsModel(QObject):
 
     @property
     def labels(self) -> Labels:
-        """All of them."""
+        """All labels."""
         return self._labels
 
     @property
     def selected(self) -> tuple[Span, ...]:
-        """The spans that are selected, in the order of time."""
+        """Selected spans, in the order of time."""
         spans = self._labels.spans
         return tuple(spans[row] for row in self.selected_rows)
 
     @property
     def selected_rows(self) -> NDArray[np.int64]:
-        """The same as rows of :attr:`arrays`."""
+        """Selected spans as rows of :attr:`arrays`."""
         chosen = np.fromiter(self._selected, np.int64, len(self._selected))
         return np.flatnonzero(np.isin(self._arrays.ids, chosen))
 
@@ -82,36 +76,36 @@ class LabelsModel(QObject):
 
     @property
     def track(self) -> str:
-        """Where new spans come; empty where there is no track."""
+        """Track for new spans; empty without any track."""
         return self._track
 
     @property
     def label(self) -> str:
-        """What a span is called that a hand draws: the label that was used last."""
+        """Label for drawn spans: the one used last."""
         return self._label
 
     @property
     def background(self) -> str:
-        """What gaps are filled with: the label of that class, or the one that was used last."""
+        """Label to fill gaps with: that of the background class, else the one used last."""
         offered = self._labels.label_set.labels
         named = (one.name for one in offered if one.gesture_class == "background")
         return next(named, self._label)
 
     @property
     def marks(self) -> tuple[Mark, ...]:
-        """What has begun and not ended, in the order of beginning."""
+        """Marks in progress, in the order of their starts."""
         return self._marks
 
     def is_selected(self, span_id: int) -> bool:
-        """Whether a span is selected."""
+        """True if the span is selected."""
         return span_id in self._selected
 
     def within(self, start_s: float, end_s: float) -> list[Span]:
-        """The spans of which something lies between two times, in order."""
+        """Return the spans that overlap an interval, in order."""
         return [self._labels.spans[row] for row in self._arrays.within(start_s, end_s)]
 
     def at(self, time_s: float) -> Span | None:
-        """The span at a time: one on the track where new ones come, otherwise the shortest."""
+        """Return the span at a time: one on the track for new spans, else the shortest."""
         arrays = self._arrays
         rows = np.flatnonzero((arrays.starts_s <= time_s) & (time_s < arrays.ends_s))
         found = [self._labels.spans[row] for row in rows]
@@ -126,7 +120,7 @@ class LabelsModel(QObject):
         *,
         together: bool = False,
     ) -> SpanColumns:
-        """What of the spans is to be seen at a scale (:meth:`SpanArrays.columns`), and kept."""
+        """Return :meth:`SpanArrays.columns` of a time window, cached."""
         key = start_s, end_s, columns, wide_columns, together
         found = self._columns.get(key)
         if found is None:
@@ -138,14 +132,14 @@ class LabelsModel(QObject):
         return found
 
     def colour_of(self, label: str) -> str:
-        """``#rrggbb`` of a label."""
+        """Return the ``#rrggbb`` of a label."""
         known = self._labels.label_set.find(label)
         return known.colour if known is not None else UNKNOWN_COLOUR
 
     # --- changing -------------------------------------------------------------------------
 
     def open(self, labels: Labels) -> None:
-        """Take over another recording's labels; nothing is selected or being marked."""
+        """Show another recording's labels; selection and marks are cleared."""
         self._marks = ()
         self._choose(frozenset())
         self._assign(labels)
@@ -153,7 +147,7 @@ class LabelsModel(QObject):
         self.marks_changed.emit()
 
     def set_labels(self, labels: Labels) -> None:
-        """Assign labels; what is gone is no longer selected."""
+        """Assign labels; spans that no longer exist are deselected."""
         if labels is self._labels:
             return
         there = {span.id for span in labels.spans}
@@ -164,7 +158,7 @@ class LabelsModel(QObject):
             self.selection_changed.emit()
 
     def select(self, ids: Iterable[int]) -> None:
-        """Select these spans and no others; new ones come on the track of the first."""
+        """Select these spans and no others; the track of the first is the one for new spans."""
         wanted = frozenset(ids) & frozenset(self._arrays.ids.tolist())
         if wanted == self._selected:
             return
@@ -178,7 +172,7 @@ class LabelsModel(QObject):
         self.select(self._arrays.ids.tolist())
 
     def select_up_to(self, span: Span) -> None:
-        """Select from what is selected to a span: what lies between in time, on tracks between."""
+        """Select from the selection to a span: spans between in time, on tracks between."""
         names = [track.name for track in self._labels.tracks]
         corners = [*self.selected, span]
         rows = [names.index(one.track) for one in corners]
@@ -190,19 +184,19 @@ class LabelsModel(QObject):
         )
 
     def set_track(self, name: str) -> None:
-        """Choose where new spans come."""
+        """Choose the track for new spans."""
         if name != self._track:
             self._track = self._labels.track(name).name
             self.selection_changed.emit()
 
     def set_label(self, name: str) -> None:
-        """Choose what a span is called that a hand draws."""
+        """Choose the label for drawn spans."""
         if name != self._label:
             self._label = name
             self.selection_changed.emit()
 
     def set_marks(self, marks: Iterable[Mark]) -> None:
-        """Say what is being marked."""
+        """Set the marks in progress."""
         marks = tuple(marks)
         if marks != self._marks:
             self._marks = marks

@@ -1,4 +1,4 @@
-"""How spans look: a box on the timeline, a stretch of every map; narrow ones together."""
+"""Painting of spans: boxes on the timeline, tinted parts of maps; narrow ones together."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def paint_span(
     selected: bool = False,
     suggestion: bool = False,
 ) -> None:
-    """One span in its row: tinted, edges in full colour, and what it is called."""
+    """Paint one span in its row: tint, edges in full colour, and label."""
     full = QColor(colour)
     tint = QColor(full)
     tint.setAlpha(_SELECTED_TINT if selected else _TINT)
@@ -69,7 +69,7 @@ def paint_span(
 
 
 def lane_box(row: TrackRow, lane: int, left: float, right: float) -> QRectF:
-    """Where something stands in a lane of a track; the shortest is still seen."""
+    """Return the box of a span in its lane, wide enough to be seen."""
     top, height = row.lane_px(lane)
     inset = _INSET_PX if height > 8 * _INSET_PX else 0.0
     return QRectF(left, top + inset, max(right - left, 2.0), height - 2 * inset)
@@ -83,7 +83,7 @@ def paint_spans(
     rows: tuple[TrackRow, ...],
     palette: Palette,
 ) -> None:
-    """All spans in view, each in its lane."""
+    """Paint all spans in view, each in its lane."""
     columns = columns_in(painter, plot, scale, model)
     arrays = model.arrays
     image = _tinted(columns, arrays.colours, _NARROW_TINTS)
@@ -114,14 +114,14 @@ def paint_spans(
 
 
 def _text(span: Span) -> str:
-    """The label, after how sure it is where it is a suggestion."""
+    """Label of a span, after the confidence of a suggestion."""
     if span.origin == "suggestion" and span.confidence is not None:
         return f"{100 * span.confidence:.0f} % {span.label}"
     return span.label
 
 
 def map_overlay(model: LabelsModel) -> Overlay:
-    """Spans over a map."""
+    """Make the overlay of spans on a map."""
 
     def paint(painter: QPainter, plot: QRectF, scale: TimeScale) -> None:
         paint_regions(painter, plot, scale, model)
@@ -130,7 +130,7 @@ def map_overlay(model: LabelsModel) -> Overlay:
 
 
 def strip_overlay(model: LabelsModel) -> Overlay:
-    """Spans of all tracks as one line."""
+    """Make the overlay of the spans of all tracks as one line."""
 
     def paint(painter: QPainter, strip: QRectF, scale: TimeScale) -> None:
         paint_strip(painter, strip, scale, model)
@@ -139,7 +139,7 @@ def strip_overlay(model: LabelsModel) -> Overlay:
 
 
 def paint_regions(painter: QPainter, plot: QRectF, scale: TimeScale, model: LabelsModel) -> None:
-    """The spans as stretches of a map: tinted, the selected ones more, with edges where wide."""
+    """Paint spans on a map: tinted, selected ones more, with edges where wide."""
     columns = columns_in(painter, plot, scale, model, together=True, wide_px=math.inf)
     arrays = model.arrays
     tints = np.where(columns.selected, _SELECTED_REGION_TINT, _REGION_TINT) * columns.share
@@ -161,7 +161,7 @@ def paint_regions(painter: QPainter, plot: QRectF, scale: TimeScale, model: Labe
 
 
 def paint_strip(painter: QPainter, strip: QRectF, scale: TimeScale, model: LabelsModel) -> None:
-    """All spans of all tracks in one line."""
+    """Paint all spans of all tracks in one line."""
     columns = columns_in(painter, strip, scale, model, together=True, wide_px=math.inf)
     painter.drawImage(strip, _tinted(columns, model.arrays.colours, _OVERVIEW_TINTS))
 
@@ -175,14 +175,14 @@ def columns_in(
     together: bool = False,
     wide_px: float = WIDE_PX,
 ) -> SpanColumns:
-    """What is to be drawn, one column per device pixel."""
+    """Compute the spans in view, one column per device pixel."""
     ratio = painter.device().devicePixelRatioF()
     count = max(round(plot.width() * ratio), 1)
     return model.columns(scale.start_s, scale.end_s, count, wide_px * ratio, together=together)
 
 
 def _tinted(columns: SpanColumns, colours: tuple[str, ...], tints: tuple[int, int]) -> QImage:
-    """A line per lane: the colour that holds most, the stronger the more is held."""
+    """A line per lane in the colour that covers most, more opaque the more is covered."""
     low, high = tints
     alphas = np.where(columns.share > 0, low + (high - low) * columns.share, 0)
     return _coloured(columns, colours, alphas)
@@ -196,7 +196,7 @@ def _coloured(
 
 
 def _marked(columns: SpanColumns, palette: Palette) -> QImage:
-    """A line per lane: where something is selected."""
+    """A line per lane that marks selected spans."""
     return _image(np.where(columns.selected, QColor(palette.text).rgb(), 0).astype(np.uint32))
 
 

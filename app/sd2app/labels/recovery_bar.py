@@ -1,4 +1,4 @@
-"""What is to be decided or known about the labels: one line over the window."""
+"""Bar above the window about read-only labels and unsaved labels of earlier sessions."""
 
 from __future__ import annotations
 
@@ -15,17 +15,9 @@ _HEIGHT = 40
 
 
 class LabelBar(QFrame):
-    """Hidden where there is nothing to decide.
+    """Offers what the user has to decide about the labels; hidden when there is nothing.
 
-    Labels that are edited elsewhere, labels that a crash left behind, what could not be read of
-    them; while nothing is open, which recordings have some.
-
-    Parameters
-    ----------
-    restore : callable
-        Takes over what is offered.
-    recover : callable
-        Shows what can be recovered of all recordings.
+    ``restore`` takes over the labels offered, ``recover`` opens the list for all recordings.
     """
 
     def __init__(
@@ -46,10 +38,10 @@ class LabelBar(QFrame):
         for name, text, tip, run in (
             ("again", "Try again", "Edit them here, once the other window is closed",
              session.try_again),
-            ("restore", "Restore", "Take these labels over; one undo takes that back", restore),
-            ("decline", "Discard", "Offer them no more; File → Recover labels… keeps them",
+            ("restore", "Restore", "Use these labels; one undo takes that back", restore),
+            ("decline", "Discard", "Do not offer them again; File → Recover labels… lists them",
              session.decline),
-            ("postpone", "Not now", "Offer them when this recording is opened the next time",
+            ("postpone", "Not now", "Offer them again when this recording is opened next",
              session.postpone),
             ("recover", "Recover labels…", "See what is there, and open its recording", recover),
             ("close", "✕", "Close this message", session.dismiss),
@@ -75,7 +67,7 @@ class LabelBar(QFrame):
 
     @property
     def text(self) -> str:
-        """What is said, empty while hidden."""
+        """Text shown, empty while hidden."""
         return "" if self.isHidden() else f"{self._title.text()}: {self._text.text()}"
 
     def _refresh(self) -> None:

@@ -1,4 +1,4 @@
-"""Labels that can be recovered, of all recordings: opened, written to a file, or given up."""
+"""Dialog of unsaved labels of all recordings: open, write to a file, discard."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ _SAID = (
     "Edits of labels that were not saved when the program ended. Open a recording to see what"
     " they change."
 )
-_NOTHING = "There is nothing to recover: whatever was edited was saved, or was not wanted."
+_NOTHING = "There is nothing to recover: all edits were saved or discarded."
 _ROW_PX, _MARGIN_PX = 24, 16
 _HEADINGS = ("Recording", "Edits that were not saved", "Holds", "")
 
 
 def choose_recovery(session: LabelSession, parent: QWidget) -> Offer | None:
-    """Show what can be recovered; what the user wants to see in its recording."""
+    """Show the dialog; return the offer whose recording is to be opened."""
     dialog = RecoverLabelsDialog(session, parent)
     accepted = dialog.exec() == QDialog.DialogCode.Accepted
     dialog.deleteLater()
@@ -42,10 +42,7 @@ def choose_recovery(session: LabelSession, parent: QWidget) -> Offer | None:
 
 
 class RecoverLabelsDialog(QDialog):
-    """A row for each session that ended with edits that were not saved.
-
-    ``chosen`` is what the user wants to see in its recording.
-    """
+    """A row for each session with unsaved edits."""
 
     def __init__(self, session: LabelSession, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -62,12 +59,12 @@ class RecoverLabelsDialog(QDialog):
         self._list.setAllColumnsShowFocus(True)
         self._list.header().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         self._list.currentItemChanged.connect(self._follow)
-        self._list.itemActivated.connect(lambda *_: self._open.isEnabled() and self._accept())
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, self)
         roles = QDialogButtonBox.ButtonRole
         self._open = buttons.addButton("Open recording", roles.AcceptRole)
         self._write = buttons.addButton("Write to file…", roles.ActionRole)
         self._discard = buttons.addButton("Discard", roles.ActionRole)
+        self._list.itemActivated.connect(lambda *_: self._open.isEnabled() and self._accept())
         self._open.clicked.connect(self._accept)
         self._write.clicked.connect(self._write_file)
         self._discard.clicked.connect(self._give_up)
@@ -99,7 +96,8 @@ class RecoverLabelsDialog(QDialog):
         self._list.setVisible(bool(found.offers))
         self._notes.setText("\n".join(found.notes))
         self._notes.setVisible(bool(found.notes))
-        self._list.setCurrentItem(self._list.topLevelItem(0))
+        if (first := self._list.topLevelItem(0)) is not None:
+            self._list.setCurrentItem(first)
         self._follow()
 
     @property
@@ -155,7 +153,7 @@ class RecoverLabelsDialog(QDialog):
         answer = QMessageBox.question(
             self,
             "Delete for good?",
-            f"{edits_text(offer)} of {offer.recording.name} are deleted and cannot be had back.",
+            f"{edits_text(offer)} of {offer.recording.name} are deleted and cannot be restored.",
             buttons.Discard | buttons.Cancel,
             buttons.Cancel,
         )

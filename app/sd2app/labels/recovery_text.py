@@ -1,4 +1,4 @@
-"""What is said of labels that can be recovered."""
+"""Sentences about labels that can be recovered."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ from sd2core.labels.spans import Labels
 
 
 def edits_text(offer: Offer) -> str:
-    """How much work it is, and until when."""
+    """Return the number of edits, and time and name of the last."""
     edits = "1 edit" if offer.edits == 1 else f"{offer.edits:,} edits"
     return f"{edits} until {clock_text(offer.time_unix_s)}, the last “{offer.last}”"
 
 
 def spans_text(labels: Labels) -> str:
-    """How many spans there are."""
+    """Return the number of spans."""
     return "1 span" if len(labels.spans) == 1 else f"{len(labels.spans):,} spans"
 
 
 def offer_text(offer: Offer, there: Labels) -> str:
-    """What is offered, beside what is there."""
+    """Describe an offer, compared with the open labels."""
     difference = compare(there, offer.labels)
     return f"{edits_text(offer)}. {spans_text(offer.labels)}; against what is open: {difference}."
 
 
 def waiting_text(found: Found) -> str:
-    """Which recordings have labels that were not saved; empty where none has."""
+    """Name the recordings with unsaved labels; empty without any."""
     names = list(dict.fromkeys(one.recording.name for one in found.offers if not one.declined))
     if not names:
         return ""

@@ -1,4 +1,4 @@
-"""Where tracks, lanes and what is being marked stand on the label timeline, in pixels."""
+"""Geometry of tracks, lanes and marks on the label timeline, in pixels."""
 
 from __future__ import annotations
 
@@ -17,15 +17,7 @@ _GAP_PX = 1.0
 
 @dataclass(frozen=True)
 class TrackRow:
-    """One track.
-
-    Parameters
-    ----------
-    name : str
-    top_px, height_px : float
-    lanes : int
-        How many lanes share the height.
-    """
+    """Row of one track; its lanes share the height."""
 
     name: str
     top_px: float
@@ -33,19 +25,19 @@ class TrackRow:
     lanes: int
 
     def lane_px(self, lane: int) -> tuple[float, float]:
-        """Top and height of a lane."""
+        """Return top and height of a lane."""
         height_px = (self.height_px - 2 * _GAP_PX) / self.lanes
         return self.top_px + _GAP_PX + lane * height_px, height_px
 
     def lane_at(self, y_px: float) -> int:
-        """The lane at a height."""
+        """Return the lane at a height."""
         lane = int((y_px - self.top_px - _GAP_PX) * self.lanes / (self.height_px - 2 * _GAP_PX))
         return min(max(lane, 0), self.lanes - 1)
 
 
 @dataclass(frozen=True)
 class LabelRows:
-    """All tracks, from top to bottom, and the lane of each mark."""
+    """Rows of all tracks, from top to bottom, and the lane of each mark."""
 
     tracks: tuple[TrackRow, ...]
     mark_lanes: tuple[int, ...]
@@ -54,7 +46,7 @@ class LabelRows:
     def of(
         cls, tracks: Sequence[LabelTrack], arrays: SpanArrays, marks: Sequence[Mark]
     ) -> LabelRows:
-        """A track is as high as it needs to be for its lanes, up to a limit."""
+        """Lay out tracks, each as high as its lanes need, up to a limit."""
         counts = list(arrays.lanes_of_track)
         numbers = {track.name: number for number, track in enumerate(tracks)}
         mark_lanes: list[int] = []
@@ -79,17 +71,17 @@ class LabelRows:
 
     @property
     def height_px(self) -> float:
-        """Of all tracks; there is room for one where there is none."""
+        """Height of all tracks, of one at least."""
         last = self.tracks[-1] if self.tracks else TrackRow("", 0.0, ROW_PX, 1)
         return last.top_px + last.height_px
 
     def row_at(self, y_px: float) -> TrackRow | None:
-        """The track at a height."""
+        """Return the row at a height."""
         for row in self.tracks:
             if row.top_px <= y_px < row.top_px + row.height_px:
                 return row
         return None
 
     def row_of(self, track: str) -> TrackRow:
-        """The row of a track; it must exist."""
+        """Return the row of a track; it must exist."""
         return next(row for row in self.tracks if row.name == track)

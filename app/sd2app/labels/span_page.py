@@ -25,7 +25,7 @@ _LISTED = {one.id: one for one in COLUMNS if one.listed is not None}
 
 
 class SpanPage(QWidget):
-    """A line of filters above the table; kept up to date while it is seen."""
+    """A line of filters above the table; kept up to date while it is shown."""
 
     def __init__(
         self,
@@ -62,19 +62,19 @@ class SpanPage(QWidget):
         labels.changed.connect(self._offer)
 
     def find(self) -> None:
-        """Put the keyboard into the search."""
+        """Focus the search."""
         self.search.setFocus(Qt.FocusReason.ShortcutFocusReason)
         self.search.selectAll()
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Somebody looks."""
+        """Follow the labels."""
         super().showEvent(event)
         self._offer()
         self._model.set_watched(True)
         self.table.mirror()
 
     def hideEvent(self, event: QHideEvent) -> None:
-        """Nobody looks."""
+        """Stop following the labels."""
         super().hideEvent(event)
         self._model.set_watched(False)
 
@@ -86,7 +86,7 @@ class SpanPage(QWidget):
         self._model.set_filter(SpanFilter(self.search.text(), **chosen))
 
     def _offer(self) -> None:
-        """Labels and tracks may be others now; a filter on one that is gone is lifted."""
+        """Update the filters; one on a label or track that is gone is cleared."""
         if not self.isVisible():
             return
         for name, choice in self._chosen.items():

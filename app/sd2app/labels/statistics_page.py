@@ -1,4 +1,4 @@
-"""Statistics per label, to be read and copied."""
+"""Page of statistics per label, with buttons to copy them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _PADDING_PX = 10
 
 
 class StatisticsPage(QWidget):
-    """A row per label; kept up to date while it is seen."""
+    """A row per label; kept up to date while it is shown."""
 
     def __init__(self, model: StatisticsTableModel, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -52,12 +52,12 @@ class StatisticsPage(QWidget):
         layout.addLayout(row)
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Somebody looks."""
+        """Follow the labels."""
         super().showEvent(event)
         self._model.set_watched(True)
 
     def hideEvent(self, event: QHideEvent) -> None:
-        """Nobody looks."""
+        """Stop following the labels."""
         super().hideEvent(event)
         self._model.set_watched(False)
 

@@ -1,15 +1,15 @@
-"""The table of spans: what is selected here is selected on the timeline, and the other way."""
+"""Table of spans; its selection is the selection on the timeline."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise
+from typing import cast
 
-from PySide6.QtCore import QItemSelection, QItemSelectionModel, QModelIndex, Qt
+from PySide6.QtCore import QItemSelection, QItemSelectionModel, QItemSelectionRange, QModelIndex, Qt
 from PySide6.QtGui import QAction, QContextMenuEvent, QFocusEvent, QPainter, QPaintEvent
-from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QMenu, QWidget
+from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QMenu, QStyleOptionViewItem, QWidget
 
-from sd2app.labels.cells import SpanCells
 from sd2app.labels.columns import COLUMNS
 from sd2app.labels.edits import LabelEdits
 from sd2app.labels.model import LabelsModel
@@ -18,14 +18,42 @@ from sd2app.session.playback import PlaybackModel
 from sd2app.session.time_window import VisibleSpanModel
 from sd2app.settings import Settings
 from sd2app.widgets.cell_table import CellTable
+from sd2app.widgets.icons import swatch_icon
+from sd2app.widgets.table import Choosable, FramedCells
 from sd2core.labels import field_edits
+
+
+class SpanCells(FramedCells):
+    """Editors of the cells: lists of labels and tracks, lines for everything else."""
+
+    def __init__(self, table: SpanTableModel, labels: LabelsModel, parent: QWidget) -> None:
+        super().__init__(parent)
+        self._table, self._labels = table, labels
+
+    def createEditor(
+        self, parent: QWidget, option: QStyleOptionViewItem, index: QModelIndex
+    ) -> QWidget:
+        """Make a list or a line."""
+        column = COLUMNS[index.column()]
+        if column.listed is None:
+            line = super().createEditor(parent, option, index)
+            line.setAccessibleName(column.heading)
+            line.setToolTip(column.tip)
+            return line
+        coloured = column.id == "label"
+        choices = [
+            Choosable(one, one, swatch_icon(self._labels.colour_of(one)) if coloured else None)
+            for one in self._table.choices(column)
+        ]
+        return self.listed(choices, column.heading, parent)
+
 
 _PADDING_PX = 12
 _HIDDEN = "span_table/hidden"
 
 
 class SpanTable(CellTable):
-    """The window follows the current cell.
+    """Table whose current cell the window follows.
 
     It shows the first frame of the span in that row, in a column of ends the last one.
     """
@@ -54,7 +82,7 @@ class SpanTable(CellTable):
         labels.changed.connect(self.mirror)
 
     def set_menu(self, actions: Sequence[QAction]) -> None:
-        """Actions of the window that the context menu offers too."""
+        """Set the window's actions that the context menu offers as well."""
         self._menu_actions = actions
 
     # --- columns --------------------------------------------------------------------------
@@ -66,9 +94,6 @@ class SpanTable(CellTable):
         header.setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
         header.setMinimumSectionSize(40)
         header.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
-        header.customContextMenuRequested.connect(
-            lambda at: self.columns_menu.exec(header.mapToGlobal(at))
-        )
         metrics = self.fontMetrics()
         hidden = self._hidden()
         for place, column in enumerate(COLUMNS):
@@ -76,7 +101,10 @@ class SpanTable(CellTable):
             self.setColumnWidth(place, widest_px + _PADDING_PX)
             self.setColumnHidden(place, column.id in hidden)
         self.columns_menu = self._made_columns_menu()
-        """Which columns are shown."""
+        """Menu of the columns that are shown."""
+        header.customContextMenuRequested.connect(
+            lambda at: self.columns_menu.exec(header.mapToGlobal(at))
+        )
         self.sortByColumn(0, Qt.SortOrder.AscendingOrder)
         self.setSortingEnabled(True)
 
@@ -104,18 +132,18 @@ class SpanTable(CellTable):
     # --- one selection --------------------------------------------------------------------
 
     def selectionChanged(self, selected: QItemSelection, deselected: QItemSelection) -> None:
-        """The user has chosen rows: these spans are selected everywhere."""
+        """Select the chosen rows' spans in the whole window."""
         super().selectionChanged(selected, deselected)
         if not (self._mirroring or self._model.following):
             # By ranges: rows one by one are asked for every cell, which takes seconds.
             spans = self._model.spans
-            ranges = self.selectionModel().selection()
+            ranges = cast(Iterable[QItemSelectionRange], self.selectionModel().selection())
             self._labels.select(
                 span.id for part in ranges for span in spans[part.top() : part.bottom() + 1]
             )
 
     def currentChanged(self, current: QModelIndex, previous: QModelIndex) -> None:
-        """The user has gone to another cell: the window goes there too."""
+        """Go to the span of the current cell."""
         super().currentChanged(current, previous)
         if not (self._mirroring or self._model.following):
             self._go(current)
@@ -132,7 +160,7 @@ class SpanTable(CellTable):
             self._visible.reveal(self._playback.time_s)
 
     def mirror(self) -> None:
-        """Select the rows of what is selected elsewhere."""
+        """Select the rows of the spans selected elsewhere."""
         if not self.isVisible() or self._model.following:
             return
         rows = sorted(
@@ -158,7 +186,7 @@ class SpanTable(CellTable):
             self._mirroring = False
 
     def focusInEvent(self, event: QFocusEvent) -> None:
-        """With a row to begin from: the selected one, else that of the frame on screen."""
+        """Make a row current: the selected one, else that of the frame on screen."""
         super().focusInEvent(event)
         if self.currentIndex().isValid() or not self._model.spans:
             return
@@ -176,17 +204,21 @@ class SpanTable(CellTable):
     # --- the rest -------------------------------------------------------------------------
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """The rows, or why there are none."""
+        """Paint the rows, or why there are none."""
         super().paintEvent(event)
         if not self._model.spans:
             with QPainter(self.viewport()) as painter:
                 painter.setPen(self.palette().color(self.palette().ColorRole.PlaceholderText))
-                words = "No span is like that" if self._model.total else "Nothing is labelled yet"
+                words = (
+                    "No span matches the filters"
+                    if self._model.total
+                    else "Nothing is labelled yet"
+                )
                 place = Qt.AlignmentFlag.AlignCenter
                 painter.drawText(self.viewport().rect(), place, words)
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
-        """What can be done to the selected rows."""
+        """Show the menu of the selected rows."""
         if not self._labels.selected:
             return
         menu = QMenu(self)

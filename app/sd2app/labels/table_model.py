@@ -2,52 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from PySide6.QtCore import (
-    QAbstractTableModel,
-    QModelIndex,
-    QObject,
-    QPersistentModelIndex,
-    Qt,
-    Signal,
-)
+from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtGui import QIcon
 
 from sd2app.labels.columns import COLUMNS, Change, Column, Edge
 from sd2app.labels.model import LabelsModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.widgets.icons import swatch_icon
+from sd2app.widgets.record_table import NO_PARENT, Heading, Index, RecordTableModel
 from sd2core.labels.spans import Span
-
-Index = QModelIndex | QPersistentModelIndex
-
-_RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-_LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
-_READ = Qt.ItemFlag.ItemIsSelectable | Qt.ItemFlag.ItemIsEnabled
-_TYPED = _READ | Qt.ItemFlag.ItemIsEditable
-_NOWHERE = QModelIndex()
 
 
 @dataclass(frozen=True)
 class SpanFilter:
-    """Which spans are shown.
-
-    Parameters
-    ----------
-    text : str
-        Anywhere in label, note or track, in upper or lower case.
-    label, track : str
-        This one only; empty: any.
-    """
+    """Filter of spans by a text in label, note or track, and by label and track."""
 
     text: str = ""
     label: str = ""
     track: str = ""
 
     def keeps(self, spans: Iterable[Span]) -> list[Span]:
-        """Those that are shown."""
+        """Return the spans that pass."""
         text = self.text.casefold().strip()
         return [
             span
@@ -63,16 +42,13 @@ class SpanFilter:
         ]
 
 
-class SpanTableModel(QAbstractTableModel):
-    """A row is a span; a cell is made when it is looked at.
-
-    Rows follow the labels while somebody watches, moved rather than made anew, so that what is
-    current in a view stays with its span.
+class SpanTableModel(RecordTableModel[Span]):
+    """A row per span. Rows are moved rather than rebuilt, so that a view keeps its current span.
 
     Signals
     -------
     noted : str
-        What became of something typed that the labels had no room for.
+        Reports a typed time that could not be reached.
     """
 
     noted = Signal(str)
@@ -84,51 +60,53 @@ class SpanTableModel(QAbstractTableModel):
         apply: Callable[[Change], bool],
         parent: QObject | None = None,
     ) -> None:
-        super().__init__(parent)
+        headings = [
+            Heading(one.heading, one.tip, one.number, one.typed is not None) for one in COLUMNS
+        ]
+        super().__init__(headings, parent)
         self._labels, self._playback, self._apply = labels, playback, apply
-        self._rows: list[Span] = []
         self._row_of: dict[int, int] | None = None
         self._filter = SpanFilter()
         self._by, self._falling = COLUMNS[0], False
-        self._watched = self._following = False
+        self._following = False
         labels.changed.connect(self._follow)
 
     # --- what is shown --------------------------------------------------------------------
 
     @property
     def following(self) -> bool:
-        """Whether rows are being changed because the labels have: nobody chose anything."""
+        """True while rows change because the labels have, not by the user's choice."""
         return self._following
 
     @property
     def filter(self) -> SpanFilter:
-        """Which spans are shown."""
+        """Filter of the rows."""
         return self._filter
 
     @property
     def total(self) -> int:
-        """How many spans there are."""
+        """Number of all spans."""
         return len(self._labels.labels.spans)
 
     @property
-    def spans(self) -> list[Span]:
-        """The spans that are shown, from top to bottom."""
+    def spans(self) -> Sequence[Span]:
+        """Spans shown, from top to bottom."""
         return self._rows
 
     @property
     def words(self) -> str:
-        """How many spans there are, and how many of them are shown."""
+        """Number of spans, and of those shown."""
         whole = f"{self.total:,} span{'s' * (self.total != 1)}"
         return whole if len(self._rows) == self.total else f"{len(self._rows):,} of {whole}"
 
     def row_of(self, span_id: int) -> int | None:
-        """Where a span is shown, if it is."""
+        """Return the row of a span, or None."""
         if self._row_of is None:
             self._row_of = {span.id: row for row, span in enumerate(self._rows)}
         return self._row_of.get(span_id)
 
     def choices(self, column: Column) -> list[str]:
-        """What the cells of a column can be: labels of the set and others in use, or tracks."""
+        """Return the values a column offers: labels of the set and others in use, or tracks."""
         labels = self._labels.labels
         if column.listed == "track":
             return [track.name for track in labels.tracks]
@@ -137,13 +115,8 @@ class SpanTableModel(QAbstractTableModel):
 
     # --- choosing what is shown -----------------------------------------------------------
 
-    def set_watched(self, watched: bool) -> None:
-        """Follow the labels, or leave that until somebody looks."""
-        self._watched = watched
-        self._follow()
-
     def set_filter(self, wanted: SpanFilter) -> None:
-        """Show some of the spans; what is no longer shown is no longer selected."""
+        """Filter the rows; spans that are no longer shown are deselected."""
         if wanted == self._filter:
             return
         self._filter = wanted
@@ -156,9 +129,7 @@ class SpanTableModel(QAbstractTableModel):
         self._by, self._falling = COLUMNS[column], order == Qt.SortOrder.DescendingOrder
         self._follow()
 
-    def _follow(self) -> None:
-        if not self._watched:
-            return
+    def _refresh(self) -> None:
         rows = self._filter.keeps(self._labels.labels.spans)
         if self._by.id != "start" or self._falling:
             rows.sort(key=self._by.order, reverse=self._falling)
@@ -180,11 +151,11 @@ class SpanTableModel(QAbstractTableModel):
         head = _alike(rows, before, range(shorter))
         tail = _alike(rows, before, range(-1, -1 - (shorter - head), -1))
         if (stop := len(before) - tail) > head:
-            self.beginRemoveRows(_NOWHERE, head, stop - 1)
-            self._assign(before[:head] + before[stop:])
+            self.beginRemoveRows(NO_PARENT, head, stop - 1)
+            self._assign([*before[:head], *before[stop:]])
             self.endRemoveRows()
         if (stop := len(rows) - tail) > head:
-            self.beginInsertRows(_NOWHERE, head, stop - 1)
+            self.beginInsertRows(NO_PARENT, head, stop - 1)
             self._assign(rows)
             self.endInsertRows()
 
@@ -201,7 +172,7 @@ class SpanTableModel(QAbstractTableModel):
         self.layoutChanged.emit()
 
     def _replace(self, rows: list[Span]) -> None:
-        """Other spans in the same rows: say which rows look different."""
+        """Other spans in the same rows: report the rows that look different."""
         changed = [row for row, span in enumerate(rows) if span is not self._rows[row]]
         self._assign(rows)
         if not changed:
@@ -211,59 +182,26 @@ class SpanTableModel(QAbstractTableModel):
             last = self.index(changed[-1], len(COLUMNS) - 1)
             self.dataChanged.emit(self.index(changed[0], 0), last)
 
-    def _assign(self, rows: list[Span]) -> None:
+    def _assign(self, rows: Sequence[Span]) -> None:
         self._rows, self._row_of = rows, None
 
-    # --- Qt's questions -------------------------------------------------------------------
+    # --- cells ----------------------------------------------------------------------------
 
-    def rowCount(self, parent: Index = _NOWHERE) -> int:
-        """Spans that are shown."""
-        return 0 if parent.isValid() else len(self._rows)
+    def _text(self, record: Span, column: int) -> str:
+        return COLUMNS[column].text(record, self._playback.timebase)
 
-    def columnCount(self, parent: Index = _NOWHERE) -> int:
-        """Columns, hidden ones too."""
-        return 0 if parent.isValid() else len(COLUMNS)
+    def _icon(self, record: Span, column: int) -> QIcon | None:
+        coloured = COLUMNS[column].id == "label"
+        return swatch_icon(self._labels.colour_of(record.label)) if coloured else None
 
-    def headerData(
-        self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole
-    ) -> Any:
-        """Headings."""
-        if orientation != Qt.Orientation.Horizontal:
-            return None
-        column = COLUMNS[section]
-        if role == Qt.ItemDataRole.TextAlignmentRole:
-            return _RIGHT if column.number else _LEFT
-        roles = {
-            Qt.ItemDataRole.DisplayRole: column.heading,
-            Qt.ItemDataRole.ToolTipRole: column.tip,
-        }
-        return roles.get(Qt.ItemDataRole(role))
-
-    def flags(self, index: Index) -> Qt.ItemFlag:
-        """What can be typed into."""
-        if not index.isValid():
-            return Qt.ItemFlag.NoItemFlags
-        return _READ if COLUMNS[index.column()].typed is None else _TYPED
-
-    def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        """A cell, as it is looked at."""
-        if not index.isValid():
-            return None
-        column = COLUMNS[index.column()]
-        if role in (Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.EditRole):
-            return column.text(self._rows[index.row()], self._playback.timebase)
-        if role == Qt.ItemDataRole.TextAlignmentRole:
-            return _RIGHT if column.number else _LEFT
-        if role == Qt.ItemDataRole.DecorationRole and column.id == "label":
-            return swatch_icon(self._labels.colour_of(self._rows[index.row()].label))
-        if role == Qt.ItemDataRole.ToolTipRole and column.id in ("label", "track", "note"):
-            return column.text(self._rows[index.row()], self._playback.timebase)
-        return None
+    def _tip(self, record: Span, column: int) -> str | None:
+        wide = COLUMNS[column].id in ("label", "track", "note")
+        return self._text(record, column) if wide else None
 
     # --- typing ---------------------------------------------------------------------------
 
     def setData(self, index: Index, value: Any, role: int = Qt.ItemDataRole.EditRole) -> bool:
-        """Make the edit that was typed; False, with the cell as it was, where it was refused."""
+        """Make the edit typed; False, with the cell unchanged, where it was refused."""
         column, span, text = COLUMNS[index.column()], self._rows[index.row()], str(value)
         if column.typed is None or text == self.data(index):
             return False
@@ -276,7 +214,7 @@ class SpanTableModel(QAbstractTableModel):
         return done
 
     def _say_where(self, span: Span, edge: Edge, text: str) -> None:
-        """Frames, neighbours and the other edge may have stopped it before what was typed."""
+        """Report a time that frames, neighbours or the other edge did not allow."""
         base = self._playback.timebase
         wanted_s = edge.when(text, span, base)
         there_s = edge.of(self._labels.labels.span(span.id))
@@ -287,8 +225,8 @@ class SpanTableModel(QAbstractTableModel):
             )
 
 
-def _alike(rows: list[Span], before: list[Span], places: range) -> int:
-    """How many rows hold the same span, place by place, until one does not."""
+def _alike(rows: Sequence[Span], before: Sequence[Span], places: range) -> int:
+    """Number of leading rows that hold the same span."""
     for count, place in enumerate(places):
         if rows[place].id != before[place].id:
             return count

@@ -1,8 +1,8 @@
-"""Tracks of labels under the maps: shown, and drawn, moved and shortened by hand."""
+"""Timeline of labels under the maps, on which spans are drawn, moved and resized by mouse."""
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from PySide6.QtCore import QRectF, QSize, Qt, QTimer
 from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QWheelEvent
@@ -10,7 +10,6 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from sd2app.labels.dragging import LabelDragging
 from sd2app.labels.edits import LabelEdits
-from sd2app.labels.grip import Grip, grip_at, words
 from sd2app.labels.loop import SpanLoop
 from sd2app.labels.model import LabelsModel
 from sd2app.labels.painting import lane_box, paint_span, paint_spans
@@ -20,6 +19,58 @@ from sd2app.session.playback import PlaybackModel
 from sd2app.session.time_window import VisibleSpanModel
 from sd2app.widgets.cached_paint import Still
 from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, paint_cursor, turn_wheel
+from sd2core.labels.spans import Span
+
+_EDGE_PX = 5.0
+
+
+class HitTarget(NamedTuple):
+    """Part of the timeline at a place: an edge or the inside of a span, a name, or empty."""
+
+    part: Literal["start", "end", "span", "nothing", "name"]
+    x_px: float
+    track: str
+    span: Span | None = None
+
+
+def target_at(
+    labels: LabelsModel, rows: LabelRows, scale: TimeScale, x_px: float, y_px: float
+) -> HitTarget | None:
+    """Find the part of the timeline at a place; edges of selected spans go first."""
+    row = rows.row_at(y_px)
+    if row is None:
+        return None
+    if x_px < GUTTER_PX:
+        return HitTarget("name", x_px, row.name)
+    arrays = labels.arrays
+    reach_s = _EDGE_PX * scale.seconds_per_px
+    time_s, lane = scale.time_of(x_px), row.lane_at(y_px)
+    near = [
+        arrays.spans[one]
+        for one in arrays.within(time_s - reach_s, time_s + reach_s)
+        if arrays.spans[one].track == row.name and arrays.lanes[one] == lane
+    ]
+    near.sort(key=lambda one: not labels.is_selected(one.id))
+    for span in near:
+        # The middle third of a short span is for moving it.
+        edge_s = min(reach_s, span.duration_s / 3)
+        inside = span.start_s <= time_s < span.end_s
+        if abs(time_s - span.start_s) <= (edge_s if inside else reach_s):
+            return HitTarget("start", x_px, row.name, span)
+        if abs(time_s - span.end_s) <= (edge_s if inside else reach_s):
+            return HitTarget("end", x_px, row.name, span)
+    held = next((one for one in near if one.start_s <= time_s < one.end_s), None)
+    return HitTarget("nothing" if held is None else "span", x_px, row.name, held)
+
+
+def _tip_of(target: HitTarget) -> str:
+    span = target.span
+    if span is None:
+        return target.track if target.part == "name" else ""
+    lines = [f"{span.label}: {span.start_s:.3f} to {span.end_s:.3f} s ({span.duration_s:.3f} s)"]
+    lines += [span.note] if span.note else []
+    return "\n".join(lines)
+
 
 _ATTRACT_PX = 8.0
 _MOVED_PX = 3.0
@@ -30,11 +81,11 @@ _SCROLL_MS, _SCROLL_SHARE = 30, 0.03
 
 
 class LabelTimeline(QWidget):
-    """A row per track. Drag an empty place, a span or one of its edges; Alt lets nothing attract.
+    """A row per track. Drag an empty place, a span or an edge of it; with Alt nothing snaps.
 
-    With Shift a span is drawn over others, which it cuts. A click selects a span and goes to its
-    start, with Ctrl it adds to the selection, with Shift all up to it; a double click plays it in
-    a loop. A click on the name of a track lets new spans come there.
+    With Shift a new span is drawn over others, which it cuts. A click selects a span and goes to
+    its start, with Ctrl it adds to the selection, with Shift it selects all up to it; a double
+    click plays it in a loop. A click on the name of a track makes it the one for new spans.
     """
 
     def __init__(
@@ -51,7 +102,7 @@ class LabelTimeline(QWidget):
         super().__init__(parent)
         self._labels, self._edits, self._dragging, self._loop = labels, edits, dragging, loop
         self._span, self._playback, self._display = span, playback, display
-        self._grip: Grip | None = None
+        self._target: HitTarget | None = None
         self._pointer_px = 0.0
         self._attracted = self._cutting = False
         self._rows = LabelRows.of(labels.labels.tracks, labels.arrays, labels.marks)
@@ -77,7 +128,7 @@ class LabelTimeline(QWidget):
         self._follow()
 
     def sizeHint(self) -> QSize:
-        """As high as its tracks."""
+        """Return the height of all tracks."""
         return QSize(640, round(self._rows.height_px))
 
     @property
@@ -87,13 +138,13 @@ class LabelTimeline(QWidget):
 
     @property
     def rows(self) -> LabelRows:
-        """Where tracks and lanes stand."""
+        """Rows of tracks and their lanes."""
         return self._rows
 
     # --- painting -------------------------------------------------------------------------
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Names, spans, what is being marked, cursor."""
+        """Paint names, spans, marks and the cursor."""
         scale, model, rows = self.scale, self._labels, self._rows
         plot = self._plot_rect()
         with QPainter(self) as painter:
@@ -112,7 +163,7 @@ class LabelTimeline(QWidget):
         return QRectF(GUTTER_PX, 0, self.width() - GUTTER_PX - MARGIN_PX, self.height())
 
     def _paint(self, painter: QPainter) -> None:
-        """What stands still: names, rows, spans."""
+        """Paint the parts that do not move: names, rows, spans."""
         palette, rows = self._display.palette, self._rows.tracks
         painter.fillRect(self.rect(), QColor(palette.panel))
         self._paint_names(painter)
@@ -171,26 +222,26 @@ class LabelTimeline(QWidget):
 
     # --- the hand -------------------------------------------------------------------------
 
-    def grip_at(self, x_px: float, y_px: float) -> Grip | None:
-        """What is under the pointer."""
-        return grip_at(self._labels, self._rows, self.scale, x_px, y_px)
+    def target_at(self, x_px: float, y_px: float) -> HitTarget | None:
+        """Find the part of the timeline at a place."""
+        return target_at(self._labels, self._rows, self.scale, x_px, y_px)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        """Take hold."""
+        """Start a click or a drag."""
         if event.button() == Qt.MouseButton.LeftButton:
-            self._grip = self.grip_at(event.position().x(), event.position().y())
+            self._target = self.target_at(event.position().x(), event.position().y())
             self._cutting = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        """Show what could be held, or drag what is."""
+        """Drag, or show by the cursor what could be dragged."""
         x = event.position().x()
-        if self._grip is None:
+        if self._target is None:
             if not event.buttons():
-                self._show_grip(self.grip_at(x, event.position().y()))
+                self._show_target(self.target_at(x, event.position().y()))
             return
         if not self._dragging.dragging and (
-            self._grip.part == "name"
-            or abs(x - self._grip.x_px) < _MOVED_PX
+            self._target.part == "name"
+            or abs(x - self._target.x_px) < _MOVED_PX
             or not self._dragging.begin_drag()
         ):
             return
@@ -202,77 +253,79 @@ class LabelTimeline(QWidget):
         self._drag()
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        """Let go, or click."""
+        """End a drag, or take it as a click."""
         self._scroll.stop()
-        grip, self._grip = self._grip, None
+        target, self._target = self._target, None
         if self._dragging.dragging:
             self._dragging.end_drag()
-        elif grip is not None:
-            self._click(grip, event.modifiers())
+        elif target is not None:
+            self._click(target, event.modifiers())
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         """Play a span in a loop."""
-        grip = self.grip_at(event.position().x(), event.position().y())
-        if grip is not None and grip.span is not None:
-            self._loop.play(grip.span)
+        target = self.target_at(event.position().x(), event.position().y())
+        if target is not None and target.span is not None:
+            self._loop.play(target.span)
         else:
             self.mousePressEvent(event)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
-        """Zoom about the pointer, or pan."""
+        """Zoom about the mouse, or pan."""
         turn_wheel(event, self._span, self.scale)
 
-    def _click(self, grip: Grip, modifiers: Qt.KeyboardModifier) -> None:
-        if grip.part != "name" and modifiers & Qt.KeyboardModifier.ShiftModifier and grip.span:
-            self._labels.select_up_to(grip.span)
+    def _click(self, target: HitTarget, modifiers: Qt.KeyboardModifier) -> None:
+        if target.part != "name" and modifiers & Qt.KeyboardModifier.ShiftModifier and target.span:
+            self._labels.select_up_to(target.span)
             return
-        self._labels.set_track(grip.track)
-        if grip.span is not None and modifiers & Qt.KeyboardModifier.ControlModifier:
+        self._labels.set_track(target.track)
+        if target.span is not None and modifiers & Qt.KeyboardModifier.ControlModifier:
             chosen = {span.id for span in self._labels.selected}
-            self._labels.select(chosen ^ {grip.span.id})
-        elif grip.span is not None:
-            self._edits.go_to(grip.span)
-        elif grip.part != "name":
+            self._labels.select(chosen ^ {target.span.id})
+        elif target.span is not None:
+            self._edits.go_to(target.span)
+        elif target.part != "name":
             self._labels.select(())
-            self._playback.seek(self.scale.time_of(grip.x_px))
+            self._playback.seek(self.scale.time_of(target.x_px))
 
     def _let_go(self) -> None:
-        """What is no longer dragged is no longer held."""
+        """Forget the target once the drag was ended elsewhere."""
         if not self._dragging.dragging:
             self._scroll.stop()
-            self._grip = None
+            self._target = None
 
     def _drag(self) -> None:
-        grip = self._grip
-        assert grip is not None
+        target = self._target
+        assert target is not None
         scale = self.scale
         within_s = _ATTRACT_PX * scale.seconds_per_px if self._attracted else 0.0
-        time_s, pressed_s = scale.time_of(self._pointer_px), scale.time_of(grip.x_px)
-        if grip.span is None or self._cutting:
-            self._dragging.drag_new(grip.track, pressed_s, time_s, within_s, cutting=self._cutting)
-        elif grip.part == "span":
-            start_s = grip.span.start_s + time_s - pressed_s
-            self._dragging.drag_span(grip.span.id, start_s, within_s)
+        time_s, pressed_s = scale.time_of(self._pointer_px), scale.time_of(target.x_px)
+        if target.span is None or self._cutting:
+            self._dragging.drag_new(
+                target.track, pressed_s, time_s, within_s, cutting=self._cutting
+            )
+        elif target.part == "span":
+            start_s = target.span.start_s + time_s - pressed_s
+            self._dragging.drag_span(target.span.id, start_s, within_s)
         else:
-            side: Literal["start", "end"] = "start" if grip.part == "start" else "end"
-            self._dragging.drag_edge(grip.span.id, side, time_s, within_s)
+            side: Literal["start", "end"] = "start" if target.part == "start" else "end"
+            self._dragging.drag_edge(target.span.id, side, time_s, within_s)
 
     def _scroll_on(self) -> None:
-        """The hand is beyond the end: the axis moves on, and what is held with it."""
+        """Scroll the axis while the mouse is beyond its end."""
         step_s = _SCROLL_SHARE * self._span.duration_s
         before_s = self._span.start_s
         self._span.pan(step_s if self._pointer_px > GUTTER_PX else -step_s)
-        assert self._grip is not None
+        assert self._target is not None
         moved_px = (self._span.start_s - before_s) / self.scale.seconds_per_px
-        self._grip = self._grip._replace(x_px=self._grip.x_px - moved_px)
+        self._target = self._target._replace(x_px=self._target.x_px - moved_px)
         self._drag()
 
-    def _show_grip(self, grip: Grip | None) -> None:
+    def _show_target(self, target: HitTarget | None) -> None:
         shapes = {
             "start": Qt.CursorShape.SizeHorCursor,
             "end": Qt.CursorShape.SizeHorCursor,
             "span": Qt.CursorShape.OpenHandCursor,
         }
-        part = "nothing" if grip is None or self._edits.refusal else grip.part
+        part = "nothing" if target is None or self._edits.refusal else target.part
         self.setCursor(shapes.get(part, Qt.CursorShape.ArrowCursor))
-        self.setToolTip("" if grip is None else words(grip))
+        self.setToolTip("" if target is None else _tip_of(target))

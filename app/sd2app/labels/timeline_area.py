@@ -1,4 +1,4 @@
-"""The label timeline with many tracks: what is too high for the window is scrolled."""
+"""Scroll area of the label timeline, for many tracks."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ _HIGHEST_PX = round(8.5 * ROW_PX)
 
 
 class LabelArea(QScrollArea):
-    """As high as the tracks, up to a limit; the track where new spans come is in view.
+    """Scrolls when the tracks are too high; keeps the track for new spans in view.
 
-    The scroll bar stands in the margin beside the tracks: the time axis keeps its width.
+    The scroll bar stands in the margin beside the tracks, so the time axis keeps its width.
     """
 
     def __init__(

@@ -10,7 +10,7 @@ from sd2app.agreement.timeline import OtherTimeline
 from sd2app.classify.chooser import ClassifierChooser
 from sd2app.classify.strip import ClassStrip
 from sd2app.denoise.chooser import DenoiserChooser
-from sd2app.labels.on_maps import RegionHand
+from sd2app.labels.map_dragging import SpanDragger
 from sd2app.labels.painting import map_overlay, strip_overlay
 from sd2app.labels.timeline import LabelTimeline
 from sd2app.labels.timeline_area import LabelArea
@@ -59,7 +59,7 @@ class Tracks(QWidget):
         self.denoised.set_button(ModelButton(denoisers, models))
         hand = c.labels, c.label_dragging, c.span_loop
         for view in (self.synthetic, self.denoised, self.before, self.real, self.difference):
-            RegionHand(view, *hand)
+            SpanDragger(view, *hand)
         self.labels = LabelTimeline(
             c.labels,
             c.label_edits,

@@ -1,4 +1,4 @@
-"""Over the labels while there are suggestions: how many, from what, and what to do with them."""
+"""Bar above the labels to decide on suggestions."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _BUTTONS = (
 
 
 class SuggestionBar(QWidget):
-    """A view of :class:`SuggestionsModel`; hidden until suggestions are asked for."""
+    """View of :class:`SuggestionsModel`; hidden until suggestions are asked for."""
 
     def __init__(
         self, model: SuggestionsModel, actions: ActionSet, parent: QWidget | None = None

@@ -1,4 +1,4 @@
-"""What can suggest spans: motion in a map, or the classifier."""
+"""Finders of suggested spans: the protocol, and motion in a map."""
 
 from __future__ import annotations
 
@@ -14,15 +14,7 @@ from sd2core.labels.suggest import SuggestOptions, motion_energy_db, suggest_spa
 
 
 class Threshold(NamedTuple):
-    """A number that the user turns.
-
-    Parameters
-    ----------
-    low, high, usual, step : float
-    decimals : int
-    unit : str
-    tip : str
-    """
+    """Range of the threshold that the user sets."""
 
     low: float
     high: float
@@ -34,47 +26,47 @@ class Threshold(NamedTuple):
 
 
 class Found(NamedTuple):
-    """What was found, and what to say where that is nothing."""
+    """Spans found, and a sentence for when there are none."""
 
     spans: tuple[Span, ...]
     if_none: str = ""
 
 
 class SpanFinder(Protocol):
-    """One way of finding spans."""
+    """Method of finding spans."""
 
     title: str
     threshold: Threshold
 
     @property
     def why_not(self) -> str:
-        """Why it cannot be used; empty where it can."""
+        """Reason why it cannot be used; empty where it can."""
 
     @property
     def sources(self) -> tuple[TrackModel, ...]:
-        """Maps to look in."""
+        """Maps to choose from."""
 
     @property
     def source(self) -> TrackModel | None:
-        """The map that is looked in."""
+        """Map that is searched."""
 
     def set_source(self, source: TrackModel | None) -> None:
-        """Look in another map; None: in the one that is usual."""
+        """Search another map; None: the default."""
 
     @property
     def signals(self) -> tuple[SignalInstance, ...]:
-        """After which it may be possible to look."""
+        """Signals after which a search may become possible."""
 
     @property
     def ready(self) -> bool:
-        """Whether all is there that is needed to look."""
+        """True if everything needed for a search is there."""
 
     def look(self, threshold: float) -> Callable[[], Found]:
-        """What looks, in the background."""
+        """Make the search, to be run in the background."""
 
 
 class MotionFinder:
-    """What moves: it says where, not what."""
+    """Finder of motion, of any kind."""
 
     title = "motion"
     threshold = Threshold(
@@ -88,38 +80,38 @@ class MotionFinder:
 
     @property
     def why_not(self) -> str:
-        """Why it cannot be used; empty where it can."""
+        """Reason why it cannot be used; empty where it can."""
         return "" if self.sources else "There is no map to look in"
 
     @property
     def sources(self) -> tuple[TrackModel, ...]:
-        """Maps to look in."""
+        """Maps that are there."""
         return tuple(track for track in self._maps if track.map is not None)
 
     @property
     def source(self) -> TrackModel | None:
-        """The map that is looked in: the one chosen, else the first."""
+        """Map that is searched: the one chosen, else the first."""
         there = self.sources
         if self._source in there:
             return self._source
         return there[0] if there else None
 
     def set_source(self, source: TrackModel | None) -> None:
-        """Look in another map; None: in the first."""
+        """Search another map; None: the first."""
         self._source = source
 
     @property
     def signals(self) -> tuple[SignalInstance, ...]:
-        """After which it may be possible to look."""
+        """Signals of the maps."""
         return tuple(track.changed for track in self._maps)
 
     @property
     def ready(self) -> bool:
-        """Whether the map is complete."""
+        """True if the map is complete."""
         return self.source is not None and self.source.covered is None
 
     def look(self, threshold: float) -> Callable[[], Found]:
-        """What looks, in the background."""
+        """Make the search, to be run in the background."""
         source, usual = self.source, SuggestOptions()
         assert source is not None
         assert source.map is not None

@@ -22,7 +22,7 @@ Apply = Callable[[Callable[[Labels, Timebase], Edit]], bool]
 
 
 class SuggestionsModel(QObject):
-    """Spans to be decided on, as somebody finds them; they themselves are among the labels.
+    """Suggested spans to be accepted or rejected; the spans themselves are among the labels.
 
     Another threshold takes the place of the step before as long as nothing else was done, so
     that trying thresholds is one step. What was rejected does not come again while the
@@ -78,58 +78,58 @@ class SuggestionsModel(QObject):
 
     @property
     def active(self) -> bool:
-        """Whether suggestions are asked for: their bar is shown."""
+        """True while the bar of suggestions is shown."""
         return self._active
 
     @property
     def busy(self) -> bool:
-        """Whether they are being looked for, or a map for them is being computed."""
+        """True during a search, or while its map is being computed."""
         return self._runner.busy or self._wanted
 
     @property
     def pending(self) -> tuple[Span, ...]:
-        """Those that nobody has decided on."""
+        """Suggestions neither accepted nor rejected."""
         return self._pending
 
     @property
     def finders(self) -> tuple[SpanFinder, ...]:
-        """Ways to find spans."""
+        """All finders."""
         return self._finders
 
     @property
     def finder(self) -> SpanFinder:
-        """The way that is used."""
+        """Finder in use."""
         return self._finder
 
     @property
     def sources(self) -> tuple[TrackModel, ...]:
-        """Maps to look in."""
+        """Maps to choose from."""
         return self._finder.sources
 
     @property
     def source(self) -> TrackModel | None:
-        """The map that is looked in."""
+        """Map that is searched."""
         return self._finder.source
 
     @property
     def threshold(self) -> float:
-        """What a suggestion reaches, in the unit of :attr:`limits`."""
+        """Threshold of a suggestion, in the unit of :attr:`limits`."""
         return self._thresholds[self._finders.index(self._finder)]
 
     @property
     def limits(self) -> Threshold:
-        """Of the threshold."""
+        """Range of the threshold."""
         return self._finder.threshold
 
     @property
     def accepted_as(self) -> str:
-        """The label that accepting gives to what is not known; empty where all is known."""
+        """Label for accepted spans without a known one; empty where all are known."""
         unknown = any(span.label == LABEL for span in self._pending)
         return self._labels.label if unknown else ""
 
     @property
     def text(self) -> str:
-        """How it stands, in words."""
+        """State of the search, as a sentence."""
         source, why_not = self.source, self._problem or self._finder.why_not
         if why_not or source is None:
             return why_not
@@ -147,7 +147,7 @@ class SuggestionsModel(QObject):
     # --- asking ---------------------------------------------------------------------------
 
     def start(self, finder: SpanFinder | None = None) -> None:
-        """Look for spans, in the way that is named or else the first one."""
+        """Search with a finder, or with the first one."""
         self._finder = finder or self._finders[0]
         if not self._finder.why_not:
             self._active = True
@@ -155,31 +155,31 @@ class SuggestionsModel(QObject):
             self._look()
 
     def set_finder(self, finder: SpanFinder) -> None:
-        """Look in another way; what it finds takes the place of what there was."""
+        """Search with another finder; its results replace earlier ones."""
         if finder is not self._finder:
             self._finder = finder
             self._look()
 
     def stop(self) -> None:
-        """No more suggestions are wanted; those that are there stay."""
+        """Stop the search and hide the bar; suggestions that are there stay."""
         self._runner.cancel()
         self._active = self._wanted = False
         self.changed.emit()
 
     def set_threshold(self, threshold: float) -> None:
-        """Suggest what reaches this."""
+        """Search with another threshold."""
         if threshold != self.threshold:
             self._thresholds[self._finders.index(self._finder)] = threshold
             self._look()
 
     def set_source(self, source: TrackModel) -> None:
-        """Look in another map."""
+        """Search another map."""
         if source is not self.source:
             self._finder.set_source(source)
             self._look()
 
     def open(self) -> None:
-        """Another recording is there: of the one before nothing is remembered."""
+        """Forget everything about the recording before."""
         self._declined, self._made, self._if_none, self._problem = (), None, "", ""
         for finder in self._finders:
             finder.set_source(None)
@@ -188,13 +188,13 @@ class SuggestionsModel(QObject):
         self.changed.emit()
 
     def close(self) -> None:
-        """Stop looking."""
+        """Stop the search."""
         self._runner.close()
 
     # --- deciding -------------------------------------------------------------------------
 
     def current(self) -> tuple[Span, ...]:
-        """What accepting and rejecting are about: those selected, else the next in time."""
+        """Return the suggestions to decide on: those selected, else the next in time."""
         chosen = tuple(span for span in self._labels.selected if span.origin == "suggestion")
         if chosen:
             return chosen
@@ -202,19 +202,19 @@ class SuggestionsModel(QObject):
         return tuple(span for span in self._pending if span.end_s > now_s)[:1] or self._pending[:1]
 
     def accept(self, label: str | None = None) -> None:
-        """Take the current one, under a label, and go on to the next."""
+        """Accept the current suggestion with a label, and go to the next."""
         self._take(self.current(), label)
 
     def accept_all(self) -> None:
-        """Take all that there are."""
+        """Accept all."""
         self._take(self._pending, None)
 
     def reject(self) -> None:
-        """Let the current one go, and go on to the next."""
+        """Reject the current suggestion, and go to the next."""
         self._reject(self.current())
 
     def reject_all(self) -> None:
-        """Let all go."""
+        """Reject all."""
         self._reject(self._pending)
 
     def _take(self, spans: Sequence[Span], label: str | None) -> None:

@@ -83,8 +83,8 @@ def test_from_one_disagreement_to_the_next(compared, tmp_path) -> None:
     assert compared.playback.time_s == pytest.approx(2.0)
     said = dict(facts(model))
     assert (said["Spans matched"], said["of these with the same label"]) == ("2", "1")
-    assert said["Starts differ by"] == "0.00 s, median"
-    assert said["Ends differ by"] == "0.15 s, median"
+    assert said["Median difference of starts"] == "0.00 s"
+    assert said["Median difference of ends"] == "0.15 s"
 
 
 def test_it_follows_what_is_edited_and_leaves_suggestions_out(compared, tmp_path) -> None:

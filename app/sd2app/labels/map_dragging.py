@@ -1,4 +1,4 @@
-"""The mouse over the labels on a map: a click selects, a double click loops, edges are dragged."""
+"""Mouse actions on spans over a map: a click selects, a double click loops, edges are dragged."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ _MOVED_PX = 3.0
 Edge = tuple[int, Literal["start", "end"]]
 
 
-class RegionHand(QObject):
-    """Watches a map, which goes on seeking: only edges of what is selected are kept from it."""
+class SpanDragger(QObject):
+    """Event filter on a map; the map itself still seeks, except at edges of selected spans."""
 
     def __init__(
         self, view: TimePlot, labels: LabelsModel, dragging: LabelDragging, loop: SpanLoop
@@ -33,7 +33,7 @@ class RegionHand(QObject):
         view.installEventFilter(self)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Take what is meant for labels."""
+        """Handle the mouse events that concern spans."""
         if not isinstance(event, QMouseEvent):
             return False
         place, kind = event.position(), event.type()
@@ -86,7 +86,7 @@ class RegionHand(QObject):
             self._edge = None
 
     def _edge_at(self, place: QPointF) -> Edge | None:
-        """The edge of a selected span that is near."""
+        """Edge of a selected span near a place."""
         if not self._is_inside(place):
             return None
         time_s = self._time_s(place)
