@@ -18,7 +18,7 @@ from sd2core.accuracy.results import (
     Reason,
     Spread,
 )
-from sd2core.accuracy.synthesizers import synthesizer_for
+from sd2core.accuracy.trial import synthesizer_for
 
 EXACT = AccuracyPlan()
 FACING = AccuracyPlan(visibility="facing")

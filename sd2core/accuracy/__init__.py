@@ -1,4 +1,4 @@
-"""The trade between speed and accuracy: rungs, what they cost and miss, and what a scene needs.
+"""Accuracy against speed: plans, their measured cost and error, and the plan a scene needs.
 
 ``choose`` and ``measure`` are loaded when they are first used::
 
@@ -28,7 +28,7 @@ from sd2core.accuracy.results import (
 if TYPE_CHECKING:
     from sd2core.accuracy.choosing import choose
     from sd2core.accuracy.measuring import measure
-    from sd2core.accuracy.synthesizers import synthesizer_for
+    from sd2core.accuracy.trial import synthesizer_for
 
 __all__ = [
     "AccuracyPlan",
@@ -46,7 +46,7 @@ __all__ = [
     "synthesizer_for",
 ]
 
-_HOME = {"choose": "choosing", "measure": "measuring", "synthesizer_for": "synthesizers"}
+_HOME = {"choose": "choosing", "measure": "measuring", "synthesizer_for": "trial"}
 
 
 def __getattr__(name: str) -> Any:

@@ -1,33 +1,83 @@
-"""Measurements kept per clip, and marked stale when scene or machine are no longer those."""
+"""Cache of measurements per clip, marked stale when scene or machine differ."""
 
 from __future__ import annotations
 
+import hashlib
 import json
+import platform
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from sd2core.accuracy.plans import AccuracyPlan, Family
 from sd2core.accuracy.results import Cost, Errors, Machine, Measurement, PlanResult, Spread
-from sd2core.accuracy.scene import clip_fingerprint, scene_fingerprint, this_machine
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.numerics.compiled import worker_count
 from sd2core.sensor import VirtualSensor
+from sd2core.version import __version__
+
+_PROCESSORS = Path("/proc/cpuinfo")
+
+
+def clip_fingerprint(mesh: MeshSequence) -> str:
+    """Fingerprint of a moving mesh: faces, counts, times, gaps, and three of its frames."""
+    digest = hashlib.sha256(repr((mesh.vertex_count, mesh.frame_count)).encode())
+    if mesh.faces is not None:
+        digest.update(mesh.faces.tobytes())
+    if mesh.vertex_counts is not None:
+        digest.update(mesh.vertex_counts.tobytes())
+    digest.update(np.ascontiguousarray(mesh.times_s).tobytes())
+    if mesh.present is not None:
+        digest.update(mesh.present.tobytes())
+    for frame in (0, mesh.frame_count // 2, mesh.frame_count - 1):
+        digest.update(np.ascontiguousarray(mesh.frame(frame)).tobytes())
+    return digest.hexdigest()[:16]
+
+
+def scene_fingerprint(
+    mesh: MeshSequence, sensor: VirtualSensor, options: SynthesisOptions, family: Family
+) -> str:
+    """Fingerprint of everything that errors depend on."""
+    what: dict[str, Any] = {
+        "clip": clip_fingerprint(mesh),
+        "sensor": asdict(sensor),
+        "options": asdict(options),
+        "family": family,
+    }
+    return hashlib.sha256(repr(what).encode()).hexdigest()[:16]
+
+
+def this_machine() -> Machine:
+    """Processor, cores and program version in use."""
+    return Machine(_processor(), worker_count(), __version__)
+
+
+def _processor() -> str:
+    if _PROCESSORS.exists():
+        for line in _PROCESSORS.read_text(encoding="utf-8", errors="replace").splitlines():
+            name, _, value = line.partition(":")
+            if name.strip() == "model name":
+                return value.strip()
+    return platform.processor() or platform.machine()
+
 
 _FORMAT = 1
 
 
-def remembered(
+def cached_measurement(
     mesh: MeshSequence,
     sensor: VirtualSensor,
     options: SynthesisOptions,
     family: Family = "histogram",
 ) -> Measurement | None:
-    """The last measurement of this clip, if there is one that can be read.
+    """Last measurement of this clip, or None if there is none that can be read.
 
-    ``stale`` when it was of another sensor place or other options, or on another
+    It is ``stale`` if it was of another sensor place or other options, or on another
     machine or version.
     """
     try:
@@ -43,10 +93,10 @@ def remembered(
     return replace(measurement, stale=not same)
 
 
-def remember(mesh: MeshSequence, measurement: Measurement) -> None:
+def store_measurement(mesh: MeshSequence, measurement: Measurement) -> None:
     """Keep a measurement in the user's cache folder, in place of the clip's last one.
 
-    Where nothing can be written it is not kept, and nothing is said.
+    A folder that cannot be written to is no error.
     """
     place = _place(mesh, measurement.family)
     content = {"format": _FORMAT, **asdict(measurement)}
@@ -100,7 +150,7 @@ def _with_spreads(content: dict[str, Any]) -> dict[str, Any]:
 
 
 def _number(value: Any) -> Any:
-    """An integer stays one."""
+    # Integers stay integers.
     if not isinstance(value, int | float):
         raise TypeError(f"{value!r} is not a number")
     return value

@@ -1,29 +1,197 @@
-"""What this scene requires: the cheapest plan that holds a tolerance, and why."""
+"""Choice of the cheapest plan that holds a tolerance on a scene."""
 
 from __future__ import annotations
 
 import math
 import time
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from itertools import pairwise, product
 
-from sd2core.accuracy.plans import MASK_REUSE_M, AccuracyPlan, counting_plans
-from sd2core.accuracy.reasons import reasons_for
-from sd2core.accuracy.results import Choice, Errors
-from sd2core.accuracy.survey import Survey, survey_scene
+from sd2core.accuracy.plans import (
+    FRAME_RATE_FACTORS,
+    MASK_REUSE_M,
+    AccuracyPlan,
+    counting_plans,
+    visibility_plans,
+)
+from sd2core.accuracy.reasons import SceneFacts, reasons_for, scene_facts
+from sd2core.accuracy.results import Choice, Errors, relative_l1
+from sd2core.accuracy.sample import take_sample
+from sd2core.accuracy.trial import Trial
 from sd2core.doppler.options import PRESETS, SynthesisOptions
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.numerics.compiled import worker_count
 from sd2core.progress import Progress, silent
 from sd2core.sensor import VirtualSensor
+
+_COUNTING_REPEATS = 4
+
+
+@dataclass(eq=False)
+class Survey:
+    """Error and cost of single settings on one scene.
+
+    Parameters
+    ----------
+    base : AccuracyPlan
+        Highest accuracy in every setting but the frame rate, which would slow down all others.
+    change : dict of AccuracyPlan to float
+        Relative L1 after smoothing on the frames to choose on: of ``base`` with one
+        setting lowered, against ``base``; of ``base`` at several frame rates, against
+        the reference.
+    mask_ms, count_ms : dict of AccuracyPlan to float
+        Milliseconds of processor time per frame for visibility, and for counting.
+    cost_share : dict of float to float
+        Cost of a share of the vertices, as a share of the cost of all.
+    """
+
+    trial: Trial
+    base: AccuracyPlan
+    facts: SceneFacts
+    change: dict[AccuracyPlan, float] = field(default_factory=dict)
+    mask_ms: dict[AccuracyPlan, float] = field(default_factory=dict)
+    count_ms: dict[AccuracyPlan, float] = field(default_factory=dict)
+    cost_share: dict[float, float] = field(default_factory=lambda: {1.0: 1.0})
+
+    def forecast_error(self, plan: AccuracyPlan) -> float:
+        """Sum of the errors of a plan's settings: more than their error together."""
+        rate = replace(self.base, frame_rate_factor=plan.frame_rate_factor)
+        down = (self.change[alone] for alone in self._alone(plan) if alone != self.base)
+        return self.change[rate] + sum(down)
+
+    def forecast_ms(self, plan: AccuracyPlan) -> float:
+        """Milliseconds per frame that a plan should take when all cores share the work."""
+        base = self.base
+        mask_ms = 0.0 if plan.mask_reuse_m else self.mask_ms[_sight_of(plan, base)]
+        count_ms = self.count_ms[replace(base, frame_rate_factor=plan.frame_rate_factor)]
+        if plan.range_law == "frame":
+            per_vertex = self.count_ms[base]
+            saved = per_vertex - self.count_ms[replace(base, range_law="frame")]
+            count_ms -= min(max(saved, 0.0), 0.9 * per_vertex)
+        return self.cost_share[plan.vertices_kept] * (mask_ms + count_ms) / worker_count()
+
+    def settings_changed(self, plan: AccuracyPlan) -> int:
+        """Number of settings in which a plan differs from the base."""
+        alone = [*self._alone(plan), replace(self.base, frame_rate_factor=plan.frame_rate_factor)]
+        return sum(other != self.base for other in alone)
+
+    def _alone(self, plan: AccuracyPlan) -> Iterator[AccuracyPlan]:
+        """Yield the base with each setting of a plan alone; frame rates are not among them."""
+        yield _sight_of(plan, self.base)
+        yield replace(self.base, vertices_kept=plan.vertices_kept)
+        yield replace(self.base, range_law=plan.range_law)
+        yield replace(self.base, beyond=plan.beyond)
+        if plan.mask_reuse_m:
+            yield replace(self.base, mask_reuse_m=plan.mask_reuse_m)
+
+
+def survey_scene(
+    mesh: MeshSequence,
+    sensor: VirtualSensor,
+    options: SynthesisOptions,
+    progress: Progress = silent,
+    *,
+    like: Survey | None = None,
+    trial: Trial | None = None,
+) -> Survey:
+    """Measure error and cost of each setting alone.
+
+    Parameters
+    ----------
+    options : SynthesisOptions
+        For what a plan does not choose.
+    progress : Progress
+        Counts what was tried; may raise Cancelled.
+    like : Survey, optional
+        Survey of the same mesh with the same options from another place: saves sampling and
+        decimating again.
+    trial : Trial, optional
+        Trial of the same scene, if there is one already.
+    """
+    surface = mesh.faces is not None
+    if trial is None and like is not None:
+        trial = like.trial.at(sensor)
+    elif trial is None:
+        trial = Trial(mesh, sensor, options, take_sample(mesh, options))
+    base = AccuracyPlan(visibility="exact" if surface else "none", weight=options.weight)
+    single = [replace(sight, weight=options.weight) for sight in visibility_plans(surface=surface)]
+    single += [replace(base, vertices_kept=kept) for kept in trial.vertices_kept if kept < 1]
+    if options.range_exponent:
+        single.append(replace(base, range_law="frame"))
+    single.append(replace(base, beyond="drop"))
+    if surface:
+        single += [replace(base, mask_reuse_m=reach_m) for reach_m in MASK_REUSE_M]
+    single = [plan for plan in single if plan != base]
+    rates = [replace(base, frame_rate_factor=factor) for factor in FRAME_RATE_FACTORS]
+    total = len(single) + 2 * len(rates) + 2
+    done = 0
+
+    def step() -> None:
+        nonlocal done
+        done += 1
+        progress(done, total)
+
+    def within(*_: int) -> None:
+        progress(done, total)
+
+    runs = trial.sample.chosen_on
+    reference = trial.reference(runs, progress=within)
+    step()
+    survey = Survey(trial, base, scene_facts(trial, within))
+    trial.load_kernels(within)
+    step()
+    for plan in rates:
+        found = trial.columns(plan, runs, progress=within)
+        survey.change[plan] = relative_l1(found.smooth, reference.smooth)
+        step()
+    # Counting alone, over many frames at once: it is too quick for a few. In turns, so that a
+    # busy machine slows all alike; the first time prepares what only this plan needs.
+    counted = (*rates, *(plan for plan in single if plan.range_law == "frame"))
+    for _, plan in product(range(_COUNTING_REPEATS), counted):
+        cheap = replace(plan, visibility="facing" if surface else "none")
+        spent_ms = trial.milliseconds(cheap, threads=1, progress=within)
+        survey.count_ms[plan] = min(survey.count_ms.get(plan, spent_ms), spent_ms)
+    for fewer, more in pairwise(rates):
+        # More moments take longer, whatever a clock says of microseconds.
+        survey.count_ms[more] = max(survey.count_ms[fewer], survey.count_ms[more])
+    step()
+    against = trial.columns(base, runs, progress=within)
+    quick_ms = survey.count_ms[base]
+    survey.mask_ms[base] = max(against.milliseconds - quick_ms, 0.0)
+    for plan in single:
+        found = trial.columns(plan, runs, progress=within)
+        truth = against.twice() if plan.mask_reuse_m else against
+        survey.change[plan] = relative_l1(found.smooth, truth.smooth)
+        survey.mask_ms[plan] = max(found.milliseconds - quick_ms, 0.0)
+        if plan.vertices_kept < 1:
+            # The first time prepares what only this mesh needs.
+            again = trial.columns(plan, runs, progress=within)
+            spent_ms = min(found.milliseconds, again.milliseconds)
+            share = spent_ms / against.milliseconds if against.milliseconds > 0 else 1.0
+            survey.cost_share[plan.vertices_kept] = min(max(share, plan.vertices_kept), 1.0)
+        step()
+    return survey
+
+
+def _sight_of(plan: AccuracyPlan, base: AccuracyPlan) -> AccuracyPlan:
+    return replace(
+        base,
+        visibility=plan.visibility,
+        depth_resolution=plan.depth_resolution,
+        mask_stride=plan.mask_stride,
+    )
+
 
 _MOST_TRIALS = 8
 _MORE_TRIALS = 4
 
 _FREE_SHARE = 0.1
-"""What costs nothing is modelled when it changes the map by this share of the tolerance."""
+"""A setting without cost is modelled when it changes the map by this share of the tolerance."""
 
 _SLACK = 1.5
-"""Changes of single rungs add up to more than a plan's error: how much more is let pass."""
+"""Errors of single settings add up to more than a plan's error; by this factor at most."""
 
 _WORTH_TAKING = 1.05
 _NEGLIGIBLE_MS = 0.002
@@ -44,9 +212,9 @@ def choose(
     survey: Survey | None = None,
     progress: Progress = silent,
 ) -> Choice:
-    """The cheapest counting plan within a tolerance, or the best within a budget.
+    """Choose the cheapest counting plan within a tolerance, or the best within a budget.
 
-    Each rung is taken down alone on some frames, which gives the reasons and a
+    Each setting is lowered alone on some frames, which gives the reasons and a
     forecast for every combination. The most promising ones are tried, on those frames
     and on others, until one holds.
 
@@ -58,19 +226,19 @@ def choose(
     budget_ms : float
         Milliseconds per frame on all cores, after a move of the sensor.
     dragging : bool
-        Whether plans that keep a mask while the sensor moves are among those that a
-        budget considers: such a plan saves nothing for a single map.
+        True if a budget also considers plans that keep a mask while the sensor moves: such a
+        plan saves nothing for a single map.
     options : SynthesisOptions
         For what a plan does not choose; the paper's by default.
     survey : Survey
-        Of this scene, when it has been made already.
+        Survey of this scene, if there is one already.
     progress : Progress
         May raise Cancelled.
 
     Returns
     -------
     Choice
-        With ``holds`` False the best that can be had.
+        With ``holds`` False the best available plan.
 
     Raises
     ------
@@ -81,7 +249,7 @@ def choose(
     started = time.perf_counter()
     _check(tolerance, budget_ms)
     if survey is None:
-        survey = survey_scene(mesh, sensor, checked_options(mesh, options), progress)
+        survey = survey_scene(mesh, sensor, check_options(mesh, options), progress)
     if tolerance is not None:
         plan, holds, errors = _by_tolerance(survey, tolerance, progress)
     else:
@@ -102,19 +270,19 @@ def choose(
     )
 
 
-def checked_options(mesh: MeshSequence, options: SynthesisOptions | None) -> SynthesisOptions:
-    """Options that the ladder can work with: the paper's unless others are given.
+def check_options(mesh: MeshSequence, options: SynthesisOptions | None) -> SynthesisOptions:
+    """Options for which plans can be compared: the paper's unless others are given.
 
     Raises
     ------
     Sd2Error
-        For Vid2Doppler's velocities, which have no rungs.
+        For Vid2Doppler's velocities, which have no settings to choose from.
     """
     options = options or PRESETS["paper"]
     if options.velocity != "central":
         raise Sd2Error(
             f"The options take the velocities of {options.velocity}",
-            "central differences: that tool's arithmetic has no rungs to choose from",
+            "central differences: that tool's arithmetic has no settings to choose from",
         )
     if mesh.faces is None:
         options = replace(options, visibility="none")
@@ -135,7 +303,7 @@ def _check(tolerance: float | None, budget_ms: float | None) -> None:
 def _by_tolerance(
     survey: Survey, tolerance: float, progress: Progress
 ) -> tuple[AccuracyPlan, bool, Errors]:
-    """The cheapest of those tried that holds; else the nearest of them."""
+    """Cheapest tried plan that holds, else the one with the smallest error."""
     plans = sorted(_candidates(survey, tolerance), key=lambda plan: _dearness(survey, plan))
     forecast = {plan: survey.forecast_error(plan) for plan in plans}
     safe = [plan for plan in plans if forecast[plan] <= tolerance]
@@ -184,16 +352,13 @@ def _by_budget(
 
 
 def _dearness(survey: Survey, plan: AccuracyPlan) -> tuple[int, int]:
-    """Cost in steps that are worth taking, and within a step how much is unlike the base.
-
-    A rung that saves nothing to speak of is not taken down.
-    """
+    """Sort key: cost in steps of 5 %, then the number of settings that differ from the base."""
     step = math.log(survey.forecast_ms(plan) + _NEGLIGIBLE_MS) / math.log(_WORTH_TAKING)
-    return round(step), survey.rungs_down(plan)
+    return round(step), survey.settings_changed(plan)
 
 
 def _reach_m(survey: Survey) -> float | None:
-    """How far the sensor may move while a kept mask is better than the facing test."""
+    """Longest move of the sensor after which a kept mask is better than the facing test."""
     if survey.base.visibility != "exact":
         return None
     facing = survey.change[replace(survey.base, visibility="facing")]
@@ -206,7 +371,7 @@ def _reach_m(survey: Survey) -> float | None:
 
 
 def _tried(survey: Survey, plan: AccuracyPlan, tolerance: float, progress: Progress) -> Errors:
-    """Errors on the frames to check on; on those to choose on, if they are too large there."""
+    """Errors on the frames to check on; if already too large on those to choose on, there."""
     sample = survey.trial.sample
     errors = survey.trial.errors(plan, sample.chosen_on, progress=progress)
     if errors.l1 > tolerance:

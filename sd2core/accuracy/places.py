@@ -1,8 +1,7 @@
-"""One plan for many places: chosen once for a mesh, and only where that saves time.
+"""Choice of one plan for many sensor places around a mesh, where that saves time.
 
-Choosing takes as long as thousands of frames of maps. So it is first estimated, on a few frames,
-what choosing would take, what maps as the options say, and what the most accurate plan, against
-which errors are measured.
+Choosing takes as long as thousands of frames of maps. So the times of choosing, of maps with the
+given options, and of maps with the most accurate plan are first estimated on a few frames.
 """
 
 from __future__ import annotations
@@ -14,12 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from sd2core.accuracy.choosing import checked_options, choose
+from sd2core.accuracy.choosing import check_options, choose, survey_scene
 from sd2core.accuracy.plans import AccuracyPlan, reference_plan
 from sd2core.accuracy.sample import take_sample
-from sd2core.accuracy.survey import survey_scene
-from sd2core.accuracy.synthesizers import synthesizer_for
-from sd2core.accuracy.trial import Trial
+from sd2core.accuracy.trial import Trial, synthesizer_for
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.doppler.reference import reference_stretch
 from sd2core.mesh.sequence import MeshSequence
@@ -61,12 +58,12 @@ class PlacedPlan:
     reasons: tuple[str, ...]
 
     def provenance(self) -> dict[str, Any]:
-        """What a map says of it."""
+        """Entries for the metadata of a map."""
         return self.plan.provenance(self.error_l1) | {"plan_reasons": list(self.reasons)}
 
 
 def spread(sensors: Sequence[VirtualSensor]) -> list[VirtualSensor]:
-    """The first, the last and what lies midway: places on which a plan is checked."""
+    """Places on which a plan is checked: the first, the last and some in between."""
     numbers = np.linspace(0, len(sensors) - 1, min(MOST_PLACES, len(sensors))).round().astype(int)
     return [sensors[number] for number in numbers.tolist()]
 
@@ -79,7 +76,7 @@ def choose_for_places(
     options: SynthesisOptions,
     progress: Progress = silent,
 ) -> PlacedPlan:
-    """The cheapest plan that holds a tolerance at all these places, as far as looking pays.
+    """Choose the cheapest plan that holds a tolerance at all these places.
 
     Chosen at the first place and checked at the others; where it does not hold, another one
     is chosen there. Where choosing is estimated to take longer than it saves, maps are
@@ -101,7 +98,7 @@ def choose_for_places(
     Sd2Error
         As :func:`~sd2core.accuracy.choosing.choose`.
     """
-    options = checked_options(mesh, options)
+    options = check_options(mesh, options)
     search = _Search(mesh, places, tolerance, options, progress)
     if frames < _FEWEST_FRAMES:
         return search.top(f"{frames:,} frames of maps are too few to choose a plan for")
@@ -151,11 +148,11 @@ class _Search:
         self._trials: list[Trial] = []
 
     def top(self, reason: str) -> PlacedPlan:
-        """The most accurate plan."""
+        """Most accurate plan, taken for this reason."""
         return PlacedPlan(self.most_accurate, 0.0, (f"{reason}: the most accurate one is taken",))
 
     def checked(self, plan: AccuracyPlan, reasons: tuple[str, ...]) -> PlacedPlan | None:
-        """The plan, if it holds everywhere."""
+        """Plan with its largest error, or None if it does not hold everywhere."""
         worst = 0.0
         for trial in self._tried():
             runs = trial.sample.checked_on
@@ -165,7 +162,7 @@ class _Search:
         return PlacedPlan(plan, worst, reasons)
 
     def chosen(self) -> PlacedPlan | None:
-        """The first plan that is the cheapest at one place and holds at all."""
+        """First plan that is the cheapest at one place and holds at all of them, or None."""
         for place, trial in zip(self._places, self._tried(), strict=True):
             survey = survey_scene(self._mesh, place, self._options, self._progress, trial=trial)
             choice = choose(

@@ -1,4 +1,4 @@
-"""The rungs of the ladder, and a plan: one choice of each."""
+"""Plans: one value for every setting that trades accuracy for speed."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _OCCLUSION = ("depth", "exact")
 
 @dataclass(frozen=True)
 class AccuracyPlan:
-    """One choice of every rung.
+    """One value for every setting that trades accuracy for speed.
 
     Parameters
     ----------
@@ -42,20 +42,20 @@ class AccuracyPlan:
         As in :class:`sd2core.doppler.SynthesisOptions`. FMCW takes ``facing`` and
         ``exact``, for facets.
     mask_reuse_m : float
-        How far the sensor may have moved since the mask was made; 0 makes it
-        anew for every place.
+        Distance that the sensor may have moved since the mask was made; 0 computes a mask
+        for every place.
     vertices_kept : float
         Share of the mesh's vertices; 1 is the full mesh.
     weight : {"count", "area", "projected"}
-        What a vertex counts: a choice of quantity, not of accuracy.
+        Weight of a vertex: a choice of quantity, not of accuracy.
     range_law : {"vertex", "frame"}
         Range law for each vertex, or one factor for each frame.
     beyond : {"drop", "wrap", "clip"}
-        What happens to velocities off the axis.
+        Treatment of velocities beyond the axis.
     frame_rate_factor : int
-        By how much the frame rate is raised before velocities are taken.
+        Factor by which the frame rate is raised before velocities are taken.
     blocks : int
-        FMCW: stretches of a frame's chirps with a beat frequency of their own.
+        FMCW: parts of a frame's chirps with a beat frequency of their own.
     motion : {"constant", "interpolated"}
         FMCW: within a frame, constant velocity or interpolated at every chirp.
     """
@@ -90,7 +90,7 @@ class AccuracyPlan:
 
     @property
     def family(self) -> Family:
-        """Plans of one family have one reference."""
+        """Family of the plan; plans of one family share their reference."""
         return "histogram" if self.signal == "histogram" else "fmcw"
 
     def __str__(self) -> str:
@@ -122,7 +122,7 @@ class AccuracyPlan:
         yield {"drop": "beyond dropped", "wrap": "wrapped", "clip": "clipped"}[self.beyond]
 
     def options(self, base: SynthesisOptions) -> SynthesisOptions:
-        """The options that carry a counting plan out; what it does not choose is the base's."""
+        """Synthesis options of a counting plan; what it does not choose is taken from ``base``."""
         return replace(
             base,
             visibility=self.visibility,
@@ -135,16 +135,16 @@ class AccuracyPlan:
         )
 
     def wave(self, base: WaveOptions) -> WaveOptions:
-        """The options that carry an FMCW plan out."""
+        """Options of an FMCW plan; what it does not choose is taken from ``base``."""
         model: Literal["nufft", "direct"] = "direct" if self.signal == "direct" else "nufft"
         return replace(base, model=model, blocks=self.blocks, motion=self.motion)
 
     def to_json(self) -> dict[str, Any]:
-        """Every rung by name, for provenance."""
+        """Every setting by name, for provenance."""
         return asdict(self)
 
     def provenance(self, error_l1: float) -> dict[str, Any]:
-        """What a map says of the plan it was made by, with its measured error."""
+        """Entries for the metadata of a map: the plan and its measured error."""
         return {"plan": self.to_json() | {"text": str(self)}, "plan_error_l1": error_l1}
 
     @classmethod
@@ -154,18 +154,18 @@ class AccuracyPlan:
         Raises
         ------
         Sd2Error
-            For rungs that this version does not know.
+            For settings that this version does not know.
         """
         unknown = set(content) - {field.name for field in fields(cls)}
         if unknown:
-            raise Sd2Error(f"A plan names {', '.join(sorted(unknown))}", "rungs of this version")
+            raise Sd2Error(f"A plan names {', '.join(sorted(unknown))}", "settings of this version")
         return cls(**content)
 
 
 def reference_plan(
     family: Family, weight: Weight = "count", *, surface: bool = True
 ) -> AccuracyPlan:
-    """What errors are measured against: the top of every rung.
+    """Plan that errors are measured against: every setting at its most accurate.
 
     Of a point cloud, without a ``surface``, every point is seen.
     """
@@ -178,8 +178,8 @@ def reference_plan(
     )
 
 
-def sights(*, surface: bool = True) -> Iterator[AccuracyPlan]:
-    """Every choice of visibility; for a point cloud there is but one."""
+def visibility_plans(*, surface: bool = True) -> Iterator[AccuracyPlan]:
+    """Plans of every visibility; for a point cloud there is only one."""
     yield AccuracyPlan(visibility="none")
     if not surface:
         return
@@ -197,20 +197,23 @@ def counting_plans(
     range_law: bool = True,
     vertices_kept: Sequence[float] = VERTICES_KEPT,
 ) -> Iterator[AccuracyPlan]:
-    """Every combination of the counting rungs, masks made for the place at hand.
+    """Plans of every combination of the counting settings, without reused masks.
 
     Parameters
     ----------
     surface : bool
         False for a point cloud, which has no visibility and cannot be decimated.
     range_law : bool
-        Whether there is a range law to apply by vertex or by frame.
+        True if there is a range law to apply by vertex or by frame.
     vertices_kept : sequence of float
         Shares that the surface can be decimated to, and 1: a few faces cannot be.
     """
     laws: tuple[RangeLaw, ...] = ("vertex", "frame") if range_law else ("vertex",)
     for sight, kept, factor, law in product(
-        sights(surface=surface), vertices_kept if surface else (1.0,), FRAME_RATE_FACTORS, laws
+        visibility_plans(surface=surface),
+        vertices_kept if surface else (1.0,),
+        FRAME_RATE_FACTORS,
+        laws,
     ):
         yield replace(
             sight, weight=weight, vertices_kept=kept, frame_rate_factor=factor, range_law=law
@@ -224,7 +227,7 @@ def compared_plans(
     range_law: bool = True,
     vertices_kept: Sequence[float] = VERTICES_KEPT,
 ) -> Iterator[AccuracyPlan]:
-    """The counting plans of a table: every rung alone, and the main combinations.
+    """Counting plans of a table: every setting alone, and the main combinations.
 
     Parameters as for :func:`counting_plans`.
     """
@@ -232,7 +235,7 @@ def compared_plans(
     for plan in counting_plans(
         weight, surface=surface, range_law=range_law, vertices_kept=vertices_kept
     ):
-        taken_down = sum(
+        lowered = sum(
             getattr(plan, name) != getattr(base, name)
             for name in ("visibility", "mask_stride", "vertices_kept", "range_law")
         ) + (plan.frame_rate_factor > 1)
@@ -242,7 +245,7 @@ def compared_plans(
             and plan.frame_rate_factor in (1, 4)
             and plan.range_law == "vertex"
         )
-        if taken_down <= 1 or usual:
+        if lowered <= 1 or usual:
             yield plan
     yield replace(base, beyond="drop")
     if surface:
@@ -251,7 +254,7 @@ def compared_plans(
 
 
 def wave_plans() -> Iterator[AccuracyPlan]:
-    """The FMCW plans worth a look; the last one leaves nothing out but subdivision."""
+    """FMCW plans of a table; the last one leaves nothing out but subdivision."""
     base = AccuracyPlan(signal="fmcw")
     for sight in ("facing", "exact"):
         for kept in VERTICES_KEPT[:3]:

@@ -1,9 +1,10 @@
-"""What a scene requires, in words with numbers."""
+"""Reasons for the settings of a plan, in words with numbers."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from sd2core.progress import Progress, silent
 
 @dataclass(frozen=True)
 class SceneFacts:
-    """Of the sampled frames, all vertices counted alike.
+    """Motion and distance of the vertices in the sampled frames, all counted alike.
 
     Parameters
     ----------
@@ -27,10 +28,10 @@ class SceneFacts:
         From the 5th to the 95th percentile of the ranges within a frame, relative
         to their median; median over frames.
     motion_bins : float
-        By how many bins a velocity changes from one frame to the next; mean over
+        Bins by which a velocity changes from one frame to the next; mean over
         the vertices that leave the nulled bins.
     empty : bool
-        Nothing of what is seen leaves the nulled bins.
+        True if nothing that is seen leaves the nulled bins.
     """
 
     still_share: float
@@ -40,8 +41,8 @@ class SceneFacts:
     empty: bool
 
 
-def look_at(trial: Trial, progress: Progress = silent) -> SceneFacts:
-    """Velocities and ranges of every vertex in the frames to choose on."""
+def scene_facts(trial: Trial, progress: Progress = silent) -> SceneFacts:
+    """Collect velocities and ranges of every vertex in the frames to choose on."""
     options = trial.options
     axis = options.axis
     synthesizer = trial.synthesizer(
@@ -80,6 +81,41 @@ def look_at(trial: Trial, progress: Progress = silent) -> SceneFacts:
     )
 
 
+_SENTENCES = {
+    "empty": "this map is empty: nothing that is seen leaves the nulled bins",
+    "some still": "{value} of the vertices never leave the nulled bins: not modelled",
+    "none still": "every vertex leaves the nulled bins: all are modelled",
+    "occlusion exact": "{between}: occlusion is modelled exactly",
+    "occlusion depth": (
+        "{between}: occlusion is modelled by a depth buffer of {pixels} pixels, off by {off}"
+    ),
+    "occlusion facing": "{between}: occlusion is not modelled",
+    "occlusion none": "hidden vertices change this map by {value}: all count",
+    "mask of each frame": (
+        "visibility of every 2nd frame changes the map by {value}: made for each frame"
+    ),
+    "mask of some frames": (
+        "visibility of every {ordinal} frame serves its neighbours: that changes the map by {value}"
+    ),
+    "mask reused": (
+        "a mask kept while the sensor moves {reach_m:g} m changes the map by {value}: {use}"
+    ),
+    "geometry": "{share} of the vertices change the map by {value}: {use}",
+    "range law": (
+        "range varies by {spread} over the body: the range law vertex by vertex changes the map by"
+        " {value}: {use}"
+    ),
+    "no aliasing": "no velocity passes {v_max_mps:g} m/s: aliasing does not matter",
+    "aliasing": (
+        "{beyond} of the velocities pass {v_max_mps:g} m/s and change the map by {value}: {use}"
+    ),
+    "motion": (
+        "velocities change by {bins:.2g} bins from frame to frame, which changes the map by"
+        " {value}: {use}"
+    ),
+}
+
+
 def reasons_for(
     plan: AccuracyPlan,
     base: AccuracyPlan,
@@ -87,173 +123,84 @@ def reasons_for(
     facts: SceneFacts,
     v_max_mps: float,
 ) -> tuple[Reason, ...]:
-    """Why a plan is what it is.
+    """Explain the settings of a chosen plan.
 
     Parameters
     ----------
-    plan : AccuracyPlan
-        The one chosen.
     base : AccuracyPlan
-        The top of every rung but the frame rate.
+        Highest accuracy in every setting but the frame rate.
     change : mapping
         Relative L1 after smoothing of what was tried: of plans that differ from
-        ``base`` in one rung, and of frame rates.
+        ``base`` in one setting, and of frame rates.
     v_max_mps : float
         End of the axis.
     """
-    found = [_static(facts)]
+    found: list[Reason] = []
+
+    def add(setting: str, modelled: bool, value: float, key: str, **numbers: object) -> None:
+        text = _SENTENCES[key].format(value=percent(value), **numbers)
+        found.append(Reason(setting, modelled, value, text))
+
+    def alone(**setting: Any) -> float:
+        return change[replace(base, **setting)]
+
+    still = "empty" if facts.empty else "some still" if facts.still_share > 0 else "none still"
+    add("static", not facts.empty and facts.still_share <= 0, facts.still_share, still)
     if base.visibility != "none":
-        found.append(_occlusion(plan, base, change))
-        found += _mask_age(plan, base, change)
-        found += _mask_reuse(plan, base, change)
-        found += _geometry(plan, base, change)
-    found += _range_law(plan, base, change, facts)
-    found += [
-        _aliasing(plan, base, change, facts, v_max_mps),
-        _motion(plan, base, change, facts),
-    ]
-    return tuple(found)
-
-
-def _static(facts: SceneFacts) -> Reason:
-    if facts.empty:
-        text = "this map is empty: nothing that is seen leaves the nulled bins"
-        return Reason("static", False, facts.still_share, text)
-    share = percent(facts.still_share)
-    return Reason(
-        "static",
-        facts.still_share <= 0,
-        facts.still_share,
-        f"{share} of the vertices never leave the nulled bins: not modelled"
-        if facts.still_share > 0
-        else "every vertex leaves the nulled bins: all are modelled",
-    )
-
-
-def _occlusion(
-    plan: AccuracyPlan, base: AccuracyPlan, change: Mapping[AccuracyPlan, float]
-) -> Reason:
-    facing = change[replace(base, visibility="facing")]
-    every = change[replace(base, visibility="none")]
-    # What no other visibility can do: inside a body the facing test hides all of it.
-    needed = min(facing, every)
-    text = f"what stands in between changes this map by {percent(needed)}"
-    if plan.visibility == "exact":
-        return Reason("occlusion", True, needed, f"{text}: occlusion is modelled exactly")
-    if plan.visibility == "depth":
-        at = change[replace(base, visibility="depth", depth_resolution=plan.depth_resolution)]
-        how = f"a depth buffer of {plan.depth_resolution} pixels, off by {percent(at)}"
-        return Reason("occlusion", True, needed, f"{text}: occlusion is modelled by {how}")
-    if plan.visibility == "facing":
-        text = f"what stands in between changes this map by {percent(facing)}"
-        return Reason("occlusion", False, facing, f"{text}: occlusion is not modelled")
-    return Reason(
-        "occlusion", False, every, f"hidden vertices change this map by {percent(every)}: all count"
-    )
-
-
-def _mask_age(
-    plan: AccuracyPlan, base: AccuracyPlan, change: Mapping[AccuracyPlan, float]
-) -> list[Reason]:
-    if plan.visibility not in ("depth", "exact") or plan.mask_reuse_m:
-        return []
-    if plan.mask_stride > 1:
-        off = change[replace(base, mask_stride=plan.mask_stride)]
-        text = (
-            f"visibility of every {_ordinal(plan.mask_stride)} frame serves its neighbours: that"
-            f" changes the map by {percent(off)}"
-        )
-        return [Reason("mask_age", False, off, text)]
-    off = change[replace(base, mask_stride=2)]
-    text = f"visibility of every 2nd frame changes the map by {percent(off)}: made for each frame"
-    return [Reason("mask_age", True, off, text)]
-
-
-def _mask_reuse(
-    plan: AccuracyPlan, base: AccuracyPlan, change: Mapping[AccuracyPlan, float]
-) -> list[Reason]:
-    if plan.visibility not in ("depth", "exact"):
-        return []
-    tried = [other for other in change if other == replace(base, mask_reuse_m=other.mask_reuse_m)]
-    reused = [other for other in tried if other.mask_reuse_m > 0]
-    if not reused:
-        return []
-    if plan.mask_reuse_m:
-        reused = [other for other in reused if other.mask_reuse_m == plan.mask_reuse_m] or reused
-    widest = max(reused, key=lambda other: other.mask_reuse_m)
-    off = change[widest]
-    text = f"a mask kept while the sensor moves {widest.mask_reuse_m:g} m changes the map by"
-    use = "kept" if plan.mask_reuse_m else "made anew at rest"
-    return [Reason("mask_reuse", not plan.mask_reuse_m, off, f"{text} {percent(off)}: {use}")]
-
-
-def _geometry(
-    plan: AccuracyPlan, base: AccuracyPlan, change: Mapping[AccuracyPlan, float]
-) -> list[Reason]:
-    tried = sorted(
-        (other for other in change if other == replace(base, vertices_kept=other.vertices_kept)),
-        key=lambda other: -other.vertices_kept,
-    )
-    coarser = [other for other in tried if other.vertices_kept < 1]
-    if not coarser:
-        return []
-    if plan.vertices_kept < 1:
-        off = change[replace(base, vertices_kept=plan.vertices_kept)]
-        text = f"{percent(plan.vertices_kept)} of the vertices change the map by {percent(off)}"
-        return [Reason("geometry", False, off, f"{text}: they are enough")]
-    off = change[coarser[0]]
-    text = f"{percent(coarser[0].vertices_kept)} of the vertices change the map by {percent(off)}"
-    return [Reason("geometry", True, off, f"{text}: the full mesh is used")]
-
-
-def _range_law(
-    plan: AccuracyPlan, base: AccuracyPlan, change: Mapping[AccuracyPlan, float], facts: SceneFacts
-) -> list[Reason]:
-    by_frame = replace(base, range_law="frame")
-    if by_frame not in change:
-        return []
-    off = change[by_frame]
-    text = (
-        f"range varies by {percent(facts.range_spread)} over the body: the range law vertex by"
-        f" vertex changes the map by {percent(off)}"
-    )
-    modelled = plan.range_law == "vertex"
-    use = "modelled" if modelled else "one range per frame"
-    return [Reason("range_law", modelled, off, f"{text}: {use}")]
-
-
-def _aliasing(
-    plan: AccuracyPlan,
-    base: AccuracyPlan,
-    change: Mapping[AccuracyPlan, float],
-    facts: SceneFacts,
-    v_max_mps: float,
-) -> Reason:
-    off = change[replace(base, beyond="drop")]
+        facing, every = alone(visibility="facing"), alone(visibility="none")
+        # Inside a body the facing test hides all of it: what no cheaper visibility can do.
+        needed = {"none": every, "facing": facing}.get(plan.visibility, min(facing, every))
+        numbers = {"between": f"what stands in between changes this map by {percent(needed)}"}
+        if plan.visibility == "depth":
+            pixels = plan.depth_resolution
+            off = alone(visibility="depth", depth_resolution=pixels)
+            numbers |= {"pixels": str(pixels), "off": percent(off)}
+        occluded = plan.visibility in ("depth", "exact")
+        add("occlusion", occluded, needed, f"occlusion {plan.visibility}", **numbers)
+        if occluded and not plan.mask_reuse_m:
+            stride = plan.mask_stride
+            key = "mask of some frames" if stride > 1 else "mask of each frame"
+            off = alone(mask_stride=stride if stride > 1 else 2)
+            add("mask_age", stride == 1, off, key, ordinal=_ordinal(stride))
+        reaches_m = [
+            other.mask_reuse_m
+            for other in change
+            if other.mask_reuse_m > 0 and other == replace(base, mask_reuse_m=other.mask_reuse_m)
+        ]
+        if occluded and reaches_m:
+            kept = plan.mask_reuse_m
+            reach_m = kept if kept in reaches_m else max(reaches_m)
+            use = "kept" if kept else "made again at rest"
+            off = alone(mask_reuse_m=reach_m)
+            add("mask_reuse", not kept, off, "mask reused", reach_m=reach_m, use=use)
+        shares = [
+            other.vertices_kept
+            for other in change
+            if other.vertices_kept < 1 and other == replace(base, vertices_kept=other.vertices_kept)
+        ]
+        if shares:
+            whole = plan.vertices_kept == 1
+            share = max(shares) if whole else plan.vertices_kept
+            use = "the full mesh is used" if whole else "they are enough"
+            off = alone(vertices_kept=share)
+            add("geometry", whole, off, "geometry", share=percent(share), use=use)
+    if replace(base, range_law="frame") in change:
+        modelled = plan.range_law == "vertex"
+        use = "modelled" if modelled else "one range per frame"
+        spread = percent(facts.range_spread)
+        add("range_law", modelled, alone(range_law="frame"), "range law", spread=spread, use=use)
     if facts.beyond_share <= 0:
-        text = f"no velocity passes {v_max_mps:g} m/s: aliasing does not matter"
-        return Reason("aliasing", False, 0.0, text)
-    text = (
-        f"{percent(facts.beyond_share)} of the velocities pass {v_max_mps:g} m/s and change the"
-        f" map by {percent(off)}"
-    )
-    wrapped = plan.beyond == "wrap"
-    use = "aliasing matters, wrapped" if wrapped else "aliasing is left out, dropped"
-    return Reason("aliasing", wrapped, off, f"{text}: {use}")
-
-
-def _motion(
-    plan: AccuracyPlan, base: AccuracyPlan, change: Mapping[AccuracyPlan, float], facts: SceneFacts
-) -> Reason:
-    off = change[replace(base, frame_rate_factor=1)]
-    text = (
-        f"velocities change by {facts.motion_bins:.2g} bins from frame to frame, which changes the"
-        f" map by {percent(off)}"
-    )
-    if plan.frame_rate_factor == 1:
-        return Reason("motion", False, off, f"{text}: one moment per frame is enough")
-    use = f"frame rate raised {plan.frame_rate_factor} times"
-    return Reason("motion", True, off, f"{text}: {use}")
+        add("aliasing", False, 0.0, "no aliasing", v_max_mps=v_max_mps)
+    else:
+        wrapped = plan.beyond == "wrap"
+        use = "aliasing matters, wrapped" if wrapped else "aliasing is left out, dropped"
+        beyond, off = percent(facts.beyond_share), alone(beyond="drop")
+        add("aliasing", wrapped, off, "aliasing", beyond=beyond, v_max_mps=v_max_mps, use=use)
+    factor = plan.frame_rate_factor
+    use = "one moment per frame is enough" if factor == 1 else f"frame rate raised {factor} times"
+    off = alone(frame_rate_factor=1)
+    add("motion", factor > 1, off, "motion", bins=facts.motion_bins, use=use)
+    return tuple(found)
 
 
 def _ordinal(number: int) -> str:

@@ -1,11 +1,20 @@
-"""What the ladder measured, and what it chose: records for tables, plots and files."""
+"""Records of what was measured and chosen, errors between maps, and their plot."""
 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from sd2core.accuracy.plans import AccuracyPlan, Family
+from sd2core.sensor import VelocityAxis
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 
 _LEAST_PERCENT = 1e-3
 
@@ -13,7 +22,7 @@ _LEAST_PERCENT = 1e-3
 def percent(share: float) -> str:
     """A share with two figures; whole above 10 %, and not more than a map can tell below.
 
-    Infinite is what changes an empty map.
+    It is infinite where an empty map changes.
     """
     value = 100 * share
     if value == 0:
@@ -27,21 +36,28 @@ def percent(share: float) -> str:
 
 @dataclass(frozen=True)
 class Spread:
-    """Of a quantity over frames, or over repeated runs."""
+    """Median and 95th percentile of a quantity over frames, or over repeated runs."""
 
     median: float
     p95: float
 
+    @classmethod
+    def of(cls, values: NDArray[np.float64]) -> Spread:
+        """Spread of some values; zeros if there are none."""
+        if not values.size:
+            return cls(0.0, 0.0)
+        return cls(float(np.median(values)), float(np.percentile(values, 95)))
+
 
 @dataclass(frozen=True)
 class Errors:
-    """How far a plan's map is from the reference map of the same frames.
+    """Errors of a plan's map against the reference map of the same frames.
 
     Parameters
     ----------
     l1 : float
         Relative L1 of all frames together, after smoothing: sum of absolute
-        differences over the sum of the reference. What a tolerance is about.
+        differences over the sum of the reference. A tolerance limits this error.
     l1_raw : float
         The same before smoothing, which hides errors.
     l1_frames, l1_raw_frames : Spread
@@ -53,7 +69,7 @@ class Errors:
         Share of a frame's energy that lies in wrong bins (total variation of the
         frame's distribution over velocity).
     frames : int
-        How many frames, counted for each side from which a kept mask was tried. Those
+        Number of frames, counted for each side from which a kept mask was tried. Those
         in which hardly anything moves are left out of the figures of single frames.
     """
 
@@ -69,7 +85,7 @@ class Errors:
 
 @dataclass(frozen=True)
 class Cost:
-    """What a plan takes per frame once the clip is prepared, for a new sensor place.
+    """Time and memory of a plan per frame, once the clip is prepared, for a new sensor place.
 
     Parameters
     ----------
@@ -78,7 +94,7 @@ class Cost:
         of the other plans. Milliseconds per frame; the first is the thread's
         own processor time, which other programs do not disturb.
     peak_bytes : int
-        Most memory allocated at once while the sampled frames were worked out.
+        Most memory allocated at once while the sampled frames were computed.
     setup_s : float
         Once per clip: decimating and preparing the sampled frames.
     """
@@ -91,20 +107,20 @@ class Cost:
 
 @dataclass(frozen=True)
 class PlanResult:
-    """A plan, what it costs here, and how far it is off here."""
+    """Plan with its measured cost and errors."""
 
     plan: AccuracyPlan
     errors: Errors
     cost: Cost
 
     def to_json(self) -> dict[str, Any]:
-        """Plain content, with the plan also in words."""
+        """Content for JSON, with the plan also in words."""
         return asdict(self) | {"text": str(self.plan)}
 
 
 @dataclass(frozen=True)
 class Machine:
-    """What costs depend on."""
+    """Machine and program version that measured costs depend on."""
 
     processor: str
     cores: int
@@ -122,7 +138,7 @@ class Measurement:
     ----------
     family : {"histogram", "fmcw"}
     reference : AccuracyPlan
-        In words: what the errors are relative to.
+        Plan whose map the errors are relative to.
     results : tuple of PlanResult
         Cheapest first.
     scene : str
@@ -135,7 +151,7 @@ class Measurement:
         FMCW: pieces per facet of the reference sum, and by how much the map
         changed from the level before.
     stale : bool
-        Scene or machine are no longer those.
+        True if scene or machine have changed since.
     """
 
     family: Family
@@ -150,7 +166,7 @@ class Measurement:
 
     @property
     def front(self) -> tuple[PlanResult, ...]:
-        """The Pareto front: no other plan is both cheaper and nearer; cheapest first."""
+        """Pareto front, cheapest first: no other plan is both cheaper and more accurate."""
         best: list[PlanResult] = []
         for result in sorted(self.results, key=lambda r: (r.cost.all_cores_ms.median, r.errors.l1)):
             if not best or result.errors.l1 < best[-1].errors.l1:
@@ -158,11 +174,11 @@ class Measurement:
         return tuple(best)
 
     def to_json(self) -> dict[str, Any]:
-        """Plain content, with plans also in words."""
+        """Content for JSON, with plans also in words."""
         return asdict(self) | {"results": [result.to_json() for result in self.results]}
 
     def of(self, plan: AccuracyPlan) -> PlanResult | None:
-        """What was measured of a plan, if it was; else of the same with velocities wrapped."""
+        """Result of a plan, else of the same plan with velocities wrapped, or None."""
         wrapped = replace(plan, beyond="wrap")
         found = {result.plan: result for result in self.results}
         return found.get(plan) or found.get(wrapped)
@@ -170,22 +186,22 @@ class Measurement:
 
 @dataclass(frozen=True)
 class Reason:
-    """Why a rung was chosen, in words with numbers.
+    """Reason for one setting of a plan, in words with numbers.
 
     Parameters
     ----------
-    rung : str
+    setting : str
         "occlusion", "static", "range_law", "aliasing", "motion", "mask_age",
         "mask_reuse", "geometry" or "weight".
     modelled : bool
-        Whether the scene requires it, so that the plan contains it.
+        True if the scene requires it, so that the plan contains it.
     value : float
         The number that decided: a relative change of the map, or a share.
     text : str
         One sentence without a full stop.
     """
 
-    rung: str
+    setting: str
     modelled: bool
     value: float
     text: str
@@ -193,13 +209,12 @@ class Reason:
 
 @dataclass(frozen=True)
 class Choice:
-    """The cheapest plan that holds a tolerance, or the most accurate within a budget.
+    """Cheapest plan that holds a tolerance, or most accurate plan within a budget.
 
     Parameters
     ----------
     holds : bool
-        Whether tolerance or budget is held; otherwise the plan is the best that
-        can be had.
+        True if tolerance or budget is held; otherwise the plan is the best available.
     errors : Errors
         On the frames to check on.
     cost_ms : float
@@ -212,7 +227,7 @@ class Choice:
     spent_s : float
         How long the choosing took.
     unseen : bool
-        Whether the errors are of frames that were not used to choose: a clip of fewer
+        True if the errors are of frames that were not used to choose; a clip of fewer
         than ten frames has none to spare.
     """
 
@@ -228,7 +243,7 @@ class Choice:
 
     @property
     def summary(self) -> str:
-        """One line: the plan, its measured error and cost."""
+        """Plan, measured error and cost in one line."""
         cost = f"{self.cost_ms:.2g} ms per frame"
         if self.holds:
             return f"{self.plan}: off by {percent(self.errors.l1)}, {cost}"
@@ -239,5 +254,139 @@ class Choice:
         return f"No plan keeps within {self.budget_ms:g} ms per frame; the fastest is {found}"
 
     def to_json(self) -> dict[str, Any]:
-        """Plain content, for provenance and programs."""
-        return asdict(self) | {"text": str(self.plan), "summary": self.summary}
+        """Content for JSON, with the plan also in words."""
+        content = asdict(self) | {"text": str(self.plan), "summary": self.summary}
+        for reason in content["reasons"]:
+            # Programs that read the output of `sd2 ladder --json` know a setting by this name.
+            reason["rung"] = reason.pop("setting")
+        return content
+
+
+_MOVING = 0.1
+"""Frames with less than this share of the mean frame's energy have no figures of their own."""
+
+
+def relative_l1(values: NDArray[np.float64], reference: NDArray[np.float64]) -> float:
+    """Sum of absolute differences over the sum of the reference.
+
+    0 when both are empty, infinite when only the reference is.
+    """
+    difference, total = float(np.abs(values - reference).sum()), float(reference.sum())
+    if total > 0:
+        return difference / total
+    return 0.0 if difference == 0 else float("inf")
+
+
+def compute_errors(
+    raw: NDArray[np.float64],
+    reference_raw: NDArray[np.float64],
+    smooth: NDArray[np.float64],
+    reference_smooth: NDArray[np.float64],
+    axis: VelocityAxis,
+) -> Errors:
+    """Compare a map with its reference, before and after smoothing.
+
+    Parameters
+    ----------
+    raw, reference_raw, smooth, reference_smooth : float64 arrays, shape (bins, n)
+        Not negative.
+
+    Returns
+    -------
+    Errors
+        A frame that is empty in the map but not in the reference has peak and
+        mean velocity 0, and all its energy in wrong bins.
+    """
+    energy = reference_smooth.sum(axis=0)
+    moving = (energy > 0) & (energy >= _MOVING * energy.mean())
+    a, b = smooth[:, moving], reference_smooth[:, moving]  # (bins, k)
+    share_a, share_b = _shares(a), _shares(b)
+    centres_mps = axis.centres_mps
+    mean_mps = np.abs(centres_mps @ share_a - centres_mps @ share_b)
+    peak_mps = np.abs(_peaks(a, centres_mps) - _peaks(b, centres_mps))
+    wrong = np.where(a.sum(axis=0) > 0, 0.5 * np.abs(share_a - share_b).sum(axis=0), 1.0)
+    return Errors(
+        l1=relative_l1(smooth, reference_smooth),
+        l1_raw=relative_l1(raw, reference_raw),
+        l1_frames=_per_frame(smooth, reference_smooth, moving),
+        l1_raw_frames=_per_frame(raw, reference_raw, moving),
+        peak_mps=Spread.of(peak_mps),
+        mean_mps=Spread.of(mean_mps),
+        wrong_bins=Spread.of(wrong),
+        frames=raw.shape[1],
+    )
+
+
+def _per_frame(
+    values: NDArray[np.float64], reference: NDArray[np.float64], moving: NDArray[np.bool_]
+) -> Spread:
+    total = reference[:, moving].sum(axis=0)
+    difference = np.abs(values - reference)[:, moving].sum(axis=0)
+    # Smoothing may bring energy into a frame that has none of its own.
+    return Spread.of(difference[total > 0] / total[total > 0])
+
+
+def _shares(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    total = values.sum(axis=0)
+    return np.divide(values, total, out=np.zeros_like(values), where=total > 0)
+
+
+def _peaks(values: NDArray[np.float64], centres_mps: NDArray[np.float64]) -> NDArray[np.float64]:
+    peaks: NDArray[np.float64] = centres_mps[values.argmax(axis=0)]
+    return np.where(values.sum(axis=0) > 0, peaks, 0.0)
+
+
+FLOOR = 1e-5
+"""Errors below this, among them 0, are drawn here: the axis is logarithmic."""
+
+_MARKS = {"none": "x", "facing": "^", "depth": "s", "exact": "o"}
+_COLOURS = {"none": "#888888", "facing": "#b35806", "depth": "#2166ac", "exact": "#1b7837"}
+
+
+def plot_cost_and_error(measurement: Measurement, choice: Choice | None = None) -> Figure:
+    """Plot error after smoothing against milliseconds per frame, both axes logarithmic.
+
+    Parameters
+    ----------
+    choice : Choice, optional
+        Marked, with its tolerance as a line.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.0, 4.5), dpi=120, layout="constrained")
+    axes = figure.add_subplot()
+    for visibility, mark in _MARKS.items():
+        shown = [r for r in measurement.results if r.plan.visibility == visibility]
+        if shown:
+            style: dict[str, Any] = {"marker": mark, "color": _COLOURS[visibility]}
+            axes.scatter(*_places(shown), s=22, alpha=0.8, label=visibility, **style)
+    cost_ms, error = _places(measurement.front)
+    axes.step(cost_ms, error, where="post", color="black", linewidth=1, label="Pareto front")
+    if choice is not None:
+        _mark(axes, measurement, choice)
+    axes.set(
+        xscale="log",
+        yscale="log",
+        xlabel="cost on all cores (ms per frame)",
+        ylabel="relative L1 after smoothing",
+        title=f"{measurement.source}, {measurement.machine}",
+    )
+    axes.grid(which="both", alpha=0.2)
+    axes.legend(title="visibility", fontsize=8)
+    return figure
+
+
+def _places(results: tuple[PlanResult, ...] | list[PlanResult]) -> tuple[list[float], list[float]]:
+    return (
+        [result.cost.all_cores_ms.median for result in results],
+        [max(result.errors.l1, FLOOR) for result in results],
+    )
+
+
+def _mark(axes: Axes, measurement: Measurement, choice: Choice) -> None:
+    if choice.tolerance is not None:
+        axes.axhline(choice.tolerance, color="#c51b7d", linewidth=1, linestyle="--")
+    chosen = measurement.of(choice.plan)
+    cost_ms = chosen.cost.all_cores_ms.median if chosen is not None else choice.cost_ms
+    place = cost_ms, max(choice.errors.l1, FLOOR)
+    axes.scatter(*place, s=130, facecolors="none", edgecolors="#c51b7d", label="chosen")

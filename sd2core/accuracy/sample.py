@@ -1,4 +1,4 @@
-"""The frames of a clip on which plans are tried."""
+"""Sample of the frames of a clip on which plans are tried."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Run:
 
     @property
     def frames(self) -> range:
-        """Their numbers in the clip."""
+        """Numbers of the frames in the clip."""
         return range(self.first, self.first + self.stop - self.start)
 
 
@@ -64,11 +64,11 @@ class Sample:
 
     @property
     def runs(self) -> tuple[Run, ...]:
-        """All of them, once."""
+        """Runs to choose on and to check on, each once."""
         return tuple(dict.fromkeys((*self.chosen_on, *self.checked_on)))
 
     def of(self, mesh: MeshSequence) -> MeshSequence:
-        """The sampled frames of a mesh in memory, one run after the other on their own times.
+        """Sampled frames of a mesh in memory, one run after the other at their own times.
 
         Raises
         ------
@@ -98,15 +98,15 @@ def take_sample(mesh: MeshSequence, options: SynthesisOptions, runs: int = 6) ->
     Parameters
     ----------
     options : SynthesisOptions
-        Of which the smoothing of the vertices' paths matters: it looks far.
+        Smoothing of the vertices' paths widens the margins of the runs.
     runs : int
-        How many stretches of ten frames, half of them to choose on. A clip that is
+        Number of runs of ten frames, half of them to choose on. A clip that is
         too short for them is used whole.
 
     Returns
     -------
     Sample
-        Every other one of the runs, ordered by how lively they are, is to check on.
+        Every second run in order of liveliness is to check on.
     """
     frames = mesh.frame_count
     margin = _FEWEST_MARGIN
@@ -145,7 +145,7 @@ def take_sample(mesh: MeshSequence, options: SynthesisOptions, runs: int = 6) ->
 
 
 def _whole(frames: int) -> Sample:
-    """All of a short clip, cut into runs that take turns."""
+    """Sample of a whole short clip, cut into runs that take turns."""
     count = max(1, min(8, frames // _SHORTEST_RUN))
     edges = np.linspace(0, frames, count + 1).astype(int).tolist()
     runs = [Run(a, b, a) for a, b in itertools.pairwise(edges)]
@@ -155,7 +155,7 @@ def _whole(frames: int) -> Sample:
 
 
 def _apart(starts: NDArray[np.intp], length: int) -> NDArray[np.intp]:
-    """Those that do not overlap with the one before."""
+    """Starts of the runs that do not overlap with the one before."""
     kept: list[int] = []
     for start in starts.tolist():
         if not kept or start >= kept[-1] + length:
@@ -164,7 +164,7 @@ def _apart(starts: NDArray[np.intp], length: int) -> NDArray[np.intp]:
 
 
 def _speed(mesh: MeshSequence, frame: int) -> float:
-    """Mean squared speed of some vertices, in (m/s)²; 0 where there is nobody."""
+    """Mean squared speed of some vertices, in (m/s)²; 0 without a person."""
     if not mesh.presence.there[frame : frame + 2].all():
         return 0.0
     two = mesh.read(frame, frame + 2).astype(np.float64)

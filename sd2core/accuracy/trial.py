@@ -1,4 +1,4 @@
-"""Trying counting plans out on sampled frames: what they make of them, and how long it takes."""
+"""Trial of counting plans on sampled frames: their maps, errors and time."""
 
 from __future__ import annotations
 
@@ -10,23 +10,54 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.accuracy.deviation import errors
-from sd2core.accuracy.plans import VERTICES_KEPT, AccuracyPlan, reference_plan, sights
-from sd2core.accuracy.results import Errors
+from sd2core.accuracy.plans import VERTICES_KEPT, AccuracyPlan, reference_plan, visibility_plans
+from sd2core.accuracy.results import Errors, compute_errors
 from sd2core.accuracy.sample import Run, Sample
 from sd2core.doppler.masks import Visibility
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.doppler.reference import reference_stretch
 from sd2core.doppler.smoothing import smooth
 from sd2core.doppler.synthesizer import Synthesizer
+from sd2core.errors import Sd2Error
 from sd2core.mesh.decimation import decimate
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import workers
 from sd2core.progress import Progress, silent
 from sd2core.sensor import VirtualSensor
 
+
+def synthesizer_for(
+    plan: AccuracyPlan,
+    mesh: MeshSequence,
+    options: SynthesisOptions,
+    *,
+    like: Synthesizer | None = None,
+) -> Synthesizer:
+    """Create the synthesizer of a counting plan.
+
+    Parameters
+    ----------
+    mesh : MeshSequence
+        Full mesh.
+    options : SynthesisOptions
+        For what a plan does not choose: axis, nulled bins, range law, smoothing.
+    like : Synthesizer, optional
+        Synthesizer of a plan that keeps as many vertices; its decimated mesh, and
+        its prepared frames where possible, are shared.
+
+    Raises
+    ------
+    Sd2Error
+        For an FMCW plan, or a plan that this mesh cannot have.
+    """
+    if plan.family != "histogram":
+        raise Sd2Error(f"The plan is {plan}", "a plan that counts vertices")
+    counted = like.mesh if like is not None else decimate(mesh, plan.vertices_kept)
+    return Synthesizer(counted, plan.options(options), blocks_of=like)
+
+
 _ASIDE_M = 1e-7
-"""A place so near that nothing changes, and yet another one: its masks are made anew."""
+"""Offset that changes no velocity, but makes another place, whose masks are computed again."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,19 +72,15 @@ class Columns:
     milliseconds: float = 0.0
 
     def twice(self) -> Columns:
-        """The same columns again behind the first."""
+        """Columns, followed by the same columns again."""
         return _joined([self, self])
 
 
 class Trial:
-    """Counting plans on one scene.
+    """Counting plans on the sampled frames of one scene.
 
-    Smoothing stays within each run, in a plan's map as in the reference.
-
-    Parameters
-    ----------
-    options : SynthesisOptions
-        What a plan does not choose.
+    Smoothing stays within each run, in a plan's map as in the reference. The options say what a
+    plan does not choose.
     """
 
     def __init__(
@@ -77,7 +104,7 @@ class Trial:
 
     @property
     def vertices_kept(self) -> tuple[float, ...]:
-        """Shares that the mesh can be decimated to, and 1: a few faces cannot be."""
+        """Shares of the vertices that the mesh can be decimated to, and 1."""
         if self.mesh.faces is None:
             return (1.0,)
         # The whole mesh first, so that what is wrong in a frame is said of it.
@@ -87,14 +114,14 @@ class Trial:
         )
 
     def at(self, sensor: VirtualSensor) -> Trial:
-        """The same plans from another place; what does not depend on it is shared."""
+        """Trial from another place, sharing what does not depend on it."""
         other = copy.copy(self)
         other.sensor = sensor
         other._references = {}
         return other
 
     def reference(self, runs: Sequence[Run], *, progress: Progress = silent) -> Columns:
-        """The reference plan's columns, in double precision."""
+        """Columns of the reference plan, in double precision."""
         options = reference_plan("histogram", self.options.weight).options(self._unsmoothed)
         mesh = self._sampled(1.0)
 
@@ -116,7 +143,7 @@ class Trial:
     def columns(
         self, plan: AccuracyPlan, runs: Sequence[Run], *, progress: Progress = silent
     ) -> Columns:
-        """A plan's columns, with masks made for them alone.
+        """Columns of a plan, with masks made for them alone.
 
         A plan that reuses masks is tried with masks made to the left and to the
         right of the sensor; both count.
@@ -136,20 +163,20 @@ class Trial:
     def errors(
         self, plan: AccuracyPlan, runs: Sequence[Run], *, progress: Progress = silent
     ) -> Errors:
-        """How far a plan is from the reference on some runs."""
+        """Errors of a plan against the reference on some runs."""
         reference = self.reference(runs, progress=progress)
         found = self.columns(plan, runs, progress=progress)
         if plan.mask_reuse_m:
             reference = reference.twice()
-        return errors(found.raw, reference.raw, found.smooth, reference.smooth, self.options.axis)
+        axis = self.options.axis
+        return compute_errors(found.raw, reference.raw, found.smooth, reference.smooth, axis)
 
     def milliseconds(
         self, plan: AccuracyPlan, threads: int | None = None, *, progress: Progress = silent
     ) -> float:
-        """How long a plan takes per frame, over all sampled frames, after the sensor has moved.
+        """Time of a plan per frame, over all sampled frames, after the sensor has moved.
 
-        With one thread that thread's own processor time, otherwise the time that
-        passes.
+        With one thread the processor time of that thread, otherwise wall-clock time.
         """
         synthesizer = self.synthesizer(plan, threads, progress=progress)
         frames = synthesizer.mesh.frame_count
@@ -163,8 +190,11 @@ class Trial:
         return 1e3 * (stretch.processor_s if threads == 1 else passed_s) / frames
 
     def load_kernels(self, progress: Progress = silent) -> None:
-        """Call what is compiled once, so that reading it from disk is not timed."""
-        for plan in (AccuracyPlan(visibility="none"), *sights(surface=self.mesh.faces is not None)):
+        """Call the compiled kernels once, so that loading them from disk is not timed."""
+        for plan in (
+            AccuracyPlan(visibility="none"),
+            *visibility_plans(surface=self.mesh.faces is not None),
+        ):
             if plan.mask_stride == 1:
                 run = self.sample.runs[0]
                 self._counted(
@@ -177,7 +207,7 @@ class Trial:
     def synthesizer(
         self, plan: AccuracyPlan, threads: int | None = None, *, progress: Progress = silent
     ) -> Synthesizer:
-        """What carries a plan out on the sampled frames; prepared."""
+        """Synthesizer of a plan for the sampled frames, with its blocks prepared."""
         key = plan.vertices_kept, plan.frame_rate_factor
         like = self._prepared.get(key)
         made = Synthesizer(
@@ -191,12 +221,12 @@ class Trial:
         return made
 
     def decimating_s(self, plan: AccuracyPlan) -> float:
-        """How long it took to make the clip's mesh for a plan, once."""
+        """Seconds that decimating the clip's mesh for a plan took."""
         self._sampled(plan.vertices_kept)
         return self._decimating_s[plan.vertices_kept]
 
     def forget(self) -> None:
-        """Let prepared frames go, so that their making can be watched."""
+        """Drop prepared frames, so that their preparation can be measured."""
         self._prepared.clear()
 
     def _sampled(self, kept: float) -> MeshSequence:
@@ -216,7 +246,7 @@ class Trial:
         reused: bool = False,
         progress: Progress = silent,
     ) -> Columns:
-        """Columns with masks made for this place, or with the last ones made."""
+        """Columns with masks made for this place, or with the last masks."""
         visibility: Visibility | None = "frozen" if reused else None
         stretches = [
             synthesizer.stretch(place, run.start, run.stop, visibility, progress) for run in runs

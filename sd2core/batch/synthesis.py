@@ -168,8 +168,8 @@ def _synthesizer(mesh: MeshInput, section: Synthesise, plan: dict[str, Any] | No
         _kept.synthesizer = None
         options, share = section.options(), section.vertices_kept or 1.0
         if plan is not None:
-            rungs = AccuracyPlan.from_json(plan["plan"])
-            options, share = rungs.options(options), rungs.vertices_kept
+            settings = AccuracyPlan.from_json(plan["plan"])
+            options, share = settings.options(options), settings.vertices_kept
         _kept.synthesizer = Synthesizer(
             decimate(opened, share), options, memory_budget_bytes=PREPARED_BYTES, threads=1
         )

@@ -84,7 +84,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _ladder(options: argparse.Namespace) -> int:
-    from sd2core.accuracy.choosing import checked_options
+    from sd2core.accuracy.choosing import check_options
     from sd2core.cli.reading import check_output, mesh_and_sensor
     from sd2core.doppler import PRESETS
     from sd2core.files.figure_files import SUFFIXES, save_figure
@@ -96,7 +96,7 @@ def _ladder(options: argparse.Namespace) -> int:
     if options.quick and options.family == "fmcw":
         raise Sd2Error("--quick is given with --family fmcw", "it with --family histogram only")
     mesh, sensor = mesh_and_sensor(options)
-    synthesis = checked_options(mesh, replace(PRESETS["paper"], weight=options.weight))
+    synthesis = check_options(mesh, replace(PRESETS["paper"], weight=options.weight))
     choice = None
     if options.family == "histogram":
         tolerance = options.tolerance
@@ -105,9 +105,9 @@ def _ladder(options: argparse.Namespace) -> int:
         choice = chosen(mesh, sensor, synthesis, tolerance, options.budget_ms)
     measurement = None if options.quick else _measured(mesh, sensor, synthesis, options)
     if options.plot is not None and measurement is not None:
-        from sd2core.accuracy.plot import plot_trade
+        from sd2core.accuracy.results import plot_cost_and_error
 
-        save_figure(plot_trade(measurement, choice), options.plot)
+        save_figure(plot_cost_and_error(measurement, choice), options.plot)
     if options.json:
         print_json(
             {
@@ -174,10 +174,10 @@ def _measured(
     synthesis: SynthesisOptions,
     options: argparse.Namespace,
 ) -> Measurement:
-    from sd2core.accuracy.cache import remember, remembered
+    from sd2core.accuracy.cache import cached_measurement, store_measurement
     from sd2core.accuracy.measuring import REPEATS, measure
 
-    known = remembered(mesh, sensor, synthesis, options.family)
+    known = cached_measurement(mesh, sensor, synthesis, options.family)
     if known is not None and not (known.stale or options.fresh or options.repeats):
         return known
     with progress_bar("Measuring", "plan") as progress:
@@ -189,7 +189,7 @@ def _measured(
             repeats=options.repeats or REPEATS,
             progress=progress,
         )
-    remember(mesh, measurement)
+    store_measurement(mesh, measurement)
     return measurement
 
 
@@ -240,4 +240,4 @@ def _print_measurement(measurement: Measurement) -> None:
             f" {percent(errors.wrong_bins.median):>6} ({percent(errors.wrong_bins.p95)})"
             f"  {'*' if result in front else ' '} {result.plan}"
         )
-    print("  * no other plan is both cheaper and nearer")
+    print("  * no other plan is both cheaper and more accurate")

@@ -183,14 +183,14 @@ def _cost(
     options: argparse.Namespace,
 ) -> tuple[Choice, PlacementCost]:
     """What the ladder says where the sensor has the median of all ranges."""
-    from sd2core.accuracy.choosing import checked_options
+    from sd2core.accuracy.choosing import check_options
     from sd2core.cli.ladder import chosen
     from sd2core.doppler import PRESETS
     from sd2core.placements.cost import PlacementCost
 
     places = placements.places()
     middle = sorted(range(len(places)), key=lambda number: places[number].range_m)[len(places) // 2]
-    synthesis = checked_options(mesh, PRESETS["paper"])
+    synthesis = check_options(mesh, PRESETS["paper"])
     tolerance = options.tolerance
     if tolerance is None and options.budget_ms is None:
         tolerance = _TOLERANCE

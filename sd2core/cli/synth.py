@@ -247,7 +247,7 @@ def _as_chosen(
     options: argparse.Namespace, mesh: MeshSequence, sensor: VirtualSensor
 ) -> DopplerMap:
     """Map by the plan that the scene requires; plan and reasons go into its provenance."""
-    from sd2core.accuracy.synthesizers import synthesizer_for
+    from sd2core.accuracy.trial import synthesizer_for
 
     base = synthesis_options(options)
     choice = chosen(mesh, sensor, base, options.tolerance, options.budget_ms, dragging=False)

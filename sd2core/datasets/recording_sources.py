@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.accuracy.places import choose_for_places, spread
-from sd2core.accuracy.synthesizers import synthesizer_for
+from sd2core.accuracy.trial import synthesizer_for
 from sd2core.datasets.simulating import CLUTTER, Simulation, simulated_map
 from sd2core.datasets.source import (
     BACKGROUND,

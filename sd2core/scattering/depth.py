@@ -1,4 +1,4 @@
-"""Visibility by a depth buffer: the fast, approximate rung below exact.
+"""Visibility by a depth buffer: fast and approximate.
 
 Each frame's triangles are drawn into a square picture of the depths that the
 sensor sees. It decides for the vertices that lie clearly on or clearly behind the

@@ -15,7 +15,7 @@ from sd2core.accuracy import places
 from sd2core.accuracy.choosing import choose
 from sd2core.accuracy.places import PlacedPlan, choose_for_places, spread
 from sd2core.accuracy.plans import reference_plan
-from sd2core.accuracy.synthesizers import synthesizer_for
+from sd2core.accuracy.trial import synthesizer_for
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
 from sd2core.files.resources import resource_path
 from sd2core.mesh.sequence import MeshSequence

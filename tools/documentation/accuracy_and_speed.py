@@ -11,12 +11,10 @@ from collections.abc import Iterator
 
 from matplotlib.figure import Figure
 
-from sd2core.accuracy.choosing import choose
+from sd2core.accuracy.cache import this_machine
+from sd2core.accuracy.choosing import choose, survey_scene
 from sd2core.accuracy.measuring import measure
-from sd2core.accuracy.plot import plot_trade
-from sd2core.accuracy.results import Measurement
-from sd2core.accuracy.scene import this_machine
-from sd2core.accuracy.survey import survey_scene
+from sd2core.accuracy.results import Measurement, plot_cost_and_error
 from sd2core.doppler import PRESETS
 from sd2core.files.figure_files import save_figure
 from sd2core.files.resources import resource_path
@@ -43,7 +41,7 @@ What accuracy costs, measured. Made by
 make accuracy
 ```
 
-on {machine}. Running it again gives other times, and nearly the same errors. What the rungs are
+on {machine}. Running it again gives other times, and nearly the same errors. What the settings are
 is [decision 14](decisions/0014-the-ladder.md); `sd2 ladder MESH` and the Trade panel measure the
 same on a scene of one's own.
 
@@ -106,7 +104,7 @@ def _tolerances(mesh: MeshSequence, sensor: VirtualSensor) -> Iterator[str]:
 
 def _measured(measurement: Measurement, picture: str) -> Iterator[str]:
     """Table and picture of all plans of a family."""
-    save_figure(plot_trade(measurement), IMAGES / picture)
+    save_figure(plot_cost_and_error(measurement), IMAGES / picture)
     what = {"histogram": "Counting", "fmcw": "FMCW signal"}[measurement.family]
     yield f"### {what}: {len(measurement.results)} plans\n"
     yield f"![error against cost]({IMAGES.name}/{picture})\n"

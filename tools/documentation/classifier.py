@@ -21,7 +21,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from sd2core.accuracy.scene import this_machine
+from sd2core.accuracy.cache import this_machine
 from tools.documentation.places import DOCS, IMAGES
 from tools.documentation.runs import campaign_of, sd2
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from sd2core.accuracy.scene import this_machine
+from sd2core.accuracy.cache import this_machine
 from sd2core.denoise.files import load_model
 from sd2core.denoise.metrics import mean_velocity_error, peak_error, stands_out
 from sd2core.files.atomic import atomic_write_text

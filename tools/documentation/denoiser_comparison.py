@@ -15,7 +15,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from sd2core.accuracy.scene import this_machine
+from sd2core.accuracy.cache import this_machine
 from sd2core.denoise.registry import options as options_of
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.figure_files import save_figure

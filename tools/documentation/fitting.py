@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from sd2core.accuracy.scene import this_machine
+from sd2core.accuracy.cache import this_machine
 from sd2core.compare.figure import draw_comparison
 from sd2core.compare.meshes import compare_meshes
 from sd2core.files.atomic import atomic_write_text

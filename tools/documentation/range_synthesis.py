@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from sd2core.accuracy.scene import this_machine
+from sd2core.accuracy.cache import this_machine
 from sd2core.files.atomic import atomic_write_text
 from sd2core.pairs.store import read_pairs
 from tools.documentation.places import BUILD, DOCS

@@ -14,7 +14,7 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from sd2core.accuracy.scene import this_machine
+from sd2core.accuracy.cache import this_machine
 from sd2core.batch.driver import AHEAD
 from sd2core.batch.estimate import task_rates
 from sd2core.batch.folder import BatchFolder

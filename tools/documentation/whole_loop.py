@@ -17,7 +17,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from sd2core.accuracy.scene import this_machine
+from sd2core.accuracy.cache import this_machine
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.resources import resource_path
 from tools.documentation.places import BUILD, DOCS, IMAGES, REPOSITORY

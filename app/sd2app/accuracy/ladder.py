@@ -12,9 +12,9 @@ from sd2core.progress import Progress
 from sd2core.sensor import VirtualSensor
 
 if TYPE_CHECKING:
+    from sd2core.accuracy.choosing import Survey
     from sd2core.accuracy.plans import AccuracyPlan, Family
     from sd2core.accuracy.results import Choice, Measurement
-    from sd2core.accuracy.survey import Survey
     from sd2core.doppler.synthesizer import Synthesizer
 
 
@@ -43,7 +43,7 @@ def _survey(
     progress: Progress,
     like: Survey | None,
 ) -> Survey:
-    from sd2core.accuracy.survey import survey_scene
+    from sd2core.accuracy.choosing import survey_scene
 
     return survey_scene(mesh, sensor, options, progress, like=like)
 
@@ -63,21 +63,21 @@ def _measure(mesh: MeshSequence, sensor: VirtualSensor, **wish: Any) -> Measurem
 def _remembered(
     mesh: MeshSequence, sensor: VirtualSensor, options: SynthesisOptions, family: Family
 ) -> Measurement | None:
-    from sd2core.accuracy.cache import remembered
+    from sd2core.accuracy.cache import cached_measurement
 
-    return remembered(mesh, sensor, options, family)
+    return cached_measurement(mesh, sensor, options, family)
 
 
 def _remember(mesh: MeshSequence, measurement: Measurement) -> None:
-    from sd2core.accuracy.cache import remember
+    from sd2core.accuracy.cache import store_measurement
 
-    remember(mesh, measurement)
+    store_measurement(mesh, measurement)
 
 
 def _synthesizer_for(
     plan: AccuracyPlan, mesh: MeshSequence, options: SynthesisOptions, like: Synthesizer | None
 ) -> Synthesizer:
-    from sd2core.accuracy.synthesizers import synthesizer_for
+    from sd2core.accuracy.trial import synthesizer_for
 
     return synthesizer_for(plan, mesh, options, like=like)
 

@@ -15,7 +15,7 @@ from sd2app.maps.partial_map import FINAL, ROUGH
 from sd2app.settings import Settings
 from sd2app.shell.wiring import build_context
 from sd2core.accuracy.plans import AccuracyPlan
-from sd2core.accuracy.synthesizers import synthesizer_for
+from sd2core.accuracy.trial import synthesizer_for
 from sd2core.doppler.synthesizer import Synthesizer
 from sd2core.io.mesh import load_mesh
 from sd2core.maps import DopplerMap

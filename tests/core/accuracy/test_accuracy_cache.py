@@ -11,10 +11,14 @@ import pytest
 from accuracy_scenes import ball, swinging
 
 from sd2core.accuracy import cache
-from sd2core.accuracy.cache import remember, remembered
+from sd2core.accuracy.cache import (
+    cached_measurement,
+    scene_fingerprint,
+    store_measurement,
+    this_machine,
+)
 from sd2core.accuracy.plans import AccuracyPlan, reference_plan
 from sd2core.accuracy.results import Cost, Errors, Machine, Measurement, PlanResult, Spread
-from sd2core.accuracy.scene import scene_fingerprint, this_machine
 from sd2core.doppler import PRESETS
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import VirtualSensor
@@ -58,22 +62,22 @@ def measured(mesh: MeshSequence) -> Measurement:
 
 
 def test_what_was_remembered_comes_back(mesh: MeshSequence) -> None:
-    assert remembered(mesh, CAMERA, PAPER) is None
-    remember(mesh, measured(mesh))
-    found = remembered(mesh, CAMERA, PAPER)
+    assert cached_measurement(mesh, CAMERA, PAPER) is None
+    store_measurement(mesh, measured(mesh))
+    found = cached_measurement(mesh, CAMERA, PAPER)
     assert found == measured(mesh)
     assert found is not None
     assert not found.stale
-    assert remembered(mesh, CAMERA, PAPER, "fmcw") is None
+    assert cached_measurement(mesh, CAMERA, PAPER, "fmcw") is None
 
 
 def test_another_place_or_option_makes_it_stale(mesh: MeshSequence) -> None:
-    remember(mesh, measured(mesh))
+    store_measurement(mesh, measured(mesh))
     for sensor, options in (
         (VirtualSensor((1.0, 0.0, 0.0)), PAPER),
         (CAMERA, replace(PAPER, null_bins=())),
     ):
-        found = remembered(mesh, sensor, options)
+        found = cached_measurement(mesh, sensor, options)
         assert found is not None
         assert found.stale
 
@@ -81,41 +85,41 @@ def test_another_place_or_option_makes_it_stale(mesh: MeshSequence) -> None:
 def test_another_machine_makes_it_stale(
     mesh: MeshSequence, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    remember(mesh, measured(mesh))
+    store_measurement(mesh, measured(mesh))
     monkeypatch.setattr(cache, "this_machine", lambda: Machine("abacus", 10, "0"))
-    found = remembered(mesh, CAMERA, PAPER)
+    found = cached_measurement(mesh, CAMERA, PAPER)
     assert found is not None
     assert found.stale
 
 
 def test_another_mesh_has_a_memory_of_its_own(mesh: MeshSequence) -> None:
-    remember(mesh, measured(mesh))
+    store_measurement(mesh, measured(mesh))
     vertices = mesh.read(0, mesh.frame_count) + np.float32(0.1)
-    assert remembered(replace(mesh, vertices=vertices), CAMERA, PAPER) is None
+    assert cached_measurement(replace(mesh, vertices=vertices), CAMERA, PAPER) is None
 
 
 @pytest.mark.parametrize("damage", ["", "{", "[]", '{"format": 99}'])
 def test_what_cannot_be_read_is_measured_again(
     mesh: MeshSequence, folder: Path, damage: str
 ) -> None:
-    remember(mesh, measured(mesh))
+    store_measurement(mesh, measured(mesh))
     (path,) = folder.rglob("*.json")
     path.write_text(damage)
-    assert remembered(mesh, CAMERA, PAPER) is None
+    assert cached_measurement(mesh, CAMERA, PAPER) is None
 
 
 def test_a_file_lacks_nothing(mesh: MeshSequence, folder: Path) -> None:
-    remember(mesh, measured(mesh))
+    store_measurement(mesh, measured(mesh))
     (path,) = folder.rglob("*.json")
     content = json.loads(path.read_text())
     del content["results"][0]["errors"]["l1"]
     path.write_text(json.dumps(content))
-    assert remembered(mesh, CAMERA, PAPER) is None
+    assert cached_measurement(mesh, CAMERA, PAPER) is None
 
 
 @pytest.mark.parametrize("wrong", ["x", None, [], {"median": "x", "p95": 0.1}, {"median": 0.1}])
 def test_figures_are_numbers(mesh: MeshSequence, folder: Path, wrong: object) -> None:
-    remember(mesh, measured(mesh))
+    store_measurement(mesh, measured(mesh))
     (path,) = folder.rglob("*.json")
     content = json.loads(path.read_text())
     for damaged in (
@@ -129,13 +133,13 @@ def test_figures_are_numbers(mesh: MeshSequence, folder: Path, wrong: object) ->
         },
     ):
         path.write_text(json.dumps(damaged))
-        assert remembered(mesh, CAMERA, PAPER) is None
+        assert cached_measurement(mesh, CAMERA, PAPER) is None
 
 
 def test_a_thinned_mesh_counted_otherwise_is_another_clip(mesh: MeshSequence) -> None:
     counts = np.ones(mesh.vertex_count, np.int64)
-    remember(replace(mesh, vertex_counts=counts), measured(mesh))
-    assert remembered(replace(mesh, vertex_counts=2 * counts), CAMERA, PAPER) is None
+    store_measurement(replace(mesh, vertex_counts=counts), measured(mesh))
+    assert cached_measurement(replace(mesh, vertex_counts=2 * counts), CAMERA, PAPER) is None
 
 
 def test_where_nothing_can_be_written_nothing_is_kept(
@@ -143,8 +147,8 @@ def test_where_nothing_can_be_written_nothing_is_kept(
 ) -> None:
     (folder / "file").write_text("")
     monkeypatch.setattr("platformdirs.user_cache_dir", lambda *_, **__: str(folder / "file"))
-    remember(mesh, measured(mesh))
-    assert remembered(mesh, CAMERA, PAPER) is None
+    store_measurement(mesh, measured(mesh))
+    assert cached_measurement(mesh, CAMERA, PAPER) is None
 
 
 def test_the_front_has_only_what_nothing_beats(mesh: MeshSequence) -> None:

@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sd2core.accuracy import choose
+from sd2core.accuracy.cache import clip_fingerprint
 from sd2core.accuracy.plans import MASK_STRIDES
 from sd2core.accuracy.sample import KEPT, Sample, take_sample
-from sd2core.accuracy.scene import clip_fingerprint
 from sd2core.doppler import PRESETS
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import VirtualSensor

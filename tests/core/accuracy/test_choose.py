@@ -10,12 +10,11 @@ import pytest
 import trimesh
 from accuracy_scenes import ball, moving, plate, steady, swinging, together
 
-from sd2core.accuracy.choosing import choose
-from sd2core.accuracy.deviation import relative_l1
+from sd2core.accuracy.choosing import choose, survey_scene
 from sd2core.accuracy.plans import FRAME_RATE_FACTORS
+from sd2core.accuracy.results import relative_l1
 from sd2core.accuracy.sample import take_sample
-from sd2core.accuracy.survey import survey_scene
-from sd2core.accuracy.synthesizers import synthesizer_for
+from sd2core.accuracy.trial import synthesizer_for
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
@@ -80,14 +79,14 @@ def test_a_point_cloud_has_a_plan() -> None:
     choice = choose(cloud, CAMERA, tolerance=0.05)
     assert choice.holds
     assert choice.plan.visibility == "none"
-    assert {reason.rung for reason in choice.reasons}.isdisjoint({"occlusion", "geometry"})
+    assert {reason.setting for reason in choice.reasons}.isdisjoint({"occlusion", "geometry"})
 
 
 def test_a_body_at_rest_needs_nothing() -> None:
     choice = choose(ball(steady((0, 0, 3), (0, 0, 0))), CAMERA, tolerance=0.01)
     assert choice.holds
     assert choice.errors.l1 == 0
-    (still,) = (reason for reason in choice.reasons if reason.rung == "static")
+    (still,) = (reason for reason in choice.reasons if reason.setting == "static")
     assert still.value == 1
 
 
@@ -121,7 +120,7 @@ def test_one_positive_wish(scene: MeshSequence, wanted: dict[str, float]) -> Non
         choose(scene, CAMERA, **wanted)  # type: ignore[arg-type]
 
 
-def test_the_other_tool_has_no_rungs(scene: MeshSequence) -> None:
+def test_the_other_tool_has_no_settings(scene: MeshSequence) -> None:
     with pytest.raises(Sd2Error, match="vid2doppler"):
         choose(scene, CAMERA, tolerance=0.1, options=PRESETS["vid2doppler"])
 
@@ -171,19 +170,19 @@ def test_what_cannot_be_decimated_is_not_planned_so() -> None:
     assert survey.trial.vertices_kept == (1.0,)
     choice = choose(triangle, CAMERA, tolerance=0.5, survey=survey)
     assert choice.plan.vertices_kept == 1
-    assert not any(reason.rung == "geometry" for reason in choice.reasons)
+    assert not any(reason.setting == "geometry" for reason in choice.reasons)
 
 
 def test_inside_a_body_nothing_needs_to_stand_in_between() -> None:
     """There the facing test hides all of it; that is not what occlusion is for."""
     around = ball(swinging((0, 0, 0.02), 0.8, 0.7), radius_m=1.0, fineness=3)
     choice = choose(around, CAMERA, tolerance=0.02)
-    found = next(reason for reason in choice.reasons if reason.rung == "occlusion")
+    found = next(reason for reason in choice.reasons if reason.setting == "occlusion")
     assert choice.plan.visibility == "none"
     assert not found.modelled
     assert found.value < 0.001
     # Nor is anything said of masks where none is used.
-    assert not any(reason.rung in ("mask_reuse", "mask_age") for reason in choice.reasons)
+    assert not any(reason.setting in ("mask_reuse", "mask_age") for reason in choice.reasons)
 
 
 def test_a_single_map_keeps_no_mask(scene: MeshSequence) -> None:

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from sd2core.accuracy.deviation import errors, relative_l1, spread
-from sd2core.accuracy.results import Spread
+from sd2core.accuracy.results import Spread, compute_errors, relative_l1
 from sd2core.sensor import VelocityAxis
 
 AXIS = VelocityAxis(4, 2.0)  # bins of 1 m/s, centres -1.5, -0.5, 0.5, 1.5
@@ -18,7 +17,7 @@ MAPS = arrays(np.float64, (4, 5), elements=st.integers(0, 1000).map(float))
 
 @given(MAPS)
 def test_a_map_has_no_error_against_itself(values: np.ndarray) -> None:
-    found = errors(values, values, values, values, AXIS)
+    found = compute_errors(values, values, values, values, AXIS)
     assert found.l1 == found.l1_raw == 0
     for figure in (found.l1_frames, found.peak_mps, found.mean_mps, found.wrong_bins):
         assert figure == Spread(0, 0)
@@ -33,7 +32,7 @@ def test_relative_l1_does_not_depend_on_the_unit(values: np.ndarray, unit: float
 def test_known_differences() -> None:
     reference = np.array([[0, 0, 0, 4.0], [0, 2, 2, 0]]).T
     values = np.array([[0, 0, 4.0, 0], [0, 2, 1, 0]]).T
-    found = errors(values, reference, values, reference, AXIS)
+    found = compute_errors(values, reference, values, reference, AXIS)
     assert found.l1 == pytest.approx((8 + 1) / 8)
     # Frame 0: 4 moved one bin; frame 1: half of one bin is missing.
     assert found.l1_frames.median == pytest.approx((8 / 4 + 1 / 4) / 2)
@@ -47,14 +46,14 @@ def test_known_differences() -> None:
 def test_frames_at_rest_have_no_figures_of_their_own() -> None:
     reference = np.array([[0, 0, 0, 100.0], [0, 0, 0, 1.0]]).T
     values = np.array([[0, 0, 0, 100.0], [1.0, 0, 0, 0]]).T
-    found = errors(values, reference, values, reference, AXIS)
+    found = compute_errors(values, reference, values, reference, AXIS)
     assert found.l1 == pytest.approx(2 / 101)
     assert found.peak_mps.p95 == 0
 
 
 def test_an_empty_map_is_wrong_altogether() -> None:
     reference = np.array([[0, 0, 0, 2.0]]).T
-    found = errors(0 * reference, reference, 0 * reference, reference, AXIS)
+    found = compute_errors(0 * reference, reference, 0 * reference, reference, AXIS)
     assert found.l1 == 1
     assert found.wrong_bins.median == 1
     assert found.peak_mps.median == 1.5
@@ -63,5 +62,5 @@ def test_an_empty_map_is_wrong_altogether() -> None:
 
 
 def test_spread_of_nothing() -> None:
-    assert spread(np.zeros(0)) == Spread(0, 0)
-    assert spread(np.arange(101.0)) == Spread(50, 95)
+    assert Spread.of(np.zeros(0)) == Spread(0, 0)
+    assert Spread.of(np.arange(101.0)) == Spread(50, 95)

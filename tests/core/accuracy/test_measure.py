@@ -1,4 +1,4 @@
-"""The table: every plan with errors that its rungs explain, and costs that are measured."""
+"""The table: every plan with errors that its settings explain, and costs that are measured."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_the_reference_plan_itself_is_right(table: Measurement) -> None:
     assert error(table, AccuracyPlan(frame_rate_factor=8)) < 1e-3
 
 
-def test_each_rung_brings_the_map_nearer(table: Measurement) -> None:
+def test_each_setting_brings_the_map_nearer(table: Measurement) -> None:
     raised = replace(AccuracyPlan(), frame_rate_factor=4)
     kinds = [replace(raised, visibility=kind) for kind in ("none", "facing", "exact")]
     found = [error(table, plan) for plan in kinds]

@@ -1,4 +1,4 @@
-"""Plans: one choice of every rung, in one line, and back from a file."""
+"""Plans: one choice of every setting, in one line, and back from a file."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sd2core.accuracy.plans import (
     compared_plans,
     counting_plans,
     reference_plan,
-    sights,
+    visibility_plans,
     wave_plans,
 )
 from sd2core.accuracy.results import percent
@@ -43,7 +43,7 @@ def test_a_plan_of_another_version_is_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    ("rungs", "message"),
+    ("settings", "message"),
     [
         ({"signal": "sonar"}, "sonar"),
         ({"signal": "fmcw", "visibility": "depth"}, "depth"),
@@ -54,12 +54,12 @@ def test_a_plan_of_another_version_is_refused() -> None:
         ({"visibility": "none", "mask_reuse_m": 0.1}, "none"),
     ],
 )
-def test_what_cannot_be_is_refused(rungs: dict[str, object], message: str) -> None:
+def test_what_cannot_be_is_refused(settings: dict[str, object], message: str) -> None:
     with pytest.raises(Sd2Error, match=message):
-        AccuracyPlan(**rungs)  # type: ignore[arg-type]
+        AccuracyPlan(**settings)  # type: ignore[arg-type]
 
 
-def test_a_plan_changes_only_its_rungs() -> None:
+def test_a_plan_changes_only_its_settings() -> None:
     base = replace(PRESETS["paper"], velocity_sigma_bins=3.0, null_bins=())
     plan = AccuracyPlan(visibility="depth", depth_resolution=128, mask_stride=5, range_law="frame")
     options = plan.options(base)
@@ -74,9 +74,9 @@ def test_a_plan_changes_only_its_rungs() -> None:
 
 
 def test_every_sight_is_a_choice_of_its_own() -> None:
-    found = list(sights())
+    found = list(visibility_plans())
     assert len(set(found)) == len(found)
-    assert [plan.visibility for plan in sights(surface=False)] == ["none"]
+    assert [plan.visibility for plan in visibility_plans(surface=False)] == ["none"]
 
 
 def test_a_point_cloud_has_no_visibility_and_no_geometry() -> None:

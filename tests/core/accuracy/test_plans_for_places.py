@@ -14,7 +14,7 @@ from moving_spheres import swinging_sphere
 from sd2core.accuracy import Choice, places
 from sd2core.accuracy.places import MOST_PLACES, choose_for_places, spread
 from sd2core.accuracy.plans import AccuracyPlan, reference_plan
-from sd2core.accuracy.synthesizers import synthesizer_for
+from sd2core.accuracy.trial import synthesizer_for
 from sd2core.doppler import PRESETS
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import silent

@@ -9,9 +9,8 @@ import pytest
 import trimesh
 from accuracy_scenes import ball, moving, plate, steady, swinging, together
 
-from sd2core.accuracy.choosing import choose
+from sd2core.accuracy.choosing import choose, survey_scene
 from sd2core.accuracy.results import Choice, Reason
-from sd2core.accuracy.survey import survey_scene
 from sd2core.doppler import PRESETS
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import VirtualSensor
@@ -28,8 +27,8 @@ def chosen(mesh: MeshSequence, tolerance: float = TOLERANCE) -> Choice:
     return choice
 
 
-def reason(choice: Choice, rung: str) -> Reason:
-    return next(reason for reason in choice.reasons if reason.rung == rung)
+def reason(choice: Choice, setting: str) -> Reason:
+    return next(reason for reason in choice.reasons if reason.setting == setting)
 
 
 APPROACHING = steady((0, 0, 6), (0, 0, -0.9))

@@ -101,7 +101,7 @@ def test_synth_refuses_what_cannot_be_held(sd2: Sd2, plate: Path, tmp_path: Path
     assert not out.exists()
 
 
-def test_synth_takes_a_plan_or_its_rungs(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
+def test_synth_takes_a_plan_or_its_settings(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
     out = tmp_path / "map.npz"
     outcome = sd2("synth", plate, "--out", out, "--tolerance", "5%", "--visibility", "facing")
     assert outcome.code == 1

@@ -13,7 +13,7 @@ from swinging_recordings import FRAMES, RATE_HZ, recording
 
 from sd2core.accuracy.places import PlacedPlan
 from sd2core.accuracy.plans import AccuracyPlan
-from sd2core.accuracy.synthesizers import synthesizer_for
+from sd2core.accuracy.trial import synthesizer_for
 from sd2core.datasets.forecast import Counting
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.reading import open_dataset
