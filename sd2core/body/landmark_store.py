@@ -133,7 +133,7 @@ class TrackInParts:
         if arrays is None:
             raise Sd2Error(
                 f"The landmarks of frames {start} and on have gone from the folder of the work",
-                "a folder that nobody else changes",
+                "a folder that no other program changes",
                 "Start the same command again; it goes on from what is there",
             )
         return arrays
@@ -175,7 +175,7 @@ class RefinedStretches:
             if stretch is None:
                 raise Sd2Error(
                     f"What was found in frame {first} and on has gone from the folder of the work",
-                    "a folder that nobody else changes",
+                    "a folder that no other program changes",
                     "Start the same command again; it goes on from what is there",
                 )
             stretches.append(vars(stretch))

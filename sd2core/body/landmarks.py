@@ -87,7 +87,7 @@ def find_landmarks(
     Raises
     ------
     Sd2Error
-        If the video is a single picture, or nobody is found in it.
+        If the video is a single picture, or no person is found in it.
     """
     if len(video) < 2:
         raise Sd2Error(
@@ -105,7 +105,7 @@ def find_landmarks(
     refined = _refined(video, models, sightings, silhouettes, threads, progress, on_frame, store)
     if not refined.confidence.any():
         raise Sd2Error(
-            f"Nobody could be followed through {video.path}",
+            f"No person could be followed through {video.path}",
             "a person who is seen in some frames in succession",
             "Say where the person is: --person X,Y,WIDTH,HEIGHT --person-frame FRAME",
         )

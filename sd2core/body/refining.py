@@ -126,7 +126,7 @@ class Refiner:
             self._free.put(landmarker)
         there = pose.next_roi
         away = np.hypot(there.centre_x_px - roi.centre_x_px, there.centre_y_px - roi.centre_y_px)
-        # Somebody else in the square is not the person who was followed.
+        # Another person in the square is not the one who was followed.
         return pose if pose.confidence >= FOUND and away < _STRAYED * roi.size_px else None
 
 

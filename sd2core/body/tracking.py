@@ -157,7 +157,7 @@ class PersonTracker:
         best, best_rank = None, -np.inf
         for found in self._people(picture, self._predicted(time_s))[:_MAX_CANDIDATES]:
             away = self._away(found.roi, time_s)
-            # Somebody far away this soon is somebody else.
+            # A person far away this soon is another one.
             if away > 0.5 + 1.5 * gap_s:
                 continue
             pose = self._look(picture, found.roi)
@@ -192,7 +192,7 @@ class PersonTracker:
             self.own = looks
             return
         mine, theirs = self._likeness(looks)
-        # While somebody else is in the way, the colours are not the person's own.
+        # While another person covers them, the colours are not the person's own.
         if mine > theirs + 0.1:
             self.own = self.own + np.float32(0.05) * (looks - self.own)
 

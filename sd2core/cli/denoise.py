@@ -18,8 +18,8 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         "turn a synthetic Doppler map into what a radar would show",
         handler=_denoise,
         description=(
-            "A trained model works out what a radar would have measured where `sd2 synth`\n"
-            "counted vertices. The map must be made as those that the model learnt from (same\n"
+            "A trained model estimates what a radar would have measured, from the map that\n"
+            "`sd2 synth` counted. The map must be made as those that the model learnt from (same\n"
             "bins, same emptied bins); `sd2 info MODEL` says how. Another frame rate is brought\n"
             "to the model's and back. Frames without a person stay empty."
         ),

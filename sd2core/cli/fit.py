@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 _BARS = {
     "models": ("Fetching the landmark models", "B"),
     "find": ("Finding the person", "frame"),
-    "refine": ("Looking again", "frame"),
+    "refine": ("Refining the landmarks", "frame"),
     "fit": ("Fitting the body", "step"),
     "write": ("Writing the mesh", "frame"),
 }
@@ -107,7 +107,9 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         "--landmarks", type=Path, metavar="FILE", help="keep the landmarks as well (.npz)"
     )
     parser.add_argument(
-        "--restart", action="store_true", help="begin anew, not where a stopped run ended"
+        "--restart",
+        action="store_true",
+        help="start from the beginning, not where a stopped run ended",
     )
     kind = parser.add_mutually_exclusive_group()
     add_json(kind)
@@ -246,7 +248,7 @@ def _print(options: argparse.Namespace, made: FittedVideo, seconds: float) -> No
         {
             "frames": f"{frames}, {present} with the person"
             + (f" ({bridged} of them interpolated)" if bridged else ""),
-            "to the landmarks": f"{100 * about['residual_m']:.1f} cm on average",
+            "landmarks off by": f"{100 * about['residual_m']:.1f} cm on average",
             "focal length": f"{camera['focal_px']:.0f} px,"
             f" {sources.get(camera['source'], 'by default (56° across the longer side)')}",
             "stature": f"{about['stature_m']:g} m"

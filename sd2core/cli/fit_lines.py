@@ -7,6 +7,8 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from sd2core.cli.running import error_text
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -38,16 +40,7 @@ class FitLines:
 
     def error(self, error: Exception) -> None:
         """Print the reason of a failure."""
-        from sd2core.errors import Sd2Error
-
-        text = str(error)
-        if isinstance(error, OSError) and error.strerror:
-            text = f"{error.filename}: {error.strerror}." if error.filename else error.strerror
-        elif isinstance(error, MemoryError):
-            text = f"There is not enough memory for this ({error})."
-        elif not isinstance(error, Sd2Error):
-            text = f"This should not happen ({type(error).__name__}: {error})."
-        _say("error", text=text)
+        _say("error", text=error_text(error))
 
     def done(self, made: FittedVideo, seconds: float) -> None:
         """Print the notes, and that the mesh is written."""

@@ -22,8 +22,8 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         "turn a raw radar capture into a Doppler map",
         handler=_radar,
         description=(
-            "Prints what the radar can tell apart by its configuration, and says when the\n"
-            "velocity axis reaches further than the radar sees."
+            "Prints the resolution and limits of the radar by its configuration, and a note if\n"
+            "the velocity axis extends beyond them."
         ),
         examples=(
             "  sd2 radar capture/ --out real.npz\n"

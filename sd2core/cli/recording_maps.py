@@ -60,7 +60,7 @@ def _synthetic(recording: Recording, mesh: MeshSequence | None) -> DopplerMap:
     if mesh is None:
         with progress_bar("Reading the mesh") as progress:
             mesh = recording.load_mesh(progress)
-    with progress_bar("Synthesizing") as progress:
+    with progress_bar("Synthesising") as progress:
         return Synthesizer(mesh, preset="paper").map(recording.sensor, progress=progress)
 
 

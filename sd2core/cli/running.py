@@ -37,19 +37,27 @@ def run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
     except Exception as error:
         if os.environ.get("SD2_TRACEBACK") == "1":
             raise
-        if isinstance(error, OSError) and error.filename:
-            return _explain(f"{error.filename}: {error.strerror}.")
-        if isinstance(error, OSError) and error.errno:
-            if _output_fails():
-                _discard_output()
-                return _explain(f"The output cannot be written ({error.strerror}).")
-            return _explain(f"{error.strerror}.")
-        if isinstance(error, MemoryError):
-            return _explain(f"There is not enough memory for this ({error}).")
-        return _explain(
-            f"This should not happen ({type(error).__name__}: {error}). Please report it, with"
-            " what is printed when the same command runs with SD2_TRACEBACK=1 set."
-        )
+        if isinstance(error, OSError) and not error.filename and error.errno and _output_fails():
+            _discard_output()
+            return _explain(f"The output cannot be written ({error.strerror}).")
+        text = error_text(error)
+        if not isinstance(error, OSError | MemoryError):
+            text += (
+                " Please report it, with what is printed when the same command runs with"
+                " SD2_TRACEBACK=1 set."
+            )
+        return _explain(text)
+
+
+def error_text(error: Exception) -> str:
+    """Sentence that explains any error to the user."""
+    if isinstance(error, Sd2Error):
+        return str(error)
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename}: {error.strerror}." if error.filename else f"{error.strerror}."
+    if isinstance(error, MemoryError):
+        return f"There is not enough memory for this ({error})."
+    return f"This should not happen ({type(error).__name__}: {error})."
 
 
 def attach_negative_values(arguments: Sequence[str]) -> list[str]:

@@ -115,7 +115,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         "--mask-stride",
         type=positive_int,
         metavar="N",
-        help="work depth or exact visibility out for every N-th frame only, and use it for the"
+        help="compute depth or exact visibility for every N-th frame only, and use it for the"
         " frames nearest to each (default: 1)",
     )
     parser.add_argument(
@@ -266,7 +266,7 @@ def _counted(
         doppler = synthesizer.map(sensor, progress=progress)
     if not options.uncertainty:
         return doppler
-    with progress_bar("Finding how well it is known") as progress:
+    with progress_bar("Estimating the uncertainty") as progress:
         return replace(doppler, uncertainty=synthesizer.uncertainty(sensor, progress=progress))
 
 

@@ -23,7 +23,7 @@ if sys.platform == "win32":
         return True
 
     def _is_held(stream: IO[bytes]) -> bool:
-        # There is no shared hold here: who else just looks is gone in an instant.
+        # There is no shared lock here: other processes that just look are gone in an instant.
         for _ in range(5):
             if _grab(stream):
                 return False
@@ -40,7 +40,7 @@ else:
         return True
 
     def _is_held(stream: IO[bytes]) -> bool:
-        # A shared hold: all who look get one at the same time, unless somebody has taken it.
+        # A shared lock: all who look get one at the same time, unless a process holds the lock.
         try:
             fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
         except OSError:
@@ -78,5 +78,5 @@ def is_locked(path: Path) -> bool:
     try:
         with path.open("ab") as stream:
             return _is_held(stream)
-    except OSError:  # somebody else's file, or one that was deleted just now
+    except OSError:  # another user's file, or one that was deleted just now
         return False

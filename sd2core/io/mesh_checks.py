@@ -45,7 +45,7 @@ def mark_empty_frames(raw: RawMesh, source: str) -> None:
     if whole.all():
         return
     there = np.ones(frames, bool) if raw.present is None else raw.present
-    # Where the file says that there is nobody, its vertices say nothing.
+    # In frames without a person by the file, vertices say nothing.
     empty = ~finite.any(axis=1) | (~there & ~whole)
     if not whole.any() and empty.all():
         raise Sd2Error(

@@ -273,7 +273,7 @@ def _synthesis_facts(provenance: dict[str, Any]) -> dict[str, str]:
     return {
         "plan": ""
         if plan is None
-        else f"{plan['text']}, off by {100 * provenance['plan_error_l1']:.2g} %",
+        else f"{plan['text']}, error {100 * provenance['plan_error_l1']:.2g} % of the map (L1)",
         "sensor": f"at x {x:g}, y {y:g}, z {z:g} m",
         "visibility": f"{provenance['visibility']}: {fmean(visible):.1%} visible on average"
         + shared,
