@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from sd2app.settings import Settings
-from sd2app.stored_choices import StoredChoices
+from sd2app.settings import Settings, StoredChoices
 
 DEFAULTS = {"steps": 300, "delay_s": 0.5, "model": "lstm", "export": True}
 KNOWN = {"model": ("lstm", "s4")}

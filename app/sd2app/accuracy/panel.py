@@ -2,26 +2,40 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QSignalBlocker, Qt
-from PySide6.QtGui import QAction
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
+    QGridLayout,
     QHBoxLayout,
-    QProgressBar,
+    QLabel,
+    QSizePolicy,
     QToolButton,
     QVBoxLayout,
     QWidget,
 )
 
+from sd2app.accuracy.model import PRESETS, TradeModel
+from sd2app.widgets.inputs import NumberBox
+from sd2app.widgets.panel import title
+from sd2app.widgets.text import milliseconds, number, percent
+
+if TYPE_CHECKING:
+    from sd2core.accuracy.results import Reason
+
+from PySide6.QtCore import QSignalBlocker
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import (
+    QProgressBar,
+)
+
 from sd2app.accuracy.measurements import FAMILIES
-from sd2app.accuracy.model import TradeModel
 from sd2app.accuracy.plot import TradePlot
-from sd2app.accuracy.reason_list import ReasonList
 from sd2app.accuracy.text import deviation
-from sd2app.accuracy.tolerance_row import ToleranceRow
 from sd2app.session.display import DisplayModel
 from sd2app.widgets.inputs import Choice
-from sd2app.widgets.panel import rule, sentence, title
-from sd2app.widgets.text import milliseconds, percent, seconds
+from sd2app.widgets.panel import rule, sentence
+from sd2app.widgets.text import seconds
 
 _FAMILY_TEXT = {"histogram": "counting", "fmcw": "FMCW signal"}
 _NO_MESH = "Open a mesh: here you choose how exact its synthetic map is to be, and see the cost."
@@ -213,3 +227,107 @@ def _unbroken(plan: str) -> str:
     """No line starts with a separator, or ends between a sign and its number."""
     space = "\N{NO-BREAK SPACE}"
     return plan.replace(" ·", f"{space}·").replace("× ", f"×{space}").replace(" %", f"{space}%")
+
+
+class ReasonList(QWidget):
+    """One line per reason: ✓ is modelled, – is left out."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._shown: tuple[Reason, ...] = ()
+        self._grid = QGridLayout(self)
+        self._grid.setContentsMargins(0, 0, 0, 0)
+        self._grid.setHorizontalSpacing(6)
+        self._grid.setVerticalSpacing(4)
+        self._grid.setColumnStretch(1, 1)
+
+    def show_reasons(self, reasons: tuple[Reason, ...]) -> None:
+        """Replace what is listed; what is modelled comes first."""
+        if reasons == self._shown:
+            return
+        self._shown = reasons
+        while (item := self._grid.takeAt(0)) is not None:
+            if (widget := item.widget()) is not None:
+                widget.deleteLater()
+        for row, reason in enumerate(sorted(reasons, key=lambda reason: not reason.modelled)):
+            mark = QLabel("✓" if reason.modelled else "–", self)
+            sentence = reason.text[:1].upper() + reason.text[1:]
+            # A number and its unit stay on one line.
+            text = QLabel(sentence.replace(" %", "\N{NO-BREAK SPACE}%"), self)
+            text.setWordWrap(True)
+            text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+            text.setAccessibleName(
+                f"{'Modelled' if reason.modelled else 'Left out'}: {reason.text}"
+            )
+            for label in (mark, text):
+                label.setObjectName("plain" if reason.modelled else "muted")
+            self._grid.addWidget(mark, row, 0, Qt.AlignmentFlag.AlignTop)
+            self._grid.addWidget(text, row, 1)
+
+
+class ToleranceRow(QWidget):
+    """How much of the map may differ from the reference."""
+
+    def __init__(self, trade: TradeModel, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._trade = trade
+        self._box = NumberBox(
+            0.05,
+            50.0,
+            " %",
+            "Tolerance: how much of the map may differ from the reference, after smoothing",
+            decimals=2,
+            step=0.5,
+        )
+        self._box.valueChanged.connect(lambda value: trade.set_tolerance(value / 100))
+        head = QHBoxLayout()
+        head.addWidget(title("Tolerance"))
+        head.addStretch(1)
+        head.addWidget(self._box)
+        row = QHBoxLayout()
+        row.setSpacing(4)
+        self._presets: dict[float, QToolButton] = {}
+        for tolerance in PRESETS:
+            button = QToolButton(self)
+            button.setObjectName("preset")
+            button.setCheckable(True)
+            button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+            button.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+            button.clicked.connect(lambda _=False, value=tolerance: trade.set_tolerance(value))
+            row.addWidget(button, 1)
+            self._presets[tolerance] = button
+        self._meaning = QLabel(self)
+        self._meaning.setObjectName("muted")
+        self._meaning.setWordWrap(True)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(4)
+        layout.addLayout(head)
+        layout.addLayout(row)
+        layout.addWidget(self._meaning)
+        trade.changed.connect(self._refresh)
+        self._refresh()
+
+    def _refresh(self) -> None:
+        trade = self._trade
+        self._box.show_value(100 * trade.tolerance)
+        clicked = trade.in_use is not None and trade.in_use.origin == "clicked"
+        known = trade.measured.counting is not None
+        for tolerance, button in self._presets.items():
+            cost_ms = trade.cost_at(tolerance)
+            cost = number(cost_ms) if cost_ms is not None else "–"
+            # What a tolerance costs stands under it once the scene has been measured.
+            button.setText(f"{percent(tolerance)}\n{cost}" if known else percent(tolerance))
+            button.setChecked(not clicked and abs(tolerance - trade.tolerance) < 1e-9)
+            price = "measure this scene to see its cost"
+            if known:
+                price = "no plan holds it"
+            if cost_ms is not None:
+                price = f"{milliseconds(cost_ms)} per frame here"
+            button.setToolTip(f"Accept an error of {percent(tolerance)}: {price}")
+            button.setAccessibleName(button.toolTip())
+        here = " Under each its cost here, ms per frame." if known else ""
+        self._meaning.setText(
+            f"{percent(trade.tolerance)}: the differences from the reference map add up to"
+            f" {percent(trade.tolerance)} of it.{here}"
+        )

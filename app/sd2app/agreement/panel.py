@@ -8,10 +8,8 @@ from sd2app.agreement.model import AgreementModel
 from sd2app.agreement.text import facts, label_facts, verdict, where
 from sd2app.session.playback import PlaybackModel
 from sd2app.shell.menus import ActionSet
-from sd2app.widgets.elided import ElidedLabel
-from sd2app.widgets.fact_rows import FactRows
 from sd2app.widgets.inputs import action_button
-from sd2app.widgets.panel import rule, sentence, title
+from sd2app.widgets.panel import ElidedLabel, FactRows, rule, sentence, title
 
 _MOST_FACTS, _MOST_LABELS = 10, 12
 _NOTHING = (

@@ -22,10 +22,9 @@ from PySide6.QtWidgets import (
 
 from sd2app.batch.model import BatchModel
 from sd2app.batch.text import failure_text, headline, step_facts, time_text
-from sd2app.widgets.cell_table import ROW_PX
-from sd2app.widgets.elided import ElidedLabel
 from sd2app.widgets.pages import InnerPage, InnerPages
-from sd2app.widgets.panel import outlined, sentence, side_by_side
+from sd2app.widgets.panel import ElidedLabel, outlined, sentence, side_by_side
+from sd2app.widgets.table import ROW_PX
 
 _MOST_STEPS = 6
 _NO_DATASET = "No data set has been exported here yet."

@@ -11,8 +11,7 @@ from typing import Any, Literal, get_args
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import LatestRunner
-from sd2app.settings import Settings
-from sd2app.stored_choices import StoredChoices
+from sd2app.settings import Settings, StoredChoices
 from sd2core.batch.plan import BatchPlan, Denoise, Export, Fit, Recordings, Synthesise
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import plain_path

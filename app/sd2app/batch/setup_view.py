@@ -29,10 +29,16 @@ from sd2app.batch.setup import (
     most_workers,
 )
 from sd2app.batch.text import entry_text, estimate_facts, estimate_headline, unusable_text
-from sd2app.widgets.elided import ElidedLabel
-from sd2app.widgets.fact_rows import FactRows
 from sd2app.widgets.inputs import Choice, NumberBox
-from sd2app.widgets.panel import outlined, rule, sentence, side_by_side, title
+from sd2app.widgets.panel import (
+    ElidedLabel,
+    FactRows,
+    outlined,
+    rule,
+    sentence,
+    side_by_side,
+    title,
+)
 from sd2app.widgets.text import percent
 
 _SUBJECT_TEXT = {

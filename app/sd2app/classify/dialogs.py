@@ -12,7 +12,7 @@ from sd2app.classify.result import read_result
 from sd2app.classify.result_dialog import ClassResultDialog
 from sd2app.classify.text import classifier_page
 from sd2app.session.content import UNTITLED
-from sd2app.widgets.confirm import may_delete
+from sd2app.widgets.dialogs import may_delete
 from sd2app.widgets.model_card_dialog import ModelCardDialog
 from sd2core.errors import Sd2Error
 

@@ -11,8 +11,7 @@ from sd2app.classify.run import ClassRun
 from sd2app.classify.run_text import facts, headline, note, time_text
 from sd2app.classify.training import ClassTraining
 from sd2app.session.display import DisplayModel
-from sd2app.widgets.fact_rows import FactRows
-from sd2app.widgets.panel import outlined, sentence
+from sd2app.widgets.panel import FactRows, outlined, sentence
 
 _PARTS = 1000
 

@@ -26,9 +26,9 @@ from sd2app.session.display import DisplayModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.time_window import VisibleSpanModel
 from sd2app.widgets.cached_paint import Still
-from sd2app.widgets.elided import ElidedLabel
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.model_menu import ModelButton
+from sd2app.widgets.panel import ElidedLabel
 from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, paint_cursor, turn_wheel
 from sd2core.labels.label_set import LabelSet
 

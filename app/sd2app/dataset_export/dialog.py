@@ -22,9 +22,8 @@ from PySide6.QtWidgets import (
 
 from sd2app.dataset_export.model import ENDINGS, MAPS, ExportModel
 from sd2app.dataset_export.text import label_words, size_words, split_words
-from sd2app.widgets.elided import ElidedLabel
 from sd2app.widgets.inputs import Choice, NumberBox
-from sd2app.widgets.panel import outlined, rule, sentence, side_by_side
+from sd2app.widgets.panel import ElidedLabel, outlined, rule, sentence, side_by_side
 from sd2core.recording.recording import is_recording
 
 _FORMATS = {

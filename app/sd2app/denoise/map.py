@@ -6,7 +6,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,15 +14,16 @@ from PySide6.QtCore import QObject, QTimer, Signal
 
 from sd2app.background.latest import LatestRunner
 from sd2app.denoise.library import Denoiser, LiveSession
-from sd2app.denoise.pieces import AT_ONCE, cut_out, next_piece, touched, with_context
 from sd2app.maps.partial_map import View
-from sd2app.maps.refine import Companion
+from sd2app.maps.quality import Companion
 from sd2app.session.content import reference_of
 from sd2app.session.tasks import Job, JobsModel
 from sd2app.session.tracks import TrackModel
 from sd2core.denoise.resample_to_model import is_regular
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
+from sd2core.pairs.segments import LENGTH, OVERLAP
+from sd2core.timebase import Timebase
 
 _TOO_SLOW_S = 0.15
 """A model that takes longer for what follows a hand waits until the hand rests."""
@@ -34,6 +35,11 @@ _BETWEEN_MS = 80
 """While the synthetic map sharpens, a short clip is denoised so often at most."""
 
 _WAITS = "too slow to be dragged, follows when the sensor rests"
+
+AT_ONCE = 2048
+"""Frames that are denoised together; a clip up to this length always is whole."""
+CONTEXT = 288
+"""Frames around a stretch that its preview is made with: four windows of training."""
 
 
 class Swept(NamedTuple):
@@ -431,3 +437,62 @@ class DenoisedMap(QObject):
         if self._job is not None:
             self._jobs.finish(self._job)
             self._job = None
+
+
+def next_piece(wanted: NDArray[np.bool_], view: View) -> View | None:
+    """The stretch to be denoised next, half-open; None when there is none.
+
+    Parameters
+    ----------
+    wanted : bool array, shape (T,)
+        Frames that are known, and whose answer is not.
+    view : tuple of int
+        Frames on screen: these first, then those that follow, then those before.
+    """
+    if len(wanted) <= AT_ONCE:
+        return (0, len(wanted)) if wanted.any() else None
+    for start, stop in (view, (view[1], len(wanted)), (0, view[0])):
+        numbers = np.flatnonzero(wanted[start:stop])
+        if numbers.size:
+            first = start + int(numbers[0])
+            last = start + int(numbers[numbers < numbers[0] + AT_ONCE][-1])
+            return first, last + 1
+    return None
+
+
+def with_context(known: NDArray[np.bool_], piece: View) -> View:
+    """A stretch with what comes before and after it, as far as that is known.
+
+    It begins where a window does that is cut from the whole clip.
+    """
+    first, last = piece[0], piece[1]
+    wanted = max(first - CONTEXT, 0)
+    before = known[wanted - wanted % (LENGTH - OVERLAP) : first][::-1]
+    after = known[last : last + CONTEXT]
+    return (
+        first - (len(before) if before.all() else int(before.argmin())),
+        last + (len(after) if after.all() else int(after.argmin())),
+    )
+
+
+def touched(piece: View, frames: int) -> slice:
+    """Frames whose preview changes with a stretch."""
+    return slice(max(piece[0] - CONTEXT, 0), min(piece[1] + CONTEXT, frames))
+
+
+def cut_out(doppler: DopplerMap, start: int, values: NDArray[np.float32]) -> DopplerMap:
+    """A stretch of a map, with values (bins, frames) of its own, as a map."""
+    stop = start + values.shape[1]
+    whole = (start, stop) == (0, len(doppler.timebase))
+    return replace(
+        doppler,
+        values=values,
+        timebase=doppler.timebase if whole else Timebase(doppler.times_s[start:stop]),
+        present=None if doppler.present is None else doppler.present[start:stop],
+        uncertainty=None,
+    )
+
+
+def known_frames(doppler: DopplerMap, covered: Any) -> NDArray[np.bool_]:
+    """Frames of a track that hold something, (T,)."""
+    return np.ones(len(doppler.timebase), bool) if covered is None else np.asarray(covered, bool)

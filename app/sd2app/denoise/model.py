@@ -11,12 +11,11 @@ from PySide6.QtCore import QObject, QTimer, Signal
 
 from sd2app.background.latest import LatestRunner
 from sd2app.denoise.library import Denoiser, DenoiserLibrary
-from sd2app.denoise.map import DenoisedMap
-from sd2app.denoise.pieces import known_frames
+from sd2app.denoise.map import DenoisedMap, known_frames
 from sd2app.denoise.text import origin_words, track_words
 from sd2app.maps.model import SynthesisModel
-from sd2app.maps.partial_map import View
-from sd2app.maps.refine import Companion, Part
+from sd2app.maps.partial_map import Part, View
+from sd2app.maps.quality import Companion
 from sd2app.session.denoiser_choice import NO_MODEL, UNSAID, DenoiserChoice
 from sd2app.session.document import DocumentModel
 from sd2app.session.tasks import JobsModel

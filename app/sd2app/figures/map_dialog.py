@@ -13,8 +13,7 @@ from PySide6.QtWidgets import (
 from sd2app.figures.map_figure import FigureModel
 from sd2app.figures.preview import FigurePreview
 from sd2app.palette import Palette
-from sd2app.widgets.dialog_buttons import ExportButtons
-from sd2app.widgets.figure_file import ask_figure
+from sd2app.widgets.dialogs import ExportButtons, ask_figure
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.panel import side_by_side
 

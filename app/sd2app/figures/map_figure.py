@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QObject
 
-from sd2app.figures.drawn_figure import DrawnFigure
+from sd2app.figures.preview import DrawnFigure
 from sd2app.maps.difference import DifferenceModel
 from sd2app.session.display import HeatmapLevels
 from sd2app.session.tracks import TrackModel

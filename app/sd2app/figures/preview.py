@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QObject, Signal
+
+from sd2app.background.latest import Emit, LatestRunner
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
 from PySide6.QtWidgets import QWidget
 
-from sd2app.figures.drawn_figure import DrawnFigure
 from sd2app.palette import Palette
+
+_PREVIEW_DPI = 110
 
 
 class FigurePreview(QWidget):
@@ -48,3 +61,97 @@ class FigurePreview(QWidget):
         box.moveCenter(QRectF(self.rect()).center())
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
         painter.drawImage(box, image)
+
+
+class DrawnFigure(QObject):
+    """Draws in the background; the newest choice wins.
+
+    Signals
+    -------
+    changed
+        A choice, or whether it is being drawn.
+    drawn
+        Another preview.
+    written : Path
+        The file is there.
+    """
+
+    changed = Signal()
+    drawn = Signal()
+    written = Signal(object)
+
+    def __init__(self, name: str, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._picture: NDArray[np.uint8] | None = None
+        self._problem = ""
+        self._exporting = False
+        self._runner = LatestRunner(name, self)
+        self._runner.finished.connect(self._receive)
+        self._runner.failed.connect(self._refuse)
+        self._runner.idle_changed.connect(lambda _: self.changed.emit())
+
+    @property
+    def picture(self) -> NDArray[np.uint8] | None:
+        """The preview, RGBA of shape (H, W, 4)."""
+        return self._picture
+
+    @property
+    def problem(self) -> str:
+        """Why it cannot be drawn."""
+        return self._problem
+
+    @property
+    def busy(self) -> bool:
+        """Whether it is being drawn or written."""
+        return self._runner.busy
+
+    @property
+    def exporting(self) -> bool:
+        """Whether it is being written."""
+        return self._exporting
+
+    def close(self) -> None:
+        """Stop drawing."""
+        self._runner.close()
+
+    def _preview(self, plot: Callable[[Emit], Figure]) -> None:
+        """Draw what ``plot`` makes, for the screen."""
+
+        def draw(emit: Emit) -> NDArray[np.uint8]:
+            from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+            figure = plot(emit)
+            figure.set_dpi(_PREVIEW_DPI)
+            canvas = FigureCanvasAgg(figure)
+            canvas.draw()
+            return np.array(canvas.buffer_rgba())
+
+        self._problem = ""
+        self._runner.submit(draw)
+        self.changed.emit()
+
+    def _write(self, path: Path, write: Callable[[Emit], None]) -> None:
+        """Let ``write`` make the file."""
+
+        def make(emit: Emit) -> Path:
+            write(emit)
+            return path
+
+        self._exporting = True
+        self._runner.submit(make)
+        self.changed.emit()
+
+    def _receive(self, result: Any) -> None:
+        if isinstance(result, Path):
+            self._exporting = False
+            self.changed.emit()
+            self.written.emit(result)
+            return
+        self._picture = result
+        self.drawn.emit()
+
+    def _refuse(self, error: Exception) -> None:
+        self._runner.cancel()
+        self._exporting = False
+        self._problem = str(error)
+        self.changed.emit()

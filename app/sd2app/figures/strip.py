@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from PySide6.QtCore import QObject
 
 from sd2app.background.latest import Emit
-from sd2app.figures.drawn_figure import DrawnFigure
+from sd2app.figures.preview import DrawnFigure
 from sd2app.session.content import UNTITLED, Content
 from sd2core.errors import Sd2Error
 from sd2core.figures.frames import frames_around, parse_frames, spread_frames

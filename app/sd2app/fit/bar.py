@@ -11,7 +11,7 @@ from sd2app.fit.clock import FitFollower
 from sd2app.fit.model import FitModel
 from sd2app.fit.offer import FitOffer
 from sd2app.fit.progress import left_in_words
-from sd2app.widgets.elided import ElidedLabel
+from sd2app.widgets.panel import ElidedLabel
 
 _STEPS = 1000
 _HEIGHT = 40

@@ -23,9 +23,8 @@ from PySide6.QtWidgets import (
 from sd2app.fit.person_picker import PersonPicker
 from sd2app.fit.setup import ANGLES_DEG, DEFAULT_STATURE_M, STATURES_M, FitSetupModel
 from sd2app.palette import Palette
-from sd2app.widgets.elided import ElidedLabel
 from sd2app.widgets.inputs import Choice, NumberBox
-from sd2app.widgets.panel import side_by_side
+from sd2app.widgets.panel import ElidedLabel, side_by_side
 from sd2app.widgets.time_axis import clock_text
 
 VIDEOS = "Video (*.mp4 *.mkv *.mov *.avi *.webm *.m4v *.mpg *.ts *.wmv);;All files (*)"

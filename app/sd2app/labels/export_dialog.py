@@ -13,7 +13,7 @@ from PySide6.QtWidgets import (
 )
 
 from sd2app.labels.export_model import LabelExportModel
-from sd2app.widgets.dialog_buttons import ExportButtons
+from sd2app.widgets.dialogs import ExportButtons
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.panel import rule, sentence
 from sd2core.labels.formats import FORMATS

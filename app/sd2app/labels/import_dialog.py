@@ -13,9 +13,8 @@ from PySide6.QtWidgets import (
 )
 
 from sd2app.labels.import_model import LabelImportModel
-from sd2app.widgets.fact_rows import FactRows
 from sd2app.widgets.inputs import Choice
-from sd2app.widgets.panel import rule, sentence, title
+from sd2app.widgets.panel import FactRows, rule, sentence, title
 from sd2core.labels.formats import FORMATS
 
 _MOST_FACTS = 6

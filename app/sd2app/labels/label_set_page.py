@@ -27,12 +27,10 @@ from PySide6.QtWidgets import (
 )
 
 from sd2app.labels.label_set_model import CLASS, COLOUR, KEY, NAME, NO_CLASS, LabelSetModel
-from sd2app.widgets.cell_table import CellTable
-from sd2app.widgets.elided import ElidedLabel
 from sd2app.widgets.icons import swatch_icon
-from sd2app.widgets.own_keys import claims
-from sd2app.widgets.panel import outlined
-from sd2app.widgets.table import Choosable, FramedCells, ListedEditor
+from sd2app.widgets.inputs import claims
+from sd2app.widgets.panel import ElidedLabel, outlined
+from sd2app.widgets.table import CellTable, Choosable, FramedCells, ListedEditor
 
 _WIDE = ("■ a longer name", "Key", "■ vermilion (alike)", "background", "Spans")
 _PADDING_PX = 14

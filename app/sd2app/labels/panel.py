@@ -14,8 +14,8 @@ from sd2app.labels.statistics import StatisticsTableModel
 from sd2app.labels.statistics_page import StatisticsPage
 from sd2app.labels.table import SpanTable
 from sd2app.labels.table_model import SpanTableModel
-from sd2app.widgets.elided import ElidedLabel
 from sd2app.widgets.pages import InnerPage, InnerPages
+from sd2app.widgets.panel import ElidedLabel
 
 if TYPE_CHECKING:
     from sd2app.shell.menus import ActionSet

@@ -16,9 +16,8 @@ from sd2app.labels.columns import COLUMNS
 from sd2app.labels.model import LabelsModel
 from sd2app.labels.table import SpanTable
 from sd2app.labels.table_model import SpanFilter, SpanTableModel
-from sd2app.widgets.inputs import Choice
+from sd2app.widgets.inputs import Choice, SearchLine
 from sd2app.widgets.panel import outlined
-from sd2app.widgets.search_line import SearchLine
 
 _ANY = {"label": "Any label", "track": "Any track"}
 _LISTED = {one.id: one for one in COLUMNS if one.listed is not None}

@@ -13,8 +13,8 @@ from PySide6.QtWidgets import (
 )
 
 from sd2app.labels.statistics import StatisticsTableModel
-from sd2app.widgets.cell_table import ROW_PX
 from sd2app.widgets.panel import outlined
+from sd2app.widgets.table import ROW_PX
 
 _WIDE = "■ left-to-right  "
 _PADDING_PX = 10

@@ -17,9 +17,8 @@ from sd2app.labels.table_model import SpanTableModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.time_window import VisibleSpanModel
 from sd2app.settings import Settings
-from sd2app.widgets.cell_table import CellTable
 from sd2app.widgets.icons import swatch_icon
-from sd2app.widgets.table import Choosable, FramedCells
+from sd2app.widgets.table import CellTable, Choosable, FramedCells
 from sd2core.labels import field_edits
 
 

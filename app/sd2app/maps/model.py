@@ -11,14 +11,22 @@ from PySide6.QtCore import QObject, QTimer, Signal
 
 from sd2app.accuracy.model import TradeModel
 from sd2app.background.latest import LatestRunner
-from sd2app.maps.compiling import CompilerModel
-from sd2app.maps.partial_map import FINAL, View
-from sd2app.maps.quality import budget_ms, distance_m, final_way, final_words, rough_way
+from sd2app.maps.partial_map import FINAL, PaintedMap, Part, View
+from sd2app.maps.quality import (
+    Companion,
+    Way,
+    budget_ms,
+    distance_m,
+    final_way,
+    final_words,
+    is_swept_whole,
+    refine,
+    rough_way,
+    worked_out,
+)
 from sd2app.maps.readout import FrameReader, Readout
-from sd2app.maps.refine import Companion, Part, Way, is_swept_whole, refine, worked_out
-from sd2app.maps.shown_map import PaintedMap
 from sd2app.maps.synthesizers import Carriers
-from sd2app.maps.warm_up import Readier
+from sd2app.maps.warm_up import CompilerModel, Readier
 from sd2app.session.document import DocumentModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.sensor import SensorModel

@@ -28,10 +28,9 @@ from sd2app.session.time_window import VisibleSpanModel
 from sd2app.session.tracks import TrackModel
 from sd2app.session.video import VideoModel
 from sd2app.video.overlay_settings import OverlayModel
-from sd2app.widgets.elided import ElidedLabel
-from sd2app.widgets.figure_file import FIGURES
-from sd2app.widgets.frames import fill, panel, splitter
+from sd2app.widgets.dialogs import FIGURES
 from sd2app.widgets.inputs import Choice
+from sd2app.widgets.panel import ElidedLabel, fill, panel, splitter
 
 
 class ComparisonWindow(QWidget):

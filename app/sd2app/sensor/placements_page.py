@@ -20,10 +20,8 @@ from sd2app.sensor.placement_text import (
     limits_text,
 )
 from sd2app.sensor.placements import PlacementsModel
-from sd2app.widgets.fact_rows import FactRows
-from sd2app.widgets.inputs import Choice
-from sd2app.widgets.panel import outlined, rule, sentence, side_by_side, title
-from sd2app.widgets.typed_line import TypedLine
+from sd2app.widgets.inputs import Choice, TypedLine
+from sd2app.widgets.panel import FactRows, outlined, rule, sentence, side_by_side, title
 from sd2core.figures.colours import SEQUENTIAL
 
 _KIND_TEXT: dict[Kind, str] = {"none": "None", "grid": "Grid", "cloud": "Random cloud"}

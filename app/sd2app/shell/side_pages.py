@@ -9,8 +9,7 @@ from sd2app.agreement.panel import AgreementPanel
 from sd2app.classify.panel import ClassPanel
 from sd2app.labels.label_set_dialog import LabelSetDialogs
 from sd2app.labels.panel import LabelsPanel
-from sd2app.sensor.pages import SensorPages
-from sd2app.sensor.panel import SensorPanel
+from sd2app.sensor.panel import SensorPages, SensorPanel
 from sd2app.sensor.placement_dialogs import PlacementDialogs
 from sd2app.sensor.placements_page import PlacementsPage
 from sd2app.shell.side_panel import SidePanel

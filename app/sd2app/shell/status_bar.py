@@ -9,7 +9,7 @@ from sd2app.accuracy.model import TradeModel
 from sd2app.maps.model import SynthesisModel
 from sd2app.session.tasks import JobsModel
 from sd2app.session.tracks import PointerModel, Reading
-from sd2app.widgets.elided import ElidedLabel
+from sd2app.widgets.panel import ElidedLabel
 from sd2app.widgets.time_axis import clock_text
 
 _QUIET_MS = 300

@@ -23,7 +23,7 @@ from PySide6.QtWidgets import (
 
 from sd2app.background.latest import LatestRunner
 from sd2app.settings import Settings
-from sd2app.widgets.frames import fill, panel, splitter
+from sd2app.widgets.panel import fill, panel, splitter
 from sd2app.widgets.theme import apply_theme
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from sd2app.labels.panel import LabelsPanel
     from sd2app.labels.tracks_dialog import TrackDialogs
     from sd2app.scene import SceneView
-    from sd2app.sensor.pages import SensorPages
+    from sd2app.sensor.panel import SensorPages
     from sd2app.shell.file_dialogs import Dialogs
     from sd2app.shell.side_panel import SidePanel
     from sd2app.shell.wiring import Context

@@ -7,8 +7,8 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QWidget
 
 from sd2app.shell.menus import ActionSet
 from sd2app.suggestions.model import SuggestionsModel
-from sd2app.widgets.elided import ElidedLabel
 from sd2app.widgets.inputs import Choice, NumberBox, action_button
+from sd2app.widgets.panel import ElidedLabel
 
 _BUTTONS = (
     ("accept_suggestion", "Accept"),

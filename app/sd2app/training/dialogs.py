@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QApplication, QCheckBox, QFileDialog, QMessageBox,
 
 from sd2app.training.model import TrainingModel
 from sd2app.training.result import TrainingUse
-from sd2app.widgets.confirm import may_delete
+from sd2app.widgets.dialogs import may_delete
 from sd2core.errors import Sd2Error
 
 

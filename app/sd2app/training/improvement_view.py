@@ -7,8 +7,7 @@ from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QVBoxLayout, QWidget
 
 from sd2app.training.result import TrainingUse
 from sd2app.training.text import gain_rows, gain_summary
-from sd2app.widgets.fact_rows import FactRows
-from sd2app.widgets.panel import outlined, sentence, title
+from sd2app.widgets.panel import FactRows, outlined, sentence, title
 
 
 class TrainingGainView(QWidget):

@@ -25,9 +25,8 @@ from sd2app.training.text import (
     remedy_text,
     time_text,
 )
-from sd2app.widgets.fact_rows import FactRows
 from sd2app.widgets.inputs import Choice
-from sd2app.widgets.panel import outlined, sentence
+from sd2app.widgets.panel import FactRows, outlined, sentence
 
 _STEPS = 1000
 _CLOSING_TEXT = {"ask": "ask", "keep": "keep training", "stop": "stop, keep the best"}

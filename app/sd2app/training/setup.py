@@ -10,8 +10,7 @@ from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import LatestRunner
 from sd2app.background.step_times import StepKey, StepTime, StepTimes
-from sd2app.settings import Settings
-from sd2app.stored_choices import StoredChoices
+from sd2app.settings import Settings, StoredChoices
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import plain_path
 from sd2core.pairs.summary import PairFacts, pair_facts

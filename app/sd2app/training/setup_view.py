@@ -26,9 +26,8 @@ from sd2app.training.text import (
     steps_text,
     store_text,
 )
-from sd2app.widgets.elided import ElidedLabel
 from sd2app.widgets.inputs import Choice, NumberBox
-from sd2app.widgets.panel import data_row, outlined, sentence, title
+from sd2app.widgets.panel import ElidedLabel, data_row, outlined, sentence, title
 
 _FIELDS = (
     # name, text, low, high, decimals, step, tip

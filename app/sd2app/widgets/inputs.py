@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, QSignalBlocker, Qt
-from PySide6.QtGui import QAction, QKeyEvent, QWheelEvent
-from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QToolButton, QWidget
+from collections.abc import Collection
 
-from sd2app.widgets.own_keys import claims
+from PySide6.QtCore import QEvent, QSignalBlocker, Qt, Signal
+from PySide6.QtGui import QAction, QFocusEvent, QKeyEvent, QWheelEvent
+from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QLineEdit, QToolButton, QWidget
 
-_OWN_KEYS = (
+_STEP_KEYS = (
     Qt.Key.Key_Up,
     Qt.Key.Key_Down,
     Qt.Key.Key_PageUp,
@@ -17,6 +17,13 @@ _OWN_KEYS = (
     Qt.Key.Key_Enter,
     Qt.Key.Key_Escape,
 )
+
+_PLAIN = (
+    Qt.KeyboardModifier.NoModifier,
+    Qt.KeyboardModifier.ShiftModifier,
+    Qt.KeyboardModifier.KeypadModifier,
+)
+_ENDING_KEYS = (Qt.Key.Key_Escape, Qt.Key.Key_Return, Qt.Key.Key_Enter)
 
 
 class NumberBox(QDoubleSpinBox):
@@ -62,7 +69,7 @@ class NumberBox(QDoubleSpinBox):
 
     def event(self, event: QEvent) -> bool:
         """Keys that step or end the editing do that here."""
-        return claims(event, _OWN_KEYS) or super().event(event)
+        return claims(event, _STEP_KEYS) or super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Return and Escape end the editing."""
@@ -122,3 +129,97 @@ def action_button(action: QAction, text: str) -> QToolButton:
 
     action.changed.connect(follow)
     return button
+
+
+def claims(event: QEvent, keys: Collection[Qt.Key] | None = None) -> bool:
+    """Take a plain key, any or one of these, before it is taken for that of an action.
+
+    To be asked first in ``event()``; True when the event is settled.
+    """
+    if (
+        event.type() == QEvent.Type.ShortcutOverride
+        and isinstance(event, QKeyEvent)
+        and event.modifiers() in _PLAIN
+        and (keys is None or event.key() in keys)
+    ):
+        event.accept()
+        return True
+    return False
+
+
+class SearchLine(QLineEdit):
+    """Escape empties it, then gives the keyboard back to the window."""
+
+    def __init__(self, hint: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setPlaceholderText(hint)
+        self.setAccessibleName(hint)
+        self.setClearButtonEnabled(True)
+
+    def event(self, event: QEvent) -> bool:
+        """Escape and Return are its own."""
+        return claims(event, _ENDING_KEYS) or super().event(event)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Escape."""
+        if event.key() != Qt.Key.Key_Escape:
+            super().keyPressEvent(event)
+        elif self.text():
+            self.clear()
+        else:
+            self.clearFocus()
+
+
+class TypedLine(QLineEdit):
+    """Says what is typed while it is typed; Escape takes it back.
+
+    Return and Escape give the keyboard back to the window.
+
+    Signals
+    -------
+    typed : str
+        What it holds now.
+    ended
+        The keyboard is elsewhere again.
+    """
+
+    typed = Signal(str)
+    ended = Signal()
+
+    def __init__(self, name: str, tip: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setAccessibleName(name)
+        self.setToolTip(tip)
+        self._before = ""
+        self.textEdited.connect(self.typed)
+
+    def show_text(self, text: str) -> None:
+        """Follow a model."""
+        if text != self.text():
+            self.setText(text)
+
+    def event(self, event: QEvent) -> bool:
+        """Escape and Return are its own."""
+        return claims(event, _ENDING_KEYS) or super().event(event)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Return and Escape end the typing."""
+        if event.key() == Qt.Key.Key_Escape:
+            if self.text() != self._before:
+                self.setText(self._before)
+                self.typed.emit(self._before)
+            self.clearFocus()
+        elif event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            self.clearFocus()
+        else:
+            super().keyPressEvent(event)
+
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        """Typing may begin."""
+        self._before = self.text()
+        super().focusInEvent(event)
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        """Typing has ended."""
+        super().focusOutEvent(event)
+        self.ended.emit()

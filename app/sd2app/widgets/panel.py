@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QLabel, QToolButton, QWidget
-
-from sd2app.widgets.elided import ElidedLabel
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtGui import QPainter, QPaintEvent
+from PySide6.QtWidgets import (
+    QFrame,
+    QGridLayout,
+    QHBoxLayout,
+    QLabel,
+    QLayout,
+    QSizePolicy,
+    QSplitter,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
 
 
 def title(text: str) -> QLabel:
@@ -89,3 +99,111 @@ def side_by_side(*widgets: QWidget, spacing_px: int = 8) -> QHBoxLayout:
         row.addWidget(widget)
     row.addStretch(1)
     return row
+
+
+class FactRows(QWidget):
+    """Rows of a name and a value, as many as there are facts, up to ``most``.
+
+    Parameters
+    ----------
+    most : int
+    at_the_edge : bool
+        Values stand at the right edge and long names wrap, instead of values following names.
+    """
+
+    def __init__(self, most: int, at_the_edge: bool, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        grid = QGridLayout(self)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setHorizontalSpacing(12)
+        grid.setVerticalSpacing(2)
+        grid.setColumnStretch(0 if at_the_edge else 1, 1)
+        self._cells: list[tuple[QLabel, QLabel]] = []
+        for row in range(most):
+            name, value = sentence(""), QLabel(self)
+            name.setWordWrap(at_the_edge)
+            if at_the_edge:
+                value.setAlignment(Qt.AlignmentFlag.AlignRight)
+            grid.addWidget(name, row, 0)
+            grid.addWidget(value, row, 1)
+            self._cells.append((name, value))
+
+    def show_facts(self, facts: Sequence[tuple[str, str]]) -> None:
+        """Show them, and nothing where there are none."""
+        self.setVisible(bool(facts))
+        for row, (name, value) in enumerate(self._cells):
+            texts = facts[row] if row < len(facts) else ("", "")
+            for label, text in zip((name, value), texts, strict=True):
+                label.setText(text)
+                label.setVisible(row < len(facts))
+
+
+class ElidedLabel(QLabel):
+    """A label as narrow as need be; the whole text is in its tooltip and its accessible name."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
+
+    def setText(self, text: str) -> None:
+        """Show a text."""
+        if text != self.text():
+            super().setText(text)
+            self.setToolTip(text)
+            self.setAccessibleName(text)
+
+    def minimumSizeHint(self) -> QSize:
+        """Some words at least."""
+        return QSize(40, super().minimumSizeHint().height())
+
+    def sizeHint(self) -> QSize:
+        """All of it."""
+        metrics = self.fontMetrics()
+        return QSize(metrics.horizontalAdvance(self.text()) + 4, metrics.height())
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """As much of the text as there is room for."""
+        with QPainter(self) as painter:
+            painter.setPen(self.palette().color(self.foregroundRole()))
+            text = self.fontMetrics().elidedText(
+                self.text(), Qt.TextElideMode.ElideRight, self.width()
+            )
+            painter.drawText(self.rect(), int(self.alignment()), text)
+
+
+def panel(name: str) -> QFrame:
+    """An empty panel."""
+    frame = QFrame()
+    frame.setObjectName("panel")
+    frame.setAccessibleName(name.capitalize())
+    # A click anywhere in it takes the keyboard back from a number box.
+    frame.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
+    return frame
+
+
+def splitter(
+    orientation: Qt.Orientation, widgets: list[QWidget], sizes: tuple[int, ...]
+) -> QSplitter:
+    """Widgets side by side or below each other, of these sizes to begin with."""
+    made = QSplitter(orientation)
+    made.setChildrenCollapsible(False)
+    made.setHandleWidth(8)
+    for widget in widgets:
+        made.addWidget(widget)
+    made.setSizes(list(sizes))
+    # Extra room goes to the middle of the top row and to the left of the bottom row.
+    for index, size in enumerate(sizes):
+        made.setStretchFactor(index, 1 if size == max(sizes) else 0)
+    return made
+
+
+def fill(frame: QFrame, content: QWidget | QLayout) -> None:
+    """Put something into an empty panel."""
+    if isinstance(content, QWidget):
+        layout: QLayout = QVBoxLayout()
+        layout.addWidget(content)
+    else:
+        layout = content
+    layout.setContentsMargins(1, 1, 1, 1)
+    layout.setSpacing(0)
+    frame.setLayout(layout)

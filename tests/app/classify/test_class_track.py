@@ -11,7 +11,7 @@ from fake_classifiers import CLASSES, FakeClassifier, FakeClassifiers, class_car
 
 from sd2app.classify.text import reading_text
 from sd2app.classify.track import ClassTrack
-from sd2app.denoise.pieces import AT_ONCE
+from sd2app.denoise.map import AT_ONCE
 from sd2app.session.tracks import TrackModel
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap

@@ -14,7 +14,6 @@ from fake_ladder import FakeLadder
 from PySide6.QtCore import QObject
 
 from sd2app.denoise import map as denoised_map
-from sd2app.denoise import pieces as denoise_pieces
 from sd2app.settings import Settings
 from sd2app.shell.wiring import build_context
 from sd2core.errors import Sd2Error
@@ -296,11 +295,10 @@ def test_a_recording_with_the_same_model_needs_no_loading(context, models, qtbot
 def test_a_long_clip_is_a_preview_first_and_then_what_it_is_as_a_whole(
     context, models, qtbot, ball, monkeypatch
 ):
-    for module in (denoise_pieces, denoised_map):
-        monkeypatch.setattr(module, "AT_ONCE", 16)
+    monkeypatch.setattr(denoised_map, "AT_ONCE", 16)
     # Far too little for this model, which remembers half of its answer.
-    monkeypatch.setattr(denoise_pieces, "CONTEXT", 1)
-    monkeypatch.setattr(denoise_pieces, "LENGTH", denoise_pieces.OVERLAP + 1)
+    monkeypatch.setattr(denoised_map, "CONTEXT", 1)
+    monkeypatch.setattr(denoised_map, "LENGTH", denoised_map.OVERLAP + 1)
     open_it(context, qtbot, ball)
     context.span.set_span(2.0, 2.5)
     rest(context, qtbot)
@@ -328,19 +326,18 @@ def test_a_long_clip_is_a_preview_first_and_then_what_it_is_as_a_whole(
 
 def test_pieces_begin_where_windows_of_the_whole_clip_do():
     known = np.ones(2000, bool)
-    begin, end = denoise_pieces.with_context(known, (1000, 1200))
+    begin, end = denoised_map.with_context(known, (1000, 1200))
     assert begin % 62 == 0
     assert 1000 - 288 - 62 < begin <= 1000 - 288
     assert end == 1200 + 288
     known[900] = known[1300] = False
-    assert denoise_pieces.with_context(known, (1000, 1200)) == (901, 1300)
-    assert denoise_pieces.with_context(known, (0, 2000)) == (0, 2000)
+    assert denoised_map.with_context(known, (1000, 1200)) == (901, 1300)
+    assert denoised_map.with_context(known, (0, 2000)) == (0, 2000)
 
 
 def test_a_long_clip_is_a_job_that_can_be_cancelled(context, models, qtbot, ball, monkeypatch):
-    for module in (denoise_pieces, denoised_map):
-        monkeypatch.setattr(module, "AT_ONCE", 8)
-    monkeypatch.setattr(denoise_pieces, "CONTEXT", 40)
+    monkeypatch.setattr(denoised_map, "AT_ONCE", 8)
+    monkeypatch.setattr(denoised_map, "CONTEXT", 40)
     open_it(context, qtbot, ball)
     models.gate.clear()
     context.denoise.use(next(iter(models.cards)))

@@ -10,7 +10,7 @@ import trimesh
 from fake_denoisers import FakeDenoisers
 from fake_ladder import COUNTING, EXACT, FACING, FakeLadder
 
-from sd2app.maps import compiling
+from sd2app.maps import warm_up as map_warm_up
 from sd2app.maps.partial_map import FINAL, ROUGH
 from sd2app.settings import Settings
 from sd2app.shell.wiring import build_context
@@ -133,8 +133,8 @@ def test_another_recording_replaces_work_under_way(context, qtbot, ball, tmp_pat
 def test_without_machine_code_exact_waits_for_the_compiler(context, qtbot, ball, monkeypatch):
     state = {"ready": False, "exit": None}
     compiler = SimpleNamespace(poll=lambda: state["exit"])
-    monkeypatch.setattr(compiling, "kernels_ready", lambda: state["ready"])
-    monkeypatch.setattr(compiling, "compile_in_background", lambda: compiler)
+    monkeypatch.setattr(map_warm_up, "kernels_ready", lambda: state["ready"])
+    monkeypatch.setattr(map_warm_up, "compile_in_background", lambda: compiler)
     open_ball(context, qtbot, ball)
     qtbot.waitUntil(lambda: "compiling" in context.synthetic.status, timeout=10_000)
     assert not context.synthesis.complete
@@ -145,8 +145,8 @@ def test_without_machine_code_exact_waits_for_the_compiler(context, qtbot, ball,
 
 def test_a_compiler_that_fails_does_not_keep_exact_away(context, qtbot, ball, monkeypatch):
     compiler = SimpleNamespace(poll=lambda: 1)
-    monkeypatch.setattr(compiling, "kernels_ready", lambda: False)
-    monkeypatch.setattr(compiling, "compile_in_background", lambda: compiler)
+    monkeypatch.setattr(map_warm_up, "kernels_ready", lambda: False)
+    monkeypatch.setattr(map_warm_up, "compile_in_background", lambda: compiler)
     open_ball(context, qtbot, ball)
     qtbot.waitUntil(lambda: context.synthesis.complete, timeout=30_000)
 
@@ -361,7 +361,7 @@ def test_the_library_chooses_for_a_small_scene(qapp, qtbot, ball):
 def test_a_long_clip_waits_with_what_is_out_of_view_until_the_plan_is_known(
     context, fake, qtbot, ball, monkeypatch
 ):
-    monkeypatch.setattr("sd2app.maps.refine.AT_ONCE", 1000)
+    monkeypatch.setattr("sd2app.maps.quality.AT_ONCE", 1000)
     fake.gate.clear()
     open_ball(context, qtbot, ball)
     context.span.set_span(1.0, 2.0)

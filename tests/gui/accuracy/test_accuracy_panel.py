@@ -7,13 +7,11 @@ from fake_ladder import COUNTING, EXACT, FACING, WAVES, measurement_of, result_o
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QLabel, QTabBar, QToolButton, QToolTip
 
-from sd2app.accuracy.panel import TradePanel
+from sd2app.accuracy.panel import ReasonList, ToleranceRow, TradePanel
 from sd2app.accuracy.plot import TradePlot
-from sd2app.accuracy.reason_list import ReasonList
-from sd2app.accuracy.tolerance_row import ToleranceRow
-from sd2app.widgets.elided import ElidedLabel
 from sd2app.widgets.inputs import Choice as ChoiceBox
 from sd2app.widgets.inputs import NumberBox
+from sd2app.widgets.panel import ElidedLabel
 from sd2core.accuracy.plans import AccuracyPlan
 from sd2core.sensor import VirtualSensor
 

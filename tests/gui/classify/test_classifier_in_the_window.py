@@ -26,9 +26,8 @@ from sd2app.classify.result_dialog import ClassResultDialog
 from sd2app.classify.strip import ClassPlot, ClassReadout, ClassStrip, stacked_image
 from sd2app.labels.timeline import LabelTimeline
 from sd2app.suggestions.bar import SuggestionBar
-from sd2app.widgets.inputs import Choice
+from sd2app.widgets.inputs import Choice, TypedLine
 from sd2app.widgets.model_card_dialog import ModelCardDialog
-from sd2app.widgets.typed_line import TypedLine
 from sd2core.files.resources import resource_path
 
 

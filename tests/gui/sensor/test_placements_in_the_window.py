@@ -8,8 +8,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QCheckBox, QFileDialog, QLabel, QToolButton
 
 from sd2app.sensor.placements_page import PlacementsPage
-from sd2app.widgets.inputs import Choice
-from sd2app.widgets.typed_line import TypedLine
+from sd2app.widgets.inputs import Choice, TypedLine
 from sd2core.placements.placements import (
     PlacementCloud,
     PlacementGrid,

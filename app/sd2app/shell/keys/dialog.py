@@ -23,8 +23,8 @@ from PySide6.QtWidgets import (
 from sd2app.shell.keys.bindings import KeyBindings
 from sd2app.shell.keys.capture import KeyCapture
 from sd2app.shell.keys.model import KEYS, KeyListModel
-from sd2app.widgets.cell_table import CellTable
-from sd2app.widgets.search_line import SearchLine
+from sd2app.widgets.inputs import SearchLine
+from sd2app.widgets.table import CellTable
 from sd2core.errors import Sd2Error
 
 _KEYS_PX = 250

@@ -1,0 +1,52 @@
+"""Questions, buttons and file filters of dialogs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from PySide6.QtWidgets import QDialog, QDialogButtonBox, QFileDialog, QMessageBox, QWidget
+
+from sd2core.files.figure_files import SUFFIXES
+
+FIGURES = ";;".join(f"{suffix[1:].upper()} (*{suffix})" for suffix in SUFFIXES)
+
+
+def may_delete(parent: QWidget, title: str, what: str) -> bool:
+    """Whether something may be deleted; Escape and Return keep it."""
+    buttons = QMessageBox.StandardButton
+    either = buttons.Discard | buttons.Cancel
+    answer = QMessageBox.question(parent, title, what, either, buttons.Cancel)
+    return bool(answer == buttons.Discard)
+
+
+class ExportButtons(QDialogButtonBox):
+    """Export… asks where to, and Cancel ends the dialog.
+
+    Parameters
+    ----------
+    dialog : QDialog
+    ask : callable
+        Where to; called when the first is pressed.
+    """
+
+    def __init__(self, dialog: QDialog, ask: Callable[[], None]) -> None:
+        super().__init__(QDialogButtonBox.StandardButton.Cancel, dialog)
+        self._export = self.addButton("Export…", QDialogButtonBox.ButtonRole.ActionRole)
+        self._export.setDefault(True)
+        self._export.clicked.connect(ask)
+        self.rejected.connect(dialog.reject)
+
+    def show_state(self, *, possible: bool, exporting: bool) -> None:
+        """Whether there is something to export, and whether it is being written."""
+        self._export.setEnabled(possible and not exporting)
+        self._export.setText("Exporting…" if exporting else "Export…")
+
+
+def ask_figure(parent: QWidget, title: str, name: str) -> Path | None:
+    """Let the user choose; a name without an ending gets that of the kind."""
+    chosen, kind = QFileDialog.getSaveFileName(parent, title, f"{name}.png", FIGURES)
+    if not chosen:
+        return None
+    path = Path(chosen)
+    return path if path.suffix else path.with_suffix(f".{kind[:3].lower()}")
