@@ -12,8 +12,7 @@ from sd2app.accuracy.measurements import front_at_rest, serves_at_rest
 from sd2app.accuracy.model import TradeModel
 from sd2app.accuracy.text import point_text
 from sd2app.session.display import DisplayModel
-from sd2app.widgets.log_axis import LogAxis, tick_text
-from sd2app.widgets.point_plot import PointPlot
+from sd2app.widgets.plot import LogAxis, PointPlot, tick_text
 from sd2app.widgets.text import percent
 
 if TYPE_CHECKING:

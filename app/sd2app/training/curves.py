@@ -13,8 +13,7 @@ from sd2app.session.display import DisplayModel
 from sd2app.training.history import EpochPoint, TrainingHistory
 from sd2app.training.model import TrainingModel
 from sd2app.training.text import point_text
-from sd2app.widgets.log_axis import LogAxis, tick_text
-from sd2app.widgets.plot import SteppedPlot
+from sd2app.widgets.plot import LogAxis, SteppedPlot, tick_text
 from sd2app.widgets.time_axis import ticks
 
 _PAD = 1.12

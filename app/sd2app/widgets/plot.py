@@ -1,13 +1,241 @@
-"""A plot whose points stand in a row, gone through with the keyboard."""
+"""Base classes of plots: axes, points under the pointer and points reached by keyboard."""
 
 from __future__ import annotations
 
-from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPen
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
-from sd2app.widgets.point_plot import PointPlot
+from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QFocusEvent, QHelpEvent, QKeyEvent, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
+
+from sd2app.session.display import DisplayModel
 
 _STEPS = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
+
+Tick = tuple[float, str]
+"""A pixel along an axis, and what is written there."""
+
+
+@dataclass(frozen=True)
+class LogAxis:
+    """Values from ``low`` to ``high`` on pixels from ``start_px`` to ``end_px``.
+
+    What lies below ``low``, nought included, stands on the edge.
+    """
+
+    low: float
+    high: float
+    start_px: float
+    end_px: float
+
+    @classmethod
+    def around(
+        cls, values: list[float], start_px: float, end_px: float, *, floor: float = 0.0
+    ) -> LogAxis:
+        """An axis with some room around positive values; nothing below ``floor`` is shown."""
+        shown = [max(value, floor) for value in values if max(value, floor) > 0] or [1.0]
+        low, high = min(shown) / 1.5, max(shown) * 1.5
+        return cls(max(low, floor), max(high, 10 * max(low, floor)), start_px, end_px)
+
+    def px(self, value: float) -> float:
+        """Pixel of a value."""
+        clamped = min(max(value, self.low), self.high)
+        share = math.log(clamped / self.low) / math.log(self.high / self.low)
+        return self.start_px + share * (self.end_px - self.start_px)
+
+    def is_below(self, value: float) -> bool:
+        """Whether a value has no place but the edge."""
+        return value < self.low
+
+    def ticks(self, most: int) -> list[float]:
+        """Values to write: decades, and 2 and 5 times them where there is room."""
+        first, last = (math.floor(math.log10(end)) for end in (self.low, self.high))
+        for steps in ((1, 2, 5), (1, 3), (1,)):
+            values = [
+                step * 10.0**power
+                for power in range(first, last + 1)
+                for step in steps
+                if self.low * 0.999 <= step * 10.0**power <= self.high * 1.001
+            ]
+            if len(values) <= most:
+                return values
+        return values[:: -(-len(values) // most)]
+
+
+def tick_text(value: float) -> str:
+    """Short, without exponents."""
+    return f"{value:.10f}".rstrip("0").rstrip(".")
+
+
+class PointPlot(QWidget):
+    """Axes, the point that is pointed at, and who has the keyboard.
+
+    A plot says what its points are, where they stand and what they mean, and draws them.
+
+    Parameters
+    ----------
+    display : DisplayModel
+    name : str
+        What a screen reader calls it.
+    """
+
+    MARGINS_PX: ClassVar[tuple[int, int, int, int]]
+    """Left, top, right and bottom of what is drawn on."""
+    HEIGHTS_PX: ClassVar[tuple[int, int, int]]
+    """Least, preferred and greatest."""
+    KEYS: ClassVar[frozenset[Qt.Key]]
+    """Those that belong to the plot while it has the keyboard."""
+
+    def __init__(self, display: DisplayModel, name: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._display = display
+        self._pointed: Any = None
+        self.setMouseTracking(True)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.setMinimumHeight(self.HEIGHTS_PX[0])
+        self.setMaximumHeight(self.HEIGHTS_PX[2])
+        self.setAccessibleName(name)
+        display.theme_changed.connect(self.update)
+
+    def sizeHint(self) -> QSize:
+        """A little wider than high."""
+        return QSize(260, self.HEIGHTS_PX[1])
+
+    # --- what a plot says of itself -------------------------------------------------------
+
+    def points(self) -> Sequence[Any]:
+        """All that can be pointed at."""
+        raise NotImplementedError
+
+    def first_point(self) -> Any:
+        """The point at which the keyboard arrives, or None."""
+        raise NotImplementedError
+
+    def tip_place(self, point: Any) -> QPointF:
+        """The pixel beside which a point is explained."""
+        raise NotImplementedError
+
+    def words_of(self, point: Any) -> str:
+        """What a point means."""
+        raise NotImplementedError
+
+    def tip_of(self, point: Any) -> str:
+        """The same on screen, perhaps with what can be done."""
+        return self.words_of(point)
+
+    def paint_plot(self, painter: QPainter) -> None:
+        """Draw everything but the ground and the focus."""
+        raise NotImplementedError
+
+    # --- painting -------------------------------------------------------------------------
+
+    def plot_rect(self) -> QRectF:
+        """Where points are drawn."""
+        left, top, right, bottom = self.MARGINS_PX
+        return QRectF(self.rect()).adjusted(left, top, -right, -bottom)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """The plot, in a frame while it has the keyboard."""
+        with QPainter(self) as painter:
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            painter.fillRect(self.rect(), QColor(self._display.palette.panel))
+            self.paint_plot(painter)
+            if self.hasFocus():
+                painter.setPen(QPen(QColor(self._display.palette.accent), 1))
+                painter.setBrush(Qt.BrushStyle.NoBrush)
+                painter.drawRect(QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5))
+
+    def paint_axes(
+        self, painter: QPainter, across: Iterable[Tick], upwards: Iterable[Tick], below: str
+    ) -> None:
+        """Both axes with their grid and what the lower one is called; the pen is muted then."""
+        colours, plot = self._display.palette, self.plot_rect()
+        line_px = painter.fontMetrics().height()
+        grid, ink = QPen(QColor(colours.border), 1), QColor(colours.muted)
+        for x, text in across:
+            painter.setPen(grid)
+            painter.drawLine(QPointF(x, plot.top()), QPointF(x, plot.bottom()))
+            painter.setPen(ink)
+            box = QRectF(x - 30, plot.bottom() + 3, 60, line_px)
+            painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)
+        for y, text in upwards:
+            painter.setPen(grid)
+            painter.drawLine(QPointF(plot.left(), y), QPointF(plot.right(), y))
+            painter.setPen(ink)
+            box = QRectF(0, y - line_px / 2, plot.left() - 6, line_px)
+            right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+            painter.drawText(box, right, text)
+        painter.setPen(QPen(QColor(colours.hatch), 1))
+        painter.drawLine(plot.bottomLeft(), plot.bottomRight())
+        painter.drawLine(plot.topLeft(), plot.bottomLeft())
+        painter.setPen(ink)
+        painter.drawText(
+            QRectF(plot.left(), plot.bottom() + line_px + 3, plot.width(), line_px),
+            Qt.AlignmentFlag.AlignCenter,
+            below,
+        )
+
+    def most_upwards(self, painter: QPainter) -> int:
+        """How many numbers have room beside each other on the axis to the left."""
+        return max(int(self.plot_rect().height() / (1.8 * painter.fontMetrics().height())), 2)
+
+    # --- pointing -------------------------------------------------------------------------
+
+    @property
+    def pointed(self) -> Any:
+        """The point under the pointer, or the one the keyboard is at."""
+        return self._pointed
+
+    def point_at(self, point: Any) -> None:
+        """Point at one, or at nothing."""
+        if point is not self._pointed:
+            self._pointed = point
+            self.setAccessibleDescription(self.words_of(point) if point is not None else "")
+            self.update()
+
+    def explain(self) -> None:
+        """Show what is pointed at in words, beside it."""
+        point = self.pointed
+        if point is None:
+            QToolTip.hideText()
+            return
+        QToolTip.showText(
+            self.mapToGlobal(self.tip_place(point).toPoint()), self.tip_of(point), self
+        )
+
+    # --- keyboard -------------------------------------------------------------------------
+
+    def event(self, event: QEvent) -> bool:
+        """Keys of the plot are not those of the window while it has the keyboard."""
+        if (
+            event.type() == QEvent.Type.ShortcutOverride
+            and isinstance(event, QKeyEvent)
+            and event.modifiers() == Qt.KeyboardModifier.NoModifier
+            and event.key() in self.KEYS
+            and self.points()
+        ):
+            event.accept()
+            return True
+        if isinstance(event, QHelpEvent):
+            return True
+        return super().event(event)
+
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        """Show where the keyboard is."""
+        super().focusInEvent(event)
+        if event.reason() != Qt.FocusReason.MouseFocusReason:
+            self.point_at(self.first_point())
+        self.update()
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        """Point at nothing."""
+        super().focusOutEvent(event)
+        self.point_at(None)
+        QToolTip.hideText()
 
 
 class SteppedPlot(PointPlot):

@@ -11,7 +11,7 @@ from sd2app.training.curves import error_ticks
 from sd2app.training.history import TrainingHistory
 from sd2app.training.run import TrainingMonitor
 from sd2app.training.text import metric_rows
-from sd2app.widgets.log_axis import LogAxis
+from sd2app.widgets.plot import LogAxis
 from sd2app.widgets.text import duration_text
 
 START = {"event": "start", "model": "s4", "parameters": 7, "device": "cpu", "epochs": 4,

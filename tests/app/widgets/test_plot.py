@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sd2app.widgets.log_axis import LogAxis, tick_text
+from sd2app.widgets.plot import LogAxis, tick_text
 
 positive = st.floats(1e-6, 1e6)
 
