@@ -1,4 +1,4 @@
-"""The task that turns a synthetic map into what a radar would show."""
+"""Task that denoises a synthetic map."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass
 class _Kept:
-    """The model that one process keeps from one task to the next."""
+    """Model that a process keeps from one task to the next."""
 
     path: str = ""
     digest: str = ""
@@ -50,7 +50,7 @@ def denoise(maps: Sequence[Path], model: str, digest: str, outs: Sequence[Path])
 
 
 def _denoise_long(trained: TrainedDenoiser, maps: Sequence[Path], outs: Sequence[Path]) -> None:
-    """A stretch at a time, with what the model remembers of those before."""
+    """Denoise one stretch after the other, keeping the model's state."""
     from sd2core.denoise.long_maps import denoise_long
     from sd2core.denoise.resample_to_model import check_map, clips, is_regular
 
@@ -79,7 +79,7 @@ class _Files:
         self.edges = np.cumsum([0, *map(len, times_s)])
 
     def part(self, number: int) -> DopplerMap:
-        """One stretch."""
+        """Return the map of one stretch."""
         if number not in self._loaded:
             while len(self._loaded) > 1:
                 del self._loaded[next(iter(self._loaded))]
@@ -87,11 +87,11 @@ class _Files:
         return self._loaded[number]
 
     def holding(self, frame: int) -> int:
-        """The stretch that a frame of the whole map belongs to."""
+        """Return the stretch that holds a frame of the whole map."""
         return int(np.searchsorted(self.edges, frame, side="right")) - 1
 
     def read(self, start: int, stop: int) -> NDArray[np.float32]:
-        """Energies of frames of the whole map, (n, bins)."""
+        """Return energies of frames of the whole map, (n, bins)."""
         pieces = []
         for number in range(self.holding(start), self.holding(stop - 1) + 1):
             low, high = self.edges[number], self.edges[number + 1]
@@ -101,7 +101,7 @@ class _Files:
 
 
 class _Writer:
-    """Puts denoised frames, which come in order, into one file per stretch."""
+    """Writes denoised frames, which come in order, to one file per stretch."""
 
     def __init__(
         self, trained: TrainedDenoiser, files: _Files, outs: Sequence[Path], resampled: bool
@@ -112,7 +112,7 @@ class _Writer:
         self._energies = self._empty()
 
     def take(self, first: int, energies: NDArray[np.float32]) -> None:
-        """Frames from ``first`` on; those that are passed over stay empty."""
+        """Take frames from ``first`` on; frames that are skipped stay empty."""
         while len(energies):
             while first >= self._files.edges[self._number + 1]:
                 self._next()
@@ -122,7 +122,7 @@ class _Writer:
             first, energies = first + count, energies[count:]
 
     def end(self) -> None:
-        """Write what is left."""
+        """Write the remaining stretches."""
         while self._number < len(self._outs):
             self._next()
 

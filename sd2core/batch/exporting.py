@@ -1,4 +1,4 @@
-"""The task that makes a data set of all maps of a batch."""
+"""Task that makes a data set of all maps of a batch."""
 
 from __future__ import annotations
 
@@ -35,18 +35,18 @@ _NOTE = "dataset.json"
 
 
 def dataset_path(folder: BatchFolder, export: Export) -> Path:
-    """Where the data set is."""
+    """Return the path of the data set."""
     return folder.path / f"dataset.{export.format}"
 
 
 def dataset_key(folder: BatchFolder, export: Export) -> str:
-    """Hash of all that the data set depends on; ``results.jsonl`` must be there."""
+    """Return the hash of all that the data set depends on; ``results.jsonl`` must exist."""
     content = {"results": file_digest(folder.results), "export": export.model_dump(mode="json")}
     return key_of("export", content)
 
 
 def is_exported(folder: BatchFolder, export: Export) -> bool:
-    """Whether the data set is there, made of what is there now."""
+    """Tell if the data set exists and was made of the current results."""
     try:
         note = json.loads((folder.path / _NOTE).read_text(encoding="utf-8"))
         return bool(
@@ -57,7 +57,7 @@ def is_exported(folder: BatchFolder, export: Export) -> bool:
 
 
 def export_dataset(folder: BatchFolder, export: Export, progress: Progress) -> None:
-    """Write the data set with its card; goes on with one that was begun.
+    """Write the data set with its card, or continue one that was begun.
 
     Sources that have been there stay. Where one of them has changed, or the settings have,
     it is written anew.
@@ -102,7 +102,7 @@ def _settings_of(note: Path) -> str | None:
 
 
 def _is_stale(out: Path, folder: BatchFolder, export: Export) -> bool:
-    """Whether a source that the data set has is not wanted any more, or is another now."""
+    """Tell if the data set has a source that is no longer wanted or has changed."""
     from sd2core.datasets.reading import open_dataset
 
     if not out.exists():
@@ -120,7 +120,7 @@ def _is_stale(out: Path, folder: BatchFolder, export: Export) -> bool:
 
 
 class _Counted:
-    """Sources whose number is known, made one by one."""
+    """Iterable of sources with a known length."""
 
     def __init__(self, folder: BatchFolder, export: Export) -> None:
         self._folder, self._export = folder, export
@@ -134,7 +134,7 @@ class _Counted:
 
 
 def rows_of(folder: BatchFolder) -> Iterator[list[Row]]:
-    """The stretches of one map after the other."""
+    """Yield the rows of one map after the other."""
     with folder.results.open(encoding="utf-8") as stream:
         rows = (json.loads(line) for line in stream)
         for _, group in groupby(rows, lambda row: (row["recording"], row["placement"])):
@@ -159,7 +159,7 @@ def _sources(folder: BatchFolder, export: Export) -> Iterator[LazySource]:
 
 
 def _parts(frames: int, export: Export) -> list[tuple[int, int]]:
-    """Frames that are cut into segments together.
+    """Return the ranges of frames that are cut into segments together.
 
     Segments begin every so many frames. Parts begin with one of them and end with another,
     so that a long recording gives the segments that it would give as a whole.
@@ -210,7 +210,7 @@ def _loader(
 def _stretch_of(
     folder: BatchFolder, rows: Sequence[Row], kind: str, part: tuple[int, int]
 ) -> DopplerMap:
-    """Frames of a map, from the files of its stretches."""
+    """Join frames of a map from the files of its stretches."""
     start, stop = part
     maps = []
     for row in rows:
@@ -225,7 +225,7 @@ def _stretch_of(
 
 
 class _Opened:
-    """The recording that was used last, and its radar's map."""
+    """Recording used last, kept open, with its radar's map."""
 
     def __init__(self) -> None:
         self._path: Path | None = None
@@ -233,7 +233,7 @@ class _Opened:
         self._radar: DopplerMap | None = None
 
     def recording(self, path: Path) -> Recording | None:
-        """None for a mesh or a video by itself."""
+        """Open a recording; None for a mesh or a video alone."""
         from sd2core.recording.recording import is_recording, open_recording
 
         if path != self._path:
@@ -242,7 +242,7 @@ class _Opened:
         return self._recording
 
     def radar(self, recording: Recording, like: DopplerMap, timebase: Timebase) -> DopplerMap:
-        """What the radar saw at these times."""
+        """Return the radar's map at these times."""
         from sd2core.datasets.recording_sources import radar_map
         from sd2core.mocap.recording_pairs import on_clock
 

@@ -1,4 +1,4 @@
-"""The task that makes a mesh of a video."""
+"""Task that fits a body to a video and writes the mesh."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sd2core.progress import silent
 
 
 def fit_choices(fit: Fit, subject: str, focal_px: float | None) -> dict[str, Any]:
-    """What is told of one video, as JSON can hold it.
+    """Return the options for fitting one video, as JSON can hold them.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def fit_choices(fit: Fit, subject: str, focal_px: float | None) -> dict[str, Any
 
 
 def fit_to_video(video: str, choices: dict[str, Any], models: str | None, out: str) -> None:
-    """Fit a body and write the mesh, and then what tasks need to know of it.
+    """Fit a body, write the mesh, then a file with the facts that tasks need.
 
     A fit that was killed goes on where it was.
     """
@@ -50,12 +50,12 @@ def fit_to_video(video: str, choices: dict[str, Any], models: str | None, out: s
 
 
 def facts_path(mesh: Path) -> Path:
-    """Where it stands what tasks need to know of a fitted mesh; there when it is complete."""
+    """Return the path of the facts of a fitted mesh; the file exists once the mesh is complete."""
     return mesh.with_suffix(".json")
 
 
 def fitted(mesh: Path) -> MeshInput | None:
-    """A mesh that has been fitted, if it is complete."""
+    """Return a fitted mesh; None while it is missing or incomplete."""
     try:
         content = json.loads(facts_path(mesh).read_text(encoding="utf-8"))
         return mesh_input(content) if mesh.exists() else None

@@ -1,4 +1,4 @@
-"""What a batch works on: found by patterns, and looked at once."""
+"""Inputs of a batch: files found by patterns, inspected once."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ LARGEST_IN_MEMORY_BYTES = 256 << 20
 
 @dataclass(frozen=True)
 class Origin:
-    """One recording, video or mesh of a batch.
+    """Recording, video or mesh of a batch.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Origin:
 
 @dataclass(frozen=True)
 class MeshInput:
-    """A moving mesh, as far as tasks need to know it.
+    """Facts of a moving mesh that tasks need.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class MeshInput:
 
 @dataclass(frozen=True)
 class VideoInput:
-    """A video to fit a body to.
+    """Video to fit a body to.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ class VideoInput:
 
 @dataclass(frozen=True)
 class Inspection:
-    """What one recording holds; a mesh goes before a video.
+    """Content of a recording; a mesh takes precedence over a video.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ class Inspection:
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Inspection:
-        """Inverse of ``dataclasses.asdict``, also after JSON."""
+        """Rebuild from ``dataclasses.asdict``, also after JSON."""
         mesh, video = content["mesh"], content["video"]
         return cls(
             VirtualSensor(**{**content["sensor"]}),
@@ -115,12 +115,12 @@ class Inspection:
 
 
 def mesh_input(content: Mapping[str, Any]) -> MeshInput:
-    """Inverse of ``dataclasses.asdict``, also after JSON."""
+    """Rebuild from ``dataclasses.asdict``, also after JSON."""
     return MeshInput(**{**content, "target_m": tuple(content["target_m"])})
 
 
 def find_origins(recordings: Recordings, apart_from: Path) -> list[Origin]:
-    """All files that the patterns name, sorted.
+    """Return all files that match the patterns, sorted.
 
     What lies inside of a recording or of a Zarr store that is found belongs to it.
 
@@ -157,7 +157,7 @@ def _holds(folder: Path) -> bool:
 
 
 def subject_of(recordings: Recordings, path: Path, name: str) -> str:
-    """Who is in a recording."""
+    """Return the subject of a recording."""
     for pattern, subject in recordings.subject_of.items():
         if path.match(pattern):
             return subject
@@ -171,7 +171,7 @@ def subject_of(recordings: Recordings, path: Path, name: str) -> str:
 
 
 def known_inspection(folder: BatchFolder, origin: Origin) -> Inspection | None:
-    """What was found, where nothing has changed since; only names and times are looked at."""
+    """Return the kept inspection, if by names and times no file has changed since."""
     record = _record(folder, origin)
     if record is None or signature(entry[0] for entry in record["files"]) != record["files"]:
         return None
@@ -181,7 +181,7 @@ def known_inspection(folder: BatchFolder, origin: Origin) -> Inspection | None:
 
 
 def inspect(folder: BatchFolder, origin: Origin) -> Inspection:
-    """Find out what a recording holds, and keep it.
+    """Inspect a recording and keep the result.
 
     Contents are hashed where size, time of change or inode are not those from before.
     """
@@ -201,12 +201,12 @@ def inspect(folder: BatchFolder, origin: Origin) -> Inspection:
 
 
 def glance(origin: Origin) -> Inspection:
-    """What a recording holds, without hashing it: its identities are empty."""
+    """Inspect a recording without hashing it: its identities are empty."""
     return _Look(None, Digests([], {})).at(Path(origin.path))
 
 
 class _Look:
-    """One look at a recording; notes which files it depends on.
+    """Inspection of a recording that notes the files it depends on.
 
     Without a folder nothing is hashed and nothing written.
     """
@@ -298,7 +298,7 @@ class _Look:
 
 
 def open_mesh(path: Path, faces: str | None, reading: Mapping[str, Any]) -> MeshSequence:
-    """Open a mesh that is streamed, or small enough to be in memory as a whole."""
+    """Open a mesh that can be streamed or is small enough for memory."""
     from sd2core.io.mesh import load_mesh
 
     files = files_at(path)
@@ -327,7 +327,7 @@ def _bytes_in_memory(path: Path) -> int:
 
 
 def is_large_npz(path: Path) -> bool:
-    """Whether a mesh is an ``.npz`` that is to be unpacked first."""
+    """Tell if a mesh is an ``.npz`` too large for memory, to be unpacked first."""
     is_npz = path.suffix.lower() == ".npz" and path.is_file()
     return is_npz and _bytes_in_memory(path) > LARGEST_IN_MEMORY_BYTES
 
@@ -335,7 +335,7 @@ def is_large_npz(path: Path) -> bool:
 def mesh_input_of(
     path: Path, identity: str, faces: str | None = None, reading: Mapping[str, Any] | None = None
 ) -> MeshInput:
-    """What tasks need to know of a mesh."""
+    """Open a mesh and return the facts that tasks need."""
     from sd2core.placements.body_extent import BodyExtent
 
     mesh = open_mesh(path, faces, reading or {})

@@ -1,4 +1,4 @@
-"""Names of results: the hash of all that they depend on."""
+"""Keys of results: hashes of all that they depend on."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ _RESOURCES: dict[Step, tuple[str, ...]] = {"fit": ("body.npz", "lifter.npz")}
 
 
 def key_of(step: Step, content: dict[str, Any]) -> str:
-    """Name of a result: 32 hexadecimal digits, the same in every process and on every machine.
+    """Return the key of a result: 32 hexadecimal digits, the same on every machine.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def key_of(step: Step, content: dict[str, Any]) -> str:
 
 @cache
 def code_digest(step: Step) -> str:
-    """Changes with the code that makes a step's results, and the data that comes with it."""
+    """Hash of the code that makes a step's results, and of its bundled data."""
     package = Path(__file__).parent.parent
     digest = hashlib.sha256()
     for name in _CODE[step]:
@@ -89,7 +89,7 @@ def code_digest(step: Step) -> str:
 
 
 def all_code_digest() -> str:
-    """Of all steps: the same where the same program is installed."""
+    """Hash of the code of all steps: the same where the same program is installed."""
     return hashlib.sha256("".join(map(code_digest, _CODE)).encode()).hexdigest()[:16]
 
 

@@ -1,4 +1,4 @@
-"""What a batch is told: a frozen record, checked strictly. See ``docs/formats.md``."""
+"""Plan of a batch: a frozen record, checked strictly. See ``docs/formats.md``."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class _Section(BaseModel):
 
 
 class Recordings(_Section):
-    """What is worked on.
+    """Section ``[recordings]``: the input files and their subjects.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class Recordings(_Section):
 
 
 class Fit(_Section):
-    """How videos without a mesh become meshes, as ``sd2 fit`` does it.
+    """Section ``[fit]``: options of ``sd2 fit`` for videos without a mesh.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ class Fit(_Section):
 
 
 class Synthesise(_Section):
-    """How a mesh becomes a synthetic Doppler map, as ``sd2 synth`` does it.
+    """Section ``[synthesise]``: options of ``sd2 synth``.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ class Synthesise(_Section):
         return self
 
     def options(self) -> SynthesisOptions:
-        """The preset with what is given in its place."""
+        """Synthesis options: the preset with the given values in place of its own."""
         given = {
             name: value
             for name in SynthesisOptions.__dataclass_fields__
@@ -167,7 +167,7 @@ _CHOSEN_BY_TOLERANCE = (
 
 
 class Denoise(_Section):
-    """How synthetic maps become what a radar would show, as ``sd2 denoise`` does it.
+    """Section ``[denoise]``: options of ``sd2 denoise``.
 
     Parameters
     ----------
@@ -179,7 +179,7 @@ class Denoise(_Section):
 
 
 class Simulate(_Section):
-    """How a radar at each place is simulated, as ``sd2 export --simulate`` does it.
+    """Section ``[simulate]``: options of ``sd2 export --simulate``.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ class Simulate(_Section):
 
 
 class Export(_Section):
-    """How maps become a data set to learn from, as ``sd2 export`` does it.
+    """Section ``[export]``: options of ``sd2 export``.
 
     Parameters
     ----------
@@ -223,7 +223,7 @@ class Export(_Section):
 
 
 class BatchPlan(_Section):
-    """All that a batch is told. A step whose section is absent is not done.
+    """Plan of a batch. A step whose section is absent is not done.
 
     Parameters
     ----------
@@ -267,14 +267,14 @@ class BatchPlan(_Section):
 
     @property
     def placement_count(self) -> int:
-        """Placements per recording."""
+        """Number of placements per recording."""
         if self.synthesise is None:
             return 0
         own, places = _placements(self.placements)
         return own + len(places if isinstance(places, tuple) else places.places())
 
     def sensors(self, own: VirtualSensor, target_m: Vector) -> dict[int, VirtualSensor]:
-        """The sensors that look at one recording, by the number of the placement.
+        """Return the sensors around one recording, by the number of the placement.
 
         Parameters
         ----------
@@ -299,7 +299,7 @@ class _Positions(_Section):
 
 
 def _placements(content: Mapping[str, Any]) -> tuple[bool, Placements | tuple[Vector, ...]]:
-    """Whether the recording's own sensor is among them, and the others: places, or a spec."""
+    """Parse placements: the recording's own sensor or not, and the other places."""
     given = dict(content)
     kind, own = given.get("kind"), given.pop("own", False)
     if kind == "recording":

@@ -1,4 +1,4 @@
-"""Plans as TOML files: read with errors that name file, line and key, and written."""
+"""Plans as TOML files, with errors that name file, line and key."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def read_plan(path: Path) -> BatchPlan:
 
 
 def plan_from_text(text: str, folder: Path, source: str = "The plan") -> BatchPlan:
-    """A plan from TOML; paths in the text are relative to ``folder``, afterwards absolute.
+    """Parse a plan from TOML; paths relative to ``folder`` become absolute.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def plan_from_text(text: str, folder: Path, source: str = "The plan") -> BatchPl
 
 
 def plan_text(plan: BatchPlan, folder: Path) -> str:
-    """As TOML, with paths relative to a folder; :func:`plan_from_text` gives the same again."""
+    """Format a plan as TOML with paths relative to a folder; inverse of :func:`plan_from_text`."""
     plan = _with_paths(plan, lambda path: stored_path(Path(path), folder))
     content = plan.model_dump(mode="json", exclude_defaults=True)
     content = {"format": plan.format, "version": plan.version, **content}
@@ -112,7 +112,7 @@ def _with_paths(plan: BatchPlan, changed: Any) -> BatchPlan:
 
 
 def _is_path(model: str) -> bool:
-    """Whether a model is named by its file; the others are installed ones."""
+    """Tell if a model is named by its file and not by the name of an installed one."""
     return is_absolute(model) or Path(model).name != model or model.endswith(".safetensors")
 
 
@@ -133,7 +133,7 @@ def _in_words(error: ValidationError, text: str, source: str) -> Sd2Error:
 
 
 def line_of(text: str, keys: tuple[str, ...]) -> int | None:
-    """Number of the line, from 1, on which a key of a TOML text stands.
+    """Return the number, from 1, of the line of a TOML text that holds a key.
 
     Where the key itself is not there, the line of the innermost table around it that is.
     """

@@ -219,7 +219,7 @@ def _check_worker(address: str, about: Any, folder: Path) -> None:
 
 @contextmanager
 def local_pool(folder: BatchFolder, processes: int) -> Iterator[DaskPool]:
-    """Processes on this machine, one thread each, that end with this one.
+    """Start processes on this machine, one thread each, that end with this one.
 
     Reachable on the loopback interface only, with keys that nobody else has, without a
     dashboard.
@@ -230,7 +230,7 @@ def local_pool(folder: BatchFolder, processes: int) -> Iterator[DaskPool]:
 
 @contextmanager
 def local_client(scratch: Path, processes: int) -> Iterator[Any]:
-    """Client of a cluster on this machine, as :func:`local_pool` has it.
+    """Start a cluster on this machine, as :func:`local_pool` does, and return its client.
 
     Parameters
     ----------
@@ -265,7 +265,7 @@ def local_client(scratch: Path, processes: int) -> Iterator[Any]:
 
 
 def _security() -> Any:
-    """Keys of one cluster, made now and kept in memory; None where they cannot be made."""
+    """Create TLS keys of one cluster in memory; None where they cannot be made."""
     from distributed import Security
 
     try:
@@ -280,7 +280,7 @@ def _security() -> Any:
 
 @contextmanager
 def scheduler_pool(folder: BatchFolder, address: str) -> Iterator[DaskPool]:
-    """Workers of a ``dask-scheduler`` that runs already."""
+    """Open the workers of a running ``dask-scheduler``."""
     from distributed import Client
 
     with _dask_log(folder):
@@ -301,7 +301,7 @@ def scheduler_pool(folder: BatchFolder, address: str) -> Iterator[DaskPool]:
 
 @contextmanager
 def _dask_log(folder: BatchFolder) -> Iterator[None]:
-    """What Dask says goes to the log of the batch, not to the terminal."""
+    """Send Dask's messages to the log of the batch, not to the terminal."""
     loggers = [logging.getLogger(name) for name in ("distributed", "bokeh", "tornado")]
     handler = logging.FileHandler(folder.log, encoding="utf-8")
     handler.setFormatter(logging.Formatter("%(asctime)s %(name)s %(levelname)s %(message)s"))

@@ -40,7 +40,7 @@ may still be at its last task on another machine."""
 
 @dataclass(frozen=True)
 class BatchEnd:
-    """How a run ended.
+    """End of a run.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def run_batch(
     watch: Watch | None = None,
     pool: AbstractContextManager[Pool] | None = None,
 ) -> BatchEnd:
-    """Do all that a plan asks for and that is not there yet.
+    """Make all results of a plan that do not exist yet.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def run_batch(
 
 
 class _Run:
-    """What is said while a batch runs, and at its end."""
+    """Progress and report of a running batch."""
 
     def __init__(
         self, graph: TaskGraph, lines: ProgressWriter, control: Control, scheduler: str | None
@@ -133,7 +133,7 @@ class _Run:
         self._driver: Driver | None = None
 
     def through(self, pool: AbstractContextManager[Pool], source: Path | None) -> BatchEnd:
-        """Do it, and say how it ended."""
+        """Run all tasks and report the end."""
         self._start(source)
         self._folder.report.unlink(missing_ok=True)
         try:
@@ -244,7 +244,7 @@ class _Run:
         return self._folder.path / BEGUN / "failures.jsonl"
 
     def _write_results(self) -> None:
-        """Every map that is there, recording by recording, in the order of the plan."""
+        """Write a line for every map, by recording, in the order of the plan."""
         root = self._folder.path
         with atomic_write(self._folder.results) as stream:
             for number, (origin, about, mesh, planned) in enumerate(self._graph.all_maps()):
@@ -301,7 +301,7 @@ class _Run:
             remember_fit_rate(fit.resolution, tally.seconds["fit"], tally.frames["fit"])
 
     def _write_report(self, facts: dict[str, Any]) -> None:
-        """All facts, then one failure after the other: there may be many."""
+        """Write all facts, then one failure after the other, as there may be many."""
         head = {
             "format": "sd2-batch-report",
             "version": 1,
@@ -329,7 +329,7 @@ def _write_plan(folder: BatchFolder, plan: BatchPlan) -> None:
 
 
 def _clear(folder: BatchFolder) -> None:
-    """Remove what killed processes left."""
+    """Remove leftovers of killed processes."""
     begun = folder.path / BEGUN
     shutil.rmtree(begun, ignore_errors=True)
     begun.mkdir()
@@ -337,7 +337,7 @@ def _clear(folder: BatchFolder) -> None:
 
 
 def remove_old_leftovers(folder: Path, old_s: float = _OLD_S) -> None:
-    """Delete temporary files and folders that nobody writes to any more.
+    """Delete temporary files and folders that are no longer written to.
 
     Parameters
     ----------

@@ -41,7 +41,7 @@ def stretches_of(frames: int, longest: int = LONGEST_FRAMES) -> list[Stretch]:
 
 @dataclass(frozen=True)
 class Choosing:
-    """What a plan is chosen for: once for all maps of a mesh.
+    """Maps for which an accuracy plan is chosen: once for all maps of a mesh.
 
     Parameters
     ----------
@@ -59,14 +59,14 @@ class Choosing:
 
 
 def choosing_of(content: Mapping[str, Any]) -> Choosing:
-    """From what a task holds as JSON."""
+    """Rebuild from the JSON of a task."""
     places = [VirtualSensor(**one) for one in content["places"]]
     return Choosing(Path(content["path"]), places, content["frames"])
 
 
 @dataclass
 class _Kept:
-    """What one process keeps from one task to the next of the same mesh."""
+    """Objects that a process keeps from one task to the next of the same mesh."""
 
     mesh_of: MeshInput | None = None
     mesh: MeshSequence | None = None
@@ -146,7 +146,7 @@ def refuse_inside(mesh: MeshInput, sensor: VirtualSensor) -> None:
 
 
 def kept_mesh(wanted: MeshInput) -> MeshSequence:
-    """The mesh, which this process keeps open until it is asked for another one."""
+    """Open a mesh, which this process keeps until it needs another one."""
     if _kept.mesh is None or _kept.mesh_of != wanted:
         # Before another one is opened, so that there are never two.
         _kept.mesh, _kept.body, _kept.synthesizer, _kept.made_for = None, None, None, ()
@@ -178,7 +178,7 @@ def _synthesizer(mesh: MeshInput, section: Synthesise, plan: dict[str, Any] | No
 
 
 def chosen_plan(mesh: MeshInput, section: Synthesise, choosing: Choosing) -> dict[str, Any]:
-    """The plan that was chosen, by whoever was first: costs are measured, and never twice alike."""
+    """Return the accuracy plan that the first process chose: measured costs always differ."""
     path = choosing.path
     if (known := read_plan_of(path)) is not None:
         return known
@@ -204,7 +204,7 @@ def chosen_plan(mesh: MeshInput, section: Synthesise, choosing: Choosing) -> dic
 
 
 def read_plan_of(path: Path) -> dict[str, Any] | None:
-    """A plan that was chosen, if there is one."""
+    """Read an accuracy plan that was chosen, if there is one."""
     try:
         content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):

@@ -1,4 +1,4 @@
-"""What follows from what: from a recording to its meshes, maps and denoised maps."""
+"""Graph of tasks: from a recording to its meshes, maps and denoised maps."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _MAPS: tuple[Step, ...] = ("synthesise", "denoise", "simulate")
 
 @dataclass(frozen=True)
 class PlannedMap:
-    """The map of one recording from one place: one file per stretch.
+    """Map of one recording from one place: one file per stretch.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class PlannedMap:
 
     @property
     def tasks(self) -> tuple[Task, ...]:
-        """All of them."""
+        """All tasks of this map."""
         denoising = () if self.denoising is None else (self.denoising,)
         return (*self.synthesis, *denoising, *self.simulation)
 
@@ -63,7 +63,7 @@ class PlannedMap:
 
 
 class TaskGraph:
-    """The tasks of a batch, each known as soon as what it depends on is done.
+    """Tasks of a batch, each known as soon as the tasks before it are done.
 
     Parameters
     ----------
@@ -109,17 +109,17 @@ class TaskGraph:
 
     @property
     def steps(self) -> tuple[Step, ...]:
-        """What the plan has, in order."""
+        """Steps of the plan, in order."""
         return ("inspect", *(step for step in STEPS[1:] if getattr(self.plan, step) is not None))
 
     def first(self) -> Iterator[Task]:
-        """What can be done at once: every recording is looked at."""
+        """Yield the tasks that can be done at once: the inspections."""
         for origin in self.origins:
             key = key_of("inspect", {"path": origin.path})
             yield Task("inspect", key, origin, {}, group=origin.name)
 
     def last(self) -> Iterator[Task]:
-        """What is done when ``results.jsonl`` has been written: the data set."""
+        """Yield the task after ``results.jsonl`` is written: the data set."""
         if self.plan.export is not None:
             origin = Origin(str(self.folder.path), "data set", "")
             out = str(dataset_path(self.folder, self.plan.export))
@@ -129,7 +129,7 @@ class TaskGraph:
             yield Task("export", key, origin, details, frames=sources, out=out)
 
     def is_done(self, task: Task) -> bool:
-        """Whether its result is there."""
+        """Tell if the result of a task exists."""
         if task.step == "inspect":
             return known_inspection(self.folder, task.origin) is not None
         if task.step == "fit":
@@ -140,7 +140,7 @@ class TaskGraph:
         return os.path.exists(task.out)
 
     def after(self, task: Task) -> Iterator[Task]:
-        """What can be done once a task is."""
+        """Yield the tasks that can be done after this one."""
         if task.step == "inspect":
             found = known_inspection(self.folder, task.origin)
             if found is None:
@@ -156,7 +156,7 @@ class TaskGraph:
         return iter(())
 
     def lost_with(self, task: Task) -> dict[str, int]:
-        """How many tasks per step cannot be done because this one failed."""
+        """Count the tasks per step that cannot be done because this one failed."""
         if task.step in ("inspect", "fit"):
             return self._maps_of_one(1)
         where = (task.origin.name, task.placement or 0)
@@ -183,7 +183,7 @@ class TaskGraph:
         return iter((self.fit_task(origin, found.video),))
 
     def fit_task(self, origin: Origin, video: VideoInput) -> Task:
-        """What makes a mesh of a video."""
+        """Return the task that makes a mesh of a video."""
         assert self.plan.fit is not None
         choices = fit_choices(self.plan.fit, origin.subject, video.focal_px)
         key = key_of("fit", {"video": video.identity, "choices": choices})
@@ -223,7 +223,7 @@ class TaskGraph:
         return iter((self._denoising.pop(where),))
 
     def maps_of(self, origin: Origin, mesh: MeshInput, own: VirtualSensor) -> Iterator[PlannedMap]:
-        """All maps of one recording."""
+        """Yield all maps of one recording."""
         stretches = tuple(stretches_of(mesh.frames))
         sensors = self.plan.sensors(own, mesh.target_m)
         choosing = self._choosing(mesh, list(sensors.values()))
@@ -243,7 +243,7 @@ class TaskGraph:
             yield PlannedMap(placement, sensor, stretches, synthesis, denoising, simulation)
 
     def _choosing(self, mesh: MeshInput, sensors: Sequence[VirtualSensor]) -> dict[str, Any] | None:
-        """Which plan holds the tolerance, for all maps of a mesh; None where there is none."""
+        """Describe the choice of an accuracy plan for a mesh; None without a tolerance."""
         if self._scene["tolerance"] is None:
             return None
         from sd2core.accuracy.places import spread
@@ -326,7 +326,7 @@ class TaskGraph:
         return Task("simulate", key, origin, details, placement, frames, origin.name, out)
 
     def all_maps(self) -> Iterator[tuple[Origin, str, MeshInput, PlannedMap]]:
-        """Every map of every recording that has been looked at and fitted, in order.
+        """Yield every map of every recording that is inspected and fitted, in order.
 
         With the hash of what else is in the recording.
         """
@@ -350,7 +350,7 @@ def _changing(origin: Origin) -> Sd2Error:
 
 
 def simulation_of(told: Simulate) -> Simulation:
-    """The radar of a plan; refused before the work begins."""
+    """Read the radar of a plan; errors come before the work begins."""
     from sd2core.datasets.simulating import Simulation
     from sd2core.io.radar import named_radar
 
@@ -358,7 +358,7 @@ def simulation_of(told: Simulate) -> Simulation:
 
 
 def _model_of(name: str) -> tuple[str, str]:
-    """File of a model and the hash of its content; refused before the work begins."""
+    """Find a model; errors come before the work begins."""
     from sd2core.denoise.files import describe_model, find_model
 
     path = find_model(name)

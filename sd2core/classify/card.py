@@ -1,4 +1,4 @@
-"""What a classifier's file says about it; reading it needs no torch."""
+"""Description of a classifier in its file; reading it needs no torch."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ BACKGROUND = "background"
 
 @dataclass(frozen=True)
 class ClassifierCard:
-    """A trained classifier, but for its weights.
+    """Description of a trained classifier, without its weights.
 
     Parameters
     ----------
@@ -94,27 +94,27 @@ class ClassifierCard:
 
     @property
     def axis(self) -> VelocityAxis:
-        """Of the maps that it knows."""
+        """Velocity axis of the maps."""
         return self.features.axis
 
     @property
     def null_bins(self) -> tuple[int, ...]:
-        """Bins that are zero on purpose."""
+        """Bins that are set to zero."""
         return self.features.null_bins
 
     @property
     def frame_rate_hz(self) -> float:
-        """Of the maps that it knows."""
+        """Frame rate of the maps."""
         return self.features.frame_rate_hz
 
     @property
     def delay_s(self) -> float:
-        """So much later than a frame its answer is known."""
+        """Delay of an answer after its frame."""
         return self.delay_frames / self.frame_rate_hz
 
     @property
     def background(self) -> int | None:
-        """Which of the classes is the background, if one is."""
+        """Index of the background class; None where there is none."""
         return self.classes.index(BACKGROUND) if BACKGROUND in self.classes else None
 
     def nobody(self) -> NDArray[np.float32]:
@@ -129,7 +129,7 @@ class ClassifierCard:
         return found
 
     def to_json(self) -> dict[str, Any]:
-        """As kept in the header of a model file."""
+        """Return the header of a model file."""
         return {
             "format": FORMAT,
             "version": VERSION,
@@ -149,7 +149,7 @@ class ClassifierCard:
 
     @classmethod
     def from_json(cls, content: dict[str, Any], path: Path | None = None) -> ClassifierCard:
-        """Read what :meth:`to_json` gave."""
+        """Parse the header of a model file."""
         where = "The classifier" if path is None else str(path)
         try:
             if content["format"] != FORMAT or not isinstance(content["version"], int):

@@ -1,4 +1,4 @@
-"""Many trainings side by side: run what is missing, and put together what came of them."""
+"""Comparison of many trainings: run the missing ones and collect the results."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ QUICK_SHARES = (0.1, 1.0)
 
 @dataclass(frozen=True)
 class TableOptions:
-    """Which trainings a table holds.
+    """Options of a comparison: its trainings.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class TableOptions:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One training and what it was worth.
+    """One training and its score.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ class Run:
     cpu_s: float
 
     def to_json(self) -> dict[str, Any]:
-        """As kept in a file."""
+        """Return the content of a run's file."""
         return {
             "format": FORMAT,
             "version": VERSION,
@@ -128,7 +128,7 @@ class Run:
 
     @classmethod
     def from_json(cls, content: dict[str, Any]) -> Run:
-        """Read what :meth:`to_json` gave; raises KeyError, TypeError or ValueError."""
+        """Parse :meth:`to_json`; raises KeyError, TypeError or ValueError."""
         if content["format"] != FORMAT or content["version"] != VERSION:
             raise ValueError(f"format {content['format']!r} version {content['version']!r}")
         return cls(
@@ -146,7 +146,7 @@ class Run:
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """All runs of a table.
+    """All runs of a comparison.
 
     Parameters
     ----------
@@ -163,17 +163,17 @@ class Table:
     by_movement: bool
 
     def of(self, condition: Condition) -> tuple[Run, ...]:
-        """The runs of one condition, by seed."""
+        """Return the runs of one condition, by seed."""
         return tuple(run for run in self.runs if run.condition == condition)
 
     @property
     def conditions(self) -> tuple[Condition, ...]:
-        """In the order in which they were asked for."""
+        """Conditions in the order of their first runs."""
         return tuple(dict.fromkeys(run.condition for run in self.runs))
 
 
 def conditions_of(known: ClipSet, options: TableOptions, denoised: bool) -> list[Condition]:
-    """What is to be trained, each once.
+    """Return the conditions to train, each once.
 
     Parameters
     ----------
@@ -203,7 +203,7 @@ def make_table(
     denoiser: TrainedDenoiser | None = None,
     progress: Progress = silent,
 ) -> Table:
-    """Train what is not there yet, and read the rest.
+    """Train the missing runs and read the others.
 
     Parameters
     ----------
@@ -243,7 +243,7 @@ def make_table(
 def run_one(
     known: ClipSet, condition: Condition, seed: int, training: TrainOptions, denoise: Denoise
 ) -> Run:
-    """Train once and judge."""
+    """Train once and score the result."""
     chosen = choose(known, condition, seed, denoise)
     options = condition.network.of(training, seed)
     begun_s = time.process_time()
@@ -265,13 +265,13 @@ def run_one(
 
 
 def gains(table: Table, condition: Condition, of: Callable[[Run], float]) -> NDArray[np.float64]:
-    """How much better every run is than that of the same seed and share with nothing added."""
+    """Return the gain of every run over the one of the same seed and share with nothing added."""
     plain = {run.seed: run for run in table.of(replace(condition, added="nothing", moved=False))}
     return np.array([of(run) - of(plain[run.seed]) for run in table.of(condition)])
 
 
 def fits(known: ClipSet, denoiser: TrainedDenoiser) -> bool:
-    """Whether a denoiser knows maps such as these."""
+    """Tell if a denoiser is made for such maps."""
     card = denoiser.card
     return (
         card.axis == known.axis
@@ -281,7 +281,7 @@ def fits(known: ClipSet, denoiser: TrainedDenoiser) -> bool:
 
 
 def _denoising(known: ClipSet, denoiser: TrainedDenoiser | None) -> Denoise:
-    """Denoises a clip once, however often it is asked for."""
+    """Return a function that denoises every clip once."""
     kept: dict[tuple[str, str, int], Clip] = {}
 
     def denoise(clip: Clip) -> Clip:
@@ -304,7 +304,7 @@ def _key(
     seed: int,
     options: TableOptions,
 ) -> str:
-    """Tells runs apart by all that they depend on."""
+    """Hash of all that a run depends on."""
     model = ""
     if denoiser is not None and condition.added == "denoised":
         sums = hashlib.blake2b(digest_size=16)
@@ -317,7 +317,7 @@ def _key(
 
 
 def _read(path: Path) -> Run | None:
-    """A run that is there; None where there is none, or a damaged one."""
+    """Read a run; None where it is missing or damaged."""
     try:
         return Run.from_json(json.loads(path.read_text("utf-8")))
     except (OSError, ValueError, KeyError, TypeError, Sd2Error):

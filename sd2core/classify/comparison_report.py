@@ -22,7 +22,7 @@ Rows = list[list[str]]
 
 
 def title_of(condition: Condition) -> str:
-    """What is learnt from, in words."""
+    """Name the training data of a condition."""
     words = {
         "nothing": "radar only",
         "synthetic": "+ synthetic",
@@ -33,7 +33,7 @@ def title_of(condition: Condition) -> str:
 
 
 def network_of(condition: Condition) -> str:
-    """The network, what it is shown, and when it answers."""
+    """Name the network, its features and its delay."""
     network = condition.network
     shown = "columns" if network.features == "columns" else "strongest bin"
     late = f"after {network.delay_s:g} s" if network.delay_s else "at once"
@@ -41,7 +41,7 @@ def network_of(condition: Condition) -> str:
 
 
 def as_json(table: Table) -> dict[str, Any]:
-    """Everything, with means and standard deviations over seeds."""
+    """Return all runs with means and standard deviations over seeds."""
     return {
         "radar": table.kind,
         "by_movement": table.by_movement,
@@ -65,7 +65,7 @@ def as_json(table: Table) -> dict[str, Any]:
 
 
 def network_rows(table: Table) -> Rows:
-    """Networks and features at equal budget, all of the radar's data, nothing added."""
+    """Compare networks and features at equal budget on all radar data, nothing added."""
     rows = [["network", "parameters", *_score_head(table), "CPU s"]]
     for condition in table.conditions:
         if condition.share == 1.0 and condition.added == "nothing":
@@ -78,7 +78,7 @@ def network_rows(table: Table) -> Rows:
 
 
 def added_rows(table: Table) -> Rows:
-    """All of the radar's data, and what is added."""
+    """Compare the kinds of data added to all radar data."""
     rows = [["learnt from", "frames added", *_score_head(table), "gain, points", "moved, frames"]]
     for condition in main_conditions(table):
         if condition.share == 1.0:
@@ -96,7 +96,7 @@ def added_rows(table: Table) -> Rows:
 
 
 def curve_rows(table: Table) -> Rows:
-    """Mean recall by the share of the radar's data, with and without what is added."""
+    """Tabulate mean recall by share of the radar data, with and without added data."""
     titles = list(dict.fromkeys(title_of(one) for one in curve_conditions(table)))
     rows = [["of the radar's data", "frames", *titles, *(f"gain {one}" for one in titles[1:])]]
     for share in sorted({one.share for one in curve_conditions(table)}):
@@ -109,7 +109,7 @@ def curve_rows(table: Table) -> Rows:
 
 
 def confusion_rows(table: Table, condition: Condition) -> Rows:
-    """Share of each class that was taken for each, in per cent, over frames."""
+    """Tabulate the confusion of frames in per cent."""
     mean, sd = mean_confusion(table, condition), _confusion_sd(table, condition)
     rows = [["true", *(f"taken for {name}" for name in table.classes)]]
     for number, name in enumerate(table.classes):
@@ -122,32 +122,32 @@ def confusion_rows(table: Table, condition: Condition) -> Rows:
 
 
 def as_text(table: Table) -> str:
-    """All tables for a terminal."""
+    """Return all tables for a terminal."""
     return "\n".join(_lines(table, _plain))
 
 
 def as_markdown(table: Table) -> str:
-    """The same in Markdown."""
+    """Return all tables in Markdown."""
     return "\n".join(_lines(table, _markdown)) + "\n"
 
 
 def mean_confusion(table: Table, condition: Condition) -> NDArray[np.float64]:
-    """Mean over seeds of confusion matrices whose rows add up to 1; NaN without such frames."""
+    """Return the mean over seeds of row-normalised confusion matrices; NaN without such frames."""
     return np.asarray(_confusions(table, condition).mean(axis=0))
 
 
 def frame_recall(run: Run) -> float:
-    """Mean over classes of the share of frames that were found."""
+    """Mean recall of frames over classes."""
     return run.score.mean_recall
 
 
 def gesture_recall(run: Run) -> float:
-    """The same of whole gestures."""
+    """Mean recall of whole gestures over classes."""
     return mean_recall(run.score.gestures)
 
 
 def moved_recall(run: Run) -> float:
-    """Mean recall of frames where the sensor stands elsewhere."""
+    """Mean recall of frames seen from other places."""
     return float("nan") if run.moved is None else run.moved.mean_recall
 
 
@@ -181,12 +181,12 @@ def _lines(table: Table, lines_of: Callable[[Rows], list[str]]) -> list[str]:
 
 
 def main_conditions(table: Table) -> list[Condition]:
-    """Conditions of the network that all data are compared with."""
+    """Return the conditions of the network used for all comparisons of data."""
     return [one for one in table.conditions if one.network == table.options.network]
 
 
 def curve_conditions(table: Table) -> list[Condition]:
-    """Conditions of the learning curve."""
+    """Return the conditions of the learning curve."""
     return [one for one in main_conditions(table) if one.added != "radar" and not one.moved]
 
 
@@ -261,7 +261,7 @@ _COLOURS = ("#444444", "#b35806", "#2166ac")
 
 
 def draw_confusions(table: Table) -> Figure:
-    """One matrix for each of what is added to all of the radar's data."""
+    """Draw one confusion matrix for each kind of data added to all radar data."""
     shown = [one for one in main_conditions(table) if one.share == 1.0 and one.added != "radar"]
     return confusion_figure(
         [mean_confusion(table, one) for one in shown],
@@ -277,7 +277,7 @@ def confusion_figure(
     titles: Sequence[str],
     heading: str,
 ) -> Figure:
-    """Matrices whose rows add up to 1, in a row or two.
+    """Draw row-normalised confusion matrices in a row or two.
 
     Returns
     -------
@@ -300,7 +300,7 @@ def confusion_figure(
 
 
 def draw_curve(table: Table) -> Figure:
-    """Mean recall of frames by the share of the radar's data; bars are standard deviations."""
+    """Draw mean recall of frames by share of the radar data, with standard deviations."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6.4, 4.2), dpi=120, layout="constrained")

@@ -1,4 +1,4 @@
-"""What classifiers learn from: maps with a class per frame, of whom and of which kind."""
+"""Training data of classifiers: maps with a class per frame, a subject and a kind."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ UNKNOWN = -1
 
 @dataclass(frozen=True, eq=False)
 class Clip:
-    """One uninterrupted stretch of a map with the class of every frame.
+    """Uninterrupted part of a map with the class of every frame.
 
     Parameters
     ----------
@@ -67,16 +67,16 @@ class Clip:
 
     @property
     def key(self) -> tuple[str, str]:
-        """Whose movement it is: what training and test must not share."""
+        """Subject and movement, which training and test must not share."""
         return self.subject, self.movement
 
     @property
     def title(self) -> str:
-        """To name it in a message."""
+        """Name for messages."""
         return f"{self.subject}/{self.movement}"
 
     def until(self, frames: int) -> Clip:
-        """Its first frames."""
+        """Return its first frames."""
         return replace(self, energies=self.energies[:frames], label=self.label[:frames])
 
 
@@ -101,22 +101,22 @@ class ClipSet:
 
     @property
     def subjects(self) -> tuple[str, ...]:
-        """In the order of their first clips."""
+        """Subjects in the order of their first clips."""
         return tuple(dict.fromkeys(clip.subject for clip in self.clips))
 
     @property
     def kinds(self) -> tuple[MapKind, ...]:
-        """In the order of their first clips."""
+        """Kinds of maps in the order of their first clips."""
         return tuple(dict.fromkeys(clip.kind for clip in self.clips))
 
     def of(self, subjects: Iterable[str]) -> tuple[Clip, ...]:
-        """Clips of these subjects."""
+        """Return the clips of these subjects."""
         wanted = set(subjects)
         return tuple(clip for clip in self.clips if clip.subject in wanted)
 
 
 def seen_first(clips: Iterable[Clip]) -> Callable[[Clip], bool]:
-    """Which clips are from the first of the places that saw their movement: its own, if any did."""
+    """Return a test for clips from the first placement of their movement."""
     first: dict[tuple[str, str], int] = {}
     for clip in clips:
         first[clip.key] = min(clip.placement, first.get(clip.key, clip.placement))
@@ -124,7 +124,7 @@ def seen_first(clips: Iterable[Clip]) -> Callable[[Clip], bool]:
 
 
 def frame_counts(clips: Iterable[Clip], classes: int) -> NDArray[np.int64]:
-    """Frames of each class, (classes,)."""
+    """Count the frames of each class, (classes,)."""
     counts = np.zeros(classes, np.int64)
     for clip in clips:
         counts += np.bincount(clip.label[clip.label >= 0], minlength=classes)
@@ -132,7 +132,7 @@ def frame_counts(clips: Iterable[Clip], classes: int) -> NDArray[np.int64]:
 
 
 def gesture_classes(labels: Sequence[str]) -> tuple[str, ...]:
-    """Class of every label: the paper's swipes by their direction, others by their own name.
+    """Return the class of every label: swipes by direction, others by name.
 
     Background, however it is written, is the background.
     """
@@ -142,7 +142,7 @@ def gesture_classes(labels: Sequence[str]) -> tuple[str, ...]:
 def clips_of_pairs(
     pairs: PairSet, kind: MapKind, denoiser: TrainedDenoiser | None = None
 ) -> ClipSet:
-    """One kind of maps of a store of pairs.
+    """Return the clips of one kind of maps in a store of pairs.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def clips_of_map(
     movement: str,
     frame_rate_hz: float | None = None,
 ) -> ClipSet:
-    """One labelled map, such as of a recording or of a radar's own file.
+    """Return the clips of one labelled map, such as a recording's or a radar file's.
 
     A frame has the class of the label that it stands in (``gesture_class`` of the label
     set); frames without a label are background. Labels without a class, and frames on
@@ -239,7 +239,7 @@ def clips_of_map(
 
 
 def frame_labels(timebase: Timebase, labels: Labels) -> tuple[NDArray[np.int8], tuple[str, ...]]:
-    """Class of every frame, and the classes; see :func:`clips_of_map`."""
+    """Return the class of every frame, and the classes; see :func:`clips_of_map`."""
     spans = [span for span in labels.spans if span.origin != "suggestion"]
     names = {span.label: _class_of(span.label, labels.label_set) for span in spans}
     classes = in_order([BACKGROUND, *(name for name in names.values() if name)])
@@ -256,7 +256,7 @@ def frame_labels(timebase: Timebase, labels: Labels) -> tuple[NDArray[np.int8], 
 
 
 def merged(sets: Sequence[ClipSet]) -> ClipSet:
-    """Several sets as one; a bin that is emptied in one of them counts in none.
+    """Merge several sets; a bin that is zero in one of them is nulled in all.
 
     Raises
     ------
@@ -306,7 +306,7 @@ def _class_of(label: str, label_set: LabelSet) -> str:
 
 
 def in_order(names: Iterable[str]) -> tuple[str, ...]:
-    """Names of classes, each once: the background first, the others by name."""
+    """Sort names of classes, each once: the background first."""
     return tuple(sorted(set(names), key=lambda name: (name != BACKGROUND, name)))
 
 
@@ -331,7 +331,7 @@ def _check_denoiser(pairs: PairSet, denoiser: TrainedDenoiser | None) -> None:
 
 
 def with_noise_floor(clip: Clip, null_bins: Sequence[int], rng: np.random.Generator) -> Clip:
-    """A clip as a receiver with more noise would give it.
+    """Add a random noise floor to a clip, as of a noisier receiver.
 
     Parameters
     ----------
@@ -350,7 +350,7 @@ def with_noise_floor(clip: Clip, null_bins: Sequence[int], rng: np.random.Genera
 def some_noisy(
     clips: Sequence[Clip], null_bins: Sequence[int], share: float, seed: int
 ) -> list[Clip]:
-    """The clips, some of them with a noise floor: each with this probability."""
+    """Add a noise floor to each clip with this probability."""
     rng = np.random.default_rng(seed)
     return [
         with_noise_floor(clip, null_bins, rng) if rng.random() < share else clip for clip in clips

@@ -1,4 +1,4 @@
-"""What a table of trainings compares: how much real data, what is added, which network.
+"""Conditions of a comparison: share of real data, added data, and network.
 
 Of the people who are learnt from, movements are put in a random order and parted in two.
 The larger part is there as the radar saw it; of it a share is taken, whole movements, the
@@ -41,7 +41,7 @@ Denoise = Callable[[Clip], Clip]
 
 @dataclass(frozen=True)
 class Network:
-    """What is trained; a table compares several.
+    """Network to train.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class Network:
     delay_s: float = DELAY_S
 
     def of(self, training: TrainOptions, seed: int) -> TrainOptions:
-        """How it is trained, all else being equal."""
+        """Return these training options with this network and seed."""
         return replace(
             training,
             model=self.model,
@@ -74,7 +74,7 @@ PAPER = Network("lstm", "peak", 16, 0.0)
 
 @dataclass(frozen=True)
 class Condition:
-    """One way to train.
+    """Condition of a training: its data and its network.
 
     Parameters
     ----------
@@ -102,18 +102,18 @@ class Condition:
             raise Sd2Error(f"{self.added!r} is to be added", f"one of {', '.join(ADDED)}")
 
     def to_json(self) -> dict[str, Any]:
-        """By name."""
+        """Return the fields by name."""
         return asdict(self)
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> Condition:
-        """Read what :meth:`to_json` gave; raises TypeError."""
+        """Parse :meth:`to_json`; raises TypeError."""
         return cls(**{**content, "network": Network(**content["network"])})
 
 
 @dataclass(frozen=True, eq=False)
 class Chosen:
-    """What one run learns from and is judged on.
+    """Clips of one run, by their use.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ class Chosen:
 
 
 def choose(known: ClipSet, condition: Condition, seed: int, denoise: Denoise) -> Chosen:
-    """Pick the clips of one run; the same for the same seed, and the more real the more of them.
+    """Choose the clips of one run, reproducibly; a larger share includes a smaller one.
 
     Parameters
     ----------
@@ -171,12 +171,12 @@ def choose(known: ClipSet, condition: Condition, seed: int, denoise: Denoise) ->
 
 
 def has_synthetic(known: ClipSet) -> bool:
-    """Whether there are synthetic maps that could be added."""
+    """Tell if there are synthetic maps to add."""
     return "synthetic" in known.kinds
 
 
 def digest(known: ClipSet) -> str:
-    """The same for the same clips, whatever their files are called."""
+    """Hash of the clips, independent of file names."""
     sums = hashlib.blake2b(digest_size=16)
     head = [known.classes, known.axis.bins, known.axis.v_max_mps, known.null_bins]
     sums.update(json.dumps([*head, known.frame_rate_hz]).encode())
@@ -190,7 +190,7 @@ def digest(known: ClipSet) -> str:
 
 
 def counts_of(clips: Sequence[Clip], known: ClipSet) -> dict[str, int]:
-    """Frames per class, by name."""
+    """Count the frames per class, by name."""
     counts = frame_counts(clips, len(known.classes)).tolist()
     return dict(zip(known.classes, counts, strict=True))
 
@@ -198,7 +198,7 @@ def counts_of(clips: Sequence[Clip], known: ClipSet) -> dict[str, int]:
 def _pools(
     known: ClipSet, parts: Parts, seed: int
 ) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
-    """Movements that are real, and those that may be added, each in random order."""
+    """Split the movements into real ones and ones to add, each in random order."""
     keys = movements([clip for clip in parts.training if clip.kind in RADAR])
     if not keys:
         raise Sd2Error("There is no map of a radar to learn from", "labelled maps of a radar")
@@ -225,7 +225,7 @@ def _added(
 
 
 def _first(clips: Sequence[Clip], share: float) -> tuple[Clip, ...]:
-    """A share of the frames from the beginning; the last clip is cut short."""
+    """Return the first clips that hold a share of the frames; the last one is cut short."""
     left = round(share * sum(map(len, clips)))
     found = []
     for clip in clips:
@@ -237,5 +237,5 @@ def _first(clips: Sequence[Clip], share: float) -> tuple[Clip, ...]:
 
 
 def _whole(clips: Sequence[Clip], share: float) -> tuple[Clip, ...]:
-    """That share of the clips, at least one: with little to learn from, little to choose by."""
+    """Return that share of the clips, at least one: little validation data with little training data."""
     return tuple(clips[: max(1, round(share * len(clips)))])

@@ -1,4 +1,4 @@
-"""What a classifier is shown of every frame of a Doppler map.
+"""Causal, gain-free features of the frames of a Doppler map.
 
 All is causal and free of gain: a frame's features depend on it and on earlier frames,
 and a map times any number gives the same ones. So live equals batch, and a classifier
@@ -48,7 +48,7 @@ _BLOCK = 4096
 
 
 class Heard(NamedTuple):
-    """What is remembered of the frames before.
+    """State of the features after some frames.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ SILENCE = Heard(np.zeros(0), -np.inf)
 
 @dataclass(frozen=True)
 class Features:
-    """How frames become what a classifier is shown.
+    """Conversion of frames to features.
 
     Parameters
     ----------
@@ -91,13 +91,13 @@ class Features:
 
     @property
     def size(self) -> int:
-        """Numbers per frame."""
+        """Number of features per frame."""
         return 2 if self.kind == "peak" else self.axis.bins
 
     def of(
         self, energies: NDArray[np.floating], heard: Heard = SILENCE
     ) -> tuple[NDArray[np.float32], Heard]:
-        """Features of the next frames.
+        """Compute the features of the next frames.
 
         Parameters
         ----------
@@ -131,7 +131,7 @@ class Features:
     def _noise(
         self, values: NDArray[np.float64], heard: Heard
     ) -> tuple[NDArray[np.float64], Heard]:
-        """Noise level of every frame, (frames,), and what to remember."""
+        """Compute the noise level of every frame, (frames,), and the next state."""
         if not len(values):
             return np.zeros(0), heard
         window = max(round(NOISE_S * self.frame_rate_hz), 1)
@@ -144,7 +144,7 @@ class Features:
         return noise, Heard(known[-window:], float(loudest_log[-1]))
 
     def _loudest_log(self, loudest: NDArray[np.float64], before: float) -> NDArray[np.float64]:
-        """Running maximum that decays, as logarithms, (frames,)."""
+        """Compute the decaying running maximum, as logarithms, (frames,)."""
         with np.errstate(divide="ignore"):
             level = np.log(loudest)
         fallen = np.arange(1, len(level) + 1) / (LOUDEST_S * self.frame_rate_hz)
@@ -153,7 +153,7 @@ class Features:
 
 
 def _running_median(values: NDArray[np.float64], window: int) -> NDArray[np.float64]:
-    """Median of every value and those up to a window before it, as far as there are any."""
+    """Running median over a window that ends at every value."""
     found = np.empty(len(values))
     early = min(window - 1, len(values))
     for last in range(early):

@@ -38,7 +38,7 @@ def save_classifier(path: Path, trained: TrainedClassifier) -> ClassifierCard:
 
 
 def describe_classifier(path: Path) -> ClassifierCard:
-    """What a file says about its classifier; the weights stay on disk, without torch.
+    """Read the card of a classifier's file, without its weights and without torch.
 
     Raises
     ------
@@ -49,7 +49,7 @@ def describe_classifier(path: Path) -> ClassifierCard:
 
 
 def load_classifier(path: Path) -> TrainedClassifier:
-    """Load a classifier, ready to be used.
+    """Load a classifier.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A trained classifier at work: on whole maps, and on frames as they come."""
+"""Use of a trained classifier: on whole maps, and on live frames."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Probabilities = NDArray[np.float32]
 
 
 class Memory(NamedTuple):
-    """What is remembered between frames; it is never changed, only replaced."""
+    """Immutable state between frames."""
 
     heard: Heard
     network: State
@@ -35,7 +35,7 @@ class Memory(NamedTuple):
 
 
 class TrainedClassifier:
-    """A network and all that is needed to use it.
+    """Network with its card.
 
     Parameters
     ----------
@@ -49,11 +49,11 @@ class TrainedClassifier:
 
     @property
     def classes(self) -> tuple[str, ...]:
-        """In the order of the answers."""
+        """Classes in the order of the probabilities."""
         return self.card.classes
 
     def probabilities(self, doppler: DopplerMap, progress: Progress = silent) -> Probabilities:
-        """What every frame of a map shows.
+        """Compute the probability of every class in every frame of a map.
 
         Frames without a person are background for certain, and what was before them is
         forgotten: every stretch is a clip of its own (docs/decisions/0021). A map of
@@ -99,7 +99,7 @@ class TrainedClassifier:
     def probabilities_of(
         self, energies: NDArray[np.float32], progress: Progress = silent
     ) -> Probabilities:
-        """One stretch at the model's frame rate, (frames, bins) → (frames, classes)."""
+        """Compute one clip at the model's frame rate, (frames, bins) → (frames, classes)."""
         found = np.empty((len(energies), len(self.classes)), np.float32)
         memory = self.initial_memory()
         known = 0
@@ -112,14 +112,14 @@ class TrainedClassifier:
         return found
 
     def initial_memory(self) -> Memory:
-        """Before the first frame of a clip."""
+        """Return the state before the first frame of a clip."""
         with torch.no_grad():
             return Memory(SILENCE, self.network.initial_state(1))
 
     def step(
         self, frame: NDArray[np.float32], memory: Memory, present: bool = True
     ) -> tuple[Probabilities, Memory]:
-        """Show the next frame; what became known by it, and what to remember.
+        """Process the next frame; return the answers it completes and the next state.
 
         Parameters
         ----------
@@ -145,7 +145,7 @@ class TrainedClassifier:
     def advance(
         self, energies: NDArray[np.float32], memory: Memory
     ) -> tuple[Probabilities, Memory]:
-        """The same for some frames at once, (frames, bins) → (answers, classes)."""
+        """Process several frames at once, (frames, bins) → (answers, classes)."""
         if not len(energies):
             return np.zeros((0, len(self.classes)), np.float32), memory
         shown, heard = self.card.features.of(energies, memory.heard)
@@ -154,14 +154,14 @@ class TrainedClassifier:
         return answers, Memory(heard, state, owed)
 
     def finish(self, memory: Memory) -> Probabilities:
-        """Answers that are owed, if nothing moves from now on: (owed, classes)."""
+        """Return the outstanding answers, as if silence followed: (owed, classes)."""
         if not memory.owed:
             return np.zeros((0, len(self.classes)), np.float32)
         silence = np.zeros((self.card.delay_frames, self.card.features.size), np.float32)
         return self._ask(silence, memory)[0]
 
     def _ask(self, shown: NDArray[np.float32], memory: Memory) -> tuple[Probabilities, State]:
-        """Answers of the network; the first ones of a clip are about nothing."""
+        """Run the network; answers before the first frame of a clip are dropped."""
         with torch.no_grad():
             answer, state = self.network.chunk(torch.from_numpy(shown)[None], memory.network)
             found: Probabilities = probabilities_of(answer[0]).numpy()

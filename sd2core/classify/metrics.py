@@ -1,4 +1,4 @@
-"""How good predicted classes are: per frame, per gesture, and how soon."""
+"""Scores of predicted classes: per frame, per gesture, and latency."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Confusion = NDArray[np.int64]
 
 
 def confusion_of(truth: NDArray[np.integer], found: NDArray[np.integer], classes: int) -> Confusion:
-    """How often each class was taken for each; unknown frames do not count.
+    """Compute the confusion matrix; unknown frames do not count.
 
     Raises
     ------
@@ -33,19 +33,19 @@ def confusion_of(truth: NDArray[np.integer], found: NDArray[np.integer], classes
 
 
 def shares(confusion: Confusion) -> NDArray[np.float64]:
-    """Every row as shares of its sum, (classes, classes); NaN in a row of nothing."""
+    """Normalise the rows of a confusion matrix; NaN in an empty row."""
     totals = confusion.sum(axis=1, keepdims=True)
     found = np.full(confusion.shape, np.nan)
     return np.divide(confusion, totals, out=found, where=totals > 0)
 
 
 def recalls(confusion: Confusion) -> NDArray[np.float64]:
-    """Share of each class that was found, (classes,); NaN for one that does not occur."""
+    """Recall of each class, (classes,); NaN for one that does not occur."""
     return np.diag(shares(confusion))
 
 
 def mean_recall(confusion: Confusion) -> float:
-    """Over the classes that occur; NaN where none does."""
+    """Mean recall over the classes that occur; NaN where none does."""
     known = recalls(confusion)
     known = known[~np.isnan(known)]
     return float(known.mean()) if known.size else float("nan")
@@ -53,7 +53,7 @@ def mean_recall(confusion: Confusion) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Score:
-    """Of a classifier on some clips.
+    """Score of a classifier on some clips.
 
     Parameters
     ----------
@@ -75,12 +75,12 @@ class Score:
 
     @property
     def mean_recall(self) -> float:
-        """Over classes, of frames."""
+        """Mean recall of frames over classes."""
         return mean_recall(self.frames)
 
     @property
     def latency_s(self) -> float:
-        """Median; NaN where no gesture was recognised."""
+        """Median latency; NaN where no gesture was recognised."""
         return float(np.median(self.latencies_s)) if len(self.latencies_s) else float("nan")
 
     def __add__(self, other: Score) -> Score:
@@ -95,7 +95,7 @@ class Score:
         )
 
     def to_json(self) -> dict[str, Any]:
-        """What was counted, for files."""
+        """Return the counts, for files."""
         return {
             "classes": list(self.classes),
             "frames": self.frames.tolist(),
@@ -105,7 +105,7 @@ class Score:
         }
 
     def summary(self) -> dict[str, Any]:
-        """What is read off that; NaN where there is nothing to read."""
+        """Return recalls and latency; NaN where there is no data."""
         return {
             "recall_frames": recalls(self.frames).tolist(),
             "recall_gestures": recalls(self.gestures).tolist(),
@@ -116,7 +116,7 @@ class Score:
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> Score:
-        """Read what :meth:`to_json` gave; raises KeyError, TypeError or ValueError."""
+        """Parse :meth:`to_json`; raises KeyError, TypeError or ValueError."""
         return cls(
             tuple(content["classes"]),
             np.array(content["frames"], np.int64),
@@ -164,7 +164,7 @@ def score(
 
 
 def gesture_runs(truth: NDArray[np.integer], background: int | None) -> list[tuple[int, int, int]]:
-    """Half-open runs of frames of one class that is a gesture, with the class."""
+    """Find runs of frames of one gesture: half-open ranges with the class."""
     begins = np.flatnonzero(np.diff(truth, prepend=truth[:1] - 1))
     stops = np.append(begins, len(truth))[1:]
     return [

@@ -1,4 +1,4 @@
-"""The networks: features of frames in, one number per class and frame out; all causal."""
+"""Causal networks: features of frames in, one logit per class and frame out."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ State = Any
 
 
 class Classifier(nn.Module):
-    """Base of all: layers along time, then the same head for each.
+    """Base of the classifiers: layers along time, then a common head.
 
     The head is the paper's: layer norm, dense, dropout, dense (softmax is left to the loss
     and to whoever asks for probabilities).
@@ -42,24 +42,24 @@ class Classifier(nn.Module):
         )
 
     def chunk(self, features: Tensor, state: State) -> tuple[Tensor, State]:
-        """Go on with the next frames: (batch, frames, size) → (batch, frames, classes)."""
+        """Process the next frames: (batch, frames, size) → (batch, frames, classes)."""
         raise NotImplementedError
 
     def initial_state(self, batch: int = 1) -> State:
-        """Before the first frame."""
+        """Return the state before the first frame."""
         raise NotImplementedError
 
     def forward(self, features: Tensor) -> Tensor:
-        """Whole stretches, each a clip of its own."""
+        """Process whole clips."""
         return self.chunk(features, self.initial_state(len(features)))[0]
 
     def ssm_parameters(self) -> Iterator[nn.Parameter]:
-        """Those of state spaces, which learn more slowly."""
+        """Yield the parameters of state spaces, which learn more slowly."""
         return iter(())
 
 
 class LstmClassifier(Classifier):
-    """The paper's: two stateful LSTM layers (there of 16 units).
+    """Two stateful LSTM layers, as in the paper (there of 16 units).
 
     Parameters
     ----------
@@ -83,14 +83,14 @@ class LstmClassifier(Classifier):
                     forget.fill_(0.5)
 
     def initial_state(self, batch: int = 1) -> State:
-        """Zeros, twice (layers, batch, width)."""
+        """Return zeros, twice (layers, batch, width)."""
         zeros = self.head[1].weight.new_zeros(
             self.layers.num_layers, batch, self.layers.hidden_size
         )
         return zeros, zeros
 
     def chunk(self, features: Tensor, state: State) -> tuple[Tensor, State]:
-        """Continue with the layers' cells."""
+        """Process the next frames with the layers' cells."""
         hidden, state = self.layers(features, state)
         return self.head(hidden), state
 
@@ -131,18 +131,18 @@ class S4Classifier(Classifier):
         )
 
     def initial_state(self, batch: int = 1) -> State:
-        """One state per layer."""
+        """Return one state per layer."""
         return [layer.initial_state(batch) for layer in self.layers]
 
     def forward(self, features: Tensor) -> Tensor:
-        """By convolution."""
+        """Process whole clips by convolution."""
         hidden = self.lift(features)
         for layer in self.layers:
             hidden = layer(hidden)
         return self.head(hidden)
 
     def chunk(self, features: Tensor, state: State) -> tuple[Tensor, State]:
-        """By recurrence."""
+        """Process the next frames by recurrence."""
         hidden, after = self.lift(features), []
         for layer, one in zip(self.layers, state, strict=True):
             hidden, one = layer.chunk(hidden, one)
@@ -150,7 +150,7 @@ class S4Classifier(Classifier):
         return self.head(hidden), after
 
     def ssm_parameters(self) -> Iterator[nn.Parameter]:
-        """Those of all layers."""
+        """Yield the parameters of all state spaces."""
         for layer in self.layers:
             yield from layer.ssm_parameters()
 
@@ -166,7 +166,7 @@ _LARGEST = 1024
 
 
 def options(name: str) -> dict[str, Any]:
-    """Options of a model with their defaults.
+    """Return the options of a model with their defaults.
 
     Raises
     ------
@@ -179,7 +179,7 @@ def options(name: str) -> dict[str, Any]:
 
 
 def build(name: str, size: int, classes: int, **given: Any) -> Classifier:
-    """A network with fresh weights, drawn from torch's generator.
+    """Build a network with random weights from torch's generator.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ def build(name: str, size: int, classes: int, **given: Any) -> Classifier:
 
 
 def parameter_groups(network: Classifier, rate: float, ssm_rate: float) -> list[dict[str, Any]]:
-    """Parameters with their learning rates; state spaces are not decayed."""
+    """Group the parameters by learning rate; state spaces have no weight decay."""
     slow = list(network.ssm_parameters())
     ids = {id(one) for one in slow}
     rest = [one for one in network.parameters() if id(one) not in ids]

@@ -21,7 +21,7 @@ _ROUNDING_S = 1e-6
 
 @dataclass(frozen=True)
 class SpanOptions:
-    """When frames of a class are a span.
+    """Conditions for frames of a class to be a span.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def predicted_spans(
     track: str = TRACK,
     first_id: int = 1,
 ) -> tuple[Span, ...]:
-    """Runs of frames whose most probable class is one of the gestures, in order.
+    """Find the runs of frames whose most probable class is a gesture.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def predicted_spans(
 
 
 def _runs(winner: NDArray[np.int64], first: NDArray[np.int64]) -> list[tuple[int, int, int]]:
-    """Half-open runs of frames of one class within one stretch."""
+    """Find half-open runs of frames of one class within one clip."""
     begins = np.ones(len(winner), bool)
     begins[1:] = (winner[1:] != winner[:-1]) | (first[1:] != first[:-1])
     starts = np.flatnonzero(begins)

@@ -1,4 +1,4 @@
-"""Who is learnt from, who chooses the best moment, who is judged: people, never frames."""
+"""Split of clips by people: training, validation and test."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _LEAST_SUBJECTS = 3
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """Clips by what they are for; no movement of one part is in another.
+    """Clips of training, validation and test; no movement is in two parts.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class Parts:
     by_movement: bool
 
     def to_json(self) -> dict[str, Any]:
-        """Who is in which part."""
+        """Return the subjects of each part."""
         return {
             "by_movement": self.by_movement,
             **{
@@ -75,7 +75,7 @@ def split_clips(
 
 
 def fold(known: ClipSet, number: int) -> Parts:
-    """One of several ways to split, so that everybody is judged in turn.
+    """Split for one fold of a cross-validation, so that everyone is tested in turn.
 
     With three subjects or more the list of subjects is turned by ``number``, and split as
     by default. With two, one is learnt from and one judged. With one, every class gives
@@ -96,7 +96,7 @@ def fold(known: ClipSet, number: int) -> Parts:
 
 
 def movements(clips: Sequence[Clip]) -> list[Movement]:
-    """Each once, in order."""
+    """Return the movements of clips, each once, in order."""
     return list(dict.fromkeys(clip.key for clip in clips))
 
 
@@ -110,7 +110,7 @@ def _apart(clips: Sequence[Clip], kept: set[Movement]) -> tuple[tuple[Clip, ...]
 def _kept_movements(
     known: ClipSet, clips: Sequence[Clip], fold: int, share: float
 ) -> set[Movement]:
-    """That share of the movements of every class that has two or more, at least one.
+    """Choose a share of the movements of every class that has two or more, at least one.
 
     A movement counts as one of the rarest class that it holds.
     """
@@ -131,7 +131,7 @@ def _kept_movements(
 
 
 def _rarest(known: ClipSet, clips: Sequence[Clip]) -> dict[Movement, int]:
-    """Of every movement the class that has the fewest frames in all, of those it holds."""
+    """Return the rarest class that every movement holds."""
     total = frame_counts(clips, len(known.classes))
     own: dict[Movement, Any] = {}
     for clip in clips:

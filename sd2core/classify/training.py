@@ -29,7 +29,7 @@ Watch = Callable[[dict[str, Any]], None]
 
 @dataclass(frozen=True)
 class TrainOptions:
-    """How a classifier is trained.
+    """Options of a training.
 
     Parameters
     ----------
@@ -87,12 +87,12 @@ class TrainOptions:
             raise Sd2Error(f"The delay is {self.delay_s} s", f"0 to {LONGEST_DELAY_S:g} s")
 
     def to_json(self) -> dict[str, Any]:
-        """By name; options in full."""
+        """Return the fields by name, with all options of the model."""
         return {**asdict(self), "options": {**options(self.model), **self.options}}
 
 
 class Trained(NamedTuple):
-    """What came of a training.
+    """Result of a training.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ class Material(NamedTuple):
 
     @classmethod
     def of(cls, clips: Sequence[Clip], features: Features, delay_frames: int) -> Material:
-        """Of some clips."""
+        """Compute features and labels of clips."""
         return cls(
             [np.pad(features.of(c.energies)[0], ((0, delay_frames), (0, 0))) for c in clips],
             [
@@ -143,7 +143,7 @@ def train(
     about: Mapping[str, Any] | None = None,
     watch: Watch = lambda event: None,
 ) -> Trained:
-    """Learn from clips.
+    """Train a classifier on clips.
 
     The loss is the cross entropy, every class weighted by the inverse of its number of
     frames, so that all of them count the same. A batch is drawn anew when all clips have
@@ -220,7 +220,7 @@ def train(
 
 
 class _Learning:
-    """Batches, one after another."""
+    """Loop over batches with the optimiser."""
 
     def __init__(
         self,
@@ -237,7 +237,7 @@ class _Learning:
         self._highest = [group["lr"] for group in self._optimiser.param_groups]
 
     def run(self) -> Iterator[float]:
-        """The loss of every step."""
+        """Yield the loss of every step."""
         waiting: list[int] = []
         for step in range(self._chosen.steps):
             share = _schedule(step / self._chosen.steps)
@@ -251,7 +251,7 @@ class _Learning:
             yield self._learn(*self._windows(drawn))
 
     def _windows(self, clips: Sequence[int]) -> tuple[torch.Tensor, torch.Tensor]:
-        """A stretch of each clip: (batch, frames, size) and (batch, frames)."""
+        """Cut a window from each clip: (batch, frames, size) and (batch, frames)."""
         length = min(
             self._chosen.window_frames, max(len(self._material.labels[one]) for one in clips)
         )
@@ -268,7 +268,7 @@ class _Learning:
         return torch.from_numpy(shown), torch.from_numpy(label)
 
     def _learn(self, shown: torch.Tensor, label: torch.Tensor) -> float:
-        """Learn from a batch in parts, each an update, for every network the same number.
+        """Learn from a batch in parts; every network gets the same number of updates.
 
         A network that carries its state gets the frames piece after piece, one that looks at
         whole stretches some of the stretches after others.
@@ -291,7 +291,7 @@ class _Learning:
         return sum(known) / max(len(known), 1)
 
     def _update(self, answer: torch.Tensor, label: torch.Tensor) -> float | None:
-        """One step of the optimiser; the loss, or None where no frame is known."""
+        """Do one step of the optimiser; return the loss, or None where no frame is known."""
         if (label == UNKNOWN).all():
             return None
         loss = functional.cross_entropy(
@@ -334,7 +334,7 @@ def _class_weights(clips: Sequence[Clip], classes: tuple[str, ...]) -> torch.Ten
 
 @contextmanager
 def _one_thread() -> Iterator[None]:
-    """Small matrices are slower on several threads, and differ between machines."""
+    """Use one thread: small matrices are slower on several, and differ between machines."""
     before = torch.get_num_threads()
     torch.set_num_threads(1)
     try:

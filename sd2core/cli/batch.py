@@ -124,7 +124,7 @@ def _run(plan: BatchPlan, options: argparse.Namespace) -> int:
 
 @contextmanager
 def _watching(options: argparse.Namespace) -> Iterator[Watch]:
-    """Lines on standard output, or a bar on standard error where that is a terminal."""
+    """Show progress as lines on standard output, or as a bar on a terminal."""
     if options.progress_json:
         yield lambda event: print(json.dumps(event, ensure_ascii=False), flush=True)
         return

@@ -1,4 +1,4 @@
-"""``sd2 export``: a data set to learn from."""
+"""``sd2 export``: write a data set to learn from."""
 
 from __future__ import annotations
 
@@ -284,7 +284,7 @@ def _dry_run(
 
 
 def _simulating_s(options: argparse.Namespace, making: Making) -> float | None:
-    """How long simulating radars would take; None where nobody asked for it."""
+    """Estimate the seconds of simulating radars; None where it is not asked for."""
     if making.simulation is None:
         return None
     from sd2core.datasets.forecast import simulation_s
@@ -345,7 +345,7 @@ def _listed(counts: dict[Any, int]) -> str:
 
 
 class _Lines:
-    """Prints one JSON object per line, at once."""
+    """Writer of one JSON object per line."""
 
     def __init__(self) -> None:
         self._last_s = -1.0

@@ -1,4 +1,4 @@
-"""``sd2 pairs``: synthetic Doppler beside what a real radar saw, to learn from."""
+"""``sd2 pairs``: make pairs of synthetic and radar Doppler to learn from."""
 
 from __future__ import annotations
 

@@ -86,7 +86,7 @@ _READ = ("segment_label", "purity", "subject", "split", "available", "resampled"
 
 
 class _Counts:
-    """Segments counted part by part."""
+    """Counts of segments, part by part."""
 
     def __init__(self, labels: int, subjects: int) -> None:
         self.label = np.zeros(labels, np.int64)
@@ -119,7 +119,7 @@ class _Counts:
 
 
 class _Sources:
-    """Lines of sources, counted one by one."""
+    """Counts over sources."""
 
     def __init__(self) -> None:
         self.count = 0

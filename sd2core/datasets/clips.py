@@ -1,4 +1,4 @@
-"""What a classifier learns from, read from a data set: its segments put together again."""
+"""Clips for classifiers, joined again from the segments of a data set."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _SLACK_FRAMES = 0.01
 
 
 def clips_of_dataset(dataset: Dataset, kind: MapKind) -> ClipSet:
-    """One kind of maps of a data set.
+    """Return the clips of one kind of maps in a data set.
 
     Segments of a source that overlap or touch become one clip again, so that a frame
     counts once and a classifier that remembers sees whole movements.
@@ -63,7 +63,7 @@ def clips_of_dataset(dataset: Dataset, kind: MapKind) -> ClipSet:
 def _first_frames(
     dataset: Dataset, rows: NDArray[np.integer], resampled: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
-    """Where segments begin, in frames of the data set: differences count, within a source.
+    """Return the first frames of segments; only differences within a source have a meaning.
 
     A camera's frames come at times of its own, which are no whole numbers of frames; only
     what was resampled has just its times.
@@ -76,7 +76,7 @@ def _first_frames(
 def _runs(
     belongs: NDArray[np.integer], first_frame: NDArray[np.float64], length: int
 ) -> Iterator[tuple[slice, NDArray[np.int64]]]:
-    """Rows of one clip each, and at which of its frames each of its segments begins.
+    """Yield the rows of each clip, and the frame at which each of its segments begins.
 
     Rows of one clip have the same number in ``belongs``.
     """
@@ -95,7 +95,7 @@ def _runs(
 
 
 def _joined(segments: NDArray, starts: NDArray[np.int64]) -> NDArray:
-    """(segments, length, …) → (frames, …); where they overlap they are the same."""
+    """Join segments, equal where they overlap: (segments, length, …) → (frames, …)."""
     length = segments.shape[1]
     whole = np.empty((int(starts[-1]) + length, *segments.shape[2:]), segments.dtype)
     for start, segment in zip(starts, segments, strict=True):

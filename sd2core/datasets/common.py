@@ -1,4 +1,4 @@
-"""What the sources of a data set have in common: checked, and gathered as they come."""
+"""Common properties of the sources of a data set, collected and checked."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from sd2core.version import __version__
 
 @dataclass
 class Names:
-    """What sources have in common, in the order in which it came up."""
+    """Subjects, labels, classes, units and kinds of all sources, in order of appearance."""
 
     subjects: dict[str, int] = field(default_factory=dict)
     labels: dict[str, int] = field(default_factory=lambda: {BACKGROUND: 0})
@@ -26,7 +26,7 @@ class Names:
     kinds: set[str] = field(default_factory=set)
 
     def learn(self, entry: dict[str, Any]) -> None:
-        """From the line of a source."""
+        """Add the line of a source."""
         # Who has no segment is in no split.
         if entry["stop"] > entry["start"]:
             self.subjects.setdefault(entry["subject"], len(self.subjects))
@@ -38,7 +38,7 @@ class Names:
         self.kinds |= {kind for kind, count in entry["segments_of_kind"].items() if count}
 
     def check(self, source: Source) -> None:
-        """Refuse a source that calls the class of a label otherwise."""
+        """Refuse a source that gives a label another class."""
         for label, name in source.classes.items():
             if self.classes.get(label, name) != name:
                 raise Sd2Error(
@@ -48,7 +48,7 @@ class Names:
 
 
 def header_of(source: Source, options: DatasetOptions) -> Header:
-    """Header of a data set that begins with a source: what options leave open is its own."""
+    """Return the header of a new data set; its first source fills in open options."""
     first: DopplerMap = next(iter(source.maps.values()))
     nulled = sorted({number for one in source.maps.values() for number in one.null_bins})
     return Header(
@@ -97,7 +97,7 @@ def check_fits(source: Source, header: Header) -> None:
 
 
 def entry_of(source: Source, header: Header, fingerprint: str) -> dict[str, Any]:
-    """What the line of a source says, but for its rows."""
+    """Return the line of a source in the index, without its rows."""
     range_m, azimuth_deg, elevation_deg = source.spherical
     kinds = [kind for kind in header.kinds_wanted if kind in source.maps]
     return {

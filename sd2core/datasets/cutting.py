@@ -1,4 +1,4 @@
-"""A source cut into segments: pure functions from maps to rows of a data set.
+"""Cutting of a source into segments: pure functions from maps to rows of a data set.
 
 Segments lie within clips: runs of frames with a person, between which no time is missing.
 Where frames come evenly and at the rate of the data set, a segment holds them as they are.
@@ -28,7 +28,7 @@ Arrays = dict[str, NDArray]
 
 @dataclass(frozen=True, eq=False)
 class Clip:
-    """A run of frames that segments are cut from.
+    """Run of frames that segments are cut from.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def clips_of(
     length: int,
     overlap: int,
 ) -> list[Clip]:
-    """Clips of a source, with the places of their segments.
+    """Find the clips of a source and the first frames of their segments.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def clips_of(
 def count_segments(
     outline: Outline, frame_rate_hz: float, options: DatasetOptions
 ) -> tuple[int, dict[str, int]]:
-    """How many segments a source gives, and how many of each label."""
+    """Count the segments of a source, in all and by label."""
     counts: dict[str, int] = {}
     total = 0
     for clip in clips_of(
@@ -105,7 +105,7 @@ def cut_source(
     label_numbers: NDArray[np.int16],
     options: DatasetOptions,
 ) -> Iterator[Arrays]:
-    """Rows of a data set, in blocks of a bounded number of segments.
+    """Yield the rows of a data set in blocks of bounded size.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def cut_source(
 def label_of_segments(
     windows: NDArray[np.integer], labels: int, options: DatasetOptions
 ) -> tuple[NDArray[np.int16], NDArray[np.float32]]:
-    """Label of every segment by the rule, and the share of its frames that have it.
+    """Return the label of every segment and the share of its frames that have it.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def label_of_segments(
 
 
 def spectra_kinds(arrays: Arrays) -> list[MapKind]:
-    """Kinds that a block holds."""
+    """Return the kinds of maps in a block."""
     return [kind for kind in KINDS if kind in arrays]
 
 
@@ -188,7 +188,7 @@ def _values(
     clip: Clip,
     null_bins: Sequence[int],
 ) -> NDArray[np.float32]:
-    """Energies of a clip at its own times, (frames, bins)."""
+    """Return energies of a clip at its own times, (frames, bins)."""
     own = values.T[clip.start : clip.stop].copy()
     if clip.resampled:
         own = interpolated(own, times_s[clip.start : clip.stop], clip.times_s)

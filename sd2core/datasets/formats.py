@@ -1,4 +1,4 @@
-"""A finished store as one file: HDF5 or NPZ, with the same arrays and the same description."""
+"""Data sets as one file, HDF5 or NPZ, with the same arrays and description as the store."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ META, SOURCES = "meta", "sources"
 
 
 def refuse_large_npz(out: Path, segments: int, header: Header) -> None:
-    """Refuse an NPZ that nobody could open."""
+    """Refuse an NPZ too large to be opened."""
     size = segments * bytes_per_segment(header.length, header.axis.bins, len(header.kinds))
     if size > NPZ_LIMIT_BYTES:
         raise Sd2Error(
@@ -65,7 +65,7 @@ def write_packed(
 
 
 def open_hdf5(path: Path) -> tuple[Header, dict[str, Any], Any]:
-    """Header and arrays of an HDF5 data set, and the open file."""
+    """Open an HDF5 data set: header, arrays and the open file."""
     import h5py
 
     try:
@@ -85,7 +85,7 @@ def open_hdf5(path: Path) -> tuple[Header, dict[str, Any], Any]:
 
 
 def open_npz(path: Path) -> tuple[Header, dict[str, Any], list[dict[str, Any]]]:
-    """Header, arrays and sources of an NPZ data set, all of it read."""
+    """Read an NPZ data set: header, arrays and sources."""
     try:
         with np.load(path, allow_pickle=False) as data:
             found = {name: data[name] for name in data.files}
@@ -101,7 +101,7 @@ def open_npz(path: Path) -> tuple[Header, dict[str, Any], list[dict[str, Any]]]:
 
 
 def hdf5_sources(file: Any, path: Path) -> Iterator[dict[str, Any]]:
-    """Sources of an open HDF5 data set, one after another."""
+    """Yield the sources of an open HDF5 data set."""
     lines = file[SOURCES]
     for number in range(len(lines)):
         yield _json(lines[number].decode("utf-8"), path)
@@ -151,7 +151,7 @@ def _write_hdf5(
 
 @contextmanager
 def _file_in_place_of(path: Path) -> Iterator[Path]:
-    """A name to write to, which takes the place of ``path`` when the block succeeds.
+    """Give a temporary path that replaces ``path`` when the block succeeds.
 
     HDF5 writes to a file of its own, not to an open stream.
     """

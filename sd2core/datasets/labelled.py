@@ -1,4 +1,4 @@
-"""What labelled data holds, and of whom, told without making a map."""
+"""Facts of labelled data, found without making a map."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _EXPECTED = "a campaign or other pairs, a data set, a labelled recording, or a l
 
 
 class LabelledSource(NamedTuple):
-    """What is to be learnt from.
+    """Labelled data and its subject.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class LabelledSource(NamedTuple):
 
 
 class Grid(NamedTuple):
-    """What maps that are learnt from together must share."""
+    """Grid that maps must share to be trained on together."""
 
     bins: int
     v_max_mps: float
@@ -47,7 +47,7 @@ class Grid(NamedTuple):
 
 @dataclass(frozen=True)
 class LabelledFacts:
-    """What one of them holds.
+    """Content of one source of labelled data.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ class LabelledFacts:
 
 
 def unfolded(sources: Sequence[LabelledSource]) -> list[LabelledSource]:
-    """Folders of recordings or radar files as what they hold."""
+    """Replace folders by the recordings and radar files in them."""
     found: list[LabelledSource] = []
     for one in sources:
         if not one.path.exists():
@@ -91,7 +91,7 @@ def unfolded(sources: Sequence[LabelledSource]) -> list[LabelledSource]:
 
 
 def inside_of(folder: Path) -> list[Path]:
-    """Recordings and radar files right in a folder; none where it is a recording or store."""
+    """Return recordings and radar files directly in a folder; none in a recording or store."""
     if not folder.is_dir() or folder.suffix in (SUFFIX, ".zarr"):
         return []
     return sorted(
@@ -102,7 +102,7 @@ def inside_of(folder: Path) -> list[Path]:
 
 
 def labelled_facts(source: LabelledSource) -> LabelledFacts:
-    """Look into one that is no folder of several."""
+    """Return the facts of a source that is not a folder of several."""
     path = source.path
     kind = kind_of(path)
     if kind == "pairs":
@@ -117,7 +117,7 @@ def labelled_facts(source: LabelledSource) -> LabelledFacts:
 
 
 def people_of(facts: Sequence[LabelledFacts]) -> tuple[str, ...]:
-    """Everybody, as a classifier's training calls them, in its order.
+    """Return all people by the names and in the order of a classifier's training.
 
     Pairs come last. People of the same name in several stores of pairs are different ones,
     and called ``STORE:NAME``; in recordings, radar files and data sets they are the same.

@@ -1,4 +1,4 @@
-"""Names, shapes and types of what a data set holds, the same in every format."""
+"""Names, shapes and types of the arrays of a data set, the same in every format."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ CHUNK_ROWS = 8192
 
 @dataclass(frozen=True)
 class Header:
-    """What holds for all segments of a data set.
+    """Header of a data set: properties of all its segments.
 
     Parameters
     ----------
@@ -93,11 +93,11 @@ class Header:
 
     @property
     def simulated(self) -> bool:
-        """Whether any radar of it was computed."""
+        """True if any radar map was simulated."""
         return "simulated" in self.kinds
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return the header as JSON can hold it."""
         return {
             "format": FORMAT,
             "version": VERSION,
@@ -124,7 +124,7 @@ class Header:
 
     @classmethod
     def from_dict(cls, entry: dict[str, Any], path: Path) -> Header:
-        """Read what :meth:`as_dict` made; ``path`` is for messages."""
+        """Parse :meth:`as_dict`; ``path`` is for messages."""
         check_format(entry, path)
         try:
             return cls(
@@ -153,7 +153,7 @@ class Header:
 
 
 def check_format(entry: Any, path: Path) -> None:
-    """Refuse what is no data set, or one of a later version."""
+    """Refuse a file that is no data set, or of a later version."""
     found = entry.get("format") if isinstance(entry, dict) else None
     if found != FORMAT:
         raise Sd2Error(f"{path} holds no data set", "one that `sd2 export` made")
@@ -167,7 +167,7 @@ def check_format(entry: Any, path: Path) -> None:
 
 
 def format_of(path: Path) -> FileFormat:
-    """Format of a data set by the ending of its name."""
+    """Return the format of a data set by the ending of its name."""
     found = SUFFIXES.get(path.suffix.lower())
     if found is None:
         raise Sd2Error(f"The data set is to be {path}", f"a name ending in {', '.join(SUFFIXES)}")
@@ -175,18 +175,18 @@ def format_of(path: Path) -> FileFormat:
 
 
 def row_shapes(header: Header) -> dict[str, tuple[str, tuple[int, ...]]]:
-    """Type and shape of a row of every array that the header implies."""
+    """Return type and shape of a row of every array that the header implies."""
     maps = dict.fromkeys(header.kinds, ("float32", (header.length, header.axis.bins)))
     return maps | {"label": ("int16", (header.length,))} | COLUMNS
 
 
 def chunk_of(row: tuple[int, ...]) -> tuple[int, ...]:
-    """Shape of a chunk of rows of this shape."""
+    """Return the shape of a chunk of rows of this shape."""
     return (CHUNK_SEGMENTS if len(row) == 2 else CHUNK_ROWS, *row)
 
 
 def bytes_per_segment(header_length: int, bins: int, kinds: int) -> int:
-    """What a segment takes before compression."""
+    """Size of a segment in bytes before compression."""
     import numpy as np
 
     columns = sum(

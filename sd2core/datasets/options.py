@@ -1,4 +1,4 @@
-"""What a data set is to be like."""
+"""Options of a data set."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MIN_SHARE = 0.2
 
 @dataclass(frozen=True)
 class DatasetOptions:
-    """What a data set is to be like.
+    """Options of a data set.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The preview sheet of a data set: some segments of every label, as pictures."""
+"""Preview sheet of a data set: pictures of some segments of every label."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ _TITLES: dict[MapKind, str] = {
 
 @dataclass(frozen=True, eq=False)
 class Example:
-    """One column of the sheet.
+    """Column of the sheet: one segment.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class Example:
 
 
 def write_preview(path: Path) -> Path:
-    """Draw the sheet of a finished data set beside it; where it is."""
+    """Draw the sheet of a finished data set and return its path."""
     with open_dataset(path) as dataset:
         name = dataset.path.name
         title = dataset.header.title or name
@@ -77,7 +77,7 @@ def write_preview(path: Path) -> Path:
 
 
 def examples_of(dataset: Dataset, each: int = EXAMPLES) -> list[Example]:
-    """Segments that show their label well, of different people and places where there are."""
+    """Choose segments that show their label well, of different people and places."""
     header = dataset.header
     columns = {
         name: np.asarray(dataset[name][:_MOST_SEGMENTS])
@@ -136,7 +136,7 @@ def draw_preview(title: str, header: Header, examples: list[Example], segments: 
 
 
 def _bands(examples: list[Example]) -> list[list[Example]]:
-    """Columns in rows of the sheet; the examples of a label stay together."""
+    """Arrange columns in rows of the sheet, the examples of a label together."""
     groups = [
         [one for one in examples if one.label == label]
         for label in dict.fromkeys(one.label for one in examples)
@@ -150,7 +150,7 @@ def _bands(examples: list[Example]) -> list[list[Example]]:
 
 
 def _different(order: NDArray[np.int64], columns: dict[str, NDArray], each: int) -> list[int]:
-    """The first rows of an order, of other people and places as long as there are some."""
+    """Choose the first rows of an order, of different people and places while there are some."""
     chosen: list[int] = []
     # First other people, then other places, then what there is.
     for same in (("subject",), ("subject", "placement"), ()):
@@ -188,7 +188,7 @@ def _example(dataset: Dataset, columns: dict[str, NDArray], label: int, row: int
 
 
 def _cell(axes: Axes, header: Header, example: Example, kind: MapKind) -> Any:
-    """One segment in one kind."""
+    """Draw one segment in one kind."""
     length_s = header.length / header.frame_rate_hz
     limit = header.axis.v_max_mps
     axes.set_facecolor(_NOTHING)
@@ -220,7 +220,7 @@ def _cell(axes: Axes, header: Header, example: Example, kind: MapKind) -> Any:
 
 
 def _mark(axes: Axes, header: Header, example: Example) -> None:
-    """A bar over the frames that have the label."""
+    """Draw a bar over the frames that have the label."""
     limit = header.axis.v_max_mps
     edges_s = np.arange(header.length + 1) / header.frame_rate_hz
     axes.fill_between(
@@ -253,7 +253,7 @@ def _frame(
     shown: Any,
     size: tuple[float, float],
 ) -> None:
-    """Title, what is simulated, and what the colours mean."""
+    """Draw the title and the colour scale."""
     width, height = size
     # Where both are there, each row says which of them it is.
     radar = " The radar is simulated." if header.simulated and "real" not in header.kinds else ""

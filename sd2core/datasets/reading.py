@@ -1,4 +1,4 @@
-"""Data sets read back, the same way from Zarr, HDF5 and NPZ."""
+"""Reading of data sets, the same for Zarr, HDF5 and NPZ."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from sd2core.errors import Sd2Error
 
 
 class Dataset:
-    """An open data set; arrays are read in the parts that are asked for.
+    """Open data set, whose arrays are read in parts.
 
     Get one from :func:`open_dataset`. ``dataset["synthetic"][10:20]`` is an array of shape
     (10, length, bins); ``docs/formats.md`` lists all names.
@@ -46,11 +46,11 @@ class Dataset:
         self._file = file
 
     def __len__(self) -> int:
-        """Segments."""
+        """Return the number of segments."""
         return int(self.arrays["start_s"].shape[0])
 
     def __getitem__(self, name: str) -> Any:
-        """An array by its name, to be sliced."""
+        """Return an array by its name, to be sliced."""
         if name not in self.arrays:
             raise Sd2Error(f"{self.path} has no {name!r}", f"one of {', '.join(self.arrays)}")
         return self.arrays[name]
@@ -67,13 +67,13 @@ class Dataset:
         self.close()
 
     def close(self) -> None:
-        """Close the file, where it is one."""
+        """Close the file, if there is one."""
         if self._file is not None:
             self._file.close()
             self._file = None
 
     def sources(self) -> Iterator[dict[str, Any]]:
-        """What is known of each source, in the order of the array ``source``."""
+        """Yield the facts of each source, in the order of the array ``source``."""
         if self._sources is not None:
             yield from self._sources
         elif self.form == "zarr":
@@ -82,7 +82,7 @@ class Dataset:
             yield from formats.hdf5_sources(self._file, self.path)
 
     def of_split(self, split: str) -> NDArray[np.int64]:
-        """Numbers of the segments of a split, ascending.
+        """Return the indices of the segments of a split, ascending.
 
         Raises
         ------
@@ -95,7 +95,7 @@ class Dataset:
 
 
 def open_dataset(path: Path) -> Dataset:
-    """Open a data set by its path, whatever its format.
+    """Open a data set of any format.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Sources from recordings: maps of the mesh from every placement, and of the radar."""
+"""Sources from recordings: maps of the mesh from every placement, and the radar's map."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ _COUNTED_SHARE = 0.05
 
 @dataclass(frozen=True)
 class Making:
-    """How maps of recordings are made.
+    """Options for the maps of recordings.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ class Making:
 def recording_sources(
     paths: Sequence[Path], subjects: Sequence[str], making: Making
 ) -> list[LazySource]:
-    """One source per recording and placement; nothing is computed yet.
+    """Return one source per recording and placement; nothing is computed yet.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def recording_sources(
 
 
 def labels_and_classes(labels: Labels) -> tuple[tuple[str, ...], dict[str, str]]:
-    """Names of all labels, background first, and what a classifier calls them."""
+    """Return names of all labels, background first, and their classes."""
     known = [one.name for one in labels.label_set.labels]
     used = sorted({span.label for span in labels.spans} - {*known})
     names = tuple(dict.fromkeys([BACKGROUND, *map(plain_name, [*known, *used])]))
@@ -126,7 +126,7 @@ def labels_and_classes(labels: Labels) -> tuple[tuple[str, ...], dict[str, str]]
 
 
 def radar_map(recording: Recording, axis: VelocityAxis) -> DopplerMap:
-    """Map of a recording's radar file, on the recording's clock.
+    """Return the map of a recording's radar file, on the recording's clock.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def _lazy(shared: _Shared, recording: Recording, key: SourceKey) -> LazySource:
 
 
 class _Shared:
-    """The recording that was used last, open; others are let go of."""
+    """Recording used last, kept open; others are closed."""
 
     def __init__(self, making: Making) -> None:
         self.making = making
@@ -166,7 +166,7 @@ class _Shared:
 
 
 class _Opened:
-    """A recording being made into sources: what its placements share is made once."""
+    """Open recording whose placements share mesh, synthesizer and radar map."""
 
     def __init__(self, recording: Recording, making: Making, denoising: Denoising) -> None:
         self.recording = recording
@@ -246,7 +246,7 @@ class _Opened:
 
     @cached_property
     def _clock(self) -> tuple[Timebase, NDArray[np.bool_] | None, MapKind | None]:
-        """Times, frames with a person, and the kind of the radar's map: cheaply."""
+        """Times, frames with a person, and the kind of the radar's map, read cheaply."""
         recording = self.recording
         kind: MapKind | None = None
         own: Timebase | None = None
@@ -263,7 +263,7 @@ class _Opened:
 
     @property
     def _simulates(self) -> bool:
-        """Whether a radar is simulated at every place."""
+        """True if a radar is simulated at every place."""
         wanted = self._making.simulation is not None and "simulated" in self._making.kinds
         return wanted and self._mesh is not None
 
@@ -304,14 +304,14 @@ class _Opened:
 
 
 def _stage(progress: Progress, start: float, stop: float) -> Progress:
-    """Progress of a part of the work, from one share of it to another."""
+    """Map the progress of a part of the work to a range of the whole."""
     return lambda done, of: progress(
         round(_STEPS * (start + (stop - start) * done / max(of, 1))), _STEPS
     )
 
 
 def places_of(recording: Recording, making: Making) -> tuple[Place, ...]:
-    """Where else a recording is to be seen from."""
+    """Return the other places from which a recording is seen."""
     plan = recording.placements if making.placements == "planned" else making.placements
     return () if plan is None or recording.mesh is None else plan.places()
 
@@ -319,7 +319,7 @@ def places_of(recording: Recording, making: Making) -> tuple[Place, ...]:
 def _synthesizer(
     mesh: MeshSequence, sensors: Sequence[VirtualSensor], making: Making
 ) -> tuple[Synthesizer, dict[str, Any]]:
-    """What counts the mesh, and the plan that was chosen, for provenance."""
+    """Return the synthesizer of a mesh, and the accuracy plan chosen, for provenance."""
     if making.tolerance is None:
         return Synthesizer(mesh, making.synthesis), {}
     frames = mesh.frame_count * len(sensors)
@@ -328,7 +328,7 @@ def _synthesizer(
 
 
 def _fingerprint(recording: Recording, key: SourceKey, making: Making) -> str:
-    """Of what the source is made of: labels and settings as they are, files by their contents."""
+    """Hash of all that a source is made of: labels, settings and contents of files."""
     model = _model_of(recording, making) if "denoised" in making.kinds else None
     place = None
     if key.placement:
@@ -358,7 +358,7 @@ def _fingerprint(recording: Recording, key: SourceKey, making: Making) -> str:
 
 
 def _model_of(recording: Recording, making: Making) -> Path | None:
-    """The denoiser's file; None where the recording is to be shown without."""
+    """Return the denoiser's file; None where the recording is set to have none."""
     if making.model is not None:
         return find_model(making.model)
     if recording.denoiser is not None:
@@ -369,14 +369,14 @@ def _model_of(recording: Recording, making: Making) -> Path | None:
 
 
 class Denoising:
-    """Denoises one map after another."""
+    """Denoiser of maps that keeps the model used last."""
 
     def __init__(self) -> None:
         self._path: Path | None = None
         self._model: TrainedDenoiser | None = None
 
     def denoised(self, synthetic: DopplerMap, path: Path) -> DopplerMap:
-        """What a radar would show in place of a synthetic map.
+        """Denoise a synthetic map.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Simulated maps of meshes from any place: what a radar of fixed gain and noise shows there."""
+"""Simulated maps of meshes from any place, for a radar of fixed gain and noise."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _BLOCK_BYTES = 64 << 20
 
 @dataclass(frozen=True)
 class Simulation:
-    """How radars are simulated: all of them alike, so that maps differ by place and motion alone.
+    """Simulation of a radar, equal for all maps, so that they differ by place and motion alone.
 
     A rough surface, what nothing hides, and the gain and noise of a
     :class:`~sd2core.fmcw.link.LinkBudget`: what is farther away is weaker.
@@ -48,12 +48,12 @@ class Simulation:
     seed: int = 0
 
     def as_json(self) -> dict[str, Any]:
-        """All that maps depend on."""
+        """Return all settings that maps depend on."""
         return {**asdict(self), "link": asdict(LinkBudget()), "clutter": CLUTTER}
 
 
 def seed_of(mesh: MeshSequence, sensor: VirtualSensor, simulation: Simulation) -> int:
-    """Seed of one mesh seen from one place: or all maps would have the same noise."""
+    """Return the seed for one mesh and place, so that maps do not share their noise."""
     told = json.dumps([simulation.seed, asdict(sensor)]).encode()
     sums = hashlib.blake2b(told, digest_size=4)
     sums.update(np.ascontiguousarray(mesh.read(0, 1), np.float32).tobytes())
@@ -68,7 +68,7 @@ def simulated_map(
     frames: tuple[int, int] | None = None,
     progress: Progress = silent,
 ) -> DopplerMap:
-    """What a simulated radar shows of a mesh, at the times of the mesh's frames.
+    """Simulate the map that a radar shows of a mesh, at the times of the mesh's frames.
 
     The same as the map of a recording whose radar file is the capture that
     ``sd2 simulate radar --link-budget --incoherent`` makes with this sensor and seed. The raw
@@ -111,12 +111,12 @@ def simulated_map(
 
 
 def _part(progress: Progress, before: int, of: int, done: int, _: int) -> None:
-    """Say how far the frames of all blocks are."""
+    """Report the progress over all blocks."""
     progress(before + done, of)
 
 
 def _of_all_frames(meta: dict[str, Any], simulation: dict[str, Any]) -> dict[str, Any]:
-    """What a block's map says of itself that holds for all frames."""
+    """Keep the metadata of a block that holds for all frames."""
     of_block = ("beyond_share", "notes")
     of_capture = ("first_frame_s", "clipped_share", "without_person")
     kept = {name: value for name, value in meta.items() if name not in of_block}

@@ -1,4 +1,4 @@
-"""One source of segments: what one sensor shows of one recording, by kind of map."""
+"""Source of segments: maps of one recording from one sensor."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _LONGEST_LIST = 64
 
 
 class SourceKey(NamedTuple):
-    """What no two sources of a data set share."""
+    """Key of a source, unique in a data set."""
 
     subject: str
     recording: str
@@ -39,14 +39,14 @@ class SourceKey(NamedTuple):
 
     @property
     def title(self) -> str:
-        """To name it in a message."""
+        """Name for messages."""
         at = f", placement {self.placement}" if self.placement else ""
         return f"{self.recording} of {self.subject}{at}"
 
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """What a source will hold, known before its maps are made: enough to count segments.
+    """Outline of a source before its maps are made, enough to count segments.
 
     Parameters
     ----------
@@ -134,23 +134,23 @@ class Source:
 
     @property
     def key(self) -> SourceKey:
-        """What no other source shares."""
+        """Key of the source."""
         return SourceKey(self.subject, self.recording, self.placement)
 
     @property
     def times_s(self) -> NDArray[np.float64]:
-        """Of the frames, on the clock of the recording; (frames,)."""
+        """Times of the frames on the clock of the recording, (frames,)."""
         return next(iter(self.maps.values())).times_s
 
     @property
     def known(self) -> dict[MapKind, NDArray[np.bool_]]:
-        """Frames of which each map says something, (frames,)."""
+        """Frames that each map covers, (frames,)."""
         frames = len(self.times_s)
         return {kind: Presence.of(one.present, frames).there for kind, one in self.maps.items()}
 
     @property
     def present(self) -> NDArray[np.bool_]:
-        """Frames with a person, as far as anything says so; (frames,).
+        """Frames with a person, as far as known, (frames,).
 
         Maps of a mesh say it. Where there is none, all frames count that a radar recorded.
         """
@@ -162,17 +162,17 @@ class Source:
 
     @property
     def spherical(self) -> tuple[float, float, float]:
-        """Range in metres, azimuth and elevation in degrees as seen from the body; or NaN."""
+        """Range (m), azimuth and elevation (degrees) of the sensor from the body; or NaN."""
         if self.target_m is None:
             return (float("nan"),) * 3
         return spherical_from_position(self.target_m, self.sensor.position_m)
 
     def outline(self) -> Outline:
-        """What it holds, without the values."""
+        """Return the outline, without the values."""
         return Outline(tuple(self.maps), self.times_s, self.present, self.label, self.labels)
 
     def made_of(self) -> dict[str, Any]:
-        """Provenance of the source and of each map, without what is one value per frame."""
+        """Return the provenance of the source and its maps, without per-frame values."""
         maps = {
             kind: {"unit": one.unit, "null_bins": list(one.null_bins)} | _short(one.meta)
             for kind, one in self.maps.items()
@@ -182,7 +182,7 @@ class Source:
         return _short(self.provenance) | {"maps": maps}
 
     def fingerprint(self) -> str:
-        """The same for the same maps, labels and sensor."""
+        """Return a hash of maps, labels and sensor."""
         sums = hashlib.blake2b(digest_size=16)
         told = [asdict(self.sensor), self.labels, dict(self.classes)]
         sums.update(json.dumps(told).encode())
@@ -198,7 +198,7 @@ class Source:
 
 @dataclass(frozen=True, eq=False)
 class LazySource:
-    """A source that is made when it is its turn, and not at all where it is there already.
+    """Source that is made only when it is needed.
 
     Parameters
     ----------
@@ -219,14 +219,14 @@ class LazySource:
 
 
 def plain_name(label: str) -> str:
-    """The label, or :data:`BACKGROUND` where it is that in other letters (``Background``)."""
+    """Return the label, or :data:`BACKGROUND` for other spellings of it (``Background``)."""
     return BACKGROUND if label.casefold() == BACKGROUND else label
 
 
 def label_per_frame(
     spans: Any, labels: tuple[str, ...], times_s: NDArray[np.float64]
 ) -> NDArray[np.int16]:
-    """Label of every frame: that of the span that holds its time; 0 where none does.
+    """Return the label of every frame: that of the span at its time, 0 where there is none.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Who of a data set is learnt from, who validates and who tests: by name, whoever else is in it."""
+"""Split of people into training, validation and test by their names."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def split_people(
     validation: Sequence[str] | None = None,
     test: Sequence[str] | None = None,
 ) -> Split:
-    """Who is learnt from and who is kept out; :data:`RULE` says how those not named are chosen."""
+    """Split people into training, validation and test; those not named by :data:`RULE`."""
     free = [name for name in subjects if name not in {*(validation or ()), *(test or ())}]
     most = max(1, len(subjects) // 3)
     if test is None:
@@ -37,7 +37,7 @@ def split_people(
 
 
 def borrowed(splits: Mapping[str, Sequence[str]]) -> list[str]:
-    """People who are where the rule alone would not have them, in its order."""
+    """Return the people that the rule alone would put elsewhere, in its order."""
     own = {name: [one for one in names if _own(one) == name] for name, names in splits.items()}
     return sorted(
         (one for name, names in splits.items() for one in names if one not in own[name]),
@@ -46,7 +46,7 @@ def borrowed(splits: Mapping[str, Sequence[str]]) -> list[str]:
 
 
 def number_of(name: str) -> float:
-    """A number from 0 to 1 that is a person's own, evenly spread over names."""
+    """Hash a person's name to a number from 0 to 1."""
     digest = hashlib.sha256(name.encode("utf-8")).digest()
     return int.from_bytes(digest[:8], "big") / 2.0**64
 
@@ -59,7 +59,7 @@ def _own(name: str) -> str:
 
 
 def _chosen(people: Sequence[str], away: Callable[[float], float], most: int) -> list[str]:
-    """Those within a sixth; at least the nearest one, at most the ``most`` nearest."""
+    """Choose those within a sixth: at least the nearest one, at most the ``most`` nearest."""
     far = {name: away(number_of(name)) for name in people}
     count = max(sum(one < _SHARE for one in far.values()), 1)
     chosen = sorted(people, key=far.__getitem__)[: max(0, min(count, most))]

@@ -1,4 +1,4 @@
-"""The store that a data set grows in: Zarr, source by source, whole or not at all.
+"""Zarr store that a data set grows in, source by source, each whole or not at all.
 
 ``sources.jsonl`` beside the arrays has a line per source. A source counts once its line is
 there, so that a writer that was killed leaves whole sources, and the next one writes over
@@ -74,7 +74,7 @@ class SegmentStore:
 
     @classmethod
     def begin(cls, path: Path, header: Header) -> SegmentStore:
-        """Make an empty store in a folder; what may be there of one is lost."""
+        """Make an empty store in a folder; an earlier store there is deleted."""
         group = _emptied(path, header)
         for name, (kind, row) in row_shapes(header).items():
             _create(group, name, kind, row, 0)
@@ -84,7 +84,7 @@ class SegmentStore:
     def unpack(
         cls, path: Path, header: Header, arrays: Any, sources: Iterable[dict[str, Any]]
     ) -> SegmentStore:
-        """The store that a file was packed from."""
+        """Rebuild the store that a file was packed from."""
         group = _emptied(path, header)
         for name, (kind, row) in row_shapes(header).items():
             rows = arrays[name].shape[0]
@@ -100,7 +100,7 @@ class SegmentStore:
 
     @property
     def complete(self) -> bool:
-        """Whether nothing was appended since the header was last written."""
+        """True if nothing was appended since the header was last written."""
         return bool(self._group.attrs["complete"])
 
     def append(self, blocks: Iterable[Arrays], entry: dict[str, Any]) -> int:
@@ -146,7 +146,7 @@ class SegmentStore:
         return added
 
     def flush(self) -> None:
-        """Write what was appended: from here on it is there whatever happens."""
+        """Write appended sources to disk."""
         self._write()
         self._flushed_s = time.monotonic()
         if not self._lines:
@@ -158,11 +158,11 @@ class SegmentStore:
         self._lines = []
 
     def entries(self) -> Iterator[dict[str, Any]]:
-        """Lines of the sources, one after another."""
+        """Yield the lines of the sources."""
         yield from read_sources(self.path / SOURCES_NAME)
 
     def finish(self, header: Header, split_of_subject: np.ndarray) -> None:
-        """Write the split of every segment and the header: the data set is complete."""
+        """Write the split of every segment and the header, which completes the data set."""
         self.flush()
         for name in [one for one in KINDS if one in self._arrays and one not in header.kinds]:
             del self._group[name], self._arrays[name]
@@ -203,7 +203,7 @@ class SegmentStore:
 
 
 def open_arrays(path: Path) -> tuple[Header, dict[str, Any]]:
-    """Header and arrays of a finished store; nothing is read but descriptions."""
+    """Open the header and arrays of a finished store."""
     import zarr
 
     if not is_dataset(path):
@@ -225,7 +225,7 @@ def open_arrays(path: Path) -> tuple[Header, dict[str, Any]]:
 
 
 def read_sources(path: Path) -> Iterator[dict[str, Any]]:
-    """Lines of sources; the last one is left out when it was not written to its end."""
+    """Yield the lines of sources; an incomplete last line is left out."""
     if not path.exists():
         return
     with path.open(encoding="utf-8") as lines:

@@ -1,4 +1,4 @@
-"""A data set as torch takes it: segments read when they are asked for.
+"""Data set for torch, read segment by segment.
 
 ::
 
@@ -40,7 +40,7 @@ Item = tuple[torch.Tensor, torch.Tensor]
 
 
 class SegmentDataset(TorchDataset[Item]):
-    """Pairs of a segment and what is to be learnt of it.
+    """Pairs of a segment and its target.
 
     Only segments that have both are in it. The file is opened anew in every process that
     reads from it, so it can be pickled and given to a ``DataLoader`` with workers.
@@ -111,7 +111,7 @@ class SegmentDataset(TorchDataset[Item]):
         return self.__getitems__([index])[0]
 
     def __getitems__(self, indices: Sequence[int]) -> list[Item]:
-        """Several at once, which a ``DataLoader`` asks for: each chunk is read once."""
+        """Return several items, as a ``DataLoader`` asks for; each chunk is read once."""
         rows = self.indices[np.asarray(indices, np.int64)]
         energies = self._rows(self.inputs, rows)
         if self.target in KINDS:
@@ -130,11 +130,11 @@ class SegmentDataset(TorchDataset[Item]):
         return self.__dict__ | {"_open": None, "_kept": OrderedDict()}
 
     def set_epoch(self, epoch: int) -> None:
-        """Draw other gains; before the workers of that epoch are started."""
+        """Draw other gains; call it before the workers of that epoch start."""
         self._epoch = epoch
 
     def _names(self) -> tuple[tuple[str, ...], NDArray[np.int64]]:
-        """Names of the target's numbers, and the number that every label has."""
+        """Return the names of the target's numbers, and the number of every label."""
         header = self.header
         if not self.target.endswith("class"):
             return header.labels, np.arange(len(header.labels))
@@ -183,7 +183,7 @@ class SegmentDataset(TorchDataset[Item]):
         return self._kept[key]
 
     def _dataset(self) -> Dataset:
-        """The data set, opened by this very process: a file is not shared with a fork."""
+        """Return the data set, opened once per process: a file is not shared with a fork."""
         if self._open is None or self._open[0] != os.getpid():
             self._open = (os.getpid(), open_dataset(self.path))
         return self._open[1]

@@ -1,4 +1,4 @@
-"""Data sets written from a stream of sources, one source in memory at a time."""
+"""Writing of data sets from a stream of sources, one in memory at a time."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _STEPS = 1000
 
 @dataclass(frozen=True)
 class Failed:
-    """A source that could not be made, and why."""
+    """Source that could not be made, with the reason."""
 
     key: SourceKey
     reason: str
@@ -47,7 +47,7 @@ class Failed:
 
 @dataclass(frozen=True)
 class Written:
-    """What came of writing.
+    """Result of writing a data set.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def write_dataset(
     options: DatasetOptions | None = None,
     progress: Progress = silent,
 ) -> Written:
-    """Write segments of all sources; goes on with a data set that was begun.
+    """Write segments of all sources, or continue a data set that was begun.
 
     One source is in memory at a time. A source that is there already is left alone and a
     :class:`~sd2core.datasets.source.LazySource` not even loaded, so a writer that was
@@ -143,7 +143,7 @@ class _Writer:
 
     @property
     def empty(self) -> bool:
-        """Whether there is a store, and no segment in it."""
+        """True if there is a store without a segment."""
         return self._store is not None and self._store.rows == 0
 
     def write(self, sources: Iterable[Source | LazySource], progress: Progress) -> Written:
@@ -160,7 +160,7 @@ class _Writer:
     def _append_all(
         self, sources: Iterable[Source | LazySource], progress: Progress
     ) -> tuple[int, list[Failed], Sd2Error | None]:
-        """How many were added, which failed, and the first error."""
+        """Append all sources: number added, failures, and first error."""
         total = len(sources) if isinstance(sources, Sized) else 0
         seen: set[bytes] = set()
         failed: list[Failed] = []
@@ -312,7 +312,7 @@ class _Writer:
 
 
 def _refuse_other(out: Path, form: FileFormat) -> None:
-    """Refuse to write over what is no data set."""
+    """Refuse to overwrite anything but a data set."""
     if form == "zarr":
         if out.exists() and not is_dataset(out) and (
             not out.is_dir() or any(entry.name != LOCK_NAME for entry in out.iterdir())
@@ -327,7 +327,7 @@ def _digest(key: SourceKey) -> bytes:
 
 
 def _part(progress: Progress, number: int, of: int) -> Progress:
-    """Progress of one source as that of all."""
+    """Map the progress of one source to that of all."""
     return lambda done, total: progress(
         number * _STEPS + int(_STEPS * done / max(total, 1)), of * _STEPS
     )

@@ -1,4 +1,4 @@
-"""Windows of equal length to learn from, and back."""
+"""Cutting of clips into windows of equal length, and joining them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ OVERLAP = 10
 
 
 def segment_starts(frames: int, length: int = LENGTH, overlap: int = OVERLAP) -> NDArray[np.int64]:
-    """First frames of the windows that cover a stretch.
+    """Return the first frames of the windows that cover a clip.
 
     Neighbours share ``overlap`` frames; the last window ends with the stretch and may
     share more. A stretch shorter than a window has none.
@@ -38,7 +38,7 @@ def segment_starts(frames: int, length: int = LENGTH, overlap: int = OVERLAP) ->
 def cut(
     values: NDArray[np.float32], starts: NDArray[np.int64], length: int = LENGTH
 ) -> NDArray[np.float32]:
-    """Windows of a stretch: (frames, bins) → (windows, length, bins)."""
+    """Cut a clip into windows: (frames, bins) → (windows, length, bins)."""
     cut_out: NDArray[np.float32] = values[starts[:, None] + np.arange(length)]
     return cut_out
 
@@ -46,7 +46,7 @@ def cut(
 def join(
     windows: NDArray[np.float32], starts: NDArray[np.int64], frames: int
 ) -> NDArray[np.float32]:
-    """Put windows back together, blended linearly where they overlap.
+    """Join windows, blended linearly where they overlap.
 
     Parameters
     ----------

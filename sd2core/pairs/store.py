@@ -1,4 +1,4 @@
-"""Pairs to learn from: synthetic Doppler beside what a radar saw of the same movement.
+"""Store of pairs: synthetic Doppler and a radar's Doppler of the same movement.
 
 On disk a Zarr store with all takes one after another along the frames, and beside the
 arrays ``takes.jsonl``, one line per take. A take counts once its line is there, so a
@@ -32,7 +32,7 @@ _REMAKE = "Make the pairs again with `sd2 simulate campaign` or `sd2 pairs`"
 
 
 class TakeKey(NamedTuple):
-    """What no two takes of a set share."""
+    """Key of a take, unique in a set."""
 
     subject: str
     name: str
@@ -41,7 +41,7 @@ class TakeKey(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Take:
-    """One uninterrupted stretch, seen by one sensor.
+    """Uninterrupted part of a movement, seen by one sensor.
 
     Parameters
     ----------
@@ -94,12 +94,12 @@ class Take:
 
     @property
     def key(self) -> TakeKey:
-        """What no other take shares."""
+        """Key of the take."""
         return TakeKey(self.subject, self.name, self.placement)
 
     @property
     def title(self) -> str:
-        """To name it in a message."""
+        """Name for messages."""
         return f"{self.subject}/{self.name}" + (f"@{self.placement}" if self.placement else "")
 
 
@@ -127,16 +127,16 @@ class PairSet:
 
     @property
     def subjects(self) -> tuple[str, ...]:
-        """In the order of their first takes."""
+        """Subjects in the order of their first takes."""
         return tuple(dict.fromkeys(take.subject for take in self.takes))
 
     @property
     def frames(self) -> int:
-        """Of all takes together."""
+        """Number of frames of all takes."""
         return sum(len(take.times_s) for take in self.takes)
 
     def of(self, subjects: Iterable[str]) -> PairSet:
-        """The takes of these subjects.
+        """Return the set of takes of these subjects.
 
         Raises
         ------
@@ -152,14 +152,14 @@ class PairSet:
         return replace(self, takes=tuple(take for take in self.takes if take.subject in wanted))
 
     def placements(self, *, first_only: bool) -> PairSet:
-        """All takes, or only what every take's own sensor saw."""
+        """Return all takes, or only those seen by the movement's own sensor."""
         if not first_only:
             return self
         return replace(self, takes=tuple(take for take in self.takes if take.placement == 0))
 
 
 class PairWriter:
-    """Appends takes to a store; goes on with one that was begun.
+    """Writer that appends takes to a new store or to one that was begun.
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ class PairWriter:
 
     @property
     def done(self) -> Set[TakeKey]:
-        """Takes that are there; grows as they are appended."""
+        """Keys of the takes written so far."""
         return self._done
 
     def append(self, take: Take) -> None:
@@ -256,7 +256,7 @@ class PairWriter:
 
 
 def is_pair_store(path: Path) -> bool:
-    """Whether a folder looks like pairs; reads one small file."""
+    """Tell if a folder looks like pairs, from one small file."""
     try:
         header = json.loads((Path(path) / "zarr.json").read_text(encoding="utf-8"))
         return bool(header["attributes"]["format"] == FORMAT)
@@ -303,7 +303,7 @@ def read_pairs(path: Path) -> PairSet:
 
 
 def open_takes(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]], dict[str, Any]]:
-    """Header, lines of takes, and the arrays, of which nothing is read yet.
+    """Open a store: header, lines of takes, and arrays not yet read.
 
     Raises
     ------
@@ -329,7 +329,7 @@ def open_takes(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]], dict[s
 
 
 def read_description(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """Header of a store and its lines of takes; no array is read.
+    """Read the header of a store and its lines of takes, but no array.
 
     Raises
     ------
@@ -397,7 +397,7 @@ def _reopened(path: Path, header: dict[str, Any]) -> Any:
 
 
 def _read_takes(path: Path) -> list[dict[str, Any]]:
-    """Lines of takes; the last one is left out when it was not written to its end."""
+    """Read the lines of takes; an incomplete last line is left out."""
     index = path / INDEX_NAME
     if not index.exists():
         return []

@@ -1,4 +1,4 @@
-"""What a store of pairs holds, told from its description: no array is read."""
+"""Summary of a store of pairs from its description; no array is read."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sd2core.pairs.store import PairKind, read_description
 
 @dataclass(frozen=True)
 class TakeFacts:
-    """One take: whose, from where, how long."""
+    """Subject, placement and length of one take."""
 
     subject: str
     placement: int
@@ -22,7 +22,7 @@ class TakeFacts:
 
 @dataclass(frozen=True)
 class PairFacts:
-    """A store of pairs, but for its values."""
+    """Facts of a store of pairs, without its values."""
 
     path: Path
     kind: PairKind
@@ -33,29 +33,29 @@ class PairFacts:
 
     @property
     def subjects(self) -> tuple[str, ...]:
-        """In the order of their first takes."""
+        """Subjects in the order of their first takes."""
         return tuple(dict.fromkeys(take.subject for take in self.takes))
 
     @property
     def placements(self) -> int:
-        """From how many places the movements are seen."""
+        """Number of places from which the movements are seen."""
         return len({take.placement for take in self.takes})
 
     @property
     def duration_s(self) -> float:
-        """Of the movements, each counted once however often it is seen."""
+        """Duration of the movements, each counted once."""
         return sum(take.frames for take in self.takes if take.placement == 0) / self.frame_rate_hz
 
     @property
     def divisible(self) -> bool:
-        """Whether somebody has several takes."""
+        """True if a subject has several takes."""
         first = [take.subject for take in self.takes if take.placement == 0]
         return len(set(first)) < len(first)
 
     def segments(
         self, subjects: Iterable[str], length: int, overlap: int, *, first_only: bool = False
     ) -> int:
-        """How many windows the takes of these subjects give."""
+        """Count the windows of the takes of these subjects."""
         wanted = set(subjects)
         return sum(
             len(segment_starts(take.frames, length, overlap))

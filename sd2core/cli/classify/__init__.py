@@ -1,4 +1,4 @@
-"""``sd2 classify``: which gesture every frame of a Doppler map shows."""
+"""``sd2 classify``: find gestures in Doppler maps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``sd2 classify apply``: a classifier asked about a recording or a map."""
+"""``sd2 classify apply``: find gestures in a recording or a map."""
 
 from __future__ import annotations
 

@@ -102,7 +102,7 @@ def _table(options: argparse.Namespace) -> None:
 
 @contextmanager
 def _lines() -> Iterator[Progress]:
-    """A JSON line for every training that is done, on standard output."""
+    """Print a JSON line for every finished training."""
     begun_s = time.monotonic()
 
     def report(done: int, total: int) -> None:
@@ -126,7 +126,7 @@ def _options(options: argparse.Namespace) -> TableOptions:
 
 
 def _denoiser(options: argparse.Namespace, known: ClipSet) -> TrainedDenoiser | None:
-    """The denoiser that was asked for, or the bundled one where it knows such maps."""
+    """Load the denoiser named, or the bundled one where it is made for such maps."""
     from sd2core.classify.comparison import fits
     from sd2core.classify.experiment import has_synthetic
     from sd2core.denoise.files import DEFAULT_NAME, load_model

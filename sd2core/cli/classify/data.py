@@ -1,4 +1,4 @@
-"""What ``sd2 classify`` learns from: data sets, pairs, recordings, files of a radar."""
+"""Data of ``sd2 classify``: data sets, pairs, recordings and radar files."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def source(text: str) -> LabelledSource:
 
 
 def add_data(parser: argparse.ArgumentParser) -> None:
-    """Add what there is to learn from or to judge on, and which of its maps."""
+    """Add the options for data and the choice of their maps."""
     add_sources(parser)
     parser.add_argument(
         "--maps",
@@ -52,7 +52,7 @@ def add_data(parser: argparse.ArgumentParser) -> None:
 
 
 def add_sources(parser: argparse.ArgumentParser) -> None:
-    """Add what there is to learn from or to judge on, and the denoiser."""
+    """Add the options for data and the denoiser."""
     parser.add_argument(
         "data", nargs="+", type=source, metavar="DATA", help="labelled data, see above"
     )
@@ -68,7 +68,7 @@ def clips_of(
     maps: Sequence[MapName] | None,
     denoiser: TrainedDenoiser | None = None,
 ) -> ClipSet:
-    """All clips of the sources, as one set.
+    """Return all clips of the sources as one set.
 
     Parameters
     ----------
@@ -106,21 +106,21 @@ def clips_of(
 
 
 def denoiser_for(maps: Sequence[MapName], name: str | None) -> TrainedDenoiser | None:
-    """The denoiser, where one of the maps needs it."""
+    """Load the denoiser where one of the maps needs it."""
     from sd2core.denoise.files import DEFAULT_NAME, load_model
 
     return load_model(name or DEFAULT_NAME) if "denoised" in maps else None
 
 
 def asked_maps(options: argparse.Namespace) -> tuple[MapName, ...]:
-    """What ``--maps`` says."""
+    """Parse ``--maps``."""
     return parsed_maps(options.maps)
 
 
 def split_of(
     sources: Sequence[LabelledSource], part: Literal["validation", "test"]
 ) -> list[str] | None:
-    """Who validates or tests, where all sources are data sets: they say so themselves."""
+    """Return who validates or tests, where all sources are data sets that define it."""
     from sd2core.datasets.reading import open_dataset
     from sd2core.io.kinds import is_dataset
 
@@ -151,7 +151,7 @@ def _of_dataset(path: Path, maps: Sequence[MapName] | None) -> list[ClipSet]:
 def _single(
     one: LabelledSource, maps: Sequence[MapName] | None, frame_rate_hz: float | None
 ) -> list[ClipSet]:
-    """Of a recording, or of a radar's own file; at the frame rate of the first map."""
+    """Return the clips of a recording or a radar file, at the frame rate of the first map."""
     from sd2core.classify.data import clips_of_map
     from sd2core.datasets.labelled import ONE_PERSON
     from sd2core.io.radar import holds_map, load_recorded_map

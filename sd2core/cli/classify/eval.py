@@ -1,4 +1,4 @@
-"""``sd2 classify eval``: how good a classifier is on labelled maps."""
+"""``sd2 classify eval``: score a classifier on labelled maps."""
 
 from __future__ import annotations
 

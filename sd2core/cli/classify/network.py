@@ -1,4 +1,4 @@
-"""Options of ``sd2 classify`` that say what is trained."""
+"""Options of ``sd2 classify`` for the network."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def add_network(parser: argparse.ArgumentParser) -> None:
 
 
 def network_of(options: argparse.Namespace) -> Network:
-    """What was asked for."""
+    """Return the network chosen by the options."""
     from sd2core.classify.experiment import Network
 
     return Network(options.model, options.features, options.width, options.delay_s)

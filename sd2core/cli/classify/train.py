@@ -1,4 +1,4 @@
-"""``sd2 classify train``: labelled maps to a classifier."""
+"""``sd2 classify train``: train a classifier on labelled maps."""
 
 from __future__ import annotations
 
@@ -144,14 +144,14 @@ def _options(options: argparse.Namespace) -> TrainOptions:
 def _kept_out(
     options: argparse.Namespace, part: Literal["validation", "test"]
 ) -> Sequence[str] | None:
-    """Those who are named, which may be nobody; otherwise as the data sets have it."""
+    """Return the people named, possibly none; otherwise those the data sets define."""
     named: tuple[str, ...] | None = getattr(options, f"{part}_subjects")
     return split_of(options.data, part) if named is None else named
 
 
 @contextmanager
 def _watching(options: argparse.Namespace, steps: int) -> Iterator[Watch]:
-    """A bar on standard error, or a JSON line for every event on standard output."""
+    """Show a bar on standard error, or print a JSON line for every event."""
     from tqdm import tqdm
 
     if options.progress_json:
