@@ -79,7 +79,7 @@ def network_rows(table: Table) -> Rows:
 
 def added_rows(table: Table) -> Rows:
     """Compare the kinds of data added to all radar data."""
-    rows = [["learnt from", "frames added", *_score_head(table), "gain, points", "moved, frames"]]
+    rows = [["trained on", "frames added", *_score_head(table), "gain, points", "moved, frames"]]
     for condition in main_conditions(table):
         if condition.share == 1.0:
             added = np.mean([sum(run.added.values()) for run in table.of(condition)])
@@ -98,7 +98,7 @@ def added_rows(table: Table) -> Rows:
 def curve_rows(table: Table) -> Rows:
     """Tabulate mean recall by share of the radar data, with and without added data."""
     titles = list(dict.fromkeys(title_of(one) for one in curve_conditions(table)))
-    rows = [["of the radar's data", "frames", *titles, *(f"gain {one}" for one in titles[1:])]]
+    rows = [["share of radar data", "frames", *titles, *(f"gain {one}" for one in titles[1:])]]
     for share in sorted({one.share for one in curve_conditions(table)}):
         own = {title_of(one): one for one in curve_conditions(table) if one.share == share}
         frames = np.mean([sum(run.real.values()) for run in table.of(own[titles[0]])])
@@ -156,10 +156,10 @@ def _lines(table: Table, lines_of: Callable[[Rows], list[str]]) -> list[str]:
     who = (
         "one person; movements are kept apart, which says nothing about other people"
         if table.by_movement
-        else f"people who were not learnt from: {', '.join(subjects)}"
+        else f"people not trained on: {', '.join(subjects)}"
     )
     lines = [
-        f"Judged on a {table.kind} radar's maps of {who}. Numbers are per cent, mean ± standard"
+        f"Evaluated on a {table.kind} radar's maps of {who}. Numbers are per cent, mean ± standard"
         f" deviation over {table.options.seeds} seeds (each other"
         f" {'movements' if table.by_movement else 'people'}, another draw, another network)."
         " Frames: mean over classes of the share of frames that were found. Gestures:"
@@ -325,7 +325,7 @@ def draw_curve(table: Table) -> Figure:
     axes.set_xscale("log")
     axes.set_xticks(shares, [f"{share:g} %" for share in shares])
     axes.minorticks_off()
-    axes.set_xlabel(f"share of the {table.kind} radar's data that is learnt from")
+    axes.set_xlabel(f"share of the {table.kind} radar's data used for training")
     axes.set_ylabel("mean recall of frames (%)")
     axes.grid(alpha=0.25)
     axes.legend(fontsize=8)

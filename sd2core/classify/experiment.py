@@ -237,5 +237,5 @@ def _first(clips: Sequence[Clip], share: float) -> tuple[Clip, ...]:
 
 
 def _whole(clips: Sequence[Clip], share: float) -> tuple[Clip, ...]:
-    """Return that share of the clips, at least one: little validation data with little training data."""
+    """Return that share of the clips, at least one, so validation data shrinks with the rest."""
     return tuple(clips[: max(1, round(share * len(clips)))])

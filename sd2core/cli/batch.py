@@ -33,11 +33,11 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         "fit, synthesise, denoise and export many recordings from many places",
         handler=_batch,
         description=(
-            "Does what a plan says (TOML, see docs/formats.md) on all cores of this machine, or\n"
-            "on the workers of a dask-scheduler, which must see the same files under the same\n"
-            "paths. Every result is kept under the hash of what it depends on: the same command\n"
-            "again does only what is missing, after a change only what depends on that, and\n"
-            "after Ctrl-C or a crash what is left. A recording that cannot be used is reported\n"
+            "Runs a plan (TOML, see docs/formats.md) on all cores of this machine, or on the\n"
+            "workers of a dask-scheduler, which must see the same files under the same paths.\n"
+            "Every result is kept under the hash of all that it depends on: the same command\n"
+            "again makes only missing results, after a change those that depend on it, and after\n"
+            "Ctrl-C or a crash the rest. A recording that cannot be used is reported\n"
             "at the end and does not stop the others; the exit code is then 1."
         ),
         examples=(

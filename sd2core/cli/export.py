@@ -46,8 +46,8 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "Cuts maps into segments of 72 frames and writes them with a label per frame and per\n"
             "segment, subject, sensor, provenance, and a split by subject. Beside the data set\n"
             "come a card (.card.md, .card.json) and a preview sheet (.png). Inputs are recordings\n"
-            "or folders of them, pairs, and Doppler maps. What is there already is left alone:\n"
-            "stopped, or with more inputs, the same command goes on."
+            "or folders of them, pairs, and Doppler maps. Sources that are in the\n"
+            "data set already are kept: the same command resumes a stopped export, or adds inputs."
         ),
         examples=(
             "  sd2 export walk.sd2 --out walk.zarr\n"
@@ -65,7 +65,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     _add_content(parser)
     _add_making(parser)
     parser.add_argument(
-        "--dry-run", action="store_true", help="say how much it would be, and write nothing"
+        "--dry-run", action="store_true", help="print counts, size and time, and write nothing"
     )
     told = parser.add_mutually_exclusive_group()
     add_json(told)
@@ -99,29 +99,31 @@ def _add_content(parser: argparse.ArgumentParser) -> None:
         "--label-rule",
         choices=("foreground", "majority"),
         default="foreground",
-        help="a segment is called as the gesture that most of its frames have, if they are"
-        " enough, or as most frames are, background included (default: foreground)",
+        help="label of a segment: the gesture with most frames, if they are enough, or the label"
+        " with most frames, background included (default: foreground)",
     )
     group.add_argument(
         "--min-share",
         type=share,
         default=0.2,
         metavar="P",
-        help="how much of a segment is enough for foreground (default: 20%%)",
+        help="least share of a segment for foreground (default: 20%%)",
     )
-    group.add_argument("--title", default="", metavar="TEXT", help="of the card and the sheet")
+    group.add_argument(
+        "--title", default="", metavar="TEXT", help="title of the card and the sheet"
+    )
     people = parser.add_argument_group("people")
     people.add_argument(
         "--subjects",
         type=name_list,
         metavar="NAMES",
-        help="who each recording and map is of, separated by commas, in their order (default:"
-        " everyone another person)",
+        help="subject of each recording and map, separated by commas, in their order (default:"
+        " each recording shows another person)",
     )
     add_people_kept_out(
         people,
         "kept out to validate with, separated by commas, or none (default: about a sixth of all,"
-        " by their names: more people do not move the others)",
+        " chosen by their names, so that adding people does not move others)",
         "kept out to test with, or none (default: likewise)",
     )
     people.add_argument(
@@ -146,13 +148,13 @@ def _add_making(parser: argparse.ArgumentParser) -> None:
         "--tolerance",
         type=share,
         metavar="P",
-        help="make synthetic maps as quickly as this error allows, 2%% say (default: exactly)",
+        help="make synthetic maps as fast as possible within this error, e.g. 2%% (default: exact)",
     )
     group.add_argument(
         "--simulate",
         metavar="paper|CONFIG.json",
-        help="compute the signal of this radar at every place, which takes far longer than"
-        " everything else (default: only what radar files hold)",
+        help="simulate this radar at every place, which takes far longer than everything else"
+        " (default: only the maps in radar files)",
     )
     group.add_argument(
         "--model",
@@ -164,7 +166,7 @@ def _add_making(parser: argparse.ArgumentParser) -> None:
         "--null-bins",
         type=bin_list,
         metavar="LIST",
-        help="bins to empty in all kinds (default: those of the synthetic maps)",
+        help="bins to set to zero in all kinds (default: those of the synthetic maps)",
     )
 
 
@@ -275,9 +277,7 @@ def _dry_run(
     else:
         facts = _forecast_facts(forecast)
         if simulating_s is not None:
-            facts["simulating"] = (
-                f"about {duration(simulating_s)} for all of it, as measured on some frames"
-            )
+            facts["simulating"] = f"about {duration(simulating_s)} in all, measured on some frames"
         print_facts(f"{options.out} would hold", facts)
     _complain(forecast.failed)
     return 1 if forecast.failed else 0

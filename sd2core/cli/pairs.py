@@ -47,14 +47,14 @@ def _add_recordings(kinds: argparse._SubParsersAction) -> None:
         "--subjects",
         type=lambda text: tuple(text.split(",")),
         metavar="NAMES",
-        help="who each recording is of, separated by commas (default: everyone another person)",
+        help="subject of each recording, separated by commas (default: each shows another person)",
     )
     add_axis(parser)
     parser.add_argument(
         "--null-bins",
         type=bin_list,
         metavar="LIST",
-        help="bins to empty in input and target (default: 14,15,16 of 32, else none)",
+        help="bins to set to zero in input and target (default: 14,15,16 of 32, else none)",
     )
     add_json(parser)
 
@@ -69,7 +69,7 @@ def _add_mars(kinds: argparse._SubParsersAction) -> None:
             "A body of the person's size moves as the Kinect saw it; its synthetic Doppler is\n"
             "the input, the Doppler of the radar's points the target. Person and part make\n"
             "the subject (1-test), so that training and test can be kept apart.\n\n"
-            "It can be stopped at any moment; the same command goes on from there."
+            "It can be stopped at any moment; the same command resumes it."
         ),
         examples=(
             "  sd2 pairs mars mars_subject1 mars_subject4 --out mars.zarr\n"
@@ -91,7 +91,7 @@ def _add_mars(kinds: argparse._SubParsersAction) -> None:
         "--null-bins",
         type=bin_list,
         metavar="LIST",
-        help="bins to empty in input and target, e.g. 14,15,16 (default: none)",
+        help="bins to set to zero in input and target, e.g. 14,15,16 (default: none)",
     )
     parser.add_argument(
         "--visibility",
@@ -101,13 +101,12 @@ def _add_mars(kinds: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--weight",
         choices=("count", "area", "projected"),
-        help="what a vertex counts (default: count)",
+        help="weight of a vertex (default: count)",
     )
     parser.add_argument(
         "--target",
         choices=("share", "intensity"),
-        help="whether each frame of the radar holds shares that add up to 1, or intensities"
-        " (default: share)",
+        help="target of each frame: shares that add up to 1, or intensities (default: share)",
     )
     add_json(parser)
 

@@ -16,10 +16,10 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser = add_command(
         commands,
         "classify",
-        "train gesture classifiers, judge them, and use them",
+        "train, evaluate and apply gesture classifiers",
         description=(
-            "A classifier says of every frame of a Doppler map how probable each gesture is. It\n"
-            "learns from labelled maps and is judged on people that it has not learnt from."
+            "A classifier gives the probability of each gesture in every frame of a Doppler map.\n"
+            "It is trained on labelled maps and evaluated on people it was not trained on."
         ),
         examples=(
             "  sd2 classify train campaign.zarr --out gestures.safetensors\n"

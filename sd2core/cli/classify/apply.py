@@ -24,10 +24,10 @@ def add_apply(kinds: argparse._SubParsersAction) -> None:
         "find gestures in a recording or a map",
         handler=_apply,
         description=(
-            "Says for every frame how probable each class is, and makes spans of the frames in\n"
-            "which a gesture is the most probable. The confidence of a span is the mean\n"
-            "probability of its class. The map must be on the axis that the classifier learnt\n"
-            "from; another frame rate is brought to the classifier's and back."
+            "Computes the probability of each class in every frame, and spans of the frames in\n"
+            "which a gesture is the most probable class. The confidence of a span is the mean\n"
+            "probability of its class. The map must be on the velocity axis that the classifier\n"
+            "was trained on; another frame rate is resampled to the classifier's and back."
         ),
         examples=(
             "  sd2 classify apply walk.sd2 --model gestures.safetensors\n"
@@ -39,7 +39,11 @@ def add_apply(kinds: argparse._SubParsersAction) -> None:
         "map", type=Path, metavar="MAP", help="a map, a recording, or the .h5 of a K60168A"
     )
     parser.add_argument(
-        "--model", type=Path, required=True, metavar="FILE", help="by `sd2 classify train`"
+        "--model",
+        type=Path,
+        required=True,
+        metavar="FILE",
+        help="classifier from `sd2 classify train`",
     )
     parser.add_argument(
         "--of",
@@ -66,7 +70,7 @@ def add_apply(kinds: argparse._SubParsersAction) -> None:
         type=not_negative_float,
         default=0.1,
         metavar="S",
-        help="other frames up to this do not end a span (default: 0.1)",
+        help="merge spans of a class with a shorter gap between them (default: 0.1)",
     )
     add_json(parser)
 

@@ -33,11 +33,11 @@ def add_table(kinds: argparse._SubParsersAction) -> None:
             f"{DATA_HELP}\n\n"
             "Trains on the radar's maps alone, and with synthetic maps of other movements added\n"
             "(0.4 frames for each real one), denoised or not, seen from the radar's own place or\n"
-            "from others too; then with less and less of the real data. Everything is judged on\n"
-            "the radar's maps of people who were not learnt from, other ones for each seed. With\n"
-            "one person movements are kept apart instead.\n\n"
+            "from others too; then with less and less of the real data. Everything is evaluated\n"
+            "on the radar's maps of people not trained on, other ones for each seed. With one\n"
+            "person, movements are kept apart instead.\n\n"
             "OUT gets table.md, table.json, confusion.png and curve.png, and a small file for\n"
-            "every training: started again, only what is missing is trained."
+            "every training: run again, only the missing ones are trained."
         ),
         examples=(
             "  sd2 classify table campaign.zarr --out tables\n"
@@ -48,27 +48,30 @@ def add_table(kinds: argparse._SubParsersAction) -> None:
     add_sources(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="OUT", help="folder")
     parser.add_argument(
-        "--seeds", type=positive_int, metavar="N", help="how often (default: 5; quick: 2)"
+        "--seeds",
+        type=positive_int,
+        metavar="N",
+        help="number of repetitions (default: 5; quick: 2)",
     )
     parser.add_argument(
         "--shares",
         type=_shares,
         metavar="LIST",
-        help="of the real data, for the learning curve (default: 1%%,2%%,5%%,10%%,25%%,50%%,100%%;"
-        " quick: 10%%,100%%)",
+        help="shares of the real data for the learning curve (default:"
+        " 1%%,2%%,5%%,10%%,25%%,50%%,100%%; quick: 10%%,100%%)",
     )
-    parser.add_argument("--quick", action="store_true", help="few trainings, to see how it looks")
+    parser.add_argument("--quick", action="store_true", help="few trainings, for a first look")
     parser.add_argument(
         "--radar-only",
         action="store_true",
-        help="add nothing synthetic: networks and how much data they need, on all of the radar's",
+        help="add no synthetic maps: compare networks and amounts of radar data only",
     )
     add_network(parser)
     parser.add_argument("--steps", type=positive_int, metavar="N", help="batches per training")
     parser.add_argument(
         "--progress-json",
         action="store_true",
-        help="print what is done as JSON lines, for other programs (docs/formats.md)",
+        help="print progress as JSON lines, for other programs (docs/formats.md)",
     )
     add_json(parser)
 

@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 DATA_HELP = (
     "DATA is one or several of: a data set (`sd2 export`), a store of pairs (`sd2 simulate\n"
     "campaign`, `sd2 pairs`), a recording (.sd2) with labels, a labelled radar file (.h5 of a\n"
-    "K60168A), or a folder of recordings or radar files. A recording is taken for a person of\n"
-    "its own; who it is can be said as PERSON=PATH. Radar files without a person are taken for\n"
-    "one and the same person. The four swipes count as horizontal and vertical, other labels by\n"
-    "the class that the label set gives them; frames of a labelled recording without a label\n"
-    "are background."
+    "K60168A), or a folder of recordings or radar files. Each recording is assumed to show\n"
+    "another person, unless named as PERSON=PATH; radar files without a name are assumed to\n"
+    "show one and the same person. The four swipes count as horizontal and vertical, other\n"
+    "labels by the class that the label set gives them; frames of a labelled recording without\n"
+    "a label are background."
 )
 
 _WITH_SUBJECTS = ("pairs", "dataset")

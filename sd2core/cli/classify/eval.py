@@ -25,13 +25,13 @@ def add_eval(kinds: argparse._SubParsersAction) -> None:
     parser = add_command(
         kinds,
         "eval",
-        "judge a classifier on people that it has not learnt from",
+        "evaluate a classifier on people it was not trained on",
         handler=_eval,
         description=(
             f"{DATA_HELP}\n\n"
-            "Prints how often frames, and whole gestures, of each class were taken for each, and\n"
-            "how soon a gesture was recognised. Judged are the people that the training kept for\n"
-            "the test, or those that are named."
+            "Prints the confusion matrices of frames and of whole gestures, and the latency of a\n"
+            "recognised gesture. Uses the people that the training kept for the test, or those\n"
+            "that are named."
         ),
         examples=(
             "  sd2 classify eval campaign.zarr --model gestures.safetensors\n"
@@ -40,18 +40,22 @@ def add_eval(kinds: argparse._SubParsersAction) -> None:
     )
     add_data(parser)
     parser.add_argument(
-        "--model", type=Path, required=True, metavar="FILE", help="by `sd2 classify train`"
+        "--model",
+        type=Path,
+        required=True,
+        metavar="FILE",
+        help="classifier from `sd2 classify train`",
     )
     parser.add_argument(
         "--subjects",
         metavar="NAMES",
-        help="who is judged, separated by commas, or `all` (default: whom the training kept for"
-        " the test)",
+        help="people to evaluate on, separated by commas, or `all` (default: those the training"
+        " kept for the test)",
     )
     parser.add_argument(
         "--all-placements",
         action="store_true",
-        help="judge also what other places of the sensor saw, not each movement's own only",
+        help="use also the maps from other places of the sensor, not only each movement's own",
     )
     parser.add_argument(
         "--json", type=Path, metavar="FILE", help="write all numbers, or - to print them"
@@ -128,9 +132,9 @@ def _judged(known: ClipSet, card: ClassifierCard, options: argparse.Namespace) -
 def _say(found: Score, known: ClipSet, subjects: list[str], learnt: list[str]) -> None:
     from sd2core.classify.metrics import shares
 
-    print(f"Judged on {' and '.join(known.kinds)} maps of {', '.join(subjects)}")
+    print(f"Evaluated on {' and '.join(known.kinds)} maps of {', '.join(subjects)}")
     if learnt:
-        print(f"The classifier has learnt from {', '.join(learnt)}: not what it does for others.")
+        print(f"It was trained on {', '.join(learnt)}: this does not show how it does for others.")
     for what, matrix in (("frames", found.frames), ("gestures", found.gestures)):
         rows = [(what, *(f"taken for {name}" for name in found.classes), "in all")]
         for name, row, counts in zip(found.classes, shares(matrix), matrix, strict=True):

@@ -25,7 +25,7 @@ def add_network(parser: argparse.ArgumentParser) -> None:
         "--features",
         choices=("columns", "peak"),
         default="columns",
-        help="what it is shown: whole columns (the default), or the strongest bin (the paper's)",
+        help="input per frame: whole columns (the default), or the strongest bin (the paper's)",
     )
     group.add_argument(
         "--width",
@@ -39,7 +39,7 @@ def add_network(parser: argparse.ArgumentParser) -> None:
         type=not_negative_float,
         default=DELAY_S,
         metavar="S",
-        help="a frame is answered so much later, when what follows it has been seen (default:"
+        help="classify a frame so much later, with the frames after it known (default:"
         f" {DELAY_S:g}; the paper's: 0, at once)",
     )
 

@@ -44,9 +44,9 @@ def add_train(kinds: argparse._SubParsersAction) -> None:
         handler=_train,
         description=(
             f"{DATA_HELP}\n\n"
-            "Some people are kept out to choose the best moment by, some for `sd2 classify eval`.\n"
-            "Ctrl-C ends the training early; the best so far is kept. Beside FILE stands\n"
-            "FILE.json with all that is known of the training."
+            "Some people are kept out for validation, some for `sd2 classify eval`.\n"
+            "Ctrl-C ends the training early; the best so far is kept. The file\n"
+            "FILE.json beside it describes the training."
         ),
         examples=(
             "  sd2 classify train campaign.zarr --out gestures.safetensors\n"
@@ -56,35 +56,36 @@ def add_train(kinds: argparse._SubParsersAction) -> None:
     )
     add_data(parser)
     parser.add_argument(
-        "--out", type=Path, required=True, metavar="FILE", help="to write (.safetensors)"
+        "--out", type=Path, required=True, metavar="FILE", help="file to write (.safetensors)"
     )
     add_network(parser)
     parser.add_argument(
         "--placements",
         choices=("all", "first"),
         default="all",
-        help="range synthesis: learn from all places of the sensor, or the first only"
-        " (default: all)",
+        help="range synthesis: train on all places of the sensor, or the first only (default: all)",
     )
     otherwise = "(default: as the data set says, or a sixth of all)"
     add_people_kept_out(
         parser,
-        f"kept out to choose the best step by, separated by commas, or none {otherwise}",
+        f"kept out for validation, separated by commas, or none {otherwise}",
         f"kept out for a test, or none {otherwise}",
     )
-    parser.add_argument("--steps", type=positive_int, metavar="N", help="batches to learn from")
+    parser.add_argument("--steps", type=positive_int, metavar="N", help="number of training steps")
     parser.add_argument(
         "--patience",
         type=positive_int,
         metavar="N",
-        help="end after so many looks at the validation people without a better one",
+        help="end after so many validations without improvement",
     )
-    parser.add_argument("--learning-rate", type=positive_float, metavar="R", help="at its highest")
+    parser.add_argument(
+        "--learning-rate", type=positive_float, metavar="R", help="peak learning rate"
+    )
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="default: 0")
     parser.add_argument(
         "--progress-json",
         action="store_true",
-        help="print what is done as JSON lines, for other programs (docs/formats.md)",
+        help="print progress as JSON lines, for other programs (docs/formats.md)",
     )
     add_json(parser)
 

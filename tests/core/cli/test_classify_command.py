@@ -110,7 +110,7 @@ def test_a_classifier_is_trained_described_and_judged(
     assert np.sum(told["gestures"]) == 6
     assert plot.read_bytes().startswith(b"\x89PNG")
     everybody = sd2("classify", "eval", store, "--model", model, "--subjects", "all")
-    assert "has learnt from s0, s1" in everybody.out
+    assert "was trained on s0, s1" in everybody.out
     assert "taken for horizontal" in everybody.out
 
 

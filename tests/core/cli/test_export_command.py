@@ -56,7 +56,7 @@ def test_a_folder_of_recordings_becomes_a_data_set_with_card_and_sheet(
     info = sd2("info", out)
     assert info.code == 0
     assert info.out.startswith(f"Data set {out}")
-    assert "note: No real radar is in it." in info.out
+    assert "note: It has no maps of a real radar" in info.out
     assert json.loads(sd2("info", out, "--json").out)["segments"] == 15
 
 
