@@ -126,15 +126,6 @@ def _own_faces() -> tuple[tuple[Resolution, NDArray[np.int32]], ...]:
     return tuple((name, Body.load(name).faces) for name in names)
 
 
-@lru_cache(maxsize=1)
-def medium_in_high() -> NDArray[np.intp]:
-    """Vertices of the finest surface that are those of the medium one, (5000,)."""
-    from scipy.spatial import cKDTree
-
-    _, rows = cKDTree(Body.load("high").vertices_m).query(Body.load("medium").vertices_m)
-    return np.asarray(rows, np.intp)
-
-
 @lru_cache(maxsize=3)
 def own_patches(resolution: Resolution) -> JointPatches:
     """Patches of one of our surfaces."""

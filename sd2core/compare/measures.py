@@ -1,23 +1,35 @@
-"""Measures of a comparison: distances, velocities along the line of sight, jitter.
+"""Measures of a comparison, and meshes and Doppler maps made alike for it.
 
-Pure functions of arrays. Velocities are what the Doppler chain takes them to be: the
-exact change of range over the central difference, one-sided at the two ends.
+Velocities are those that the Doppler chain takes: the exact change of range over the
+central difference, one-sided at the two ends.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sd2core.doppler import PRESETS, Synthesizer
+from sd2core.errors import Sd2Error
+from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import Presence
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.progress import Progress, silent
+from sd2core.scattering.trajectory import cubic_weights
 from sd2core.scattering.velocity import moments, radial_velocity
+from sd2core.sensor import VirtualSensor
+from sd2core.timebase import Timebase
 
 Floats = NDArray[np.float64]
 
-EDGE_FRAMES = 5
-"""Frames at each end of a clip that count as its edge."""
+_SAME_S = 1e-4
+"""Frames nearer than this are the same frame: file formats round times."""
+
+_FEWEST = 4
 
 
 def line_of_sight_velocity(
@@ -67,19 +79,6 @@ def correlation(values: NDArray[Any], truth: NDArray[Any]) -> float:
     return float(a @ b) / norm if norm > 0 else float("nan")
 
 
-def peak_kept(values: NDArray[Any], truth: NDArray[Any]) -> float:
-    """Largest magnitude of one over that of the other; NaN when the truth has none."""
-    peak = float(np.abs(truth).max(initial=0.0))
-    return float(np.abs(values).max(initial=0.0)) / peak if peak > 0 else float("nan")
-
-
-def speed_mps(positions_m: NDArray[Any], times_s: Floats) -> Floats:
-    """Magnitude of the velocity, (T, N) for positions (T, N, 3)."""
-    stencil = moments(times_s, np.arange(len(times_s)), 1)
-    step = positions_m[stencil.after[:, 0]] - positions_m[stencil.before[:, 0]]
-    return np.asarray(np.linalg.norm(step, axis=-1) / stencil.duration_s)
-
-
 def jitter(positions_m: NDArray[Any], times_s: Floats, presence: Presence | None = None) -> Floats:
     """RMS over time of the third difference of the path, per joint.
 
@@ -104,30 +103,129 @@ def jitter(positions_m: NDArray[Any], times_s: Floats, presence: Presence | None
     return np.asarray(np.sqrt((third**2).sum(axis=-1).mean(axis=0)))
 
 
-def edge_ratio(errors: NDArray[Any], edge: int = EDGE_FRAMES) -> float:
-    """RMS error of the first and last frames over that of the frames between.
+def common_times(meshes: Sequence[MeshSequence], reference: int = 0) -> NDArray[np.float64]:
+    """The reference's frame times within the stretch that all meshes cover.
+
+    Raises
+    ------
+    Sd2Error
+        When fewer than four frames are left.
+    """
+    times = meshes[reference].times_s
+    first = max(float(mesh.times_s[0]) for mesh in meshes) - _SAME_S
+    last = min(float(mesh.times_s[-1]) for mesh in meshes) + _SAME_S
+    within: NDArray[np.float64] = times[(times >= first) & (times <= last)]
+    if len(within) < _FEWEST:
+        spans = ", ".join(f"{mesh.times_s[0]:.2f} to {mesh.times_s[-1]:.2f} s" for mesh in meshes)
+        raise Sd2Error(
+            f"The meshes have {len(within)} frames in common ({spans})",
+            f"{_FEWEST} or more",
+            "Give meshes of the same video; --fps places the frames of a file that has no times",
+        )
+    return within
+
+
+def at_times(mesh: MeshSequence, times_s: NDArray[np.float64]) -> tuple[MeshSequence, bool]:
+    """A mesh at other times within its own, in memory.
 
     Parameters
     ----------
-    errors : array, shape (T, ...)
+    times_s : float64 array, shape (n,)
+
+    Returns
+    -------
+    MeshSequence
+    bool
+        Whether anything was interpolated: by the cubic through two frames with
+        the tangents of their neighbours.
+
+    Notes
+    -----
+    The vertices of frames without a person mean nothing, nor do those interpolated
+    next to them; the mesh that is returned says which these are.
+    """
+    own = mesh.times_s
+    nearest = np.abs(own[:, None] - times_s[None, :]).argmin(axis=0)
+    if np.abs(own[nearest] - times_s).max() <= _SAME_S:
+        start, stop = int(nearest[0]), int(nearest[-1]) + 1
+        vertices = mesh.read(start, stop)[nearest - start]
+        there = None if mesh.present is None else mesh.present[nearest]
+        return _replaced(mesh, vertices, times_s, there, nearest), False
+    frames = np.clip(np.searchsorted(own, times_s, side="right") - 1, 0, len(own) - 2)
+    # Between two frames there is a person where both of them have one.
+    there = mesh.presence.there[frames] & mesh.presence.there[frames + 1]
+    vertices = np.empty((len(times_s), mesh.vertex_count, 3), np.float64)
+    for row, (time_s, frame) in enumerate(zip(times_s, frames, strict=True)):
+        # Only frames of the same stretch: past its end a person is somewhere else.
+        begin, end = int(mesh.presence.first[frame]), int(mesh.presence.last[frame]) + 1
+        inside = float(np.clip(time_s, own[begin], own[end - 1]))
+        first, weights = cubic_weights(own[begin:end], inside, int(frame) - begin)
+        stretch = mesh.read(begin + first, begin + first + len(weights)).astype(np.float64)
+        vertices[row] = np.tensordot(weights, stretch, 1)
+    return _replaced(mesh, vertices, times_s, there, nearest), True
+
+
+def _replaced(
+    mesh: MeshSequence,
+    vertices: NDArray[np.floating],
+    times_s: NDArray[np.float64],
+    present: NDArray[np.bool_] | None,
+    nearest: NDArray[np.intp],
+) -> MeshSequence:
+    known = None if mesh.uncertainty is None else mesh.uncertainty.of_frames(nearest)
+    return replace(
+        mesh, vertices=vertices, timebase=Timebase(times_s), present=present, uncertainty=known
+    )
+
+
+def maps_alike(
+    meshes: Sequence[MeshSequence], sensor: VirtualSensor, progress: Progress = silent
+) -> tuple[DopplerMap, ...]:
+    """Count maps of all meshes by the paper's preset.
+
+    Hidden vertices are left out where every mesh has faces; otherwise all vertices of
+    all meshes count, so that none is compared with another kind of map.
+    """
+    options = PRESETS["paper"]
+    if any(mesh.faces is None for mesh in meshes):
+        options = replace(options, visibility="none")
+    total = sum(mesh.frame_count for mesh in meshes)
+    maps, done = [], 0
+    for mesh in meshes:
+        before = done
+        maps.append(
+            Synthesizer(mesh, options).map(
+                sensor,
+                progress=lambda frames, _, before=before: progress(  # type: ignore[misc]
+                    before + frames, total
+                ),
+            )
+        )
+        done += mesh.frame_count
+    return tuple(maps)
+
+
+def map_l1(
+    values: DopplerMap, reference: DopplerMap, frames: NDArray[np.bool_] | None = None
+) -> float:
+    """Sum of absolute differences over the sum of the reference, both smoothed.
+
+    Parameters
+    ----------
+    values, reference : DopplerMap
+        Of one shape.
+    frames : bool array, shape (frames,), optional
+        Only these.
 
     Returns
     -------
     float
-        NaN when there is no frame between; 1 when there is no error anywhere.
+        0 when both are empty, infinite when only the reference is.
     """
-    if len(errors) <= 2 * edge:
-        return float("nan")
-    ends = rms(np.concatenate([errors[:edge], errors[-edge:]]))
-    middle = rms(errors[edge:-edge])
-    if middle == 0:
-        return 1.0 if ends == 0 else float("inf")
-    return ends / middle
-
-
-def coverage(errors: NDArray[Any], sigma: NDArray[Any]) -> float:
-    """Share of errors no larger than their standard deviation (0.683 when it is right)."""
-    known = np.isfinite(errors) & np.isfinite(sigma)
-    if not known.any():
-        return float("nan")
-    return float((np.abs(errors[known]) <= sigma[known]).mean())
+    a, b = (one.values.astype(np.float64) for one in (values, reference))
+    if frames is not None:
+        a, b = a[:, frames], b[:, frames]
+    difference, total = float(np.abs(a - b).sum()), float(b.sum())
+    if total > 0:
+        return difference / total
+    return 0.0 if difference == 0 else float("inf")

@@ -18,9 +18,16 @@ from sd2core.compare.joints import (
     own_resolution,
     rows_of,
 )
-from sd2core.compare.maps import map_l1, maps_alike
-from sd2core.compare.measures import correlation, jitter, line_of_sight_velocity, rms
-from sd2core.compare.times import at_times, common_times
+from sd2core.compare.measures import (
+    at_times,
+    common_times,
+    correlation,
+    jitter,
+    line_of_sight_velocity,
+    map_l1,
+    maps_alike,
+    rms,
+)
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import Presence

@@ -26,13 +26,11 @@ from sd2core.io.radar.mars import (
     mars_parts,
     read_mars,
 )
-from sd2core.mesh.sequence import MeshSequence
 from sd2core.mocap.driving import DrivenClip, puppet_of
 from sd2core.mocap.skeleton import KINECT_MARKERS, SkeletonClip
 from sd2core.pairs.store import PairWriter, Take, TakeKey
 from sd2core.progress import Progress, silent
 from sd2core.sensor import VelocityAxis, VirtualSensor
-from sd2core.timebase import Timebase
 from sd2core.version import __version__
 
 Target = Literal["share", "intensity"]
@@ -109,13 +107,6 @@ def radar_doppler(
 def skeleton_clip(stretch: MarsStretch) -> SkeletonClip:
     """The skeleton on all of the stretch's frames."""
     return SkeletonClip.on_grid(stretch.frames, stretch.joints_m, FRAMES_PER_S)
-
-
-def skeleton_cloud(clip: SkeletonClip) -> MeshSequence:
-    """The joints alone, as a cloud of points."""
-    return MeshSequence(
-        clip.joints_m.astype(np.float32), None, Timebase(clip.times_s), "joints of a skeleton"
-    )
 
 
 def body_doppler(

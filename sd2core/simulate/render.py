@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.model import Body, vertex_normals
 from sd2core.numerics.raster import interpolate, lit_share, rasterise
-from sd2core.simulate.caption import stamp
 from sd2core.simulate.clothing import Clothes, linear, srgb
 
 Singles = NDArray[np.float32]
 
+_CAPTION_MARGIN_PX = 12
 _OVERSAMPLING = 2
 _LIGHT_PIXELS = 640
 
@@ -327,3 +327,16 @@ def _disc(count: int, radius: float) -> Singles:
     r = radius * np.sqrt(k / count)
     angle = k * np.pi * (3.0 - np.sqrt(5.0))
     return np.stack([r * np.cos(angle), r * np.sin(angle)], axis=1).astype(np.float32)
+
+
+def stamp(picture: Singles, word: str) -> Singles:
+    """Picture (H, W, 3; sRGB 0 to 1) with a word and its shadow in the lower right corner."""
+    import cv2
+
+    ink = np.zeros(picture.shape[:2], np.uint8)
+    (width, _), _ = cv2.getTextSize(word, cv2.FONT_HERSHEY_SIMPLEX, 0.45, 1)
+    place = (ink.shape[1] - width - _CAPTION_MARGIN_PX, ink.shape[0] - _CAPTION_MARGIN_PX)
+    cv2.putText(ink, word, place, cv2.FONT_HERSHEY_SIMPLEX, 0.45, 255, 1, cv2.LINE_AA)
+    share = (ink / np.float32(255.0))[..., None]
+    stamped = picture * (1.0 - 0.35 * np.roll(share, (1, 1), axis=(0, 1)))
+    return np.asarray(stamped + 0.85 * share * (1.0 - stamped))

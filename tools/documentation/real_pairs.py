@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from sd2core.doppler import Synthesizer
 from sd2core.io.radar.mars import MarsPart, mars_parts, read_mars
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.mocap.driving import DrivenClip
 from sd2core.mocap.mars_pairs import (
     MarsChoices,
@@ -29,15 +30,23 @@ from sd2core.mocap.mars_pairs import (
     drive,
     radar_doppler,
     skeleton_clip,
-    skeleton_cloud,
 )
+from sd2core.mocap.skeleton import SkeletonClip
 from sd2core.pairs.store import PairSet, read_pairs
 from sd2core.sensor import VirtualSensor
+from sd2core.timebase import Timebase
 
 Maps = list[NDArray[np.float32]]
 
 DEFAULT = MarsChoices()
 RIDGE = 10.0
+
+
+def skeleton_cloud(clip: SkeletonClip) -> MeshSequence:
+    """The joints alone, as a cloud of points."""
+    return MeshSequence(
+        clip.joints_m.astype(np.float32), None, Timebase(clip.times_s), "joints of a skeleton"
+    )
 
 
 def changed(**options: object) -> MarsChoices:

@@ -10,28 +10,22 @@ from numpy.typing import NDArray
 
 from sd2core.body.silhouette import overlap, silhouette
 from sd2core.body.track import LandmarkTrack
-from sd2core.compare.joints import (
-    JOINTS,
-    JointPatches,
-    medium_in_high,
-    own_patches,
-    own_resolution,
-)
-from sd2core.compare.maps import map_l1, maps_alike
+from sd2core.compare.joints import JOINTS, JointPatches, own_patches, own_resolution
 from sd2core.compare.measures import (
-    EDGE_FRAMES,
+    at_times,
+    common_times,
     correlation,
     line_of_sight_velocity,
-    peak_kept,
+    map_l1,
+    maps_alike,
     rms,
-    speed_mps,
 )
-from sd2core.compare.times import at_times, common_times
 from sd2core.errors import Sd2Error
 from sd2core.mesh.presence import Presence
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Progress, silent
 from sd2core.sensor import VirtualSensor
+from tools.fitting.measures import EDGE_FRAMES, medium_in_high, peak_kept, speed_mps
 from tools.fitting.real_score import reprojection
 from tools.fitting.truth import Stroke, Truth
 

@@ -30,9 +30,9 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import worker_count, workers
 from sd2core.progress import Progress, silent
 from sd2core.simulate.clothing import Clothes
-from sd2core.simulate.encode import write_compact_mesh
 from sd2core.simulate.gestures import GestureSpan, arm_length_m
 from sd2core.simulate.render import Camera, Renderer
+from sd2core.simulate.sample import write_compact_mesh
 from sd2core.timebase import Timebase
 from sd2core.version import __version__
 from tools.fitting.cast import PEOPLE, ROOMS

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from sd2core.compare.measures import coverage, rms
+from sd2core.compare.measures import rms
 from tools.fitting.clip_score import ClipScore, Pair, StrokeScore, pooled
+from tools.fitting.measures import coverage
 from tools.fitting.real_score import RealScore
 
 Reach = tuple[str, float] | None

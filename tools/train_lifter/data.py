@@ -9,7 +9,7 @@ from pathlib import Path
 
 from sd2core.processes import end_with_parent
 from sd2core.progress import Progress, silent
-from sd2core.simulate.people.motion import Manner
+from tools.train_lifter.deeds import Manner
 from tools.train_lifter.takes import Take, TakeMaker
 
 _maker: TakeMaker | None = None

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from sd2core.body.lifter_features import Seen
 from sd2core.body.rotations import applied
 from sd2core.body.track import LANDMARKS
-from sd2core.simulate.people.motion import Manner
+from tools.train_lifter.deeds import Manner
 from tools.train_lifter.takes import Stage, Take
 
 Floats = NDArray[np.float64]

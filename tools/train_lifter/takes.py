@@ -17,8 +17,9 @@ from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.skinning import pose_vertices
 from sd2core.body.track import LANDMARKS
 from sd2core.files.atomic import atomic_write
-from sd2core.simulate.people.motion import Manner, random_deed, random_motion
+from sd2core.simulate.people.motion import random_motion
 from tools.train_lifter.crops import CropPainter, random_background, random_look
+from tools.train_lifter.deeds import Manner, random_deed
 from tools.train_lifter.view import random_view
 from tools.train_lifter.wardrobe import random_wardrobe
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from sd2core.body.model import Skeleton
-from sd2core.body.rotations import Floats, about, applied, frame, product, transposed
-from sd2core.simulate.gestures import elbow_position
+from sd2core.body.rotations import Floats, about, applied, product, transposed
+from sd2core.simulate.gestures import bend
 
 _KNEES_REACH = 0.995
 
@@ -53,15 +53,7 @@ def place_limb(
     far = np.linalg.norm(line, axis=1, keepdims=True)
     reach = np.clip(far, 1.05 * abs(upper - lower) + 0.02, _KNEES_REACH * (upper + lower))
     target = start + line * (reach / far)
-    joint = elbow_position(start, target, upper, lower, pole)
-    hinge = np.cross(joint - start, target - joint)
-    rest_hinge = np.cross(upper_rest, lower_rest)[None]
-    upper_turn = product(
-        frame(joint - start, hinge), transposed(frame(upper_rest[None], rest_hinge))
-    )
-    lower_turn = product(
-        frame(target - joint, hinge), transposed(frame(lower_rest[None], rest_hinge))
-    )
+    upper_turn, lower_turn = bend(start, target, upper_rest, lower_rest, pole)
     rotations[:, first] = product(transposed(root[..., :3]), upper_turn)
     # The thigh's two bones turn as one: what lies between them is the identity.
     rotations[:, second] = product(transposed(upper_turn), lower_turn)

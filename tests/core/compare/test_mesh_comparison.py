@@ -10,9 +10,8 @@ from sd2core.body.model import Body
 from sd2core.body.rotations import about
 from sd2core.compare.figure import draw_comparison
 from sd2core.compare.joints import JOINTS, rows_of
-from sd2core.compare.maps import map_l1
+from sd2core.compare.measures import at_times, common_times, map_l1
 from sd2core.compare.meshes import compare_meshes
-from sd2core.compare.times import at_times, common_times
 from sd2core.errors import Sd2Error
 from sd2core.files.figure_files import save_figure
 from sd2core.mesh.sequence import MeshSequence

@@ -16,7 +16,7 @@ from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.mesh.decimation import decimate
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
-from sd2core.simulate.encode import write_compact_mesh
+from sd2core.simulate.sample import write_compact_mesh
 from sd2core.timebase import Timebase
 
 FRAMES = 6

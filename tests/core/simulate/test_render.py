@@ -5,9 +5,8 @@ import pytest
 
 from sd2core.body.model import Body
 from sd2core.numerics.raster import interpolate, lit_share, rasterise
-from sd2core.simulate.caption import stamp
 from sd2core.simulate.clothing import SHIRT, TROUSERS
-from sd2core.simulate.render import Renderer
+from sd2core.simulate.render import Renderer, stamp
 
 PLACE = np.array([0.05, 1.1, 2.2])
 

@@ -10,12 +10,13 @@ from known_clip import STROKES, TIMES, standing, waving, write_clip
 from sd2core.body.limbs import LIMBS, vertex_limbs
 from sd2core.body.model import Body
 from sd2core.compare.joints import JOINTS, own_patches
-from sd2core.compare.measures import coverage, line_of_sight_velocity, rms
+from sd2core.compare.measures import line_of_sight_velocity, rms
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
 from tools.fitting.clip_score import LIMBS as MEASURED
 from tools.fitting.clip_score import ClipScore, score_clip
+from tools.fitting.measures import coverage
 from tools.fitting.report import Row, as_dict, clip_table, gesture_table, reach_table
 from tools.fitting.report_text import as_markdown, as_text
 from tools.fitting.truth import Truth, read_truth

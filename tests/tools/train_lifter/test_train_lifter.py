@@ -12,8 +12,8 @@ from sd2core.body.camera import PinholeCamera
 from sd2core.body.lifter import POINTS, Lifter
 from sd2core.body.lifter_features import rate
 from sd2core.simulate.people.arms import GESTURE_STYLES
-from sd2core.simulate.people.motion import random_deed
 from tools.train_lifter.crops import CropPainter, Look
+from tools.train_lifter.deeds import random_deed
 from tools.train_lifter.emulate import Emulator, Walk, random_walks
 from tools.train_lifter.examples import batch, emulated, example, varied
 from tools.train_lifter.takes import Stage, Take, TakeMaker
