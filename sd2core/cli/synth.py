@@ -20,7 +20,7 @@ from sd2core.cli.options import (
     positive_int,
 )
 from sd2core.cli.output import progress_bar
-from sd2core.cli.simulate.radar import add_radar_choice, simulated
+from sd2core.cli.simulate.radar import add_radar_choice, simulate_with_bar
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
@@ -293,7 +293,7 @@ def _by_fmcw(options: argparse.Namespace, mesh: MeshSequence, sensor: VirtualSen
     from sd2core.sensor import VelocityAxis
 
     config = named_radar(options.radar)
-    capture = simulated(mesh, sensor, config, options.visibility or "exact")
+    capture = simulate_with_bar(mesh, sensor, config, options.visibility or "exact")
     default = VelocityAxis()
     axis = VelocityAxis(options.bins or default.bins, options.v_max or default.v_max_mps)
     with progress_bar("Processing") as progress:

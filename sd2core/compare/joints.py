@@ -155,7 +155,7 @@ def _even_weights(points_m: Floats, joint_m: Floats) -> Floats:
     return even + np.asarray(np.linalg.lstsq(equations, wanted, rcond=None)[0])
 
 
-class Carried(NamedTuple):
+class CarriedPatches(NamedTuple):
     """Patches that another surface took over.
 
     Parameters
@@ -171,9 +171,9 @@ class Carried(NamedTuple):
     distance_m: float
 
 
-def carried_over(
+def carry_patches(
     patches: JointPatches, source: NDArray[np.floating], target: NDArray[np.floating]
-) -> Carried:
+) -> CarriedPatches:
     """Take patches over to another surface of the same person in the same motion.
 
     Parameters
@@ -212,7 +212,7 @@ def carried_over(
         )
     ends = np.cumsum([len(one) for one in patches.rows])[:-1]
     carried = JointPatches(tuple(np.split(nearest, ends)), patches.weights)
-    return Carried(carried, frame, distance_m)
+    return CarriedPatches(carried, frame, distance_m)
 
 
 def _shift(points: Floats, others: Floats, tree: object) -> Floats:

@@ -125,7 +125,7 @@ def common_times(meshes: Sequence[MeshSequence], reference: int = 0) -> NDArray[
     return within
 
 
-def at_times(mesh: MeshSequence, times_s: NDArray[np.float64]) -> tuple[MeshSequence, bool]:
+def resample_mesh(mesh: MeshSequence, times_s: NDArray[np.float64]) -> tuple[MeshSequence, bool]:
     """A mesh at other times within its own, in memory.
 
     Parameters
@@ -178,7 +178,7 @@ def _replaced(
     )
 
 
-def maps_alike(
+def synthesize_alike(
     meshes: Sequence[MeshSequence], sensor: VirtualSensor, progress: Progress = silent
 ) -> tuple[DopplerMap, ...]:
     """Count maps of all meshes by the paper's preset.

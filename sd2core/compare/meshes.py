@@ -13,20 +13,20 @@ from sd2core.compare.joints import (
     GROUPS,
     JOINTS,
     JointPatches,
-    carried_over,
+    carry_patches,
     own_patches,
     own_resolution,
     rows_of,
 )
 from sd2core.compare.measures import (
-    at_times,
     common_times,
     correlation,
     jitter,
     line_of_sight_velocity,
     map_l1,
-    maps_alike,
+    resample_mesh,
     rms,
+    synthesize_alike,
 )
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
@@ -176,7 +176,7 @@ def compare_meshes(
     notes: list[str] = []
     placed = []
     for mesh, label in zip(meshes, labels, strict=True):
-        moved, interpolated = at_times(mesh, times_s)
+        moved, interpolated = resample_mesh(mesh, times_s)
         if interpolated:
             notes.append(f"{label}: interpolated to the frame times of {labels[reference]}.")
         elif len(times_s) < mesh.frame_count:
@@ -211,7 +211,7 @@ def compare_meshes(
         )
     if any(mesh.faces is None for mesh in placed):
         notes.append("A mesh has no faces: all vertices count in the maps, hidden ones too.")
-    maps = maps_alike(placed, sensor, progress)
+    maps = synthesize_alike(placed, sensor, progress)
     differences = tuple(
         Difference(
             label,
@@ -264,7 +264,7 @@ def _patches(
         if resolution is not None:
             patches.append(own_patches(resolution))
             continue
-        carried = carried_over(
+        carried = carry_patches(
             own_patches(own), np.asarray(meshes[ours].vertices), np.asarray(mesh.vertices)
         )
         notes.append(

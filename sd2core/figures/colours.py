@@ -55,7 +55,7 @@ DIVERGING = colour_table(_DIVERGING)
 """Receding to approaching, shape (256, 3)."""
 
 
-def looked_up(table: Rgb, values: NDArray[np.floating], low: float, high: float) -> Rgb:
+def look_up(table: Rgb, values: NDArray[np.floating], low: float, high: float) -> Rgb:
     """Colours of values between two limits, held at both ends; shape (..., 3)."""
     share = (np.asarray(values, np.float32) - low) * (256.0 / (high - low))
     index = np.nan_to_num(np.clip(share, 0.0, 255.0), nan=0.0).astype(np.uint8)
@@ -64,4 +64,4 @@ def looked_up(table: Rgb, values: NDArray[np.floating], low: float, high: float)
 
 def velocity_colours(velocity_mps: NDArray[np.floating], v_max_mps: float) -> Rgb:
     """Diverging colours of radial velocities, fixed at ±``v_max_mps``; (V, 3)."""
-    return looked_up(DIVERGING, velocity_mps, -v_max_mps, v_max_mps)
+    return look_up(DIVERGING, velocity_mps, -v_max_mps, v_max_mps)

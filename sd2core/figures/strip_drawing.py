@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sd2core.body.camera import PinholeCamera
 from sd2core.figures.colours import rgb, velocity_colours
 from sd2core.figures.strip_source import Row, StripOptions, StripSource
-from sd2core.figures.surface import Frame, lightness, projected, seen
+from sd2core.figures.surface import Frame, find_visible_triangles, lightness, project_vertices
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.scattering.velocity import moments, radial_velocity
 from sd2core.sensor import VirtualSensor
@@ -70,7 +70,7 @@ def _velocity(mesh: MeshSequence, frame: int, sensor: VirtualSensor) -> NDArray[
 def strip_box(source: StripSource, bodies: Sequence[Body | None], options: StripOptions) -> Frame:
     """Part of the picture that every column shows."""
     camera = source.camera
-    pixels = [projected(body.vertices_m, camera)[0] for body in bodies if body is not None]
+    pixels = [project_vertices(body.vertices_m, camera)[0] for body in bodies if body is not None]
     whole = options.whole or not pixels
     low, high = np.zeros(2), np.array([camera.width, camera.height], float)
     if not whole:
@@ -130,7 +130,7 @@ def _surface(
     fine = Frame(
         box.left, box.top, max(round(box.width * zoom), 1), max(round(box.height * zoom), 1), zoom
     )
-    view = seen(body.vertices_m, faces, camera, fine)
+    view = find_visible_triangles(body.vertices_m, faces, camera, fine)
     light = lightness(body.vertices_m, faces)[:, None]
     colours = rgb(_OVERLAY) / 255 if over else body.colours
     rgba = np.zeros((*view.owner.shape, 4), np.float32)
@@ -160,7 +160,7 @@ def _draw_dots(
     box: Frame,
     over: bool,
 ) -> None:
-    pixels, depth = projected(body.vertices_m, camera)
+    pixels, depth = project_vertices(body.vertices_m, camera)
     shown = np.isfinite(depth)
     if faces is not None:
         shown &= _faces_camera(body.vertices_m, faces)

@@ -50,7 +50,7 @@ class Frame:
         return (np.asarray(pixels, np.float64) - (self.left, self.top)) * self.zoom
 
 
-def projected(
+def project_vertices(
     vertices_m: NDArray[np.floating], camera: PinholeCamera
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Pixels (V, 2) and depths (V,) of vertices; NaN behind the camera and where unknown."""
@@ -60,7 +60,7 @@ def projected(
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class VisibleTriangles:
     """Triangle that each pixel shows.
 
     Parameters
@@ -96,12 +96,12 @@ class Seen:
         return values
 
 
-def seen(
+def find_visible_triangles(
     vertices_m: NDArray[np.floating],
     faces: NDArray[np.int32],
     camera: PinholeCamera,
     frame: Frame | None = None,
-) -> Seen:
+) -> VisibleTriangles:
     """Look at a mesh.
 
     Parameters
@@ -114,14 +114,14 @@ def seen(
         The whole picture by default.
     """
     frame = frame or Frame.whole(camera)
-    pixels, depth = projected(vertices_m, camera)
+    pixels, depth = project_vertices(vertices_m, camera)
     known = np.isfinite(depth)
     ahead = np.ascontiguousarray(faces[known[faces].all(axis=1)])
     owner = np.full((frame.height, frame.width), -1, np.int32)
     points = np.where(known[:, None], frame.place(pixels), 0.0).astype(np.float32)
     nearness = np.where(known, 1.0 / np.where(known, depth, 1.0), 0.0).astype(np.float32)
     rasterise(points, nearness, ahead, np.zeros(owner.shape, np.float32), owner)
-    return Seen(owner, points, nearness, ahead)
+    return VisibleTriangles(owner, points, nearness, ahead)
 
 
 def lightness(vertices_m: NDArray[np.floating], faces: NDArray[np.int32]) -> NDArray[np.float32]:
@@ -137,7 +137,7 @@ def lightness(vertices_m: NDArray[np.floating], faces: NDArray[np.int32]) -> NDA
     return (_DARKEST + (1.0 - _DARKEST) * cosine).astype(np.float32)
 
 
-def shaded(
+def shade_mesh(
     vertices_m: NDArray[np.floating],
     faces: NDArray[np.int32] | None,
     camera: PinholeCamera,
@@ -160,19 +160,19 @@ def shaded(
         0 beside the mesh; on it from a third (edge-on) to 1 (square on, and dots).
     """
     if faces is None:
-        return dotted(vertices_m, camera, frame)
-    view = seen(vertices_m, faces, camera, frame)
+        return draw_dots(vertices_m, camera, frame)
+    view = find_visible_triangles(vertices_m, faces, camera, frame)
     light = np.zeros(view.owner.shape, np.float32)
     light[view.shown] = view.interpolated(lightness(vertices_m, faces)[:, None])[:, 0]
     return light
 
 
-def dotted(
+def draw_dots(
     vertices_m: NDArray[np.floating], camera: PinholeCamera, frame: Frame | None = None
 ) -> NDArray[np.float32]:
     """The nearest vertex of every cell as a square of ones, (height, width)."""
     frame = frame or Frame.whole(camera)
-    pixels, depth = projected(vertices_m, camera)
+    pixels, depth = project_vertices(vertices_m, camera)
     pixels = frame.place(pixels)
     size = max(round(max(frame.width, frame.height) / _DOTS_ACROSS), 1)
     light = np.zeros((frame.height, frame.width), np.float32)

@@ -95,7 +95,7 @@ class DrivenClip:
         space = ShapeSpace()
         body = space.load(resolution, self.puppet.shape)
         rig = Rig(body.skeleton, self.puppet.keypoints)
-        pose = resampled(self.pose, self.clip.times_s, times_s)
+        pose = resample_pose(self.pose, self.clip.times_s, times_s)
         vertices = FittedVertices(body, rig, len(times_s), pose.at)
         return MeshSequence(vertices, body.faces, Timebase(times_s), "body driven by a skeleton")
 
@@ -201,7 +201,7 @@ def _placed(
     return placed
 
 
-def resampled(pose: Pose, times_s: Floats, wanted_s: Floats) -> Pose:
+def resample_pose(pose: Pose, times_s: Floats, wanted_s: Floats) -> Pose:
     """A pose at other times: splines with continuous acceleration, held at both ends."""
     from scipy.interpolate import CubicSpline
     from scipy.spatial.transform import Rotation, RotationSpline

@@ -93,7 +93,7 @@ def turning(turns: tuple[tuple[float, float, float], ...]) -> Path:
     return Path(np.zeros_like, yaw_deg)
 
 
-def planned_steps(path: Path, duration_s: float, half_base_m: float) -> list[Step]:
+def plan_steps(path: Path, duration_s: float, half_base_m: float) -> list[Step]:
     """Steps, left and right in turn, wherever standing still would leave a foot behind."""
     steps: list[Step] = []
     standing = [_foothold(path, 0.0, side, half_base_m) for side in (0, 1)]
@@ -132,7 +132,7 @@ def gait(skeleton: Skeleton, times_s: Floats, path: Path, arm_scale: float = 1.0
     fine = np.arange(0.0, duration_s, 1.0 / _GRID_HZ)
     rotations = np.tile(np.eye(3), (len(fine), len(skeleton), 1, 1))
     leg_m = _leg_length_m(skeleton)
-    steps = planned_steps(path, float(times_s[-1]), _HALF_BASE * leg_m)
+    steps = plan_steps(path, float(times_s[-1]), _HALF_BASE * leg_m)
     feet = [_foot(skeleton, fine, steps, path, side, leg_m) for side in (0, 1)]
     pace = _smoothed(np.abs(np.gradient(path.forward_m(fine), fine)), 0.15)
     # +1 while the left foot is ahead, -1 while the right one is.

@@ -92,7 +92,7 @@ def target(
     times_s = np.arange(CAMPAIGN.frames, dtype=np.float64) / 30.0
     done = perform(rngs[0], subject, skeleton, space.base_skeleton, times_s, "gestures")
     setting = random_setting(rngs[1], subject.shape.stature_m, 1, CAMPAIGN.radar)
-    transforms = setting.placed(skeleton.transforms(*done.motion))
+    transforms = setting.place(skeleton.transforms(*done.motion))
     mesh = maker._mesh(surface, subject.shape, transforms[FRAMES], times_s[FRAMES])
     return radar_target(
         mesh,

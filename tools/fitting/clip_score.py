@@ -12,13 +12,13 @@ from sd2core.body.silhouette import overlap, silhouette
 from sd2core.body.track import LandmarkTrack
 from sd2core.compare.joints import JOINTS, JointPatches, own_patches, own_resolution
 from sd2core.compare.measures import (
-    at_times,
     common_times,
     correlation,
     line_of_sight_velocity,
     map_l1,
-    maps_alike,
+    resample_mesh,
     rms,
+    synthesize_alike,
 )
 from sd2core.errors import Sd2Error
 from sd2core.mesh.presence import Presence
@@ -174,7 +174,7 @@ def score_clip(
     true = truth.mesh()
     times_s = common_times([true, fitted])
     pair = [
-        _with_vertices_of(at_times(one, times_s)[0], other)
+        _with_vertices_of(resample_mesh(one, times_s)[0], other)
         for one, other in ((true, fitted), (fitted, true))
     ]
     presence = pair[1].presence
@@ -187,7 +187,7 @@ def score_clip(
     ]
     velocity = [line_of_sight_velocity(one, times_s, presence=presence) for one in joints]
     tempo = [speed_mps(one, times_s) for one in joints]
-    maps = maps_alike(pair, VirtualSensor(), progress)
+    maps = synthesize_alike(pair, VirtualSensor(), progress)
     measured = presence.measured
     apart = np.linalg.norm(joints[1] - joints[0], axis=-1)
     root = JOINTS.index("pelvis")

@@ -52,11 +52,11 @@ class Likeness(NamedTuple):
     drawn: tuple[float, ...]
 
 
-def disturbed(truth: Truth, errors: FitErrors, rng: np.random.Generator) -> MeshSequence:
+def disturb(truth: Truth, errors: FitErrors, rng: np.random.Generator) -> MeshSequence:
     """A clip's true body with drawn errors."""
     space = ShapeSpace()
     known = scene(clip_named(truth.name), space)
-    drawn = errors.drawn(rng)
+    drawn = errors.draw(rng)
     shape = drawn.shape(known.shape)
     transforms = drawn.transforms(known.skeleton, known.transforms, space.skeleton(shape))
     body = space.load(RESOLUTION, shape)
@@ -91,7 +91,7 @@ def compare_errors(
             mesh = (
                 load_mesh(fits / f"{truth.name}.zarr")
                 if draw < 0
-                else disturbed(truth, errors, np.random.default_rng([draw, number]))
+                else disturb(truth, errors, np.random.default_rng([draw, number]))
             )
             scores.append(score_clip(truth, mesh))
             done += 1

@@ -10,7 +10,7 @@ import numpy as np
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.rotations import Floats, applied, product
 from sd2core.body.track import LANDMARKS
-from sd2core.simulate.people.posing import rotated
+from sd2core.simulate.people.posing import turn_about
 
 _SIZES = ((640, 480), (640, 480), (640, 360), (480, 640))
 _UPPER_BODY = tuple(
@@ -71,14 +71,14 @@ def random_view(rng: np.random.Generator, keypoints_m: Floats) -> View | None:
         above = rng.uniform(0.5, 1.9)
         # Seen from the front mostly, from anywhere sometimes.
         azimuth = rng.normal(0.0, 25.0) if rng.random() < 0.95 else rng.uniform(-180.0, 180.0)
-        around = rotated(1, np.array([azimuth]))[0]
+        around = turn_about(1, np.array([azimuth]))[0]
         at = middle + around @ np.array([-aside, -above - middle[1], -distance])
         slope = rng.uniform(-0.3, 0.3) * height / camera.focal_px
         pitch = math.degrees(math.atan2(middle[1] - at[1], distance) - math.atan(slope))
         if abs(pitch) > 17.0:
             continue
-        turn = rotated(0, np.array([pitch]))[0] @ around.T
-        turn = rotated(2, np.array([rng.normal(0.0, 1.5)]))[0] @ turn
+        turn = turn_about(0, np.array([pitch]))[0] @ around.T
+        turn = turn_about(2, np.array([rng.normal(0.0, 1.5)]))[0] @ turn
         view = View(camera, turn, -turn @ at)
         if _sees(view, upper, hips):
             return view

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2app.palette import Palette
-from sd2core.figures.colours import SEQUENTIAL, Rgb, looked_up, rgb, velocity_colours
+from sd2core.figures.colours import SEQUENTIAL, Rgb, look_up, rgb, velocity_colours
 
 MeshColour = Literal["velocity", "range", "visibility", "plain"]
 
@@ -66,7 +66,7 @@ class SceneColours:
 
 def range_colours(range_m: NDArray[np.floating], limits_m: tuple[float, float]) -> Rgb:
     """Sequential colours of ranges between two limits; (V, 3)."""
-    return looked_up(SEQUENTIAL, range_m, *limits_m)
+    return look_up(SEQUENTIAL, range_m, *limits_m)
 
 
 def marker_colours(

@@ -8,7 +8,7 @@ from PySide6.QtCore import QRectF
 from PySide6.QtGui import QColor, QImage, QPainter
 
 from sd2core.body.camera import PinholeCamera
-from sd2core.figures.surface import Frame, shaded
+from sd2core.figures.surface import Frame, shade_mesh
 from sd2core.numerics.compiled import kernels_ready
 
 
@@ -42,7 +42,7 @@ def draw_mesh(
     width = max(round(box.width() * painter.device().devicePixelRatioF()), 1)
     zoom = width / camera.width
     frame = Frame(0.0, 0.0, width, max(round(camera.height * zoom), 1), zoom)
-    light = shaded(vertices_m, faces if kernels_ready() else None, camera, frame)
+    light = shade_mesh(vertices_m, faces if kernels_ready() else None, camera, frame)
     pixels = tinted(light, (colour.red(), colour.green(), colour.blue()), opacity)
     height, width = light.shape
     form = QImage.Format.Format_ARGB32_Premultiplied

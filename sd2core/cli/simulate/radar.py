@@ -144,7 +144,7 @@ def add_radar_choice(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def simulated(
+def simulate_with_bar(
     mesh: MeshSequence,
     sensor: VirtualSensor,
     config: RadarConfig,
@@ -215,7 +215,7 @@ def _radar(options: argparse.Namespace) -> None:
         mirror=mirror,
     )
     mesh, sensor = mesh_and_sensor(options)
-    capture = simulated(
+    capture = simulate_with_bar(
         mesh,
         sensor,
         config,

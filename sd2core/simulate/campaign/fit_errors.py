@@ -30,7 +30,7 @@ from sd2core.body.shape import BodyShape
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.resources import resource_path
-from sd2core.simulate.campaign.posture import Group, all_groups, held_otherwise, posture
+from sd2core.simulate.campaign.posture import Group, all_groups, change_posture, posture
 
 FORMAT = "sd2-fit-errors"
 VERSION = 1
@@ -63,7 +63,7 @@ class GroupErrors:
     length: float
     mixing: float
 
-    def drawn(self, rng: np.random.Generator) -> ErrorFunction:
+    def draw(self, rng: np.random.Generator) -> ErrorFunction:
         """Errors of one clip."""
         count, features = len(self.gain), self.gain.shape[1] - 1
         constant = _root(self.bias) @ rng.standard_normal(count)
@@ -173,18 +173,18 @@ class FitErrors:
         """Write JSON, whole or not at all."""
         atomic_write_text(Path(path), json.dumps(self.as_dict(), indent=1) + "\n")
 
-    def drawn(self, rng: np.random.Generator) -> Disturbance:
+    def draw(self, rng: np.random.Generator) -> Disturbance:
         """The errors of one clip's fit."""
         shape = self.shape_mean + _root(self.shape_covariance) @ rng.standard_normal(
             len(self.shape_mean)
         )
-        functions = {key: self.groups[key[0]].drawn(rng) for key in all_groups()}
+        functions = {key: self.groups[key[0]].draw(rng) for key in all_groups()}
         return Disturbance(shape, functions)
 
 
 @dataclass(frozen=True, eq=False)
 class Disturbance:
-    """The errors of one clip's fit: see :meth:`FitErrors.drawn`."""
+    """The errors of one clip's fit: see :meth:`FitErrors.draw`."""
 
     shape_error: Floats
     functions: Mapping[tuple[Group, str], ErrorFunction]
@@ -205,7 +205,7 @@ class Disturbance:
         """
         held = posture(true, transforms)
         change = {key: function(held.features(*key)) for key, function in self.functions.items()}
-        return held_otherwise(fitted, transforms, held, change)
+        return change_posture(fitted, transforms, held, change)
 
 
 def _root(covariance: Floats) -> Floats:

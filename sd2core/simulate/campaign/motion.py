@@ -130,7 +130,7 @@ def perform(
     elif kind == "pacing":
         motion = gait(skeleton, times_s, _to_and_fro(rng, float(times_s[-1])), scale)
     else:
-        arms = planned(rng, subject, float(times_s[-1]))
+        arms = plan_arms(rng, subject, float(times_s[-1]))
         motion = _gesturing(rng, subject, skeleton, times_s, arms, scale)
         for move in (*arms["L"], *arms["R"]):
             if move.label:
@@ -138,7 +138,9 @@ def perform(
     return Performance(motion, label, kind)
 
 
-def planned(rng: np.random.Generator, subject: Subject, duration_s: float) -> dict[str, list[Move]]:
+def plan_arms(
+    rng: np.random.Generator, subject: Subject, duration_s: float
+) -> dict[str, list[Move]]:
     """Moves of both arms until there is no time for another; one arm moves at a time."""
     arms: dict[str, list[Move]] = {"L": [], "R": []}
     at: dict[str, Floats] = {"L": _HANGS, "R": _HANGS}

@@ -131,7 +131,7 @@ def errors(fitted: Posture, true: Posture, group: Group, side: str = "") -> Floa
     return (fitted.limbs[group, side] - true.limbs[group, side]).reshape(frames, -1)
 
 
-def held_otherwise(
+def change_posture(
     skeleton: Skeleton,
     transforms: Floats,
     true: Posture,
@@ -218,5 +218,5 @@ def least_turn(before: Floats, after: Floats) -> Floats:
 
 
 def all_groups() -> list[tuple[Group, str]]:
-    """Every group with its side: the keys of what :func:`held_otherwise` takes."""
+    """Every group with its side: the keys of what :func:`change_posture` takes."""
     return [("place", ""), ("trunk", ""), *((group, side) for group in LIMBS for side in "LR")]

@@ -43,7 +43,7 @@ class Setting:
     sensors: tuple[VirtualSensor, ...]
     reflectors: tuple[Reflector, ...]
 
-    def placed(self, transforms: Floats) -> Floats:
+    def place(self, transforms: Floats) -> Floats:
         """Transforms (T, B, 3, 4) of a body on the floor's origin, brought here."""
         turn = about(np.array([0.0, 1.0, 0.0]), np.array([self.heading_deg]))[0]
         placed = np.einsum("ij,tbjk->tbik", turn, transforms)

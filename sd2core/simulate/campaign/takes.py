@@ -127,7 +127,7 @@ class TakeMaker:
         setting = random_setting(
             rngs[_SETTING], subject.shape.stature_m, campaign.placements, campaign.radar
         )
-        transforms = setting.placed(skeleton.transforms(*performed.motion))
+        transforms = setting.place(skeleton.transforms(*performed.motion))
         true = self._mesh(TRUE, subject.shape, transforms, times_s)
         fitted = self._fitted(rngs[_FIT], subject.shape, transforms, times_s)
         synthesizer = Synthesizer(fitted, OPTIONS, threads=1)
@@ -165,7 +165,7 @@ class TakeMaker:
         """The mesh that a fit of this take's video might give."""
         if self._errors is None:
             return self._mesh(FITTED, shape, transforms, times_s)
-        drawn = self._errors.drawn(rng)
+        drawn = self._errors.draw(rng)
         found = drawn.shape(shape)
         held = drawn.transforms(
             self._space.skeleton(shape), transforms, self._space.skeleton(found)

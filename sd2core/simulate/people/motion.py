@@ -17,7 +17,7 @@ from sd2core.simulate.people.arms import (
     moving_arm,
     still_arm,
 )
-from sd2core.simulate.people.posing import place_limb, rotated, turn_hand
+from sd2core.simulate.people.posing import place_limb, turn_about, turn_hand
 from sd2core.simulate.people.signals import wander
 from sd2core.simulate.people.walking import Footwork, footwork
 
@@ -136,9 +136,9 @@ def _turn_trunk(
     )
     shares = rng.dirichlet(np.full(len(_SPINE), 4.0))
     for bone, share in zip(_SPINE, shares, strict=True):
-        turn = product(rotated(1, share * angles[:, 1]), rotated(0, share * angles[:, 0]))
-        rotations[:, index[bone]] = product(turn, rotated(2, share * angles[:, 2]))
-    rotations[:, index["spine02"]] = product(rotations[:, index["spine02"]], rotated(0, -breath))
+        turn = product(turn_about(1, share * angles[:, 1]), turn_about(0, share * angles[:, 0]))
+        rotations[:, index[bone]] = product(turn, turn_about(2, share * angles[:, 2]))
+    rotations[:, index["spine02"]] = product(rotations[:, index["spine02"]], turn_about(0, -breath))
     gaze = (
         liveliness
         * wander(rng, times_s, rng.uniform(0.3, 1.2), 3)
@@ -147,21 +147,21 @@ def _turn_trunk(
     gaze += rng.normal([6.0, 0.0, 0.0], [8.0, 14.0, 4.0])
     gaze[:, 1] -= rng.uniform(0.0, 1.0) * angles[:, 1]
     for bone in _NECK:
-        turn = product(rotated(1, gaze[:, 1] / 4), rotated(0, gaze[:, 0] / 4))
-        rotations[:, index[bone]] = product(turn, rotated(2, gaze[:, 2] / 4))
+        turn = product(turn_about(1, gaze[:, 1] / 4), turn_about(0, gaze[:, 0] / 4))
+        rotations[:, index[bone]] = product(turn, turn_about(2, gaze[:, 2] / 4))
     shrug = liveliness * rng.uniform(0.0, 4.0) * wander(rng, times_s, 0.7, 2)
     for number, (side, sign) in enumerate((("L", 1.0), ("R", -1.0))):
         up = -14.0 * np.minimum(arms[number][:, 1], 0.0) * rng.uniform(0.4, 1.4)
         up = up + shrug[:, number] + breath + rng.normal(0.0, 2.0)
         forward = 8.0 * rng.uniform(0.0, 1.5) * (arms[number][:, 2] - 0.3) + rng.normal(0.0, 3.0)
         rotations[:, index[f"clavicle.{side}"]] = product(
-            rotated(2, -sign * up), rotated(1, sign * forward)
+            turn_about(2, -sign * up), turn_about(1, sign * forward)
         )
 
 
 def _stand(skeleton: Skeleton, rotations: Floats, stature_m: float, feet: Footwork) -> Floats:
     """Turn the root and put it over the feet; returns the translation."""
-    rotations[:, 0] = rotated(1, feet.heading_deg)
+    rotations[:, 0] = turn_about(1, feet.heading_deg)
     translation = np.empty((len(rotations), 3))
     translation[:, 0] = stature_m * feet.place[:, 0]
     translation[:, 1] = stature_m * feet.sink
@@ -174,7 +174,7 @@ def _step(
 ) -> None:
     """Bring the feet to their places; the translation is lowered where they are out of reach."""
     heads, index = skeleton.heads_m, skeleton.index
-    forward = rotated(1, feet.heading_deg) @ np.array([0.0, 0.0, -1.0])
+    forward = turn_about(1, feet.heading_deg) @ np.array([0.0, 0.0, -1.0])
     targets, longest = [], []
     for number, side in enumerate("LR"):
         ankle = heads[index[f"foot.{side}"]]
@@ -199,11 +199,11 @@ def _step(
             bones,
             transforms[:, index[f"pelvis.{side}"]],
             targets[number],
-            forward + rotated(1, feet.heading_deg) @ out,
+            forward + turn_about(1, feet.heading_deg) @ out,
         )
         foot = product(
-            rotated(1, feet.feet_heading_deg[:, number]),
-            rotated(0, 600.0 * feet.feet[:, number, 2]),
+            turn_about(1, feet.feet_heading_deg[:, number]),
+            turn_about(0, 600.0 * feet.feet[:, number, 2]),
         )
         rotations[:, index[f"foot.{side}"]] = product(transposed(turn), foot)
 

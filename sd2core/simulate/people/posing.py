@@ -11,7 +11,7 @@ from sd2core.simulate.gestures import bend
 _KNEES_REACH = 0.995
 
 
-def rotated(axis: int, angle_deg: Floats) -> Floats:
+def turn_about(axis: int, angle_deg: Floats) -> Floats:
     """Rotations about x (0), y (1) or z (2), (T, 3, 3)."""
     return about(np.eye(3)[axis], angle_deg)
 

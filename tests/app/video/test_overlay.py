@@ -11,7 +11,7 @@ from sd2app.settings import Settings
 from sd2app.video.overlay_settings import OverlayModel, OverlayStyle
 from sd2app.widgets.mesh_painting import tinted
 from sd2core.body.camera import PinholeCamera
-from sd2core.figures.surface import Frame, shaded
+from sd2core.figures.surface import Frame, shade_mesh
 
 CAMERA = PinholeCamera(160, 120, 150.0)
 
@@ -38,7 +38,7 @@ def centre_px(drawn: np.ndarray) -> tuple[float, float]:
 
 
 def test_a_ball_is_drawn_where_the_camera_sees_it(ball) -> None:
-    light = shaded(ball.vertices, np.asarray(ball.faces, np.int32), CAMERA)
+    light = shade_mesh(ball.vertices, np.asarray(ball.faces, np.int32), CAMERA)
     x, y = centre_px(light > 0)
     assert x == pytest.approx(80 + 150 * 0.4 / 3, abs=0.5)
     assert y == pytest.approx(60 - 150 * 0.2 / 3, abs=0.5)
@@ -50,8 +50,8 @@ def test_a_ball_is_drawn_where_the_camera_sees_it(ball) -> None:
 
 
 def test_dots_lie_within_the_same_outline(ball) -> None:
-    surface = shaded(ball.vertices, np.asarray(ball.faces, np.int32), CAMERA) > 0
-    dots = shaded(ball.vertices, None, CAMERA) > 0
+    surface = shade_mesh(ball.vertices, np.asarray(ball.faces, np.int32), CAMERA) > 0
+    dots = shade_mesh(ball.vertices, None, CAMERA) > 0
     assert centre_px(dots) == pytest.approx(centre_px(surface), abs=1.0)
     assert 0.05 * surface.sum() < dots.sum() < 0.9 * surface.sum()
     assert not (dots & ~np.pad(surface, 1)[:-2, 1:-1] & ~surface)[:, :80].any()
@@ -60,13 +60,13 @@ def test_dots_lie_within_the_same_outline(ball) -> None:
 def test_what_is_behind_the_camera_is_not_drawn(ball) -> None:
     behind = ball.vertices - (0, 0, 6)
     for faces in (None, np.asarray(ball.faces, np.int32)):
-        assert not shaded(behind, faces, CAMERA).any()
+        assert not shade_mesh(behind, faces, CAMERA).any()
 
 
 def test_a_part_of_the_picture_is_drawn_enlarged(ball) -> None:
     faces = np.asarray(ball.faces, np.int32)
-    whole = shaded(ball.vertices, faces, CAMERA) > 0
-    part = shaded(ball.vertices, faces, CAMERA, Frame(80, 30, 120, 120, zoom=3.0)) > 0
+    whole = shade_mesh(ball.vertices, faces, CAMERA) > 0
+    part = shade_mesh(ball.vertices, faces, CAMERA, Frame(80, 30, 120, 120, zoom=3.0)) > 0
     x, y = centre_px(whole)
     assert centre_px(part) == pytest.approx((3 * (x - 80), 3 * (y - 30)), abs=1.5)
     assert part.sum() == pytest.approx(9 * whole.sum(), rel=0.05)

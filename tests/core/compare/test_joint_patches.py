@@ -8,8 +8,7 @@ from sd2core.body.rotations import about
 from sd2core.compare.joints import (
     GROUPS,
     JOINTS,
-    carried_over,
-    medium_in_high,
+    carry_patches,
     own_patches,
     own_resolution,
     rows_of,
@@ -74,13 +73,6 @@ def test_patches_follow_the_joints(resolution: Resolution) -> None:
         assert away.max() < 0.02, joint
 
 
-def test_the_medium_surface_is_part_of_the_finest() -> None:
-    rows = medium_in_high()
-    np.testing.assert_array_equal(
-        Body.load("high").vertices_m[rows], Body.load("medium").vertices_m
-    )
-
-
 def test_no_patch_hangs_on_few_vertices() -> None:
     for resolution in ("low", "medium", "high"):
         for weights in own_patches(resolution).weights:
@@ -102,7 +94,7 @@ def test_another_surface_takes_the_patches_over(aside: tuple[float, float, float
     coarse, _, body = bent("medium")
     fine, heads, _ = bent("high")
     shuffled = fine[:, np.random.default_rng(0).permutation(fine.shape[1])] + np.array(aside)
-    carried = carried_over(own_patches("medium"), coarse, shuffled)
+    carried = carry_patches(own_patches("medium"), coarse, shuffled)
     assert carried.distance_m < 0.01
     joints = carried.patches.positions(shuffled)
     for joint, bone in BONES.items():
@@ -118,11 +110,11 @@ def test_the_frame_in_which_both_are_closest_is_used() -> None:
     rng = np.random.default_rng(1)
     for frame in (0, 1, 2, 4, 5, 6, 7):
         other[frame] += rng.normal(scale=0.03, size=other[frame].shape)
-    assert carried_over(own_patches("low"), coarse, other).frame == 3
+    assert carry_patches(own_patches("low"), coarse, other).frame == 3
 
 
 @pytest.mark.parametrize("scale", [0.001, 0.4, 1000.0])
 def test_another_scale_is_refused(scale: float) -> None:
     coarse, _, _ = bent("low")
     with pytest.raises(Sd2Error, match="cm apart"):
-        carried_over(own_patches("low"), coarse, scale * coarse)
+        carry_patches(own_patches("low"), coarse, scale * coarse)

@@ -10,7 +10,7 @@ from sd2core.body.model import Body
 from sd2core.body.rotations import about
 from sd2core.compare.figure import draw_comparison
 from sd2core.compare.joints import JOINTS, rows_of
-from sd2core.compare.measures import at_times, common_times, map_l1
+from sd2core.compare.measures import common_times, map_l1, resample_mesh
 from sd2core.compare.meshes import compare_meshes
 from sd2core.errors import Sd2Error
 from sd2core.files.figure_files import save_figure
@@ -123,12 +123,12 @@ def test_frames_without_a_person_do_not_count(mesh: MeshSequence) -> None:
     assert found.differences[1].velocity_rms_mps.max() < 0.1
     assert np.abs(found.maps[0].values[:, 11:13]).max() == 0.0
     assert any("4 of 24 frames are left out" in note for note in found.notes)
-    moved, _ = at_times(gap, np.array([0.1, 0.3167, 0.40, 0.45, 0.5]))
+    moved, _ = resample_mesh(gap, np.array([0.1, 0.3167, 0.40, 0.45, 0.5]))
     assert moved.presence.there.tolist() == [True, False, False, False, True]
 
 
 def test_frames_at_the_same_times_are_not_touched(mesh: MeshSequence) -> None:
-    again, interpolated = at_times(mesh, TIMES[3:9] + 2e-5)
+    again, interpolated = resample_mesh(mesh, TIMES[3:9] + 2e-5)
     assert not interpolated
     np.testing.assert_array_equal(again.vertices, mesh.vertices[3:9])
 

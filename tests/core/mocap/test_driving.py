@@ -12,7 +12,7 @@ from sd2core.body.rig import JOINTS as TURNS
 from sd2core.body.rotations import about
 from sd2core.errors import Sd2Error
 from sd2core.io.radar.mars import JOINTS
-from sd2core.mocap.driving import DrivenClip, puppet_of, resampled
+from sd2core.mocap.driving import DrivenClip, puppet_of, resample_pose
 from sd2core.mocap.skeleton import KINECT_MARKERS, SkeletonClip
 from sd2core.simulate.gestures import swipes
 
@@ -96,10 +96,10 @@ def test_resampling_keeps_a_steady_turn_steady() -> None:
     turns = np.tile(about(axis, 90.0 * times_s)[:, None], (1, len(TURNS), 1, 1))
     place = np.stack([0.0 * times_s, times_s, 2.0 - 0.5 * times_s], axis=1)
     wanted_s = np.linspace(0.0, 1.1, 78)
-    found = resampled(Pose(turns, place), times_s, wanted_s)
+    found = resample_pose(Pose(turns, place), times_s, wanted_s)
     np.testing.assert_allclose(found.turns[:, 5], about(axis, 90.0 * wanted_s), atol=1e-6)
     np.testing.assert_allclose(found.translation_m[:, 2], 2.0 - 0.5 * wanted_s, atol=1e-9)
-    held = resampled(Pose(turns, place), times_s, np.array([-1.0, 5.0]))
+    held = resample_pose(Pose(turns, place), times_s, np.array([-1.0, 5.0]))
     np.testing.assert_allclose(held.translation_m, place[[0, -1]], atol=1e-9)
 
 

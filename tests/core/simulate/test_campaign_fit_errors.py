@@ -32,7 +32,7 @@ def test_errors_have_the_stated_covariance() -> None:
     apart = 0.5
     poses = np.array([[0.2, -0.1], [0.2 + apart, -0.1]])
     rng = np.random.default_rng(0)
-    drawn = np.array([KNOWN.drawn(rng)(poses) for _ in range(4000)])  # (clips, poses, errors)
+    drawn = np.array([KNOWN.draw(rng)(poses) for _ in range(4000)])  # (clips, poses, errors)
     np.testing.assert_allclose(drawn.mean(axis=0), [[0.2, 0.03], [0.45, 0.03]], atol=0.02)
     centred = drawn - drawn.mean(axis=0)
     same = np.einsum("ci,cj->ij", centred[:, 0], centred[:, 0]) / len(drawn)

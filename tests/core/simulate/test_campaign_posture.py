@@ -13,8 +13,8 @@ from sd2core.simulate.campaign.posture import (
     LIMBS,
     Group,
     all_groups,
+    change_posture,
     errors,
-    held_otherwise,
     least_turn,
     posture,
 )
@@ -41,7 +41,7 @@ def no_change() -> dict[tuple[Group, str], Floats]:
 
 
 def test_a_body_that_is_not_changed_stays(skeleton: Skeleton, posed: Floats) -> None:
-    held = held_otherwise(skeleton, posed, posture(skeleton, posed), no_change())
+    held = change_posture(skeleton, posed, posture(skeleton, posed), no_change())
     np.testing.assert_allclose(held, posed, atol=1e-12)
 
 
@@ -56,7 +56,7 @@ def test_what_is_changed_is_read_again(skeleton: Skeleton, posed: Floats) -> Non
             wanted = directions + values.reshape(directions.shape)
             wanted /= np.linalg.norm(wanted, axis=2, keepdims=True)
             values[:] = (wanted - directions).reshape(values.shape)
-    held = held_otherwise(skeleton, posed, true, change)
+    held = change_posture(skeleton, posed, true, change)
     found = posture(skeleton, held, true.axes)
     for key, values in change.items():
         np.testing.assert_allclose(errors(found, true, *key), values, atol=1e-9)
@@ -66,7 +66,7 @@ def test_bones_keep_their_lengths_and_stay_together(skeleton: Skeleton, posed: F
     change = no_change()
     change["arm", "R"] += 0.3
     change["trunk", ""] += 0.2
-    held = held_otherwise(skeleton, posed, posture(skeleton, posed), change)
+    held = change_posture(skeleton, posed, posture(skeleton, posed), change)
     turns = held[..., :3]
     np.testing.assert_allclose(
         turns @ np.swapaxes(turns, -1, -2), np.broadcast_to(np.eye(3), turns.shape), atol=1e-9

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sd2core.figures.surface import shaded
+from sd2core.figures.surface import shade_mesh
 
 
 @pytest.fixture
@@ -27,7 +27,8 @@ def test_the_mesh_lies_on_the_person(walk, qtbot):
         qtbot.waitUntil(lambda frame=frame: c.video.shown_frame == frame, timeout=10_000)
         red, green, blue = (c.video.picture[:, :, k].astype(int) for k in range(3))
         pullover = (red - blue > 90) & (red - green > 20)
-        body = shaded(c.document.mesh.frame(frame), c.document.mesh.faces, c.document.camera) > 0
+        mesh = c.document.mesh
+        body = shade_mesh(mesh.frame(frame), mesh.faces, c.document.camera) > 0
         # She wears the only thing of that orange. A pullover is wider than the body in it.
         assert (pullover & body).sum() > 0.7 * pullover.sum()
         assert body.sum() < 4 * pullover.sum()

@@ -35,12 +35,12 @@ def paths(count: int, speed_hz: float) -> list[Floats]:
 
 def test_measuring_finds_what_was_drawn() -> None:
     rng = np.random.default_rng(4)
-    samples = [Sample(path, KNOWN.drawn(rng)(path)) for path in paths(60, 0.8)]
+    samples = [Sample(path, KNOWN.draw(rng)(path)) for path in paths(60, 0.8)]
     found = group_errors(samples)
     np.testing.assert_allclose(found.gain[:, 1:], KNOWN.gain[:, 1:], atol=0.12)
     # What matters is how fast errors change: the variogram over two frames.
     seen = np.mean([(one.errors[2:] - one.errors[:-2]) ** 2 for one in samples], axis=(0, 1))
-    drawn = [found.drawn(rng)(path) for path in paths(60, 0.8)]
+    drawn = [found.draw(rng)(path) for path in paths(60, 0.8)]
     again = np.mean([(one[2:] - one[:-2]) ** 2 for one in drawn], axis=(0, 1))
     np.testing.assert_allclose(np.sqrt(again), np.sqrt(seen), rtol=0.3)
     total = np.trace(found.spread + found.bias)
@@ -56,7 +56,7 @@ def test_errors_that_follow_the_pose_alone_are_all_gain() -> None:
 
 def test_who_stands_still_has_no_false_velocity(bundled: FitErrors) -> None:
     known = scene(clip_named("still-hand-up"), ShapeSpace())
-    drawn = bundled.drawn(np.random.default_rng(5))
+    drawn = bundled.draw(np.random.default_rng(5))
     held = drawn.transforms(known.skeleton, known.transforms, known.skeleton)
     np.testing.assert_allclose(held, np.broadcast_to(held[:1], held.shape), atol=1e-12)
     assert np.abs(held - known.transforms).max() > 0.01
@@ -76,7 +76,7 @@ def test_hands_err_as_much_as_fits_do(bundled: FitErrors) -> None:
     moving = np.abs(true) > 0.1
     found = []
     for seed in range(8):
-        drawn = bundled.drawn(np.random.default_rng(seed))
+        drawn = bundled.draw(np.random.default_rng(seed))
         held = drawn.transforms(known.skeleton, known.transforms, known.skeleton)
         found.append(velocity(held)[moving])
     true = true[moving]

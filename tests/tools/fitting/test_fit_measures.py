@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from tools.fitting.measures import coverage, peak_kept, speed_mps
+from sd2core.body.model import Body
+from tools.fitting.measures import coverage, medium_in_high, peak_kept, speed_mps
 
 
 def test_the_speed_along_a_circle_is_that_of_its_chords() -> None:
@@ -28,3 +29,10 @@ def test_a_right_sigma_covers_two_thirds() -> None:
     assert coverage(errors, np.full(20_000, 0.3)) == pytest.approx(0.683, abs=0.01)
     assert coverage(errors, np.full(20_000, 1e-9)) < 0.001
     assert math.isnan(coverage(errors[:1] * np.nan, np.ones(1)))
+
+
+def test_the_medium_surface_is_part_of_the_finest() -> None:
+    rows = medium_in_high()
+    np.testing.assert_array_equal(
+        Body.load("high").vertices_m[rows], Body.load("medium").vertices_m
+    )
