@@ -333,9 +333,10 @@ def stamp(picture: Singles, word: str) -> Singles:
     """Picture (H, W, 3; sRGB 0 to 1) with a word and its shadow in the lower right corner."""
     import cv2
 
-    ink = np.zeros(picture.shape[:2], np.uint8)
-    (width, _), _ = cv2.getTextSize(word, cv2.FONT_HERSHEY_SIMPLEX, 0.45, 1)
-    place = (ink.shape[1] - width - _CAPTION_MARGIN_PX, ink.shape[0] - _CAPTION_MARGIN_PX)
+    height, width = int(picture.shape[0]), int(picture.shape[1])
+    ink = np.zeros((height, width), np.uint8)
+    size, _ = cv2.getTextSize(word, cv2.FONT_HERSHEY_SIMPLEX, 0.45, 1)
+    place = (width - size[0] - _CAPTION_MARGIN_PX, height - _CAPTION_MARGIN_PX)
     cv2.putText(ink, word, place, cv2.FONT_HERSHEY_SIMPLEX, 0.45, 255, 1, cv2.LINE_AA)
     share = (ink / np.float32(255.0))[..., None]
     stamped = picture * (1.0 - 0.35 * np.roll(share, (1, 1), axis=(0, 1)))
