@@ -103,9 +103,8 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _strip(options: argparse.Namespace) -> None:
-    from sd2core.figures.frames import parse_frames, spread_frames
     from sd2core.figures.strip import plot_strip, save_strip
-    from sd2core.figures.strip_source import StripOptions
+    from sd2core.figures.strip_source import StripOptions, parse_frames, spread_frames
     from sd2core.files.figure_files import check_figure
 
     check_figure(options.out)

@@ -66,8 +66,7 @@ def make_recording_pairs(
     synthesis : SynthesisOptions
         Of the input; its axis is the target's, too.
     subjects : sequence of str, optional
-        Who each recording is of; by default everyone's recording is of another person,
-        who is called as it is.
+        Person in each recording; by default a different one in each, named like it.
 
     Raises
     ------

@@ -44,7 +44,7 @@ def _add_commands(kinds: argparse._SubParsersAction) -> None:
     data.add_argument(
         "--takes", type=positive_int, default=400, metavar="N", help="how many (default: 400)"
     )
-    data.add_argument("--seed", type=int, default=0, metavar="S", help="of all that is random")
+    data.add_argument("--seed", type=int, default=0, metavar="S", help="seed of all random numbers")
     data.add_argument(
         "--held-out", action="store_true", help="with the kinds of motion kept for testing"
     )
@@ -79,7 +79,9 @@ def _add_commands(kinds: argparse._SubParsersAction) -> None:
         default=5000,
     )
     train.add_argument("--out", type=Path, required=True, metavar="FILE", help="to write (.npz)")
-    train.add_argument("--seed", type=int, default=0, metavar="S", help="of all that is random")
+    train.add_argument(
+        "--seed", type=int, default=0, metavar="S", help="seed of all random numbers"
+    )
     scoring = add_command(
         kinds,
         "score",

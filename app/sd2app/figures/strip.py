@@ -12,8 +12,15 @@ from sd2app.background.latest import Emit
 from sd2app.figures.preview import DrawnFigure
 from sd2app.session.content import UNTITLED, Content
 from sd2core.errors import Sd2Error
-from sd2core.figures.frames import frames_around, parse_frames, spread_frames
-from sd2core.figures.strip_source import MOST_FRAMES, Row, StripOptions, StripSource
+from sd2core.figures.strip_source import (
+    MOST_FRAMES,
+    Row,
+    StripOptions,
+    StripSource,
+    frames_around,
+    parse_frames,
+    spread_frames,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -31,17 +31,21 @@ def add_campaign(kinds: argparse._SubParsersAction) -> None:
     )
     parser.add_argument("out", type=Path, metavar="OUT", help="folder of the pairs")
     parser.add_argument(
-        "--subjects", type=positive_int, default=6, metavar="N", help="people (default: 6)"
+        "--subjects",
+        type=positive_int,
+        default=6,
+        metavar="N",
+        help="number of people (default: 6)",
     )
     parser.add_argument(
         "--minutes",
         type=positive_float,
         default=90.0,
         metavar="M",
-        help="of all people together (default: 90)",
+        help="minutes of all people together (default: 90)",
     )
     parser.add_argument(
-        "--seed", type=_seed, default=0, metavar="S", help="of all that is random (default: 0)"
+        "--seed", type=_seed, default=0, metavar="S", help="seed of all random numbers (default: 0)"
     )
     parser.add_argument(
         "--placements",
@@ -63,7 +67,7 @@ def add_campaign(kinds: argparse._SubParsersAction) -> None:
         type=positive_int,
         default=2,
         metavar="P",
-        help="that work side by side (default: 2)",
+        help="worker processes (default: 2)",
     )
     parser.add_argument(
         "--fit-errors",

@@ -128,7 +128,11 @@ def add_radar(kinds: argparse._SubParsersAction) -> None:
         " (default: a gain that suits the strongest echo)",
     )
     parser.add_argument(
-        "--seed", type=int, default=0, metavar="N", help="of noise and random phases (default: 0)"
+        "--seed",
+        type=int,
+        default=0,
+        metavar="N",
+        help="seed of noise and random phases (default: 0)",
     )
     add_mesh_reading(parser)
     add_json(parser)

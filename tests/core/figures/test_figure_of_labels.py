@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from sd2core.errors import Sd2Error
-from sd2core.figures.maps import Levels, MapRow, draw_maps, save_maps
-from sd2core.figures.spans import lanes_of
+from sd2core.figures.maps import Levels, MapRow, draw_maps, lanes_of, save_maps
 from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis

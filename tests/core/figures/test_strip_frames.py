@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
-from sd2core.figures.frames import frames_around, parse_frames, spread_frames
+from sd2core.figures.strip_source import frames_around, parse_frames, spread_frames
 
 
 @pytest.mark.parametrize(
