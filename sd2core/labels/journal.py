@@ -81,11 +81,25 @@ class Change(Entry):
 
 @dataclass(frozen=True)
 class Replayed:
-    """Result of replaying a part; ``unsaved`` edits are not in the user's file."""
+    """Labels replayed from a part, with ``edits`` that the user's file does not hold.
 
-    recording: str
+    Parameters
+    ----------
+    recording : Path
+        Absolute path of the labelled recording or video.
+    labels : Labels
+        After the last whole edit.
+    edits : int
+        Number of unsaved edits.
+    last : str
+        Name of the last edit, such as "Move span".
+    time_unix_s : float
+        Time of the last edit.
+    """
+
+    recording: Path
     labels: Labels
-    unsaved: int
+    edits: int
     last: str
     time_unix_s: float
 
@@ -177,7 +191,7 @@ def replay(records: list[bytes]) -> Replayed:
         last, time_unix_s = edit.name, edit.time_unix_s
     # Only the end is checked: what is between was whole when it was written.
     entry = LabelsEntry(label_set=label_set, tracks=tracks, spans=tuple(spans.values()))
-    return Replayed(first.recording, entry.made(), unsaved, last, time_unix_s)
+    return Replayed(Path(first.recording), entry.made(), unsaved, last, time_unix_s)
 
 
 SUFFIX = ".journal"

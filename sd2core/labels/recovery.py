@@ -47,32 +47,12 @@ class _NoHeadError(ValueError):
 
 
 @dataclass(frozen=True)
-class Offer:
-    """Labels left behind by a session, with ``edits`` that the user's file does not hold.
+class Offer(Replayed):
+    """Unsaved labels of a session, and the parts that they were read from.
 
-    Parameters
-    ----------
-    recording : Path
-        Absolute path of the labelled recording or video.
-    labels : Labels
-        After the last whole edit.
-    edits : int
-        Number of unsaved edits.
-    last : str
-        Name of the last edit, such as "Move span".
-    time_unix_s : float
-        Time of the last edit.
-    declined : bool
-        True if the user discarded it.
-    files : tuple of Path
-        Parts that it was read from.
+    ``declined`` is True if the user discarded them.
     """
 
-    recording: Path
-    labels: Labels
-    edits: int
-    last: str
-    time_unix_s: float
     declined: bool
     files: tuple[Path, ...]
 
@@ -117,24 +97,13 @@ def search(folder: Path, suffixes: Iterable[str], without: Container[int] = ()) 
                 continue
             if note:
                 notes.append(note)
-            if replayed.unsaved:
-                offers.append(_offer(replayed, tuple(parts)))
+            if replayed.edits:
+                declined = parts[0].suffix == DECLINED
+                offers.append(Offer(**vars(replayed), declined=declined, files=tuple(parts)))
             else:
                 (damaged if note else settled).extend(parts)
             break
     return Search(Found(tuple(offers), tuple(notes)), tuple(settled), tuple(damaged))
-
-
-def _offer(replayed: Replayed, files: tuple[Path, ...]) -> Offer:
-    return Offer(
-        Path(replayed.recording),
-        replayed.labels,
-        replayed.unsaved,
-        replayed.last,
-        replayed.time_unix_s,
-        files[0].suffix == DECLINED,
-        files,
-    )
 
 
 def _replayed(path: Path) -> tuple[Replayed, str]:

@@ -38,7 +38,7 @@ def test_edits_are_done_again(seed: int, edits: int) -> None:
     assert end == sum(map(len, records))
     replayed = replay(payloads)
     assert replayed.labels == states[-1]
-    assert (replayed.unsaved, replayed.recording) == (edits, "/walk.sd2")
+    assert (replayed.edits, replayed.recording) == (edits, Path("/walk.sd2"))
 
 
 @settings(max_examples=20)
@@ -124,7 +124,7 @@ class TestJournal:
         assert self.read(newest) == labels
         # The older one leads exactly to where the newest begins, or one edit before it.
         begins = replay(unpacked(newest.read_bytes())[0][:1])
-        assert begins.unsaved - replay(unpacked(older.read_bytes())[0]).unsaved == 1
+        assert begins.edits - replay(unpacked(older.read_bytes())[0]).edits == 1
 
     def test_a_full_disk_is_said_and_got_over(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -159,8 +159,8 @@ class TestJournal:
         journal.write("Edit", Labels())
         journal.saved()
         replayed = replay(unpacked((tmp_path / "000001-000001.journal").read_bytes())[0])
-        assert (replayed.unsaved, replayed.last) == (0, "Edit")
+        assert (replayed.edits, replayed.last) == (0, "Edit")
         assert replayed.labels == Labels()
         journal.write("Edit again", START)
         replayed = replay(unpacked((tmp_path / "000001-000001.journal").read_bytes())[0])
-        assert (replayed.unsaved, replayed.last) == (1, "Edit again")
+        assert (replayed.edits, replayed.last) == (1, "Edit again")
