@@ -25,13 +25,12 @@ FORMAT_VERSION = 1
 
 @dataclass(frozen=True, eq=False)
 class CellUncertainty:
-    """How well the values of a map are known.
+    """Uncertainty of the values of a map.
 
     Parameters
     ----------
     expected : float32 array, shape (bins, frames)
-        Mean of what the map may be: its values, smeared by how badly velocities are
-        known.
+        Expected values of the map: its values, blurred by the uncertainty of the velocities.
     sd : float32 array, shape (bins, frames)
         Standard deviation of every value.
     """
@@ -48,16 +47,16 @@ class CellUncertainty:
             )
 
     def deviation(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """How far from a map's values the truth may be: root mean square, (bins, frames).
+        """Root-mean-square deviation of the truth from a map's values, (bins, frames).
 
         sqrt(sd² + (expected − value)²). The standard deviation alone would call a value
-        well known that is almost certainly somewhere else.
+        certain that is almost certainly wrong.
         """
         deviation: NDArray[np.float32] = np.hypot(self.sd, self.expected - values)
         return deviation
 
     def between(self, start: int, stop: int) -> CellUncertainty:
-        """Of frames ``start`` to ``stop`` (exclusive)."""
+        """Uncertainty of frames ``start`` to ``stop`` (exclusive)."""
         return CellUncertainty(self.expected[:, start:stop], self.sd[:, start:stop])
 
 
@@ -72,7 +71,7 @@ class DopplerMap:
     timebase : Timebase
         One time per frame.
     unit : str
-        What a value of 1 means, e.g. ``"share of vertices"`` or ``"power"``.
+        Meaning of the value 1, e.g. ``"share of vertices"`` or ``"power"``.
     null_bins : tuple of int
         Bins that were set to zero on purpose.
     unseen_bins : tuple of int
@@ -80,10 +79,9 @@ class DopplerMap:
     meta : dict
         Provenance that fits into JSON: sensor, options, sources, version.
     present : bool array, shape (frames,), optional
-        False in columns that say nothing because there was no person. None: all
-        columns say something.
+        False in columns without a person. None: there is a person in all of them.
     uncertainty : CellUncertainty, optional
-        Where the mesh says how well its velocities are known, and one asked for it.
+        Uncertainty of the values, if the mesh states that of its velocities.
 
     Examples
     --------
@@ -139,11 +137,11 @@ class DopplerMap:
         return self.timebase.times_s
 
     def shifted(self, offset_s: float) -> DopplerMap:
-        """The same map ``offset_s`` later."""
+        """Map moved by ``offset_s`` to later times."""
         return replace(self, timebase=self.timebase.shifted(offset_s))
 
     def between(self, start: int, stop: int) -> DopplerMap:
-        """Frames ``start`` to ``stop`` (exclusive), at their times."""
+        """Map of frames ``start`` to ``stop`` (exclusive), at their times."""
         known = self.uncertainty
         return replace(
             self,
@@ -164,8 +162,8 @@ class DopplerMap:
     def save(self, path: Path) -> None:
         """Write ``values``, ``velocity_mps``, ``times_s`` and ``meta`` to one ``.npz``.
 
-        Where there are columns without a person also ``present``; where it is known how
-        uncertain values are, ``expected`` and ``sd``.
+        Also ``present`` if there are columns without a person, and ``expected`` and ``sd`` if
+        the uncertainty of the values is known.
         """
         meta = {
             "format": "sd2-doppler-map",
@@ -265,13 +263,7 @@ def peak_velocity_mps(
 
 
 def joined(maps: Sequence[DopplerMap]) -> DopplerMap:
-    """Maps that follow one another in time as one; what it says of itself is the first's.
-
-    Parameters
-    ----------
-    maps : sequence of DopplerMap
-        On one axis.
-    """
+    """Concatenate maps of one axis in time; metadata are those of the first."""
     if len(maps) == 1:
         return maps[0]
     present = [Presence.of(one.present, len(one.timebase)).there for one in maps]

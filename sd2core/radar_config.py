@@ -11,7 +11,7 @@ from sd2core.errors import Sd2Error
 SPEED_OF_LIGHT_MPS = 299_792_458.0
 
 _LOWEST_HZ, _HIGHEST_HZ = 1e8, 1e12
-"""No radar that sees a body works outside; figures outside are in MHz or GHz."""
+"""Limits of radar frequencies; values outside were probably meant in MHz or GHz."""
 
 
 @dataclass(frozen=True)
@@ -21,11 +21,11 @@ class RadarConfig:
     Parameters
     ----------
     start_frequency_hz, end_frequency_hz : float
-        Swept while the samples of one chirp are taken.
+        Frequencies at the first and last sample of a chirp.
     adc_bits : int
         Resolution of the converter.
     name : str
-        What to call this radar on screen.
+        Name of the radar on screen.
 
     Notes
     -----
@@ -95,7 +95,7 @@ class RadarConfig:
 
     @property
     def bandwidth_hz(self) -> float:
-        """Swept during the samples of one chirp."""
+        """Bandwidth swept during the samples of one chirp."""
         return self.end_frequency_hz - self.start_frequency_hz
 
     @property
@@ -110,7 +110,7 @@ class RadarConfig:
 
     @cached_property
     def wavelength_m(self) -> float:
-        """At the centre frequency."""
+        """Wavelength at the centre frequency."""
         return SPEED_OF_LIGHT_MPS / self.centre_frequency_hz
 
     @property

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 
 FARTHEST_M = 1e9
-"""No sensor is farther from the camera: squares of ranges stay within single precision."""
+"""Largest distance of a sensor from the camera: squares of ranges stay in single precision."""
 
 Vector = tuple[float, float, float]
 
@@ -66,7 +66,7 @@ class VelocityAxis:
         return (np.arange(self.bins, dtype=np.float64) + 0.5) * self.bin_width_mps - self.v_max_mps
 
     def bin_of(self, velocity_mps: float) -> int | None:
-        """Bin that holds a velocity, or None beyond the axis."""
+        """Bin of a velocity, or None beyond the axis."""
         if not -self.v_max_mps <= velocity_mps <= self.v_max_mps:
             return None
         return min(int((velocity_mps + self.v_max_mps) / self.bin_width_mps), self.bins - 1)
@@ -148,7 +148,7 @@ def position_from_spherical(
 
 
 def spherical_from_position(target_m: Vector, position_m: Vector) -> tuple[float, float, float]:
-    """Inverse of :func:`position_from_spherical`: ``(range_m, azimuth_deg, elevation_deg)``."""
+    """Invert :func:`position_from_spherical`: ``(range_m, azimuth_deg, elevation_deg)``."""
     dx, dy, dz = (p - t for p, t in zip(position_m, target_m, strict=True))
     range_m = math.hypot(dx, dy, dz)
     if range_m == 0.0:
@@ -159,7 +159,7 @@ def spherical_from_position(target_m: Vector, position_m: Vector) -> tuple[float
 
 
 def aimed_at(sensor: VirtualSensor, target_m: Vector) -> VirtualSensor:
-    """The same sensor with its boresight through a target; unchanged on the target itself."""
+    """Sensor with its boresight turned to a target; unchanged on the target itself."""
     dx, dy, dz = (t - p for t, p in zip(target_m, sensor.position_m, strict=True))
     if dx == dy == dz == 0.0:
         return sensor

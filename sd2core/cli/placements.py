@@ -1,4 +1,4 @@
-"""``sd2 placements``: sensors around a body, where they stand and what their maps cost."""
+"""``sd2 placements``: sensors around a body, their positions and the cost of their maps."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "A grid of every range, azimuth and elevation that is given, or with --cloud as many\n"
             "random places between them. Ranges are distances from the body's centre; azimuth 0\n"
             "is between body and camera and grows to the right in the picture, elevation upwards.\n"
-            "A list is 1,2,4 or 1:4:0.5, which holds both ends. Without any of it, the places\n"
-            "that the recording plans are listed."
+            "A list is 1,2,4 or 1:4:0.5, both ends included. Without any of these options, the\n"
+            "places planned in the recording are listed."
         ),
         examples=(
             "  sd2 placements walk.sd2 --ranges 1:4:1 --azimuths -60:60:30 --out grid.json\n"
@@ -63,9 +63,14 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--cloud", type=positive_int, metavar="N", help="N random places instead of a grid"
     )
-    parser.add_argument("--seed", type=int, metavar="S", help="of the random places (default: 0)")
     parser.add_argument(
-        "--placements", type=Path, metavar="FILE", help="those of a file, as --out writes it"
+        "--seed", type=int, metavar="S", help="seed of the random places (default: 0)"
+    )
+    parser.add_argument(
+        "--placements",
+        type=Path,
+        metavar="FILE",
+        help="read the places from a file of --out",
     )
     parser.add_argument("--out", type=Path, metavar="FILE.json", help="write the plan")
     add_wish(parser, "2%%")
@@ -96,7 +101,7 @@ def _placements(options: argparse.Namespace) -> int:
             mesh = recording.load_mesh(progress)
     body = BodyExtent.of(mesh)
     sensors = placements.sensors(body.target_m)
-    with progress_bar("Looking", "place") as progress:
+    with progress_bar("Checking", "place") as progress:
         coverage = body.coverage(sensors, progress)
     choice, cost = _cost(mesh, placements, sensors, options)
     if options.out is not None:
@@ -129,7 +134,7 @@ def _placements(options: argparse.Namespace) -> int:
 
 
 def _spec(options: argparse.Namespace, recording: Recording | None) -> Placements:
-    """What is given, or what the recording plans."""
+    """Placements from the options, or those planned in the recording."""
     from sd2core.files.number_lists import parse_interval, parse_numbers
     from sd2core.placements.placements import PlacementCloud, PlacementGrid, read_placements
 
@@ -168,7 +173,7 @@ def _spec(options: argparse.Namespace, recording: Recording | None) -> Placement
 
 
 def _radar(recording: Recording | None) -> RadarConfig:
-    """Of the recording's capture, or the paper's."""
+    """Radar of the recording's capture, or the paper's."""
     from sd2core.radar_config import PAPER_RADAR
 
     if recording is None or recording.radar is None or "radar" in recording.missing():
@@ -182,7 +187,7 @@ def _cost(
     sensors: tuple[VirtualSensor, ...],
     options: argparse.Namespace,
 ) -> tuple[Choice, PlacementCost]:
-    """What the ladder says where the sensor has the median of all ranges."""
+    """Plan and cost for the sensor at the median range."""
     from sd2core.accuracy.choosing import check_options
     from sd2core.cli.ladder import chosen
     from sd2core.doppler import PRESETS

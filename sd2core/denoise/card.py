@@ -1,4 +1,4 @@
-"""What a model file says about its model; reading it needs no torch."""
+"""Description of a denoiser in its model file; reading it needs no torch."""
 
 from __future__ import annotations
 
@@ -16,32 +16,32 @@ FORMAT = "sd2-denoiser"
 VERSION = 1
 
 TrainedOn = Literal["simulated", "real"]
-"""Whether the targets came from a simulated radar or from a real one."""
+"""Origin of the training targets: a simulated radar or a real one."""
 
 
 @dataclass(frozen=True)
 class ModelCard:
-    """A trained denoiser, but for its weights.
+    """Description of a trained denoiser, without its weights.
 
     Parameters
     ----------
     model : str
         A name of :data:`sd2core.denoise.registry.MODELS` or ``FILTERS``.
     options : mapping
-        What it was built with.
+        Options of the network.
     null_bins : tuple of int
-        Bins that are zero on purpose, in what it gets and in what it answers.
+        Bins that are zero on purpose, in the input and in the result.
     trained_on : {"simulated", "real"}
     unit : str
-        What a value of 1 means in what it answers.
+        Meaning of the value 1 in the result.
     title : str
-        To call it in a list; the file's name where it is empty.
+        Name in lists; the file's name if it is empty.
     about : mapping
-        ``data``, ``command``, ``metrics``, ``limits`` and what else fits into JSON.
+        ``data``, ``command``, ``metrics``, ``limits`` and other content for JSON.
     parameters : int
-        Numbers that were learnt; known when the card comes from a file.
+        Number of learned parameters; known when the card comes from a file.
     path : Path, optional
-        The file.
+        File that holds the card.
     """
 
     model: str
@@ -71,11 +71,11 @@ class ModelCard:
 
     @property
     def name(self) -> str:
-        """Name of the file, without its ending; the kind of model before there is a file."""
+        """Name of the file, without its suffix; the kind of model before there is a file."""
         return self.path.stem if self.path is not None else self.model
 
     def to_json(self) -> dict[str, Any]:
-        """As kept in the header of a model file."""
+        """Content of the header of a model file."""
         return {
             "format": FORMAT,
             "version": VERSION,
@@ -94,12 +94,12 @@ class ModelCard:
 
     @classmethod
     def from_json(cls, content: dict[str, Any], path: Path | None = None) -> ModelCard:
-        """Read what :meth:`to_json` gave.
+        """Card from the content of :meth:`to_json`.
 
         Raises
         ------
         Sd2Error
-            When it is something else, or of a newer version.
+            For other content, or a newer version.
         """
         where = "The model" if path is None else str(path)
         try:

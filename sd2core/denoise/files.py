@@ -1,4 +1,4 @@
-"""Model files of denoisers, and where they are found."""
+"""Model files of denoisers and the folders they are found in."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from sd2core.denoise.live import TrainedDenoiser
 
 DEFAULT_NAME = "denoiser"
-"""Of the model that is used when none is named."""
+"""Name of the model that is used when none is named."""
 
 _EXPECTED = "a model file (.safetensors) written by `sd2 train`"
 
@@ -31,7 +31,7 @@ def save_model(path: Path, trained: TrainedDenoiser) -> ModelCard:
     Returns
     -------
     ModelCard
-        As it is in the file.
+        Card as written to the file.
 
     Raises
     ------
@@ -47,7 +47,7 @@ def save_model(path: Path, trained: TrainedDenoiser) -> ModelCard:
 
 
 def describe_model(path: Path) -> ModelCard:
-    """What a model file says about its model; the weights stay on disk.
+    """Read the card of a model file; the weights stay on disk.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def find_model(model: Path | str) -> Path:
     Raises
     ------
     Sd2Error
-        When there is none.
+        If there is no such model.
     """
     path = Path(model)
     if path.is_file():
@@ -120,7 +120,7 @@ def find_model(model: Path | str) -> Path:
 
 
 def available_models() -> list[ModelCard]:
-    """Models that come with the program and the user's own; damaged files are left out."""
+    """Cards of the bundled and the user's models; damaged files are left out."""
     cards = []
     for path in _known_files().values():
         try:
@@ -131,7 +131,7 @@ def available_models() -> list[ModelCard]:
 
 
 def user_models_folder() -> Path:
-    """Where a user's models are found by name; it need not be there yet."""
+    """Folder of the user's models; it may not exist yet."""
     import platformdirs
 
     return Path(platformdirs.user_data_dir("sd2-studio", appauthor=False)) / "models"

@@ -1,6 +1,6 @@
-"""Denoisers without training: what a model must beat to be worth its name.
+"""Filters without training, the baselines of the networks.
 
-All are causal. They work on compressed values, as models do.
+All are causal. They work on compressed values, as the networks do.
 """
 
 from __future__ import annotations
@@ -15,29 +15,26 @@ from torch import Tensor, nn
 from sd2core.denoise.model import Denoiser, State
 
 _MEDIANS = ((3, 1), (3, 3), (5, 1), (5, 3), (7, 1), (7, 3))
-"""Frames and bins to choose from."""
+"""Sizes of the median to choose from, in frames and bins."""
 
 _MEDIAN_FRAMES = 50_000
-"""Enough to choose a median and its gain."""
+"""Number of frames from which a median and its gain are chosen."""
 
 
 class NoDenoiser(Denoiser):
-    """Hands on what it gets: synthetic energy, brought to the level of the radar's."""
-
-    def __init__(self, bins: int) -> None:
-        super().__init__(bins)
+    """No denoising: synthetic energy, only scaled to the level of the radar's."""
 
     def initial_state(self, batch: int = 1) -> State:
-        """Nothing."""
+        """No state."""
         return None
 
     def chunk(self, values: Tensor, state: State) -> tuple[Tensor, State]:
-        """The values."""
+        """Return the values."""
         return values, state
 
 
 class _Neighbourhood(Denoiser):
-    """Looks at each cell with the frames before it and the bins beside it."""
+    """Base of filters over the frames before a cell and the bins beside it."""
 
     def __init__(self, bins: int, frames: int, width: int) -> None:
         super().__init__(bins)
@@ -45,11 +42,11 @@ class _Neighbourhood(Denoiser):
         self.width = width
 
     def initial_state(self, batch: int = 1) -> State:
-        """Nothing; before its first frame a clip is as in it."""
+        """No state: the first frame of a clip also stands for those before it."""
         return None
 
     def neighbours(self, values: Tensor, state: State) -> tuple[Tensor, State]:
-        """(B, L, bins) to (B, L, bins, frames · width), oldest frame and lowest bin first."""
+        """Neighbours of (B, L, bins), (B, L, bins, frames · width), oldest and lowest first."""
         if state is None:
             state = values[:, :1].expand(-1, self.frames - 1, -1)
         known = torch.cat([state, values], 1)  # (B, frames − 1 + L, bins)
@@ -73,13 +70,13 @@ class MedianDenoiser(_Neighbourhood):
         self.level = nn.Parameter(torch.ones(()), requires_grad=False)
 
     def chunk(self, values: Tensor, state: State) -> tuple[Tensor, State]:
-        """Median of the neighbours."""
+        """Compute the median of the neighbours."""
         around, state = self.neighbours(values, state)
         return self.level * around.median(-1).values, state
 
 
 class WienerDenoiser(_Neighbourhood):
-    """The causal linear filter of least squared error (N. Wiener, 1949), and a mean per bin.
+    """Causal linear filter of least squared error (N. Wiener, 1949), and a mean per bin.
 
     The same weights for all bins; they solve the Wiener–Hopf equations of the training
     takes.
@@ -98,7 +95,7 @@ class WienerDenoiser(_Neighbourhood):
         self.mean = nn.Parameter(torch.zeros(bins), requires_grad=False)
 
     def chunk(self, values: Tensor, state: State) -> tuple[Tensor, State]:
-        """Weighted sum of the neighbours."""
+        """Compute the weighted sum of the neighbours."""
         around, state = self.neighbours(values, state)
         return around @ self.weight + self.mean, state
 
@@ -108,12 +105,12 @@ def fit_median(
     targets: Sequence[NDArray[np.float32]],
     null_bins: Sequence[int] = (),
 ) -> MedianDenoiser:
-    """The median, and the number it is multiplied by, of least squared error.
+    """Choose the median filter, and its gain, of least squared error.
 
     Parameters
     ----------
     inputs, targets : sequence of float32 arrays, shape (frames, bins)
-        Compressed, one per take. Of many takes some serve.
+        Compressed, one per take. Only some of many takes are used.
     null_bins : sequence of int
         Bins that do not count.
     """
@@ -145,7 +142,7 @@ def fit_wiener(
     frames: int = 9,
     width: int = 5,
 ) -> WienerDenoiser:
-    """The filter of least squared error, in closed form.
+    """Fit the Wiener filter in closed form.
 
     Parameters
     ----------

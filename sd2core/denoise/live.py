@@ -1,4 +1,4 @@
-"""A trained denoiser at work: on whole maps, and on frames as they come."""
+"""Use of a trained denoiser on whole maps, and live on single frames."""
 
 from __future__ import annotations
 
@@ -22,20 +22,14 @@ from sd2core.progress import Progress, silent
 from sd2core.version import __version__
 
 CHUNK = 512
-"""Frames of a long map that a causal model is given at once, with the state from before."""
+"""Number of frames of a long map that a causal model computes at once."""
 
 _ROUND = 64
 _BATCH = 16
 
 
 class TrainedDenoiser:
-    """A model and all that is needed to use it.
-
-    Parameters
-    ----------
-    network : Denoiser
-        Put into evaluation mode.
-    """
+    """Network with the card that describes its use; it is put into evaluation mode."""
 
     def __init__(self, network: Denoiser, card: ModelCard) -> None:
         if network.bins != card.axis.bins:
@@ -47,15 +41,15 @@ class TrainedDenoiser:
 
     @property
     def device(self) -> torch.device:
-        """Where the weights are."""
+        """Device of the weights."""
         return next((one.device for one in self.network.parameters()), torch.device("cpu"))
 
     def denoise(self, doppler: DopplerMap, progress: Progress = silent) -> DopplerMap:
-        """What a radar would show in place of a synthetic map.
+        """Turn a synthetic map into the map that a radar would show.
 
-        Frames without a person stay empty, and what was before them is forgotten: every
-        stretch is a clip of its own (docs/decisions/0021). A map of another frame rate,
-        or of uneven frames, is brought to the model's rate and back.
+        Frames without a person stay empty, and cut the map into clips of their own
+        (docs/decisions/0021). A map of another frame rate, or of uneven frames, is
+        interpolated to the model's rate and back.
 
         Parameters
         ----------
@@ -94,16 +88,14 @@ class TrainedDenoiser:
     def as_denoised(
         self, doppler: DopplerMap, energies: NDArray[np.float32], resampled: bool
     ) -> DopplerMap:
-        """A map with these denoised energies (frames, bins) in place of a synthetic one's.
+        """Denoised map from a synthetic one and its denoised energies.
 
         Parameters
         ----------
-        doppler : DopplerMap
-            What they were made of.
         energies : float32 array, shape (frames, bins)
             Changed: bins that the radar does not see are emptied.
         resampled : bool
-            Whether frames were interpolated to the model's rate and back.
+            True if frames were interpolated to the model's rate and back.
         """
         energies[:, list(doppler.unseen_bins)] = 0.0
         return replace(
@@ -119,17 +111,17 @@ class TrainedDenoiser:
     def denoise_values(
         self, energies: NDArray[np.float32], progress: Progress = silent
     ) -> NDArray[np.float32]:
-        """One stretch at the model's frame rate.
+        """Denoise one clip at the model's frame rate.
 
         Parameters
         ----------
         energies : float32 array, shape (frames, bins)
-            Not negative, in the unit of the synthetic maps that the model knows.
+            Not negative, in the unit of the synthetic training maps.
 
         Returns
         -------
         float32 array, shape (frames, bins)
-            Not negative, in the unit of the radar maps that it learnt from.
+            Not negative, in the unit of the radar maps of the training.
         """
         values = np.array(energies, dtype=np.float32)
         if values.ndim != 2 or values.shape[1] != self.card.axis.bins:
@@ -146,14 +138,12 @@ class TrainedDenoiser:
         return expanded
 
     def live(self) -> LiveDenoiser:
-        """For frames as they come, at the model's frame rate."""
+        """Denoiser of single frames, at the model's frame rate."""
         return LiveDenoiser(self)
 
     def _in_chunks(self, values: NDArray[np.float32], progress: Progress) -> NDArray[np.float32]:
-        """A causal model: what comes after a frame does not touch it, so the end is padded.
-
-        Few lengths occur that way, and kernels that were worked out for one are used again.
-        """
+        # Later frames do not affect a causal model, so the end is padded: few lengths occur that
+        # way, and their convolution kernels are computed once.
         frames = len(values)
         step = _ROUND if frames <= CHUNK else CHUNK
         padded = np.zeros((-(-frames // step) * step, values.shape[1]), np.float32)
@@ -172,7 +162,7 @@ class TrainedDenoiser:
         return done[:frames]
 
     def _in_windows(self, values: NDArray[np.float32], progress: Progress) -> NDArray[np.float32]:
-        """A model of fixed windows: they overlap and are blended."""
+        """Apply a model of fixed windows, which overlap and are blended."""
         window = self.network.window
         assert window is not None
         frames = len(values)
@@ -224,16 +214,16 @@ class TrainedDenoiser:
 
 
 class LiveDenoiser:
-    """Frame in, frame out, without delay.
+    """Denoiser of single frames, without delay.
 
-    A causal model answers as it does for the whole map. A model of fixed windows sees
-    the last frames only and answers for the newest, at the window's border, where it
-    knows less than in the middle: it differs from its answer for the whole map.
+    A causal model gives the result for the whole map. A model of fixed windows gets
+    the last frames only and denoises the newest, at the window's border, where it
+    knows less than in the middle: its result differs from that for the whole map.
 
     Attributes
     ----------
     equals_batch : bool
-        Whether the answers are those for the whole map.
+        True if results are those for the whole map.
     """
 
     def __init__(self, trained: TrainedDenoiser) -> None:
@@ -244,20 +234,20 @@ class LiveDenoiser:
         self.reset()
 
     def reset(self) -> None:
-        """Forget what was; a new clip begins."""
+        """Forget the frames so far and begin a new clip."""
         network = self._trained.network
         self._frames: deque[NDArray[np.float32]] = deque(maxlen=network.window or 1)
         with torch.no_grad():
             self._state = network.initial_state(1) if self.equals_batch else None
 
     def step(self, energies: NDArray[np.float32], present: bool = True) -> NDArray[np.float32]:
-        """Answer to the next frame.
+        """Denoise the next frame.
 
         Parameters
         ----------
         energies : float32 array, shape (bins,)
         present : bool
-            False where there is no person: the answer is empty, and a new clip begins.
+            False without a person: the result is empty, and a new clip begins.
 
         Returns
         -------
@@ -278,7 +268,7 @@ class LiveDenoiser:
     def advance(
         self, energies: NDArray[np.float32], present: NDArray[np.bool_] | None = None
     ) -> NDArray[np.float32]:
-        """Answers to the next frames, as :meth:`step` gives them, at less cost.
+        """Denoise the next frames, with the result of :meth:`step` at less cost.
 
         Parameters
         ----------
@@ -307,7 +297,7 @@ class LiveDenoiser:
         return answers
 
     def _run(self, energies: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Frames without a gap."""
+        """Denoise frames without a gap."""
         trained, card = self._trained, self._card
         values = np.array(energies, dtype=np.float32)
         values[:, self._nulled] = 0.0

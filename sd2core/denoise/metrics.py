@@ -1,4 +1,4 @@
-"""How far a denoised map is from what the radar saw.
+"""Errors of a denoised map against the radar's map.
 
 All functions take energies as (frames, bins), NumPy arrays of equal shape.
 
@@ -34,7 +34,7 @@ class VelocityError:
     Parameters
     ----------
     mae_mps : float
-        Mean of |e|; NaN where no frame can be judged, as are all that follow.
+        Mean of |e|; NaN if no frame can be judged, as are all that follow.
     sd_mps : float
         Standard deviation σ of e about its mean.
     sd_absolute_mps : float
@@ -42,7 +42,7 @@ class VelocityError:
     bias_mps : float
         Mean of e.
     correlation : float
-        Of estimate and target (Pearson); NaN where one of them does not vary.
+        Pearson correlation of estimate and target; NaN if one of them does not vary.
     frames : int
         Frames that were judged.
     empty_target : int
@@ -62,7 +62,7 @@ class VelocityError:
     empty_estimate: int
 
     def to_json(self) -> dict[str, float | int]:
-        """By name."""
+        """Errors by name."""
         return asdict(self)
 
 
@@ -88,7 +88,7 @@ class MapError:
     correlation: float
 
     def to_json(self) -> dict[str, float]:
-        """By name."""
+        """Errors by name."""
         return asdict(self)
 
 
@@ -172,9 +172,9 @@ def map_error(
     estimate, target : float array, shape (frames, bins)
         Energies in the unit of the target.
     compression : Compression
-        Of targets, as the model has it.
+        Compression of the model's targets.
     null_bins : tuple of int
-        Bins that do not count.
+        Bins that are ignored.
     """
     if estimate.shape != target.shape:
         raise Sd2Error(f"The maps are of shape {estimate.shape} and {target.shape}", "the same")
@@ -193,7 +193,7 @@ def map_error(
 def stands_out(
     energies: NDArray[np.floating], null_bins: tuple[int, ...] = (), factor: float = 10.0
 ) -> NDArray[np.bool_]:
-    """Frames whose strongest bin lies above the noise, (frames,).
+    """Mask of the frames whose strongest bin lies above the noise, (frames,).
 
     A radar's map is never empty: where nothing moves, its strongest bin is that of the
     noise, and its velocity says nothing. The noise is the median of all cells of the
@@ -202,11 +202,11 @@ def stands_out(
     Parameters
     ----------
     energies : float array, shape (frames, bins)
-        Of one take.
+        Energies of one take.
     null_bins : tuple of int
-        Bins that do not count.
+        Bins that are ignored.
     factor : float
-        How far above the noise, as a ratio of energies; 10 is 10 dB.
+        Least ratio of energies above the noise; 10 is 10 dB.
     """
     counted = np.delete(energies, list(null_bins), axis=1)
     if not counted.size:

@@ -1,4 +1,4 @@
-"""Whether a map is what a model was trained on, and what can be done where it is not."""
+"""Check that a map fits a model, and interpolation to the model's frame rate."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from sd2core.timebase import Timebase
 
 
 class Card(Protocol):
-    """What a model says of the maps that it knows; see :class:`~sd2core.denoise.card.ModelCard`."""
+    """Properties of the maps that a model knows, as :class:`~sd2core.denoise.card.ModelCard`."""
 
     @property
     def name(self) -> str:
-        """What to call it in a message."""
+        """Name of the model in messages."""
 
     @property
     def title(self) -> str:
-        """The same in words, or nothing."""
+        """Title of the model, which may be empty."""
 
     @property
     def axis(self) -> VelocityAxis:
@@ -44,25 +44,20 @@ Stretch = NDArray[np.float32]
 """Energies without a gap, (frames, bins)."""
 
 SAME_RATE = 0.02
-"""Relative difference of frame rates that a model does not notice."""
+"""Relative difference of frame rates that does not affect a model."""
 
 MOST_RESAMPLED = 4.0
-"""Up to this factor a map is brought to the frame rate of the model, and back."""
+"""Largest ratio of frame rates for which a map is interpolated to the model's rate."""
 
 _UNEVEN = 0.5
-"""Frames may come this share of a frame early or late."""
+"""Share of a frame duration by which frames may be early or late."""
 
 _BREAK_FRAMES = 5.0
-"""Where frames are farther apart than this many, a new clip begins."""
+"""Number of missing frames after which a new clip begins."""
 
 
 def check_map(doppler: DopplerMap, card: Card) -> None:
-    """Refuse a map that a denoiser cannot make sense of, in words.
-
-    Raises
-    ------
-    Sd2Error
-    """
+    """Raise Sd2Error for a map that is not synthetic or does not fit the model."""
     model = f"the model {card.title or card.name}"
     if doppler.kind != "synthetic":
         raise Sd2Error(
@@ -74,12 +69,7 @@ def check_map(doppler: DopplerMap, card: Card) -> None:
 
 
 def check_bins(doppler: DopplerMap, card: Card) -> None:
-    """Refuse a map of another axis, other emptied bins or too different a frame rate.
-
-    Raises
-    ------
-    Sd2Error
-    """
+    """Raise Sd2Error for a map of another axis, other emptied bins or too different a rate."""
     model = f"the model {card.title or card.name}"
     if doppler.axis != card.axis:
         raise Sd2Error(
@@ -109,10 +99,7 @@ def check_bins(doppler: DopplerMap, card: Card) -> None:
 def stretches(doppler: DopplerMap, frame_rate_hz: float) -> list[tuple[int, int]]:
     """Half-open runs of frames that are clips of their own: without gaps, with a person.
 
-    Parameters
-    ----------
-    frame_rate_hz : float
-        Of the model that is to be asked about them.
+    ``frame_rate_hz`` is the rate of the model.
     """
     there = Presence.of(doppler.present, len(doppler.timebase)).there
     return clips(doppler.times_s, there, frame_rate_hz)
@@ -128,7 +115,7 @@ def clips(
     times_s : float64 array, shape (frames,)
     there : bool array, shape (frames,)
     frame_rate_hz : float
-        At which they are to be used.
+        Frame rate of the model.
     """
     longest_s = _BREAK_FRAMES * max(Timebase(times_s).frame_duration_s, 1 / frame_rate_hz)
     breaks = np.flatnonzero(np.diff(times_s) > longest_s) + 1
@@ -140,7 +127,7 @@ def clips(
 
 
 def is_regular(times_s: NDArray[np.float64], frame_rate_hz: float) -> bool:
-    """Whether frames come at this rate, but for what a model does not notice."""
+    """True if frames have this rate, within tolerances that do not affect a model."""
     if len(times_s) < 2:
         return True
     steps = np.diff(times_s) * frame_rate_hz
@@ -154,15 +141,7 @@ def at_rate(
     times_s: NDArray[np.float64],
     frame_rate_hz: float,
 ) -> Stretch:
-    """Do ``work`` at an even frame rate: energies are interpolated linearly, there and back.
-
-    Parameters
-    ----------
-    work : callable
-        Takes and gives (frames, bins).
-    values : float32 array, shape (frames, bins)
-    times_s : float64 array, shape (frames,)
-    """
+    """Apply ``work`` to (frames, bins) at an even frame rate, with linear interpolation."""
     even_s = even_times(times_s, frame_rate_hz)
     return interpolated(work(interpolated(values, times_s, even_s)), even_s, times_s)
 
@@ -177,7 +156,7 @@ def even_times(times_s: NDArray[np.float64], frame_rate_hz: float) -> NDArray[np
 def interpolated(
     values: Stretch, times_s: NDArray[np.float64], wanted_s: NDArray[np.float64]
 ) -> Stretch:
-    """Linearly between frames, held at both ends."""
+    """Interpolate linearly between frames, constant beyond both ends."""
     if len(times_s) == 1:
         return np.repeat(values, len(wanted_s), axis=0)
     after = np.clip(np.searchsorted(times_s, wanted_s), 1, len(times_s) - 1)

@@ -25,7 +25,7 @@ EXPONENT = 0.5
 
 @dataclass(frozen=True)
 class Compression:
-    """y = (x / reference)^exponent, and back.
+    """Compression of energies, y = (x / reference)^exponent, and its inverse.
 
     Parameters
     ----------
@@ -51,18 +51,18 @@ class Compression:
         null_bins: Sequence[int] = (),
         exponent: float = EXPONENT,
     ) -> Compression:
-        """The compression whose output has a root mean square of 1.
+        """Fit the compression whose output has a root mean square of 1.
 
         In closed form: mean((x / r)^2p) = 1 for r = mean(x^2p)^(1/2p), which for the
         amplitude (p = 1/2) is the mean energy. So an error of 1 on compressed values is
-        that of a denoiser which answers zero to everything.
+        that of an empty result.
 
         Parameters
         ----------
         stretches : iterable of float arrays, shape (frames, bins)
-            Energies to learn from.
+            Energies of the training data.
         null_bins : sequence of int
-            Bins that are always zero and do not count.
+            Bins that are always zero, which are ignored.
 
         Raises
         ------
@@ -81,13 +81,13 @@ class Compression:
         return cls((total / cells) ** (1 / (2 * exponent)), exponent)
 
     def compress(self, energy: Values) -> Values:
-        """Energies, zero or more, as compressed values."""
+        """Compress energies, which are not negative."""
         scaled: Any = energy
         compressed: Values = (scaled / self.reference) ** self.exponent
         return compressed
 
     def expand(self, compressed: Values) -> Values:
-        """Compressed values as energies; what is negative becomes zero."""
+        """Expand compressed values to energies; negative values become zero."""
         scaled: Any = compressed
         energy: Values = (scaled * (scaled > 0)) ** (1 / self.exponent) * self.reference
         return energy
@@ -95,15 +95,7 @@ class Compression:
 
 @dataclass(frozen=True)
 class Scaling:
-    """How a model compresses what it gets, and what it is to answer.
-
-    Parameters
-    ----------
-    input : Compression
-        Of synthetic Doppler.
-    target : Compression
-        Of the radar's.
-    """
+    """Compressions of a model's input (synthetic Doppler) and target (the radar's)."""
 
     input: Compression
     target: Compression
@@ -118,14 +110,14 @@ class Scaling:
         input_exponent: float = EXPONENT,
         target_exponent: float = EXPONENT,
     ) -> Scaling:
-        """Both fitted on the stretches to learn from, (frames, bins) each."""
+        """Fit both on training data, (frames, bins) each."""
         return cls(
             Compression.fitted(inputs, null_bins, input_exponent),
             Compression.fitted(targets, null_bins, target_exponent),
         )
 
     def to_json(self) -> dict[str, Any]:
-        """As kept in a model file."""
+        """Content of a model file."""
         return {
             "law": "power",
             **{
@@ -137,12 +129,12 @@ class Scaling:
 
     @classmethod
     def from_json(cls, content: dict[str, Any]) -> Scaling:
-        """Read what :meth:`to_json` gave.
+        """Scaling from the content of :meth:`to_json`.
 
         Raises
         ------
         KeyError, TypeError, ValueError, Sd2Error
-            When it is something else.
+            For other content.
         """
         if content["law"] != "power":
             raise ValueError(f"scaling law {content['law']!r}")

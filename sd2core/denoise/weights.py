@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 SUFFIX = ".safetensors"
 
 Shapes = Mapping[str, list[int]]
-"""Of every tensor of a file."""
+"""Shape of every tensor of a file."""
 
 _KEY = "sd2"
 _LONGEST_HEADER = 4 << 20
@@ -40,7 +40,7 @@ def write_weights(path: Path, network: nn.Module, description: Mapping[str, Any]
         header = json.dumps(description, allow_nan=False, ensure_ascii=False)
     except (TypeError, ValueError) as error:
         raise Sd2Error(
-            f"What is to be said about the model cannot be written ({error})",
+            f"The description of the model cannot be written ({error})",
             "text, finite numbers, lists and mappings",
         ) from error
     tensors = {
@@ -51,12 +51,12 @@ def write_weights(path: Path, network: nn.Module, description: Mapping[str, Any]
 
 
 def read_header(path: Path, expected: str) -> tuple[dict[str, Any], Shapes]:
-    """Description and shapes; the weights stay on disk, and torch is not needed.
+    """Read description and shapes; the weights stay on disk, and torch is not needed.
 
     Parameters
     ----------
     expected : str
-        What the file should be, for messages.
+        Kind of file that is expected, for messages.
 
     Raises
     ------
@@ -102,7 +102,7 @@ def read_header(path: Path, expected: str) -> tuple[dict[str, Any], Shapes]:
 
 
 def format_of(path: Path) -> str:
-    """What a model file says that it is; empty where it does not say.
+    """Format named in a model file, or an empty string.
 
     Raises
     ------
@@ -113,19 +113,19 @@ def format_of(path: Path) -> str:
 
 
 def read_weights(path: Path, network: nn.Module, name: str, shapes: Shapes, expected: str) -> None:
-    """Put the weights of a file into a network that was built as its description says.
+    """Load the weights of a file into a network that was built from its description.
 
     Parameters
     ----------
     name : str
-        What the file calls its model.
+        Name of the model in the file.
     shapes : mapping
-        As :func:`read_header` found them.
+        Shapes from :func:`read_header`.
 
     Raises
     ------
     Sd2Error
-        When they are of another network, or are no finite numbers.
+        If they are of another network, or are no finite numbers.
     """
     import torch
     from safetensors import SafetensorError

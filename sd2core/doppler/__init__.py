@@ -1,4 +1,4 @@
-"""From a moving mesh to a Doppler map, by counting vertices per velocity bin."""
+"""Synthetic Doppler maps of a moving mesh, by counting vertices per velocity bin."""
 
 from __future__ import annotations
 

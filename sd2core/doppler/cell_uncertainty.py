@@ -1,10 +1,10 @@
-"""How well the cells of a synthetic map are known, from how well its limbs' velocities are.
+"""Uncertainty of the cells of a synthetic map, from the uncertainty of its limbs' velocities.
 
 Model (docs/decisions/0021): all velocities of a limb are wrong by one random velocity,
 normally distributed with the standard deviation that the mesh states, independently of
 the other limbs, and alike (in units of that deviation) over the few frames that
-smoothing in time brings together. Nothing else is uncertain: what is seen, and how much
-it counts, stays what it is in the map.
+smoothing in time brings together. Nothing else is uncertain: visibility and weights are
+those of the map.
 
 Everything between a limb's histogram and the map is linear, so the map is a sum of
 limbs, each a function of one normally distributed number. Mean and variance of each are
@@ -15,11 +15,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.doppler.frame_counts import FrameCounts
 from sd2core.doppler.limb_histograms import FineAxis, fine_histograms, fine_histograms_of
 from sd2core.doppler.masks import Visibility
 from sd2core.doppler.parallel import Ticket, run_jobs
@@ -31,20 +31,17 @@ from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
 from sd2core.progress import Progress
 from sd2core.sensor import VirtualSensor
 
-if TYPE_CHECKING:
-    from sd2core.doppler.synthesizer import Synthesizer
-
 _REACH = 4.0
-"""Where the normal distribution is cut, in standard deviations."""
+"""Half width at which the normal distribution is cut, in standard deviations."""
 
 _STEP_BINS = 0.25
 _FEWEST_STEPS, _MOST_STEPS = 16, 256
 _FRAMES = 128
-"""Worked out together."""
+"""Frames computed together."""
 
 
 def cell_uncertainty(
-    synthesizer: Synthesizer,
+    counts: FrameCounts,
     sensor: VirtualSensor,
     start: int,
     stop: int,
@@ -52,8 +49,8 @@ def cell_uncertainty(
     progress: Progress,
     threads: int | None,
 ) -> CellUncertainty:
-    """See :meth:`Synthesizer.uncertainty`."""
-    mesh, axis = synthesizer.mesh, synthesizer.options.axis
+    """Uncertainty of frames ``start`` to ``stop``, see :meth:`Synthesizer.uncertainty`."""
+    mesh, axis = counts.mesh, counts.options.axis
     if mesh.uncertainty is None:
         raise Sd2Error(
             f"{mesh.source or 'The mesh'} does not say how well its velocities are known",
@@ -67,7 +64,7 @@ def cell_uncertainty(
     def job(low: int, high: int) -> Callable[[Ticket], None]:
         def work(ticket: Ticket) -> None:
             ticket.advance(0)
-            piece = _Piece(synthesizer, sensor, low, high, visibility)
+            piece = _Piece(counts, sensor, low, high, visibility)
             expected, variance = piece.moments(lambda: ticket.advance(0))
             columns = slice(low - start, high - start)
             found.expected[:, columns] = expected
@@ -83,21 +80,21 @@ def cell_uncertainty(
 
 
 class _Piece:
-    """Some frames of a clip, with those around them that smoothing looks at."""
+    """Some frames of a clip, with the frames around them that smoothing needs."""
 
     def __init__(
         self,
-        synthesizer: Synthesizer,
+        counts: FrameCounts,
         sensor: VirtualSensor,
         start: int,
         stop: int,
         visibility: Visibility,
     ) -> None:
-        self._synthesizer = synthesizer
+        self._counts = counts
         self._sensor = sensor
         self._start, self._stop = start, stop
         self._visibility: Visibility = visibility
-        options, mesh = synthesizer.options, synthesizer.mesh
+        options, mesh = counts.options, counts.mesh
         known = mesh.uncertainty
         assert known is not None
         self._known: VelocityUncertainty = known
@@ -105,16 +102,16 @@ class _Piece:
             mesh.times_s, start, stop, options.time_sigma_s
         )
         frames = slice(self._first, self._last)
-        # What may be anywhere on the axis need not be told from what may be even farther.
+        # A velocity that may be anywhere on the axis is as good as one that may be even farther.
         self._worst_mps = 2.0 * options.axis.v_max_mps
         most_mps = float(max(known.along_mps[frames].max(), known.across_mps[frames].max()))
         most_mps = min(most_mps, self._worst_mps)
         room_bins = math.ceil(_REACH * most_mps / options.axis.bin_width_mps) + 1
-        self._axis = FineAxis(synthesizer.counting, 0 if options.beyond == "wrap" else room_bins)
+        self._axis = FineAxis(counts.counting, 0 if options.beyond == "wrap" else room_bins)
 
     def moments(self, go_on: Callable[[], None]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Expected values and their variance, (bins, n) each."""
-        options = self._synthesizer.options
+        options = self._counts.options
         fine, sigma_bins = self._histograms(go_on)
         frames = self._stop - self._start
         expected = np.zeros((options.axis.bins, frames))
@@ -133,8 +130,8 @@ class _Piece:
     def _smoothed(
         self, raw: NDArray[np.float64], over_time: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """From shares per frame and bin (k, n, bins) to the map's, (k, bins, frames)."""
-        options = self._synthesizer.options
+        """Smooth shares per frame and bin (k, n, bins) as the map is, (k, bins, frames)."""
+        options = self._counts.options
         nulled = list(options.null_bins)
         raw[..., nulled] = 0
         along = velocity_kernel(options.axis.bins, options.velocity_sigma_bins)
@@ -144,8 +141,8 @@ class _Piece:
         return values
 
     def _smoothing_over_time(self) -> NDArray[np.float64]:
-        """Matrix that smooths over time, (frames around, frames)."""
-        mesh, options = self._synthesizer.mesh, self._synthesizer.options
+        """Matrix of the smoothing over time, (frames around, frames)."""
+        mesh, options = self._counts.mesh, self._counts.options
         return smooth_time(
             np.eye(self._last - self._first),
             mesh.times_s,
@@ -160,13 +157,13 @@ class _Piece:
         self, go_on: Callable[[], None]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Shares on the fine axis (limbs, n, parts), and their deviations in bins (n, limbs)."""
-        synthesizer, known = self._synthesizer, self._known
+        counts, known = self._counts, self._known
         frames = self._last - self._first
         fine = np.zeros((len(known.limbs), frames, self._axis.parts))
         sigma_mps = np.zeros((frames, len(known.limbs)))
-        for index, low, high in synthesizer.blocks_between(self._first, self._last):
+        for index, low, high in counts.blocks_between(self._first, self._last):
             go_on()
-            block = synthesizer.prepared.block(index)
+            block = counts.prepared.block(index)
             rows = slice(low - block.start, high - block.start)
             target = slice(low - self._first, high - self._first)
             fine[:, target] = self._counted(block, rows)
@@ -174,14 +171,14 @@ class _Piece:
                 self._sensor.position_m, self._limb_places(block, rows), low
             )
         sigma_mps = np.minimum(sigma_mps, self._worst_mps)
-        return fine, sigma_mps / synthesizer.options.axis.bin_width_mps
+        return fine, sigma_mps / counts.options.axis.bin_width_mps
 
     def _counted(self, block: Block, rows: slice) -> NDArray[np.float64]:
-        """Of some of a block's frames: shares on the fine axis, (limbs, n, parts)."""
-        synthesizer, known = self._synthesizer, self._known
-        counting, position_m = synthesizer.counting, self._sensor.position_m
-        place = synthesizer.prepared.sensor(position_m)
-        scatterers, _ = synthesizer.scatterers(block, rows, position_m, self._visibility)
+        """Shares of some of a block's frames on the fine axis, (limbs, n, parts)."""
+        counts, known = self._counts, self._known
+        counting, position_m = counts.counting, self._sensor.position_m
+        place = counts.prepared.sensor(position_m)
+        scatterers, _ = counts.scatterers(block, rows, position_m, self._visibility)
         frames = block.frames.rows(rows)
         weights = np.empty((len(frames), frames.positions.shape[2]), np.float32)
         for row, knot in enumerate(frames.centre):
@@ -190,14 +187,14 @@ class _Piece:
                 row, points, place, counting.range_exponent, counting.reference_range_m
             ) * scatterers.seen(row, points, place)
         limb, count = known.vertex_limb, len(known.limbs)
-        if synthesizer.options.velocity == "vid2doppler":
-            velocity = synthesizer.prepared.velocities_vid2doppler(block, rows, place)
+        if counts.options.velocity == "vid2doppler":
+            velocity = counts.prepared.velocities_vid2doppler(block, rows, place)
             measured = frames.duration_s.max(axis=1) > 0
             fine = fine_histograms_of(velocity, measured, self._axis, weights, limb, count)
         else:
             fine = fine_histograms(frames, place, self._axis, weights, limb, count)
-        total = synthesizer.totals(block, rows)
-        law = synthesizer.frame_law(block, rows, position_m)
+        total = counts.totals(block, rows)
+        law = counts.frame_law(block, rows, position_m)
         factor = np.divide(law, total, out=np.zeros_like(total), where=total > 0)
         return fine * factor[:, None]
 
@@ -208,11 +205,11 @@ class _Piece:
         member[np.arange(len(limb)), limb] = 1.0
         member /= np.maximum(member.sum(axis=0), 1.0)
         points = block.frames.positions[block.frames.centre[rows]]
-        return (points @ member).transpose(0, 2, 1) + self._synthesizer.prepared.origin_m
+        return (points @ member).transpose(0, 2, 1) + self._counts.prepared.origin_m
 
 
 def _grid(most_bins: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Values of a standard normal number and their shares, fine enough for such a deviation."""
+    """Grid of a standard normal variable and its weights, fine enough for this deviation."""
     if most_bins == 0:
         return np.zeros(1), np.ones(1)
     wanted = math.ceil(2 * _REACH * most_bins / _STEP_BINS)

@@ -1,4 +1,4 @@
-"""Counting vertices per velocity bin, frame by frame: compiled, and in NumPy."""
+"""Counting of vertices per velocity bin, frame by frame: compiled, and in NumPy."""
 
 from __future__ import annotations
 
@@ -20,21 +20,83 @@ from sd2core.doppler.kernels import (
     count_kernel,
     needed_kernel,
 )
-from sd2core.doppler.scatterers import Scatterers
+from sd2core.scattering.amplitude import projected_areas, range_weight
+from sd2core.scattering.visibility import facing_mask
+
+
+@dataclass(frozen=True, eq=False)
+class Scatterers:
+    """Visibility and weights of the vertices in some frames; all vertices count by default.
+
+    Parameters
+    ----------
+    normals : int8 array, shape (n, 3, V), or None
+        Only vertices whose normal faces the sensor count.
+    mask : uint8 array, shape (n, V), or None
+        Only marked vertices count.
+    areas : float32 array, shape (n, V), or None
+        A vertex counts by its area in m².
+    area_vectors : float32 array, shape (n, 3, V), or None
+        A vertex counts by the area in m² that it turns towards the sensor.
+    vertex_counts : float32 array, shape (V,), or None
+        Number of vertices that each stands for; None: itself only.
+    """
+
+    normals: NDArray[np.int8] | None = None
+    mask: NDArray[np.uint8] | None = None
+    areas: NDArray[np.float32] | None = None
+    area_vectors: NDArray[np.float32] | None = None
+    vertex_counts: NDArray[np.float32] | None = None
+
+    def seen(
+        self, row: int, points: NDArray[Any], sensor: NDArray[np.float64]
+    ) -> NDArray[np.bool_]:
+        """Visible vertices of frame ``row``, bool (V,); ``points`` (3, V) are its vertices."""
+        if self.mask is not None:
+            return self.mask[row] > 0
+        if self.normals is not None:
+            return facing_mask(points[None], self.normals[row : row + 1], sensor)[0] > 0
+        return np.ones(points.shape[1], bool)
+
+    def weights(
+        self,
+        row: int,
+        points: NDArray[Any],
+        sensor: NDArray[np.float64],
+        range_exponent: float,
+        reference_range_m: float,
+    ) -> NDArray[np.float64]:
+        """Weight of each vertex of a frame, float64 (V,); parameters as for :meth:`seen`."""
+        if self.area_vectors is not None:
+            weight = projected_areas(points, self.area_vectors[row], sensor)
+        elif self.areas is not None:
+            weight = self.areas[row].astype(np.float64)
+        else:
+            weight = self.heads(points.shape[1])
+        if range_exponent:
+            distance = np.linalg.norm(points - sensor[:, None], axis=0)
+            weight = weight * range_weight(distance, range_exponent, reference_range_m)
+        return weight
+
+    def heads(self, vertices: int) -> NDArray[np.float64]:
+        """Number of vertices that each of ``vertices`` stands for, float64 (V,)."""
+        if self.vertex_counts is None:
+            return np.ones(vertices)
+        return self.vertex_counts.astype(np.float64)
 
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """A stretch of prepared frames, as the kernels take it.
+    """Consecutive prepared frames, as the kernels take them.
 
     Parameters
     ----------
     positions : float32 or float64 array, shape (knots, 3, V)
-        Relative to the clip's origin; what is worked out from them has their precision.
+        Relative to the clip's origin; velocities have their precision.
     centre : int64 array, shape (n,)
         Knot of every frame.
     before, after : int64 array, shape (n, samples)
-        Between which knots each velocity sample of a frame is measured.
+        Knots between which each velocity sample of a frame is measured.
     duration_s : float64 array, shape (n, samples)
         Time between the two; 0 where there is nothing to measure.
     """
@@ -61,7 +123,7 @@ class Frames:
 
 @dataclass(frozen=True)
 class Counting:
-    """The choices that the counting itself needs.
+    """Velocity axis and range law of the counting.
 
     Parameters
     ----------
@@ -84,14 +146,14 @@ class Counting:
 
 @dataclass(frozen=True, eq=False)
 class Counts:
-    """What a stretch of frames counts to.
+    """Result of counting some frames.
 
     Parameters
     ----------
     histogram : float64 array, shape (n, bins)
         Vertices, or their weights, per bin; the mean over a frame's samples.
     visible, beyond : float64 array, shape (n,)
-        Number of vertices that are seen, and of those beyond the axis; one that
+        Number of visible vertices, and of those beyond the axis; a vertex that
         stands for several counts as many.
     """
 
@@ -101,7 +163,7 @@ class Counts:
 
     @classmethod
     def empty(cls, frames: int, bins: int) -> Counts:
-        """Zeros."""
+        """Zero counts of some frames."""
         return cls(np.zeros((frames, bins)), np.zeros(frames), np.zeros(frames))
 
     def rows(self, rows: slice) -> Counts:
@@ -112,11 +174,11 @@ class Counts:
 def relative_range(positions: NDArray[Any], sensor: NDArray[np.float64]) -> NDArray[Any]:
     """Range of each vertex less the sensor's distance from the clip's origin.
 
-    |p − s| − |s| = p·(p − 2s) / (|p − s| + |s|). What differs from vertex to vertex
-    and from knot to knot is kept at the body's own scale, so the difference of two
-    is the exact change of range of :func:`radial_velocity` however far the sensor
-    is, with one range per vertex and knot. Its rounding error is a few roundings of
-    the largest coordinate (:func:`sd2core.numerics.precision.velocity_error_mps`).
+    |p − s| − |s| = p·(p − 2s) / (|p − s| + |s|). The differences between vertices and knots
+    stay at the body's own scale, so the difference of two is the exact change of range of
+    :func:`radial_velocity` however far the sensor is, with one range per vertex and knot. Its
+    rounding error is a few roundings of the largest coordinate
+    (:func:`sd2core.numerics.precision.velocity_error_mps`).
 
     Parameters
     ----------
@@ -142,7 +204,7 @@ def relative_range(positions: NDArray[Any], sensor: NDArray[np.float64]) -> NDAr
 def bins_plain(
     frames: Frames, t: int, sample: int, sensor: NDArray[np.float64], counting: Counting
 ) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """Bin of every vertex (``bins`` where dropped), and whether it lies beyond the axis."""
+    """Bin of every vertex (``bins`` where dropped), and a mask of those beyond the axis."""
     closer = relative_range(frames.positions[frames.before[t, sample]], sensor) - relative_range(
         frames.positions[frames.after[t, sample]], sensor
     )
@@ -154,9 +216,9 @@ def bins_plain(
 def place_in_bins(
     f: NDArray[Any], counting: Counting
 ) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """Whole bin numbers from positions on the axis, which runs from 0 to ``bins``.
+    """Bin numbers from positions on the axis, which runs from 0 to ``bins``.
 
-    The axis is closed at both ends, as ``np.histogram`` has it.
+    The axis is closed at both ends, as in ``np.histogram``.
     """
     bins = counting.bins
     beyond = (f < 0) | (f > bins)
@@ -175,7 +237,7 @@ def count_plain(
     scatterers: Scatterers,
     into: Counts,
 ) -> None:
-    """The same as :func:`count`, in NumPy."""
+    """Count some frames as :func:`count` does, in NumPy."""
     heads = scatterers.heads(frames.positions.shape[2])
     for t, knot in enumerate(frames.centre):
         points = frames.positions[knot]
@@ -199,7 +261,7 @@ def count(
     scatterers: Scatterers,
     into: Counts,
 ) -> None:
-    """Count all frames of a stretch, compiled.
+    """Count some frames, compiled.
 
     Parameters
     ----------
@@ -277,7 +339,7 @@ def mark_needed(
 def mark_needed_plain(
     frames: Frames, sensor: NDArray[np.float64], counting: Counting, live: NDArray[np.uint8]
 ) -> NDArray[np.uint8]:
-    """The same as :func:`mark_needed`, in NumPy."""
+    """Mark vertices as :func:`mark_needed` does, in NumPy."""
     needed = np.zeros((len(frames.centre), frames.positions.shape[2]), np.uint8)
     for t in range(len(frames.centre)):
         for sample in range(frames.before.shape[1]):

@@ -1,4 +1,4 @@
-"""Which vertices a sensor sees: found block by block, kept, and reused while dragging."""
+"""Visibility masks of a mesh, computed block by block, kept, and reused while dragging."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Visibility = Literal["none", "facing", "depth", "exact", "frozen"]
 Quality = Literal["none", "facing", "depth", "exact", "frozen"]
 
 Occlusion = Literal["depth", "exact"]
-"""Visibility that takes what stands in between into account; its masks are kept."""
+"""Visibility with occlusion; its masks are kept."""
 
 Position = tuple[float, float, float]
 
@@ -38,7 +38,7 @@ class _BlockMask:
     """Depth or exact visibility of one block's frames from one place.
 
     ``visible`` (n, V) holds the facing test where visibility cannot change the
-    map; ``done`` (n,) says which frames have been worked out. With a stride only
+    map; ``done`` (n,) marks the frames that have been computed. With a stride only
     the frames that serve their neighbours ever are.
     """
 
@@ -54,7 +54,7 @@ class VisibilityMasks:
     Parameters
     ----------
     counting : Counting
-        Decides which vertices cannot change the map.
+        Determines the vertices that cannot change the map.
     """
 
     def __init__(self, prepared: PreparedMesh, counting: Counting) -> None:
@@ -71,20 +71,20 @@ class VisibilityMasks:
 
     @cached_property
     def _closed(self) -> bool:
-        """Whether the mesh is a closed surface; found when a depth buffer first asks."""
+        """True if the mesh is a closed surface; computed when a depth buffer first needs it."""
         return self._prepared.faces is not None and encloses(self._prepared.faces)
 
     def for_rows(
         self, block: Block, rows: slice, position_m: Position, visibility: Visibility
     ) -> tuple[NDArray[np.uint8] | None, Quality]:
-        """Mask for counting some of a block's frames, and the visibility that it stands for.
+        """Mask for counting some of a block's frames, and the visibility that was used.
 
         Returns
         -------
         mask : uint8 array, shape (n, V), or None
-            None for ``none`` and ``facing``: counting judges those by itself.
+            None for ``none`` and ``facing``, which counting tests by itself.
         quality : {"none", "facing", "depth", "frozen", "exact"}
-            ``facing`` where ``frozen`` was asked for and nothing is kept.
+            ``facing`` for ``frozen`` if no mask is kept.
         """
         if visibility == "exact" or visibility == "depth":
             return self._worked_out(block, rows, position_m, visibility), visibility
@@ -96,7 +96,7 @@ class VisibilityMasks:
     def for_frame(
         self, block: Block, local: int, position_m: Position, visibility: Visibility
     ) -> tuple[NDArray[np.bool_], Quality]:
-        """Visibility of every vertex of a block's frame, bool (V,), and how it was found.
+        """Visibility of every vertex of a block's frame, bool (V,), and the test that was used.
 
         Depth and exact also where they cannot change the map. With a stride, that of
         the frame whose visibility serves this one.
@@ -142,14 +142,14 @@ class VisibilityMasks:
         return ("mask", occlusion, pixels, self._stride, needed, index, position_m)
 
     def _frames(self, index: int, rows: slice) -> NDArray[np.intp]:
-        """Numbers, in the clip, of some of a block's frames."""
+        """Numbers of some of a block's frames in the clip."""
         return np.arange(rows.start, rows.stop) + self._prepared.span(index)[0]
 
     def _serving(self, frames: NDArray[np.intp] | int) -> NDArray[np.intp]:
-        """The frames whose visibility serves these: every n-th of the clip, the nearest.
+        """Nearest frames whose visibility serves these: every n-th of the clip.
 
-        Midway the later one. The last one may have more than half a stride to serve.
-        Where that frame belongs to another stretch, the end of the frame's own serves.
+        Midway it is the later one. The last one may serve more than half a stride. Where that
+        frame is separated by frames without a person, the last frame before them serves.
         """
         every = self._stride
         last = (self._prepared.mesh.frame_count - 1) // every * every
@@ -160,7 +160,7 @@ class VisibilityMasks:
         return np.clip(nearest, presence.first[frames], presence.last[frames])
 
     def _frozen(self, block: Block, rows: slice, position_m: Position) -> NDArray[np.uint8] | None:
-        """The mask in which these rows are complete that was made nearest to this place.
+        """Complete mask of these rows that was made nearest to this place.
 
         Its error grows with the distance (docs/decisions/0010); of equally near ones
         the newest. Not all are complete: a drag that goes on cancels what its pause began.
@@ -175,7 +175,7 @@ class VisibilityMasks:
     def _worked_out(
         self, block: Block, rows: slice, position_m: Position, occlusion: Occlusion
     ) -> NDArray[np.uint8]:
-        """Mask of these rows, kept or worked out now."""
+        """Mask of these rows, kept or computed now."""
         here = (occlusion, position_m)
         others = [place for place in self._kept_at.get(block.index, ()) if place != here]
         self._kept_at[block.index] = (here, *others[: _PLACES_KEPT - 1])
@@ -199,8 +199,8 @@ class VisibilityMasks:
     ) -> NDArray[np.uint8]:
         """Mask of one frame that serves its neighbours, uint8 (V,).
 
-        Tested are the vertices that can change the map in any frame it serves, also
-        beyond the block's seams.
+        The vertices that can change the map in any frame it serves are tested, also across
+        block boundaries.
         """
         home, local = divmod(frame, self._prepared.block_frames)
         mask = self._block_mask(home, position_m, occlusion)
@@ -224,12 +224,12 @@ class VisibilityMasks:
         return mask.visible[local]
 
     def _view_of(self, frame: int, place: NDArray[np.float64]) -> _View:
-        """What a sensor looks at in one frame of the clip."""
+        """View of one frame of the clip."""
         home, local = divmod(frame, self._prepared.block_frames)
         return _view(self._prepared.block(home), slice(local, local + 1), place)
 
     def _block_mask(self, index: int, position_m: Position, occlusion: Occlusion) -> _BlockMask:
-        """Visibility from a place, as far as it has been worked out."""
+        """Mask of a block from a place, as far as it has been computed."""
 
         def make() -> tuple[_BlockMask, int]:
             start, stop = self._prepared.span(index)
@@ -242,7 +242,7 @@ class VisibilityMasks:
         return mask
 
     def _needed(self, block: Block, rows: slice, place: NDArray[np.float64]) -> NDArray[np.uint8]:
-        """Which vertices' visibility can change the map, uint8 (n, V)."""
+        """Mark the vertices whose visibility can change the map, uint8 (n, V)."""
         options = self._prepared.options
         if options.velocity == "vid2doppler":
             velocity = self._prepared.velocities_vid2doppler(block, rows, place)
@@ -258,7 +258,7 @@ class VisibilityMasks:
         visible: NDArray[np.uint8],
         occlusion: Occlusion,
     ) -> None:
-        """Write the visibility of the needed vertices into ``visible``."""
+        """Set ``visible`` of the needed vertices."""
         faces = self._prepared.faces
         assert faces is not None  # the Synthesizer refuses to ask it of a point cloud
         points, pixels = view.points, self._prepared.options.depth_resolution
@@ -285,17 +285,13 @@ class VisibilityMasks:
 
 @dataclass(frozen=True, eq=False)
 class _View:
-    """What a sensor looks at in some frames, in single precision near each frame's body.
-
-    ``points`` (n, 3, V) float32, ``places_m`` (n, 3) float64 the sensor, both around
-    the same place of each frame.
-    """
+    """Vertices (n, 3, V) and sensor (n, 3) of some frames, relative to a point near each body."""
 
     points: NDArray[np.float32]
     places_m: NDArray[np.float64]
 
     def stretches(self) -> list[tuple[int, int]]:
-        """Half-open stretches of frames in which the sensor stays where it is."""
+        """Half-open runs of frames in which the sensor does not move."""
         if (self.places_m == self.places_m[0]).all():
             return [(0, len(self.points))]
         return [(t, t + 1) for t in range(len(self.points))]

@@ -1,4 +1,4 @@
-"""What can be chosen when a Doppler map is synthesised, and the presets."""
+"""Options of Doppler synthesis, and their presets."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ FARTHEST_REFERENCE_M = 1000
 
 @dataclass(frozen=True)
 class SynthesisOptions:
-    """How a mesh becomes a Doppler map.
+    """Options of the synthesis of a Doppler map from a mesh.
 
     Parameters
     ----------
     visibility : {"none", "facing", "depth", "exact"}
-        Which vertices count: all, those whose normal faces the sensor, or those
+        Vertices that count: all, those whose normal faces the sensor, or those
         that nothing hides, by a depth buffer (fast, approximate) or exactly.
     depth_resolution : {128, 256}
         Pixels along each side of the depth buffer.
     mask_stride : int
-        Depth or exact visibility is worked out for every so many frames, and
-        serves the frames nearest to each.
+        Depth or exact visibility is computed for every ``mask_stride``-th frame and
+        used for the frames nearest to it.
     weight : {"count", "area", "projected"}
         A vertex counts 1 (the map is a share of all vertices), its area, or the
         area that it turns towards the sensor, A·cos θ (shares of the surface; a
@@ -51,13 +51,13 @@ class SynthesisOptions:
         Bins set to zero: the static surroundings that a radar's clutter removal
         takes away.
     beyond : {"drop", "wrap", "clip"}
-        What happens to velocities off the axis: left out, folded back as an
+        Treatment of velocities beyond the axis: left out, folded back as an
         undersampled radar would, or counted in the last bin.
     range_exponent : float
         A vertex at range R counts (reference_range_m / R) ** range_exponent.
         4 is the radar equation; 0 turns the law off.
     reference_range_m : float
-        Where a vertex counts fully.
+        Range at which a vertex counts 1.
     range_law : {"vertex", "frame"}
         R is the range of each vertex, or one range per frame, that of the mean of
         its vertices: cheaper, and as good for a body that is small for its range.
@@ -73,8 +73,7 @@ class SynthesisOptions:
     velocity_sigma_bins, time_sigma_s : float
         Sigmas of the Gaussian on the map; 0 is off.
     null_after_smoothing : bool
-        Whether nulled bins are emptied again after the smoothing has spilt into
-        them.
+        True to empty nulled bins again after smoothing has spread energy into them.
 
     Examples
     --------
@@ -180,15 +179,15 @@ Examples
 def chosen_options(
     preset: str, bins: int | None, v_max_mps: float | None, given: Mapping[str, Any]
 ) -> SynthesisOptions:
-    """A preset with what is given in its place.
+    """Preset with some options replaced.
 
     Parameters
     ----------
     bins, v_max_mps : optional
-        Of the velocity axis. On another axis the same velocities are nulled, unless
+        Velocity axis. On another axis than the preset's the same velocities are nulled, unless
         ``null_bins`` is given.
     given : mapping
-        Other fields by their names.
+        Other options by name.
 
     Raises
     ------
@@ -208,7 +207,7 @@ def same_velocities(
 ) -> tuple[int, ...]:
     """Bins of ``other`` whose centre lies in one of the ``bins`` of ``axis``.
 
-    Those at 0 m/s belong to them where they do on ``axis``, however wide they are.
+    Bins at 0 m/s are among them if they are on ``axis``, however wide they are.
     """
     at_zero = _bins_at_zero(other) if _bins_at_zero(axis).intersection(bins) else set()
     return tuple(

@@ -1,4 +1,4 @@
-"""Running pieces of work on the kernel threads, with progress and cancellation."""
+"""Jobs on the kernel threads, with progress and cancellation."""
 
 from __future__ import annotations
 
@@ -15,12 +15,9 @@ _POLL_S = 0.03
 
 
 class Ticket:
-    """What a running piece of work reports to, and asks whether to go on.
+    """Progress and cancellation of running jobs.
 
-    Parameters
-    ----------
-    heard : callable, optional
-        Called in the worker's own thread with what is finished so far.
+    ``heard`` is called in the worker's own thread with the amount finished so far.
     """
 
     def __init__(self, heard: Callable[[int], None] | None = None) -> None:
@@ -31,7 +28,7 @@ class Ticket:
         self._lock = threading.Lock()
 
     def advance(self, amount: int) -> None:
-        """So much more is done.
+        """Report an amount of work as done.
 
         Raises
         ------
@@ -46,7 +43,7 @@ class Ticket:
             self._heard(self.finished)
 
     def run(self, job: Callable[[Ticket], None]) -> None:
-        """Do a piece of work in this thread, and keep count of its processor time."""
+        """Run a job in this thread and add its processor time."""
         start_s = time.thread_time()
         try:
             job(self)
@@ -55,7 +52,7 @@ class Ticket:
                 self.processor_s += time.thread_time() - start_s
 
     def stop(self) -> None:
-        """Make every piece of work stop at its next report."""
+        """Make every job stop at its next report."""
         self._stopped.set()
 
 
@@ -65,7 +62,7 @@ def run_jobs(
     progress: Progress,
     threads: int | None = None,
 ) -> float:
-    """Run all jobs; return when they are done.
+    """Run all jobs and wait until they are done.
 
     ``progress`` is called in the calling thread, at least every 30 ms. When it
     raises, or a job does, the others stop at their next report before the
@@ -74,16 +71,16 @@ def run_jobs(
     Parameters
     ----------
     total : int
-        What they add up to.
+        Amount of work in all jobs.
     threads : int, optional
-        How many jobs may run at once; by default as many as there are cores. 1 runs
+        Number of jobs that may run at once; by default as many as there are cores. 1 runs
         them one after the other in the calling thread.
 
     Returns
     -------
     float
-        Seconds of processor time that the jobs took, all threads together: what other
-        programs at work on this machine do not change.
+        Seconds of processor time of all threads together, which other programs on this machine
+        do not change.
     """
     progress(0, total)
     if threads == 1:

@@ -1,4 +1,4 @@
-"""What does not depend on the sensor, prepared in blocks of frames under a byte budget."""
+"""Prepared blocks of frames: all data that do not depend on the sensor, under a byte budget."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ _FEWEST_FRAMES = 8
 
 
 class ByteBudget:
-    """Keeps the most recently used arrays within a number of bytes.
+    """Least-recently-used cache of arrays within a number of bytes.
 
-    An entry larger than the budget is handed out but not kept.
+    An entry larger than the budget is returned but not kept.
     """
 
     def __init__(self, limit_bytes: int) -> None:
@@ -40,7 +40,7 @@ class ByteBudget:
         self._lock = threading.Lock()
 
     def get(self, key: Hashable) -> Any:
-        """The entry, or None."""
+        """Entry of a key, or None."""
         with self._lock:
             if key not in self._entries:
                 return None
@@ -48,7 +48,7 @@ class ByteBudget:
             return self._entries[key][0]
 
     def put(self, key: Hashable, value: Any, size_bytes: int) -> None:
-        """Keep an entry and let go of the least recently used ones beyond the limit."""
+        """Keep an entry and drop the least recently used ones beyond the limit."""
         with self._lock:
             if key in self._entries:
                 self.used_bytes -= self._entries.pop(key)[1]
@@ -60,7 +60,7 @@ class ByteBudget:
                 self.used_bytes -= self._entries.popitem(last=False)[1][1]
 
     def get_or_make(self, key: Hashable, make: Callable[[], tuple[Any, int]]) -> Any:
-        """The entry; made once, even when several threads ask for it."""
+        """Entry of a key, made once even if several threads need it."""
         value = self.get(key)
         if value is not None:
             return value
@@ -95,12 +95,12 @@ class Block:
 
 @dataclass(eq=False)
 class PreparedMesh:
-    """A mesh as the kernels take it, block by block.
+    """Mesh as the kernels take it, block by block.
 
     Attributes
     ----------
     origin_m : float64 array, shape (3,)
-        What positions are kept around.
+        Origin of the prepared positions.
     reach_m : float
         Largest coordinate in the first frame.
     """
@@ -143,10 +143,10 @@ class PreparedMesh:
         self.block_frames = max(_FEWEST_FRAMES, bytes_per_block // per_frame)
 
     def with_options(self, options: SynthesisOptions) -> PreparedMesh | None:
-        """The same blocks, in the same budget, for other options.
+        """Same blocks, in the same budget, for other options.
 
-        None if they need other knots, or their bins are not as wide: the precision of a
-        block depends on that.
+        None if those need other knots or have other bin widths, on which the precision of a
+        block depends.
         """
         for name in ("oversampling", "trajectory_smoothing_s", "velocity"):
             if getattr(options, name) != getattr(self.options, name):
@@ -163,7 +163,7 @@ class PreparedMesh:
         return -(-self.mesh.frame_count // self.block_frames)
 
     def sensor(self, position_m: tuple[float, float, float]) -> NDArray[np.float64]:
-        """A sensor's place in the frame of the prepared positions."""
+        """Place of a sensor in the frame of the prepared positions."""
         return np.asarray(position_m, np.float64) - self.origin_m
 
     def span(self, index: int) -> tuple[int, int]:
@@ -172,7 +172,7 @@ class PreparedMesh:
         return start, min(start + self.block_frames, self.mesh.frame_count)
 
     def has(self, index: int) -> bool:
-        """Whether a block is in memory."""
+        """True if a block is in memory."""
         return self.budget.get(("block", index)) is not None
 
     def block(self, index: int) -> Block:
@@ -225,7 +225,7 @@ class PreparedMesh:
         )
 
     def _kept(self, what: str, block: Block, make: Callable[[Block], NDArray[Any]]) -> NDArray[Any]:
-        """Something of a block's frames, from memory or made now."""
+        """Derived array of a block, from memory or computed now."""
 
         def sized() -> tuple[NDArray[Any], int]:
             made = make(block)
@@ -270,7 +270,7 @@ class PreparedMesh:
         return self.faces
 
     def _at_frames(self, block: Block) -> NDArray[np.float32]:
-        """Shape in the block's own frames in single precision, (n, 3, V); not its place."""
+        """Vertices of the block's own frames relative to each body, float32 (n, 3, V)."""
         return near_points(block, slice(None))[0]
 
     def _prepare(self, index: int) -> Block:
@@ -339,18 +339,10 @@ class PreparedMesh:
 
 
 def near_points(block: Block, rows: slice) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
-    """Vertices of some of a block's frames in single precision, around a place near them.
+    """Vertices of some of a block's frames in single precision, relative to a point near them.
 
-    Parameters
-    ----------
-    rows : slice
-        Frames within the block.
-
-    Returns
-    -------
-    points : float32 array, shape (n, 3, V)
-    place_m : float64 array, shape (n, 3)
-        What was taken off each frame: zero where the block is in single precision.
+    Returns the vertices (n, 3, V) and that point for each frame, float64 (n, 3), which is zero if
+    the block is in single precision.
     """
     points = block.frames.positions[block.frames.centre[rows]]
     place_m = np.zeros((len(points), 3))

@@ -11,7 +11,7 @@ from sd2core.doppler.options import SynthesisOptions
 from sd2core.mesh.presence import Presence
 
 _REACH = 4.0
-"""Where the Gaussian on time is cut, in sigmas."""
+"""Half width at which the Gaussian on time is cut, in sigmas."""
 
 _SLACK_S = 1e-9
 """A frame that lies on the cut is inside on both sides, whatever the last digit says."""
@@ -26,7 +26,7 @@ def smooth(
     options: SynthesisOptions,
     presence: Presence | None = None,
 ) -> NDArray[np.float64]:
-    """A map's frames ``start`` to ``stop``, smoothed along velocity and time.
+    """Smooth frames ``start`` to ``stop`` of a map along velocity and time.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def smooth(
     options : SynthesisOptions
         Names the widths, and the bins that are emptied again afterwards.
     presence : Presence, optional
-        Of all frames. Nothing is smoothed from one stretch to another.
+        Of all frames. Nothing is smoothed across frames without a person.
 
     Returns
     -------
@@ -53,7 +53,7 @@ def smooth(
 
 @lru_cache(maxsize=8)
 def velocity_kernel(bins: int, sigma_bins: float) -> NDArray[np.float64]:
-    """Matrix (bins, bins) that smooths along velocity, reflecting at the axis's ends."""
+    """Smoothing matrix along velocity, (bins, bins), reflecting at the axis's ends."""
     kernel: NDArray[np.float64] = np.eye(bins)
     if sigma_bins > 0:
         from scipy.ndimage import gaussian_filter1d
@@ -66,7 +66,7 @@ def velocity_kernel(bins: int, sigma_bins: float) -> NDArray[np.float64]:
 def frames_within_reach(
     times_s: NDArray[np.float64], start: int, stop: int, sigma_s: float
 ) -> tuple[int, int]:
-    """Half-open range of frames that smoothing frames ``start`` to ``stop`` looks at."""
+    """Half-open range of frames that the smoothing of frames ``start`` to ``stop`` needs."""
     if sigma_s == 0:
         return start, stop
     reach = _REACH * sigma_s + 2 * _SLACK_S
@@ -93,9 +93,9 @@ def smooth_time(
         frame ``first`` on.
     times_s : float64 array, shape (T,)
         Times of all frames, so that the result does not depend on how a
-        recording is cut into stretches.
+        recording is cut.
     presence : Presence, optional
-        Of all frames. The mean is over the frame's own stretch.
+        Of all frames. The mean does not cross frames without a person.
 
     Returns
     -------

@@ -1,35 +1,118 @@
-"""From a mesh and a sensor to a synthetic Doppler map."""
+"""Synthetic Doppler maps from a mesh and a sensor."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.doppler import histogram, vid2doppler
-from sd2core.doppler.histogram import Counting, Counts
-from sd2core.doppler.kernels import CLIP, DROP, WRAP
-from sd2core.doppler.masks import Occlusion, Position, Quality, Visibility, VisibilityMasks
-from sd2core.doppler.notes import map_notes
+from sd2core.doppler.cell_uncertainty import cell_uncertainty
+from sd2core.doppler.frame_counts import FrameCounts
+from sd2core.doppler.histogram import Counts
+from sd2core.doppler.masks import Occlusion, Quality, Visibility
 from sd2core.doppler.options import PRESETS, SynthesisOptions
 from sd2core.doppler.parallel import Ticket, run_jobs
 from sd2core.doppler.prepared import Block, ByteBudget, PreparedMesh
-from sd2core.doppler.results import FrameScattering, Stretch
-from sd2core.doppler.scatterers import Scatterers
 from sd2core.doppler.smoothing import frames_within_reach, smooth
 from sd2core.errors import Sd2Error
 from sd2core.maps import CellUncertainty, DopplerMap
+from sd2core.mesh.presence import gaps_in_words, runs
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import compile_in_background, kernels_ready
+from sd2core.numerics.precision import SHARE_OF_A_BIN, stored_velocity_error_mps
 from sd2core.progress import Progress, silent
-from sd2core.scattering.amplitude import range_weight
+from sd2core.scattering.amplitude import NEAREST_RANGE_M
 from sd2core.scattering.velocity import radial_velocity
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 from sd2core.version import __version__
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Consecutive frames of a synthetic Doppler map.
+
+    Parameters
+    ----------
+    values : float32 array, shape (bins, n)
+    raw : float64 array, shape (bins, n)
+        Values before any smoothing, with nulled bins emptied.
+    visible_share : float32 array, shape (n,)
+        Share of all vertices that the sensor sees; of a decimated mesh, of the
+        vertices that the kept ones stand for. Vertices that cannot change
+        the map (in nulled bins) are judged by the facing test.
+    beyond_share : float32 array, shape (n,)
+        Share of the visible vertices whose velocity lies beyond the axis.
+    quality : {"none", "facing", "depth", "frozen", "exact"}
+        The weakest visibility that was used: ``frozen`` falls back to facing
+        where no depth or exact visibility is kept.
+    processor_s : float
+        Processor time that visibility and counting took, all threads together.
+    """
+
+    values: NDArray[np.float32]
+    raw: NDArray[np.float64]
+    visible_share: NDArray[np.float32]
+    beyond_share: NDArray[np.float32]
+    quality: Quality
+    processor_s: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class FrameScattering:
+    """Velocity, range and visibility of the vertices of one frame.
+
+    Parameters
+    ----------
+    velocity_mps : float32 array, shape (V,)
+        Radial velocity, positive when approaching.
+    range_m : float32 array, shape (V,)
+        Distance from the sensor.
+    visible : bool array, shape (V,)
+    quality : {"none", "facing", "depth", "frozen", "exact"}
+        Visibility that was used.
+    """
+
+    velocity_mps: NDArray[np.float32]
+    range_m: NDArray[np.float32]
+    visible: NDArray[np.bool_]
+    quality: Quality
+
+
+def map_notes(prepared: PreparedMesh, sensor: VirtualSensor, start: int, stop: int) -> list[str]:
+    """Sentences about frames without a person, and about limits of single precision.
+
+    There are none in ordinary scenes.
+    """
+    mesh, options = prepared.mesh, prepared.options
+    notes = []
+    if not (measured := mesh.presence.measured[start:stop]).all():
+        share = gaps_in_words(
+            runs(~measured), mesh.times_s[start:stop], mesh.timebase.frame_duration_s
+        )
+        notes.append(f"Without a person: {share}. Those columns are empty.")
+    if np.dtype(mesh.vertices.dtype) == np.float32:
+        duration_s = 2.0 * mesh.timebase.frame_duration_s / options.oversampling
+        error_mps = stored_velocity_error_mps(prepared.reach_m, duration_s)
+        bins = error_mps / options.axis.bin_width_mps
+        if bins > SHARE_OF_A_BIN:
+            notes.append(
+                f"The mesh's coordinates reach {prepared.reach_m:,.4g} m and are stored in single"
+                f" precision: velocities are wrong by up to {bins:.2g} bins ({error_mps:.2g} m/s)."
+            )
+    range_m = max(math.dist(sensor.position_m, prepared.origin_m.tolist()), NEAREST_RANGE_M)
+    decades = options.range_exponent * math.log10(options.reference_range_m / range_m)
+    if decades - math.log10(mesh.represented_count) < math.log10(np.finfo(np.float32).tiny):
+        notes.append(
+            f"At {range_m:,.4g} m the range law makes a vertex count 1e{decades:.0f}, less than the"
+            " numbers of a map can be: it is empty or nearly so. Choose a farther reference range."
+        )
+    return notes
+
 
 _MEMORY_BUDGET_BYTES = 512 << 20
 _FAST_FRAMES = 64
@@ -38,9 +121,9 @@ _EXACT_JOB_FRAMES = 8
 
 
 class Synthesizer:
-    """Turns one mesh into Doppler maps for any sensor position.
+    """Doppler maps of one mesh for any sensor position.
 
-    What does not depend on the sensor is prepared once, in blocks of frames that
+    Data that do not depend on the sensor are prepared once, in blocks of frames that
     are kept under a byte budget; a long recording is streamed. Calls may come
     from several threads.
 
@@ -51,10 +134,10 @@ class Synthesizer:
     memory_budget_bytes : int
         For prepared blocks and visibility.
     threads : int, optional
-        On how many threads the work is spread; by default on all cores. With 1 all of
-        it is done in the calling thread.
+        Number of worker threads; by default one per core. With 1 all work is done in the
+        calling thread.
     blocks_of : Synthesizer, optional
-        Another one of the same mesh, whose prepared blocks and budget are shared
+        Another synthesizer of the same mesh, whose prepared blocks and budget are shared
         where the options allow it.
 
     Raises
@@ -95,18 +178,11 @@ class Synthesizer:
         if shared is None or shared.mesh is not mesh:
             shared = PreparedMesh(mesh, options, ByteBudget(memory_budget_bytes))
         self.prepared: PreparedMesh = shared
-        self.counting = Counting(
-            options.axis.bins,
-            options.axis.v_max_mps,
-            {"drop": DROP, "wrap": WRAP, "clip": CLIP}[options.beyond],
-            options.range_exponent if options.range_law == "vertex" else 0.0,
-            options.reference_range_m,
-        )
-        self._masks = VisibilityMasks(self.prepared, self.counting)
+        self._frames = FrameCounts(shared)
 
     @property
     def unit(self) -> str:
-        """What a value of 1 in a map means."""
+        """Meaning of the value 1 in a map."""
         options = self.options
         share = {
             "count": "share of vertices",
@@ -120,12 +196,12 @@ class Synthesizer:
 
     @property
     def _bytes_per_vertex(self) -> int:
-        """Of a prepared frame: its knots, normals and areas, in single precision."""
+        """Size of a prepared frame: knots, normals and areas, in single precision."""
         areas = {"count": 0, "area": 4, "projected": 12}[self.options.weight]
         return 12 * self.options.oversampling + 3 + areas
 
     def prepare(self, progress: Progress = silent) -> None:
-        """Read and prepare as many blocks as the budget holds, before they are asked for."""
+        """Read and prepare as many blocks as the budget holds, ahead of their use."""
         prepared = self.prepared
         bytes_per_block = prepared.block_frames * self.mesh.vertex_count * self._bytes_per_vertex
         fitting = max(1, prepared.budget.limit_bytes // bytes_per_block)
@@ -213,8 +289,8 @@ class Synthesizer:
     ) -> Stretch:
         """Doppler values of frames ``start`` to ``stop`` (exclusive).
 
-        The same as these columns of the whole map: smoothing over time looks
-        beyond the stretch.
+        They equal these columns of the whole map: smoothing over time also uses the frames
+        around them.
         """
         if not 0 <= start < stop <= self.mesh.frame_count:
             raise IndexError(f"frames {start} to {stop} of {self.mesh.frame_count}")
@@ -269,7 +345,7 @@ class Synthesizer:
                 place,
                 frames.duration_s[local, low : high + 1].sum(),
             )
-        visible, quality = self._masks.for_frame(block, local, sensor.position_m, chosen)
+        visible, quality = self._frames.masks.for_frame(block, local, sensor.position_m, chosen)
         if not self.mesh.presence.there[index]:
             visible = np.zeros_like(visible)
         return FrameScattering(
@@ -287,7 +363,7 @@ class Synthesizer:
         frames: tuple[int, int] | None = None,
         progress: Progress = silent,
     ) -> CellUncertainty:
-        """How well the cells of :meth:`map` are known, as far as the mesh's velocities are.
+        """Uncertainty of the cells of :meth:`map` that follows from that of the mesh's velocities.
 
         Model and limits are those of :mod:`sd2core.doppler.cell_uncertainty`.
 
@@ -301,13 +377,11 @@ class Synthesizer:
         Sd2Error
             When the mesh does not say how well its velocities are known.
         """
-        from sd2core.doppler.cell_uncertainty import cell_uncertainty
-
         start, stop = frames or (0, self.mesh.frame_count)
         if not 0 <= start < stop <= self.mesh.frame_count:
             raise IndexError(f"frames {start} to {stop} of {self.mesh.frame_count}")
         chosen = self._choose(visibility)
-        return cell_uncertainty(self, sensor, start, stop, chosen, progress, self._threads)
+        return cell_uncertainty(self._frames, sensor, start, stop, chosen, progress, self._threads)
 
     def cached_mask(
         self,
@@ -325,16 +399,14 @@ class Synthesizer:
         """
         stop = self.mesh.frame_count if stop is None else stop
         parts = []
-        for index, low, high in self.blocks_between(start, stop):
+        for index, low, high in self._frames.blocks_between(start, stop):
             base = index * self.prepared.block_frames
             rows = slice(low - base, high - base)
-            mask = self._masks.kept(index, rows, sensor.position_m, visibility)
+            mask = self._frames.masks.kept(index, rows, sensor.position_m, visibility)
             if mask is None:
                 return None
             parts.append(mask)
         return np.concatenate(parts)
-
-    # How frames become counts.
 
     def _choose(self, visibility: Visibility | None) -> Visibility:
         chosen: Visibility = self.options.visibility if visibility is None else visibility
@@ -352,7 +424,7 @@ class Synthesizer:
         visibility: Visibility,
         progress: Progress,
     ) -> tuple[Counts, NDArray[np.float64], Quality, float]:
-        """Counts per frame, what they are shares of, the visibility used, processor seconds."""
+        """Counts per frame, their totals, the visibility used, and processor seconds."""
         if not kernels_ready():
             compile_in_background()
         counts = Counts.empty(stop - start, self.options.axis.bins)
@@ -371,14 +443,14 @@ class Synthesizer:
                     target = slice(first - start, last - start)
                     part = counts.rows(target), totals[target]
                     qualities.add(
-                        self._count_rows(block, rows, sensor.position_m, visibility, *part)
+                        self._frames.count(block, rows, sensor.position_m, visibility, *part)
                     )
                     ticket.advance(last - first)
 
             return work
 
         jobs = []
-        for index, low, high in self.blocks_between(start, stop):
+        for index, low, high in self._frames.blocks_between(start, stop):
             # A block that must be read first is one job: its readers would wait.
             size = _FAST_FRAMES if quick else _EXACT_JOB_FRAMES
             pieces = -(-(high - low) // size) if self.prepared.has(index) else 1
@@ -391,78 +463,10 @@ class Synthesizer:
             quality = visibility
         return counts, totals, quality, processor_s
 
-    def _count_rows(
-        self,
-        block: Block,
-        rows: slice,
-        position_m: Position,
-        visibility: Visibility,
-        into: Counts,
-        totals: NDArray[np.float64],
-    ) -> Quality:
-        """Count some of a block's frames; returns the visibility that was used."""
-        place = self.prepared.sensor(position_m)
-        totals[:] = self.totals(block, rows)
-        scatterers, quality = self.scatterers(block, rows, position_m, visibility)
-        frames = block.frames.rows(rows)
-        if self.options.velocity == "vid2doppler":
-            velocity = self.prepared.velocities_vid2doppler(block, rows, place)
-            edges_mps = self.options.axis.edges_mps
-            vid2doppler.count(frames, velocity, edges_mps, place, self.counting, scatterers, into)
-        else:
-            count = histogram.count if kernels_ready() else histogram.count_plain
-            count(frames, place, self.counting, scatterers, into)
-        if self.options.range_law == "frame":
-            into.histogram[:] *= self.frame_law(block, rows, position_m)[:, None]
-        return quality
-
-    def totals(self, block: Block, rows: slice) -> NDArray[np.float64]:
-        """What the counts of some of a block's frames are shares of, (n,)."""
-        if self.options.weight != "count":
-            return self.prepared.surface(block)[rows]
-        return np.full(rows.stop - rows.start, float(self.mesh.represented_count))
-
-    def frame_law(self, block: Block, rows: slice, position_m: Position) -> NDArray[np.float64]:
-        """The range law where it is one number for each of some of a block's frames, (n,)."""
-        options = self.options
-        if options.range_law != "frame":
-            return np.ones(rows.stop - rows.start)
-        away_m = self.prepared.middles(block)[rows] - self.prepared.sensor(position_m)
-        range_m = np.linalg.norm(away_m, axis=1)
-        return range_weight(range_m, options.range_exponent, options.reference_range_m).astype(
-            np.float64
-        )
-
-    def scatterers(
-        self, block: Block, rows: slice, position_m: Position, visibility: Visibility
-    ) -> tuple[Scatterers, Quality]:
-        """What some of a block's frames count, and the visibility that was used."""
-        weight = self.options.weight
-        mask, quality = self._masks.for_rows(block, rows, position_m, visibility)
-        facing = mask is None and quality == "facing"
-        scatterers = Scatterers(
-            normals=self.prepared.normals(block)[rows] if facing else None,
-            mask=mask,
-            areas=self.prepared.areas(block)[rows] if weight == "area" else None,
-            area_vectors=self.prepared.area_vectors(block)[rows] if weight == "projected" else None,
-            vertex_counts=self.prepared.heads,
-        )
-        return scatterers, quality
-
-    # Blocks.
-
     def _block_of(self, frame: int) -> Block:
         if not 0 <= frame < self.mesh.frame_count:
             raise IndexError(f"frame {frame} of {self.mesh.frame_count}")
         return self.prepared.block(frame // self.prepared.block_frames)
-
-    def blocks_between(self, start: int, stop: int) -> list[tuple[int, int, int]]:
-        """Block number and the frames it holds of ``start`` to ``stop``."""
-        size = self.prepared.block_frames
-        return [
-            (index, max(start, index * size), min(stop, (index + 1) * size))
-            for index in range(start // size, (stop - 1) // size + 1)
-        ]
 
 
 def _no_surface(mesh: MeshSequence, wanted: str) -> Sd2Error:

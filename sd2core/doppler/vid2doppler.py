@@ -14,16 +14,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.doppler.histogram import Counting, Counts, Frames
+from sd2core.doppler.histogram import Counting, Counts, Frames, Scatterers
 from sd2core.doppler.kernels import CLIP, DROP, WRAP
-from sd2core.doppler.scatterers import Scatterers
 from sd2core.mesh.presence import Presence
 
 TAPS = 5
 """Frames in its mean over time."""
 
 REACH_BEFORE, REACH_AFTER = TAPS // 2 + 1, TAPS // 2
-"""How many frames before and after a frame its velocity depends on."""
+"""Number of frames before and after a frame that its velocity depends on."""
 
 
 def velocities(
@@ -49,8 +48,8 @@ def velocities(
         Length of the recording, where the zero padding begins.
     sensor : float64 array, shape (3,)
     presence : Presence, optional
-        Of all frames of the recording. Every stretch with a person in it is treated as
-        a recording of its own.
+        Of all frames of the recording. Frames without a person cut it into recordings of
+        their own.
 
     Returns
     -------
@@ -85,7 +84,7 @@ def velocities(
 def place_in_bins(
     velocity_mps: NDArray[np.float64], edges_mps: NDArray[np.float64], counting: Counting
 ) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """Bin numbers as ``np.histogram`` finds them (``bins`` where dropped); what is beyond."""
+    """Bin numbers as in ``np.histogram`` (``bins`` where dropped), and a mask of those beyond."""
     beyond = (velocity_mps < edges_mps[0]) | (velocity_mps > edges_mps[-1])
     if counting.beyond == WRAP:
         span = edges_mps[-1] - edges_mps[0]
@@ -108,7 +107,7 @@ def count(
     scatterers: Scatterers,
     into: Counts,
 ) -> None:
-    """Count all frames of a stretch by these velocities, as :func:`histogram.count` does.
+    """Count some frames by these velocities, as :func:`histogram.count` does.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""From raw samples to power over range and Doppler, block by block.
+"""Power over range and Doppler from raw samples, block by block.
 
-One capture and one set of options; where the power goes on a velocity axis is
-:mod:`sd2core.fmcw.processing`'s business.
+One capture and one set of options; rebinning onto a velocity axis is in
+:mod:`sd2core.fmcw.processing`.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ _BLOCK_BYTES = 4_000_000
 
 @dataclass(frozen=True)
 class ProcessingOptions:
-    """How raw samples become power over range and velocity.
+    """Options of the processing of raw samples to power over range and velocity.
 
     Parameters
     ----------
     clutter : {"none", "mean", "moving"}
-        What to subtract as static. ``mean`` takes each frame's mean over its
-        chirps, which also removes what moves slower than about one Doppler
+        Static part to subtract. ``mean`` takes each frame's mean over its
+        chirps, which also removes motion slower than about one Doppler
         bin; ``moving`` takes that mean averaged over ``clutter_window_s``,
         which keeps a slow mover.
     clutter_window_s : float
@@ -82,7 +82,7 @@ def taper(window: Window, length: int) -> NDArray[np.float32]:
 
 
 class FrameChain:
-    """What all frames of one radar and one set of options have in common.
+    """Processing of single frames for one radar and one set of options.
 
     ``range_m`` (gates,) are the centres of the gates that count, ``doppler_bins``
     the length of the zero-padded Doppler FFT.
@@ -108,7 +108,7 @@ class FrameChain:
         self._slow = (slow * np.sqrt(norm)).astype(np.float32)[:, None]
 
     def spectra(self, signal: NDArray[np.float32]) -> NDArray[np.complex64]:
-        """Spectra of frames (n, receivers, chirps, samples), (n, receivers, doppler, gates).
+        """Spectra (n, receivers, doppler, gates) of frames (n, receivers, chirps, samples).
 
         The signal, without clutter, is overwritten.
         """
@@ -125,7 +125,7 @@ class FrameChain:
 
 
 class Chain(FrameChain):
-    """The frames of one capture."""
+    """Processing of the frames of one capture."""
 
     def __init__(self, capture: RadarCapture, options: ProcessingOptions) -> None:
         super().__init__(capture.config, options)
@@ -140,7 +140,7 @@ class Chain(FrameChain):
 
     @cached_property
     def _reach(self) -> int:
-        """Frames to either side that the moving average needs."""
+        """Number of frames to either side that the moving average needs."""
         if self.options.clutter != "moving":
             return 0
         frame_s = self.capture.config.frame_repetition_s
@@ -148,7 +148,7 @@ class Chain(FrameChain):
         return round(0.5 * frames)
 
     def blocks(self) -> Iterator[tuple[int, int]]:
-        """Half-open stretches of frames that fit into a few megabytes."""
+        """Half-open runs of frames that fit into a few megabytes."""
         config = self.capture.config
         gates = len(self.range_m)
         per_frame = (

@@ -1,4 +1,4 @@
-"""From beat signals to a recording: gain, thermal noise, rounding, and how it was made."""
+"""Analogue-to-digital converter of a simulated recording: gain, thermal noise, rounding."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _NOISE_WITHOUT_ECHO_COUNTS = 4.0
 
 
 def store(shape: tuple[int, ...], dtype: DTypeLike, memory_bytes: int) -> NDArray[Any]:
-    """Array in memory, or on disk when it is larger than this; it goes with its last user."""
+    """Array in memory, or in a temporary file if it is larger than this."""
     if math.prod(shape) * np.dtype(dtype).itemsize <= memory_bytes:
         return np.empty(shape, dtype)
     with tempfile.TemporaryFile(prefix="sd2-radar-") as file:
@@ -41,7 +41,7 @@ def digitise(
     go_on: Callable[[], None] = lambda: None,
     first: int = 0,
 ) -> dict[str, float]:
-    """Gain, thermal noise and rounding to converter counts around mid-scale.
+    """Apply gain and thermal noise and round to converter counts around mid-scale.
 
     Parameters
     ----------
@@ -49,18 +49,18 @@ def digitise(
     peak : float
         Largest magnitude in it.
     power : float
-        Mean square of the moving scene's part, over the frames that have one.
+        Mean square of the moving scene's part, over the frames with a person.
     samples : uint16 array
         Result, of the same shape.
     go_on : callable
         Called once per frame; may raise to stop.
     first : int
-        Number of the first of these frames in the recording, whose noise it has.
+        Number of the first of these frames in the recording, which selects its noise.
 
     Returns
     -------
     dict
-        What the converter did, for provenance.
+        Gain and noise of the converter, for provenance.
     """
     middle = 2 ** (config.adc_bits - 1)
     gain = options.peak_share * middle / peak if peak > 0 else 1.0
@@ -102,7 +102,7 @@ def simulated_capture(
     how: dict[str, Any] | None = None,
     nobody: Sequence[tuple[int, int]] = (),
 ) -> RadarCapture:
-    """The samples with what is needed to read them, and how they were computed.
+    """Capture of simulated samples, with the provenance of the simulation.
 
     ``times_s`` are the middles of the frames on the scene's clock, ``levels`` what
     :func:`digitise` returned, ``how`` further entries about the simulation, ``nobody``
@@ -133,7 +133,7 @@ def simulated_capture(
 
 
 def _told(options: SignalOptions) -> dict[str, Any]:
-    """What counts of the options; JSON has no infinity."""
+    """Options for the provenance; JSON has no infinity."""
     told = asdict(options)
     if options.link is None:
         del told["link"]
@@ -143,6 +143,6 @@ def _told(options: SignalOptions) -> dict[str, Any]:
 
 
 def check_converter(config: RadarConfig) -> None:
-    """Refuse what does not fit into uint16."""
+    """Raise Sd2Error for a converter of more than 16 bits."""
     if config.adc_bits > 16:
         raise Sd2Error(f"The converter has {config.adc_bits} bits", "16 or fewer")

@@ -1,4 +1,4 @@
-"""What sets the level of a radar's echoes against its noise."""
+"""Link budget: level of a radar's echoes against its noise."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from sd2core.radar_config import RadarConfig
 
 @dataclass(frozen=True)
 class LinkBudget:
-    """What sets the level of echoes against noise.
+    """Gains and losses that set the level of echoes against noise.
 
     Parameters
     ----------
     transmitted_dbm, transmit_gain_dbi, receive_gain_dbi : float
-        Of a 60 GHz radar on one chip with antennas in its package; 5 dBm and 5 dBi twice.
+        Defaults of a 60 GHz radar on one chip with antennas in its package: 5 dBm and 5 dBi twice.
     reflected : float
         Share of the power that skin reflects at 60 GHz, 0.38 (permittivity 8 - 11j:
         S. Gabriel, R. W. Lau, C. Gabriel, Phys. Med. Biol. 41, 1996, dry skin).
     noise_figure_db, losses_db : float
-        Of the receiver, and of everything else together.
+        Noise figure of the receiver, and all other losses together.
     full_scale : float
         Amplitude of an echo that fills the converter, in units of square metres of
         smooth area over squared range.

@@ -1,4 +1,4 @@
-"""What of the physics a simulated FMCW signal contains, and what surrounds it."""
+"""Options of a simulated FMCW signal: propagation, surface, antennas, surroundings, receiver."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ CONCRETE = -0.39
 
 @dataclass(frozen=True)
 class Mirror:
-    """A plane that reflects the wave: floor or wall, as an image of the sensor.
+    """Reflecting plane, a floor or wall, modelled by an image of the sensor.
 
     Parameters
     ----------
     point_m : tuple of 3 floats
         Any point of the plane, camera frame.
     normal : tuple of 3 floats
-        Across the plane; length and side do not matter.
+        Normal of the plane; length and side do not matter.
     reflection : float
         Amplitude coefficient, from -1 to 1; the same for every angle.
     """
@@ -63,7 +63,7 @@ class Mirror:
 
 @dataclass(frozen=True)
 class WaveOptions:
-    """How echoes are summed, and what they pass through.
+    """Options of the sum of echoes: model, surface, motion, antennas, mirror.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class WaveOptions:
         The ``nufft`` holds every facet's beat frequency over a block of chirps.
         More blocks follow the change of range within a frame (range migration:
         Richards, *Fundamentals of Radar Signal Processing*); with one block per
-        chirp nothing is left out.
+        chirp the sum is complete.
     coherent : bool
         True: a smooth surface. Physical optics on every facet: the closed-form
         mean of cos(theta) / R^2 exp(j phase) over it, curvature of the wave front
@@ -101,7 +101,7 @@ class WaveOptions:
     mirror : Mirror or None
         Two-ray propagation: out and back each directly or by the image
         (Skolnik, *Introduction to Radar Systems*, propagation over a plane).
-        What is hidden from the sensor counts as hidden from its image.
+        Facets hidden from the sensor count as hidden from its image.
     """
 
     model: Model = "nufft"
@@ -136,7 +136,7 @@ class WaveOptions:
 
 @dataclass(frozen=True)
 class Reflector:
-    """A static point of the room.
+    """Static point reflector.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ class Reflector:
 
 @dataclass(frozen=True)
 class SignalOptions:
-    """What surrounds the moving scene, and the receiver.
+    """Options of the static surroundings and of the receiver.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ class SignalOptions:
         Share of the converter's half range that the strongest sample without
         noise reaches: this sets the gain.
     seed : int
-        Same seed, same bits.
+        Seed of the noise.
     link : LinkBudget, optional
         Sets gain and noise in place of ``snr_db`` and ``peak_share``: those of one
         receiver, whatever the scene, so that what is farther away is weaker.
@@ -186,7 +186,7 @@ class SignalOptions:
 
 @dataclass(frozen=True, eq=False)
 class Antenna:
-    """Where a wave leaves or arrives, (3,) each, and how much of it; maybe an image."""
+    """Antenna, or its image: position and boresight, (3,) each, and amplitude."""
 
     position_m: NDArray[np.float64]
     boresight: NDArray[np.float64]
@@ -209,7 +209,7 @@ class Antenna:
 def paths(
     sensor: VirtualSensor, config: RadarConfig, options: WaveOptions
 ) -> list[list[tuple[Antenna, Antenna]]]:
-    """For every receiver the pairs (transmitter, receiver) between which waves travel.
+    """Pairs (transmitter, receiver) between which waves travel, for every receiver.
 
     Raises
     ------
@@ -236,7 +236,7 @@ def paths(
 
 
 def sensor_axes(sensor: VirtualSensor) -> NDArray[np.float64]:
-    """Rows: right of, below and along the boresight, in the camera frame, (3, 3)."""
+    """Axes of the sensor in the camera frame, (3, 3): rows right, down and along the boresight."""
     azimuth = math.radians(sensor.azimuth_deg)
     right = np.array([math.cos(azimuth), 0.0, -math.sin(azimuth)])
     forward = np.asarray(sensor.boresight)

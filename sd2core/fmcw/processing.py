@@ -1,4 +1,4 @@
-"""From raw FMCW samples, measured or simulated, to Doppler maps.
+"""Doppler maps from raw FMCW samples, measured or simulated.
 
 Steps per frame: mean of every chirp removed, static clutter removed, range FFT,
 Doppler FFT, power summed over range gates and receivers, brought onto the
@@ -75,7 +75,7 @@ def doppler_map(
     Parameters
     ----------
     axis : VelocityAxis or None
-        Where to show the power. None takes ``bins`` and ``v_max_mps``, and for
+        Axis of the map. None takes ``bins`` and ``v_max_mps``, and for
         each of these that is None the radar's own: one bin per chirp, v_max.
     bins, v_max_mps
         Short for ``axis=VelocityAxis(bins, v_max_mps)``.
@@ -170,7 +170,7 @@ def range_doppler(
 
 
 def limits(config: RadarConfig) -> dict[str, float]:
-    """What a radar can see, for provenance and read-outs."""
+    """Limits of a radar in range and velocity, for provenance and read-outs."""
     return {
         "wavelength_m": config.wavelength_m,
         "v_max_mps": config.v_max_mps,
@@ -181,7 +181,7 @@ def limits(config: RadarConfig) -> dict[str, float]:
 
 
 def rebinning(config: RadarConfig, axis: VelocityAxis, doppler_bins: int) -> NDArray[np.float64]:
-    """Weights that bring FFT bins (in FFT order) onto a velocity axis.
+    """Weights of the rebinning of FFT bins (in FFT order) onto a velocity axis.
 
     The Doppler FFT is zero-padded, so that power is known several times per
     native bin. Each of its bins is an interval of width 2 v_max / doppler_bins

@@ -1,4 +1,4 @@
-"""What an FMCW radar's wave meets: facets of a moving mesh, or points."""
+"""Scenes of an FMCW radar: facets of a moving mesh, or points."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def point_scatterers(
     area_m2: ArrayLike,
     sensor: VirtualSensor,
 ) -> Scatterers:
-    """Small reflectors of a given effective area that look the same from everywhere.
+    """Scatterers of a given effective area that reflect alike in all directions.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def facet_scatterers(
     config: RadarConfig,
     visible: NDArray[np.bool_] | None = None,
 ) -> Scatterers:
-    """Facets that face the sensor, each reflecting area * cos(theta) / R^2.
+    """Scatterers of the facets that face the sensor, of amplitude area * cos(theta) / R^2.
 
     The phase is linear over a facet, so its sum over the facet is closed form
     (:func:`~sd2core.fmcw.triangle.mean_phasor`). Points one per facet would have
@@ -122,7 +122,7 @@ def radar_times_s(timebase: Timebase, config: RadarConfig) -> NDArray[np.float64
 
 
 class MeshScene:
-    """A moving mesh as seen by one radar.
+    """Moving mesh as seen by one radar.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ class MeshScene:
         return radar_times_s(self.mesh.timebase, self.config)
 
     def there(self, time_s: float) -> bool:
-        """Whether there is somebody whose motion is known: in the mesh frames on both sides."""
+        """True if there is a person in the mesh frames on both sides of an instant."""
         presence = self.mesh.presence
         return presence.whole or bool(presence.measured[list(self._around(time_s))].all())
 
@@ -194,7 +194,7 @@ class MeshScene:
         return position, velocity
 
     def visible(self, time_s: float) -> NDArray[np.bool_] | None:
-        """Facets that nothing hides, (F,); None when that was not looked at."""
+        """Mask of the facets that nothing hides, (F,); None if only the facing test applies."""
         if isinstance(self.visibility, str) and self.visibility == "facing":
             return None
         first, last = self._stretch(time_s)
@@ -204,7 +204,7 @@ class MeshScene:
         return np.asarray(self.visibility[frame])
 
     def between(self, times_s: NDArray[np.float64]) -> Iterator[tuple[NDArray[np.float64], ...]]:
-        """Vertices and velocity at every time on a smooth path through the mesh's frames.
+        """Interpolate vertices and velocity at some times, on a smooth path through the frames.
 
         Cubic Hermite with the central differences of the frames (Catmull-Rom);
         still before the first and after the last frame of the stretch with a person in
@@ -238,12 +238,12 @@ class MeshScene:
         return slope
 
     def _stretch(self, time_s: float) -> tuple[int, int]:
-        """First and last mesh frame of the stretch that an instant lies in."""
+        """First and last mesh frame of the part with a person that an instant lies in."""
         presence, frame = self.mesh.presence, next(iter(self._around(time_s)))
         return int(presence.first[frame]), int(presence.last[frame])
 
     def _around(self, time_s: float) -> dict[int, float]:
-        """Mesh frames that an instant lies between, and their shares in it; one or two."""
+        """Interpolate linearly at an instant: one or two mesh frames and their weights."""
         times = self.mesh.times_s
         if len(times) == 1:
             return {0: 1.0}

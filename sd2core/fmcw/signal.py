@@ -1,4 +1,4 @@
-"""The raw samples an FMCW radar would record of a moving scene.
+"""Raw samples of an FMCW radar from a moving scene, for the bundled sample.
 
 Beat signal of one scatterer after M. A. Richards, *Fundamentals of Radar Signal
 Processing*: cos(2 pi (f_c tau + S tau t)) with the round-trip delay tau, the
@@ -41,7 +41,7 @@ def simulate_capture(
     options: SignalOptions | None = None,
     progress: Progress = silent,
 ) -> RadarCapture:
-    """Raw samples of a moving mesh.
+    """Simulate the raw samples of a moving mesh.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def capture_scene(
     source: str = "",
     progress: Progress = silent,
 ) -> RadarCapture:
-    """Raw samples of any scene that is known at every radar frame.
+    """Simulate the raw samples of any scene that is known at every radar frame.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def echo(scatterers: Scatterers, config: RadarConfig, sensor: VirtualSensor) -> 
 def _phasors(
     first_rad: NDArray[np.float64], step_rad: NDArray[np.float64], count: int
 ) -> NDArray[np.complex128]:
-    """exp(j (first + k step)) for k < count, shape (count, n), by doubling."""
+    """Phasors exp(j (first + k step)) for k < count, (count, n), by doubling."""
     phasors = np.empty((count, len(first_rad)), dtype=np.complex128)
     phasors[0] = np.exp(1j * first_rad)
     step = np.exp(1j * step_rad)
@@ -188,7 +188,7 @@ def _receivers(config: RadarConfig, sensor: VirtualSensor) -> NDArray[np.float64
 def _range_and_rate(
     scatterers: Scatterers, part: slice, position_m: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Distance from a place and how fast it grows."""
+    """Distance from a place and its rate of change."""
     away = scatterers.position_m[part] - position_m
     range_m = np.linalg.norm(away, axis=1)
     growth = np.einsum("ni,ni->n", away, scatterers.velocity_mps[part])

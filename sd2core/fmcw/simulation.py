@@ -43,7 +43,7 @@ def simulate_radar(
     memory_bytes: int = 500_000_000,
     progress: Progress = silent,
 ) -> RadarCapture:
-    """Raw samples that a radar would record of a moving mesh.
+    """Simulate the raw samples of a radar from a moving mesh.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def _fill(
     signal: NDArray[np.float32],
     progress: Progress,
 ) -> tuple[NDArray[np.float64], float]:
-    """Beat signals of all frames, each on a thread of its own; mean squares and peak.
+    """Fill in the beat signals of all frames on worker threads; returns mean squares and peak.
 
     The mean square of a frame is that without what stands still.
     """

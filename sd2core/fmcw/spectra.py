@@ -53,7 +53,7 @@ def frame_spectra(
     processing : ProcessingOptions
         Clutter must be ``none`` or ``mean``: a moving average needs the frames between.
     seed : int
-        Of the random phases of a rough surface.
+        Seed of the random phases of a rough surface.
     threads : 1 or "all"
         1 stays in the calling thread.
 
@@ -80,7 +80,7 @@ def velocity_response(
     axis: VelocityAxis | None = None,
     processing: ProcessingOptions | None = None,
 ) -> NDArray[np.float64]:
-    """What a radar shows of an echo with constant velocity: its window and clutter filter.
+    """Response of a radar to an echo of constant velocity: window and clutter filter.
 
     A histogram over fine bins, multiplied by this, is what the radar would show of it if
     powers added up.

@@ -1,4 +1,4 @@
-"""Summing many echoes to one frame of an FMCW signal: directly, or by a non-uniform FFT.
+"""Sum of many echoes to one frame of an FMCW signal: directly, or by a non-uniform FFT.
 
 An echo at range R that grows at rate r has, at time t_m of chirp m and t_n of
 sample n from the middles of frame and chirp, the phase
@@ -28,7 +28,7 @@ _MOST_PLANS = 8
 
 
 class _Plans(threading.local):
-    """What finufft prepared for this thread: preparing takes a third as long as using."""
+    """Prepared finufft plans of this thread: preparing takes a third as long as using."""
 
     def __init__(self) -> None:
         self.made: dict[tuple[tuple[int, int], int, float], Any] = {}
@@ -42,7 +42,7 @@ _TERMS_PER_STEP = 1_000_000
 
 @dataclass(frozen=True, eq=False)
 class Echoes:
-    """What comes back to one receiver.
+    """Echoes at one receiver.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Echoes:
 
     @property
     def count(self) -> int:
-        """How many."""
+        """Number of echoes."""
         return len(self.range_m)
 
     @property
@@ -86,7 +86,7 @@ def direct(
     chirps: int | None = None,
     go_on: Callable[[], None] | None = None,
 ) -> NDArray[np.complex128]:
-    """Sum of every echo at every sample, (chirps, samples): the reference.
+    """Sum every echo at every sample directly, (chirps, samples); the reference.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def direct(
 def recurrent(
     echoes: Echoes, config: RadarConfig, chirps: int | None = None
 ) -> NDArray[np.complex128]:
-    """The direct sum with phasors turned from sample to sample, some ten times as fast.
+    """Compute the direct sum with phasors turned from sample to sample, about ten times as fast.
 
     Nothing is left out; rounding adds some 1e-14 times the samples of a chirp.
     """
@@ -153,7 +153,7 @@ def nufft(
     chirps: int | None = None,
     tolerance: float = NUFFT_TOLERANCE,
 ) -> NDArray[np.complex128]:
-    """The same sum by type-1 non-uniform FFTs on one thread, (chirps, samples).
+    """Compute the same sum by type-1 non-uniform FFTs on one thread, (chirps, samples).
 
     Parameters
     ----------

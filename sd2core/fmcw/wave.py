@@ -1,4 +1,4 @@
-"""What the waves of one radar do with a moving mesh: echoes on every path, summed up."""
+"""Beat signals of a radar and a moving mesh: the sum of the echoes on every path."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _NO_PLANE = np.array([0.0, 0.0, 0.0, 1.0])
 
 
 class WaveScene:
-    """A moving mesh, one radar, and everything waves do between them.
+    """Moving mesh and radar with the wave propagation between them.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class WaveScene:
     visibility : bool array, shape (T, F), "facing" or "exact"
         See :class:`~sd2core.fmcw.scene.MeshScene`.
     seed : int
-        Of the random phases of a rough surface.
+        Seed of the random phases of a rough surface.
     """
 
     def __init__(
@@ -75,12 +75,12 @@ class WaveScene:
         return rows[0] if len(rows) == 1 else np.concatenate(rows, axis=1)
 
     def silence(self) -> NDArray[np.float64]:
-        """Beat signal of a frame in which nothing echoes."""
+        """Zero beat signal of a frame without echoes."""
         config = self.config
         return np.zeros((config.receivers, config.chirps_per_frame, config.samples_per_chirp))
 
     def bursts(self, time_s: float) -> Iterator[tuple[tuple[NDArray[np.float64], ...], int]]:
-        """Vertices and their velocity, and for how many chirps of a frame these hold."""
+        """Yield vertices and velocities, and the number of chirps of a frame that they hold for."""
         chirps = self.config.chirps_per_frame
         if self.wave.motion == "constant":
             yield self.scene.moving(time_s), chirps
@@ -97,7 +97,7 @@ class WaveScene:
         receiver: int = 0,
         faces: NDArray[np.int32] | None = None,
     ) -> Echoes:
-        """What one receiver gets back from every facet on every path.
+        """Echoes of every facet on every path to one receiver.
 
         Other ``faces`` than the mesh's own belong to other vertices, and are for a
         smooth surface: the phases of a rough one belong to its facets.
@@ -111,7 +111,7 @@ class WaveScene:
         return parts[0] if len(parts) == 1 else _joined(parts)
 
     def static(self, reflectors: tuple[Reflector, ...]) -> NDArray[np.float64]:
-        """Beat signal of points that stand still, (receivers, chirps, samples)."""
+        """Beat signal of static points, (receivers, chirps, samples)."""
         found = self.silence()
         if reflectors:
             for receiver, pairs in enumerate(self.paths):

@@ -1,4 +1,4 @@
-"""Where a body is during a clip and how it moves, and what that asks of sensors around it."""
+"""Space that a body takes up during a clip, and how well sensors around it cover it."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ _FASTEST_SHARE = 0.01
 
 @dataclass(frozen=True, eq=False)
 class SensorCoverage:
-    """What the body asks of each of N sensors.
+    """Distances and velocities of the body as seen from each of N sensors.
 
     Parameters
     ----------
     inside : bool array, shape (N,)
-        Whether the sensor stands in the box around the body at some time.
+        True if the sensor stands in the box around the body at some time.
     farthest_m : array, shape (N,)
-        To the farthest corner of that box, at any time.
+        Largest distance to a corner of that box at any time.
     fastest_mps : array, shape (N,)
         Radial velocity, without its sign, that 1 % of the vertices exceed in some frame.
     """
@@ -38,27 +38,27 @@ class SensorCoverage:
     fastest_mps: NDArray[np.float64]
 
     def out_of_range(self, radar: RadarConfig) -> NDArray[np.bool_]:
-        """Which of a radar's sensors would see part of the body folded in range."""
+        """Mask of sensors that see part of the body beyond the radar's range."""
         return self.farthest_m > radar.range_max_m
 
     def aliasing(self, radar: RadarConfig) -> NDArray[np.bool_]:
-        """Which of a radar's sensors would see part of the body folded in velocity."""
+        """Mask of sensors that see part of the body faster than the radar's v_max."""
         return self.fastest_mps > radar.v_max_mps
 
     def beyond(self, radar: RadarConfig) -> NDArray[np.bool_]:
-        """Which places are no good for a radar, for any of these reasons."""
+        """Mask of sensors that are unsuitable for any of these reasons."""
         return self.inside | self.out_of_range(radar) | self.aliasing(radar)
 
 
 @dataclass(frozen=True, eq=False)
 class BodyExtent:
-    """A body in up to 100 frames with a person, spread over the clip.
+    """Position and motion of a body in up to 100 frames with a person, spread over the clip.
 
     Parameters
     ----------
     target_m : tuple of 3 floats
-        What sensors look at: the mean over time of the median vertex, which is inside the
-        torso whatever the limbs do.
+        Point at which sensors aim: the mean over time of the median vertex, which lies in the
+        torso however the limbs move.
     low_m, high_m : arrays, shape (n, 3)
         Corners of the box around the body in each frame.
     points_m, velocity_mps : float32 arrays, shape (n, k, 3)
@@ -74,18 +74,18 @@ class BodyExtent:
 
     @classmethod
     def of(cls, mesh: MeshSequence) -> BodyExtent:
-        """Of a clip, which is read frame by frame.
+        """Extent of the body in a clip, which is read frame by frame.
 
         Raises
         ------
         Sd2Error
-            When there is a person in no frame.
+            If no frame has a person.
         """
         there = np.flatnonzero(mesh.presence.there)
         if not len(there):
             raise Sd2Error(
                 f"{mesh.source or 'The mesh'} has a person in no frame",
-                "somebody to place sensors around",
+                "a person to place sensors around",
             )
         picked = there[np.linspace(0, len(there) - 1, min(len(there), _SAMPLED_FRAMES)).astype(int)]
         stride = -(-mesh.vertex_count // _SAMPLED_VERTICES)
@@ -111,7 +111,7 @@ class BodyExtent:
         """Coverage of the body by sensors; takes less than a millisecond for each."""
         inside = np.zeros(len(sensors), dtype=bool)
         farthest_m, fastest_mps = np.zeros((2, len(sensors)))
-        # Which of the vertices of a frame 1 % are faster than.
+        # Index of the vertex that 1 % of a frame's vertices are faster than.
         rank = int(np.ceil((1.0 - _FASTEST_SHARE) * self.points_m.shape[1])) - 1
         for number, sensor in enumerate(sensors):
             progress(number, len(sensors))

@@ -1,4 +1,4 @@
-"""What the maps of many placements cost, from what one frame of one map costs."""
+"""Cost of the maps of many placements, from the time of one frame."""
 
 from __future__ import annotations
 
@@ -10,15 +10,14 @@ _VALUE_BYTES, _TIME_BYTES = 4, 8
 
 @dataclass(frozen=True)
 class PlacementCost:
-    """Time and room that a map per placement takes.
+    """Time and memory of one map per placement.
 
     Parameters
     ----------
     maps, frames : int
         Maps, and frames of each.
     frame_ms : float
-        Of the plan that holds the tolerance, per frame on all cores, as the ladder measured
-        it on the scene.
+        Measured time per frame on all cores of the plan that holds the tolerance.
     bins : int
         Velocity bins of a map.
     """
@@ -35,10 +34,10 @@ class PlacementCost:
 
     @property
     def total_s(self) -> float:
-        """Seconds for all of them, without what is done once per clip."""
+        """Seconds for all maps, without the preparation of the clip."""
         return self.maps * self.map_s
 
     @property
     def total_bytes(self) -> int:
-        """Values and times of all maps, before compression."""
+        """Bytes of the values and times of all maps, before compression."""
         return self.maps * self.frames * (_VALUE_BYTES * self.bins + _TIME_BYTES)

@@ -1,4 +1,4 @@
-"""Where sensors are placed around a body: a grid, or a random cloud.
+"""Sensor placements around a body: a grid, or a random cloud.
 
 A place is a range, an azimuth and an elevation as seen from the body, in the convention of
 :func:`sd2core.sensor.position_from_spherical` and of the sensor panel: 0°, 0° is on the
@@ -52,7 +52,7 @@ class Place:
     elevation_deg: float = 0.0
 
     def sensor(self, target_m: Vector) -> VirtualSensor:
-        """A sensor here that looks at the target."""
+        """Sensor at this place, aimed at the target."""
         return VirtualSensor(
             position_from_spherical(target_m, self.range_m, self.azimuth_deg, self.elevation_deg),
             azimuth_deg=-self.azimuth_deg,
@@ -61,7 +61,7 @@ class Place:
 
     @property
     def words(self) -> str:
-        """Such as ``2.2 m, azimuth 30°, elevation -10°``."""
+        """Text such as ``2.2 m, azimuth 30°, elevation -10°``."""
         # Adding 0.0 makes -0.0 plain.
         azimuth_deg, elevation_deg = (
             round(angle, 1) + 0.0 for angle in (self.azimuth_deg, self.elevation_deg)
@@ -72,10 +72,10 @@ class Place:
 
 
 class _Spec:
-    """What a grid and a cloud have in common."""
+    """Base class of grid and cloud."""
 
     def places(self) -> tuple[Place, ...]:
-        """Every place once."""
+        """Distinct places."""
         raise NotImplementedError
 
     def sensors(self, target_m: Vector) -> tuple[VirtualSensor, ...]:
@@ -119,7 +119,7 @@ class PlacementGrid(_Spec):
             raise Sd2Error(f"There are {count} placements", f"at most {MOST} around one body")
 
     def places(self) -> tuple[Place, ...]:
-        """By range, then azimuth, then elevation, in the order given."""
+        """Distinct places by range, then azimuth, then elevation, in the given order."""
         return _unique(
             (range_m, azimuth_deg, elevation_deg)
             for range_m in self.ranges_m
@@ -184,7 +184,7 @@ class PlacementCloud(_Spec):
             )
 
     def places(self) -> tuple[Place, ...]:
-        """In the order they are drawn; where all are one place, only one."""
+        """Distinct places in the order they are drawn."""
         drawn = np.random.default_rng(self.seed).random((self.count, 3))
         azimuth_deg = self.azimuth_deg[0] + drawn[:, 1] * (
             self.azimuth_deg[1] - self.azimuth_deg[0]
@@ -289,7 +289,7 @@ def _unique(raw: Iterable[tuple[float, float, float]]) -> tuple[Place, ...]:
 
 
 def _place(range_m: float, azimuth_deg: float, elevation_deg: float) -> Place:
-    """The one name of a place; adding 0.0 makes -0.0 plain."""
+    """Place in its canonical form; adding 0.0 turns -0.0 into 0.0."""
     elevation_deg = round(elevation_deg, _DIGITS) + 0.0
     azimuth_deg = round(math.remainder(azimuth_deg, 360.0), _DIGITS) + 0.0
     if azimuth_deg == -180.0:
@@ -321,7 +321,7 @@ def _interval(name: str, values: object) -> Interval:
 def _bounded(
     ranges_m: tuple[float, ...], azimuths_deg: tuple[float, ...], elevations_deg: tuple[float, ...]
 ) -> tuple[tuple[str, tuple[float, ...]], ...]:
-    """Names and values, once all are known to be within bounds."""
+    """Names and values, after a check of all bounds."""
     for name, values, least, most, unit in (
         ("range", ranges_m, NEAREST_M, FARTHEST_M, " m"),
         ("azimuth", azimuths_deg, -360.0, 360.0, "°"),

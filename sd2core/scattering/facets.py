@@ -1,4 +1,4 @@
-"""Which facets a sensor sees: those that face it and have a centre that nothing hides."""
+"""Visibility of facets: those that face a sensor and whose centre nothing hides."""
 
 from __future__ import annotations
 

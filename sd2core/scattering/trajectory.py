@@ -1,7 +1,7 @@
-"""The path of every vertex: resampled and smoothed in time, whatever the sensor.
+"""Paths of the vertices, resampled and smoothed in time.
 
 Both are linear in the positions with weights that depend on the real frame times
-only, so a long recording can be taken in stretches without visible seams, and a
+only, so a long recording can be computed in parts without visible seams, and a
 variable frame rate needs no special case.
 """
 
@@ -28,7 +28,7 @@ _SLACK_S = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """A trajectory's knots: the frames, and ``oversampling - 1`` moments between each two.
+    """Knots of a trajectory: the frames, and ``oversampling - 1`` moments between each two.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class Trajectory:
         is fitted under the Gaussian, so uniform motion stays as it is, up to
         both ends of the recording.
     presence : Presence, optional
-        Of the frames. Every stretch with a person in it has a path of its own; knots
+        Of the frames. Frames without a person separate paths of their own; knots
         without a person are at the frame before.
     """
 

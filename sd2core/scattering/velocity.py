@@ -56,7 +56,7 @@ def _dot(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
 
 @dataclass(frozen=True, eq=False)
 class Stencil:
-    """Between which knots of a trajectory velocities are measured.
+    """Knots of a trajectory between which velocities are measured.
 
     Parameters
     ----------
@@ -77,11 +77,11 @@ def moments(
     oversampling: int,
     presence: Presence | None = None,
 ) -> Stencil:
-    """Between which knots the velocities of each frame are measured, on real times.
+    """Knots between which the velocities of each frame are measured, on real times.
 
     The moments of a frame are spread evenly and symmetrically around it. An odd
     number are knots, each measured between its neighbours (one-sided at the two
-    ends of the clip, and of each stretch with a person in it); an even number lie
+    ends of the clip, and next to frames without a person); an even number lie
     midway between two knots, which they are measured between.
 
     Parameters

@@ -1,0 +1,97 @@
+"""Counts of prepared frames for one sensor place: visible vertices, weights, bins."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.doppler import histogram, vid2doppler
+from sd2core.doppler.histogram import Counting, Counts, Scatterers
+from sd2core.doppler.kernels import CLIP, DROP, WRAP
+from sd2core.doppler.masks import Position, Quality, Visibility, VisibilityMasks
+from sd2core.doppler.prepared import Block, PreparedMesh
+from sd2core.numerics.compiled import kernels_ready
+from sd2core.scattering.amplitude import range_weight
+
+
+class FrameCounts:
+    """Counts of the frames of a prepared mesh, block by block, for any sensor place."""
+
+    def __init__(self, prepared: PreparedMesh) -> None:
+        self.prepared = prepared
+        self.mesh = prepared.mesh
+        self.options = options = prepared.options
+        self.counting = Counting(
+            options.axis.bins,
+            options.axis.v_max_mps,
+            {"drop": DROP, "wrap": WRAP, "clip": CLIP}[options.beyond],
+            options.range_exponent if options.range_law == "vertex" else 0.0,
+            options.reference_range_m,
+        )
+        self.masks = VisibilityMasks(prepared, self.counting)
+
+    def blocks_between(self, start: int, stop: int) -> list[tuple[int, int, int]]:
+        """Blocks of frames ``start`` to ``stop``: number, first and last (exclusive) frame."""
+        size = self.prepared.block_frames
+        return [
+            (index, max(start, index * size), min(stop, (index + 1) * size))
+            for index in range(start // size, (stop - 1) // size + 1)
+        ]
+
+    def count(
+        self,
+        block: Block,
+        rows: slice,
+        position_m: Position,
+        visibility: Visibility,
+        into: Counts,
+        totals: NDArray[np.float64],
+    ) -> Quality:
+        """Count some of a block's frames; returns the visibility that was used."""
+        place = self.prepared.sensor(position_m)
+        totals[:] = self.totals(block, rows)
+        scatterers, quality = self.scatterers(block, rows, position_m, visibility)
+        frames = block.frames.rows(rows)
+        if self.options.velocity == "vid2doppler":
+            velocity = self.prepared.velocities_vid2doppler(block, rows, place)
+            edges_mps = self.options.axis.edges_mps
+            vid2doppler.count(frames, velocity, edges_mps, place, self.counting, scatterers, into)
+        else:
+            count = histogram.count if kernels_ready() else histogram.count_plain
+            count(frames, place, self.counting, scatterers, into)
+        if self.options.range_law == "frame":
+            into.histogram[:] *= self.frame_law(block, rows, position_m)[:, None]
+        return quality
+
+    def totals(self, block: Block, rows: slice) -> NDArray[np.float64]:
+        """Totals that the counts of some of a block's frames are shares of, (n,)."""
+        if self.options.weight != "count":
+            return self.prepared.surface(block)[rows]
+        return np.full(rows.stop - rows.start, float(self.mesh.represented_count))
+
+    def frame_law(self, block: Block, rows: slice, position_m: Position) -> NDArray[np.float64]:
+        """Range law of some of a block's frames, (n,); ones where it applies to each vertex."""
+        options = self.options
+        if options.range_law != "frame":
+            return np.ones(rows.stop - rows.start)
+        away_m = self.prepared.middles(block)[rows] - self.prepared.sensor(position_m)
+        range_m = np.linalg.norm(away_m, axis=1)
+        return range_weight(range_m, options.range_exponent, options.reference_range_m).astype(
+            np.float64
+        )
+
+    def scatterers(
+        self, block: Block, rows: slice, position_m: Position, visibility: Visibility
+    ) -> tuple[Scatterers, Quality]:
+        """Scatterers of some of a block's frames, and the visibility that was used."""
+        weight = self.options.weight
+        mask, quality = self.masks.for_rows(block, rows, position_m, visibility)
+        facing = mask is None and quality == "facing"
+        scatterers = Scatterers(
+            normals=self.prepared.normals(block)[rows] if facing else None,
+            mask=mask,
+            areas=self.prepared.areas(block)[rows] if weight == "area" else None,
+            area_vectors=self.prepared.area_vectors(block)[rows] if weight == "projected" else None,
+            vertex_counts=self.prepared.heads,
+        )
+        return scatterers, quality
