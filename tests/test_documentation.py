@@ -13,9 +13,10 @@ from sd2app.command_line import full_parser
 from sd2core.cli.running import attach_negative_values
 
 REPOSITORY = Path(__file__).resolve().parent.parent
-DOCUMENTS = [REPOSITORY / name for name in ("README.md", "CONTRIBUTING.md")] + sorted(
-    (REPOSITORY / "docs").glob("*.md")
-)
+DOCUMENTS = [
+    REPOSITORY / name
+    for name in ("README.md", "CONTRIBUTING.md", "resources/README.md", "tools/README.md")
+] + sorted((REPOSITORY / "docs").glob("*.md"))
 
 
 def command_lines() -> Iterator[str]:
@@ -52,7 +53,9 @@ def test_the_python_of_the_readme_runs(
     assert names["m"].axis == names["real"].axis
 
 
-@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
+@pytest.mark.parametrize(
+    "document", DOCUMENTS, ids=lambda path: path.relative_to(REPOSITORY).as_posix()
+)
 def test_links_lead_somewhere(document: Path) -> None:
     for target in re.findall(r"\]\(([^)#]+)", document.read_text("utf-8")):
         if "://" not in target:
