@@ -35,6 +35,7 @@ _SIGMAS = 6.0
 _ROUNDS = 5
 _SWITCH_M = 0.10
 _BRIDGED_VISIBILITY = 0.25
+_MARGIN_FRAMES = 300
 
 
 @dataclass(frozen=True, eq=False)
@@ -312,10 +313,10 @@ def bridge_gaps(found: RawTrack, max_gap_s: float) -> RawTrack:
     return replace(found, present=found.present | fill, bridged=found.bridged | fill, **changed)
 
 
-_MARGIN_FRAMES = 300
+# -- The whole clip ------------------------------------------------------------------------------
 
 Read = Callable[[int, int], RawTrack]
-"""Gives what was found in frames ``start`` to ``stop``."""
+"""Function that gives what was found in frames ``start`` to ``stop``."""
 
 
 def repair_landmarks(

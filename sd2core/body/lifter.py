@@ -31,6 +31,7 @@ from sd2core.files.resources import open_bundled_arrays, resource_path
 from sd2core.mesh.presence import runs
 from sd2core.timebase import Timebase
 
+Singles = NDArray[np.float32]
 Floats = NDArray[np.float64]
 
 
@@ -81,10 +82,6 @@ class Lifted(Protocol):
     def part(self, start: int, stop: int) -> LiftedTrack:
         """Frames ``start`` to ``stop``."""
         ...
-
-
-Singles = NDArray[np.float32]
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,9 @@ Floats = NDArray[np.float64]
 CROP_PX = 256
 """Side of what the landmark network sees."""
 
+_CENTRE_S = 0.2
+_SIZE_S = 0.5
+_ANGLE_S = 0.5
 _MARGIN = 1.25
 """Side of the square over the diameter of the person's circle."""
 
@@ -84,11 +87,6 @@ def _sampled(picture: Pixels, matrix: Floats, crop_px: int) -> Pixels:
         borderMode=cv2.BORDER_CONSTANT,
     )
     return crop
-
-
-_CENTRE_S = 0.2
-_SIZE_S = 0.5
-_ANGLE_S = 0.5
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,12 @@ from sd2core.io.video import VideoReader
 Signature = NDArray[np.float32]
 """Histograms of colour of torso and thighs, shape (2, 512); each adds up to 1, or is 0."""
 
+_STEP_S = 1.0 / 15.0
+"""Time between frames that are searched; the path in between is smooth."""
+_LOOK_ROUND_S = 0.5
+_MAX_CANDIDATES = 4
+_SMALL = 0.6
+_BLOCK_BYTES = 192 * 2**20
 _SMALL_PX = 64
 _BINS = 8
 _SHOULDERS, _HIPS, _KNEES = (
@@ -72,13 +78,6 @@ def _in_crop(pose: Pose) -> Floats:
 
 Seen = Callable[[int, Pose | None], None]
 """``seen(frame, pose)``, None where the person was not found; may raise ``Cancelled``."""
-
-_STEP_S = 1.0 / 15.0
-"""Time between frames that are searched; the path in between is smooth."""
-_LOOK_ROUND_S = 0.5
-_MAX_CANDIDATES = 4
-_SMALL = 0.6
-_BLOCK_BYTES = 192 * 2**20
 
 
 @dataclass(eq=False)
