@@ -60,7 +60,7 @@ def describe(path: Path, options: argparse.Namespace) -> Description:
     if kind == "radar":
         return describe_radar(path)
     if kind == "pairs":
-        from sd2core.cli.info.pairs import describe_pairs
+        from sd2core.cli.info.learning_data import describe_pairs
         from sd2core.pairs.store import read_pairs
 
         return describe_pairs(path, read_pairs(path))
@@ -69,7 +69,7 @@ def describe(path: Path, options: argparse.Namespace) -> Description:
 
         return describe_model_file(path)
     if kind == "dataset":
-        from sd2core.cli.info.dataset import describe_dataset_at
+        from sd2core.cli.info.learning_data import describe_dataset_at
 
         return describe_dataset_at(path)
     from sd2core.maps import DopplerMap
