@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.classify.defaults import LONGEST_DELAY_S
 from sd2core.classify.features import Features
 from sd2core.errors import Sd2Error
 from sd2core.labels.label_set import check_name
@@ -18,17 +19,6 @@ from sd2core.sensor import VelocityAxis
 
 FORMAT = "sd2-classifier"
 VERSION = 2
-
-MODELS = ("lstm", "s4")
-"""The paper's network, and one of the denoiser's S4 layers."""
-
-WIDTH = 32
-"""Units or channels of every layer (the paper's: 16)."""
-
-DELAY_S = 0.5
-"""Frames of so many seconds after a frame are seen before its answer (the paper's: none)."""
-
-LONGEST_DELAY_S = 5.0
 
 BACKGROUND = "background"
 """The class of frames in which there is none of the gestures."""
@@ -41,7 +31,7 @@ class ClassifierCard:
     Parameters
     ----------
     model : str
-        A name of :data:`sd2core.classify.card.MODELS`.
+        A name of :data:`sd2core.classify.defaults.MODELS`.
     options : mapping
         What it was built with.
     features : Features

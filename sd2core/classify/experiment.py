@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
-from sd2core.classify.card import DELAY_S, WIDTH
 from sd2core.classify.data import Clip, ClipSet, frame_counts, seen_first
+from sd2core.classify.defaults import DELAY_S, WIDTH
 from sd2core.classify.features import Kind
 from sd2core.classify.splitting import Parts, fold, movements
 from sd2core.errors import Sd2Error

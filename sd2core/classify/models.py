@@ -8,7 +8,7 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-from sd2core.classify.card import MODELS, WIDTH
+from sd2core.classify.defaults import MODELS, WIDTH
 from sd2core.denoise.s4_layer import S4Layer
 from sd2core.errors import Sd2Error
 

@@ -15,8 +15,9 @@ import torch
 from numpy.typing import NDArray
 from torch.nn import functional
 
-from sd2core.classify.card import DELAY_S, LONGEST_DELAY_S, ClassifierCard
+from sd2core.classify.card import ClassifierCard
 from sd2core.classify.data import UNKNOWN, Clip, ClipSet, frame_counts, some_noisy
+from sd2core.classify.defaults import DELAY_S, LONGEST_DELAY_S
 from sd2core.classify.features import Features, Kind
 from sd2core.classify.live import TrainedClassifier
 from sd2core.classify.metrics import confusion_of, mean_recall

@@ -9,7 +9,8 @@ import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 from timing import spent_s
 
-from sd2core.classify.card import MODELS, ClassifierCard
+from sd2core.classify.card import ClassifierCard
+from sd2core.classify.defaults import MODELS
 from sd2core.classify.features import Features
 from sd2core.classify.live import TrainedClassifier
 from sd2core.classify.models import build

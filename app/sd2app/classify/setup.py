@@ -12,7 +12,7 @@ from sd2app.background.latest import LatestRunner
 from sd2app.background.step_times import StepKey
 from sd2app.classify.data import DataSource, division_of, looked_into, why_not_together
 from sd2app.settings import Settings, StoredChoices
-from sd2core.classify.card import DELAY_S, LONGEST_DELAY_S, MODELS, WIDTH
+from sd2core.classify.defaults import DELAY_S, LONGEST_DELAY_S, MODELS, WIDTH
 from sd2core.files.paths import plain_path
 from sd2core.train.data import Split
 

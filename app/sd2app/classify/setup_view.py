@@ -23,7 +23,7 @@ from sd2app.training.estimate import EstimateLines
 from sd2app.training.text import division_text, steps_text
 from sd2app.widgets.inputs import Choice, NumberBox, TypedLine
 from sd2app.widgets.panel import data_row, outlined, rule, sentence, side_by_side, title
-from sd2core.classify.card import LONGEST_DELAY_S
+from sd2core.classify.defaults import LONGEST_DELAY_S
 from sd2core.train.data import Split
 
 _MAP_TIPS = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from sd2core.classify.card import DELAY_S, MODELS, WIDTH
+from sd2core.classify.defaults import DELAY_S, MODELS, WIDTH
 from sd2core.cli.options import not_negative_float, positive_int
 
 if TYPE_CHECKING:

@@ -16,7 +16,8 @@ import pytest
 from classifiers import CLASSES, classifier, energies, features
 from safetensors.torch import save
 
-from sd2core.classify.card import MODELS, ClassifierCard
+from sd2core.classify.card import ClassifierCard
+from sd2core.classify.defaults import MODELS
 from sd2core.classify.files import describe_classifier, load_classifier, save_classifier
 from sd2core.classify.live import TrainedClassifier
 from sd2core.classify.models import build

@@ -10,8 +10,8 @@ import pytest
 import torch
 from labelled_clips import clip_set
 
-from sd2core.classify.card import MODELS
 from sd2core.classify.data import UNKNOWN, ClipSet
+from sd2core.classify.defaults import MODELS
 from sd2core.classify.files import load_classifier, save_classifier
 from sd2core.classify.live import judge
 from sd2core.classify.training import TrainOptions, train

@@ -8,7 +8,7 @@ from classifiers import CLASSES, classifier, doppler, energies
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sd2core.classify.card import MODELS
+from sd2core.classify.defaults import MODELS
 from sd2core.classify.live import CHUNK
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
