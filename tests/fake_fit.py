@@ -1,6 +1,7 @@
 """Speaks as ``sd2 fit --progress-json`` does, and fits nothing.
 
-``fake_fit.py [--frames N] [--pause-s S] [--stop-at N] [--refuse TEXT] fit VIDEO --out OUT …``;
+``fake_fit.py [--frames N] [--pause-s S] [--stop-at N] [--refuse TEXT] FOLDER fit VIDEO --out
+OUT …``;
 the mesh it writes is a folder with nothing in it, or with ``--body`` an octahedron that moves.
 ``OUT.partial`` holds how many frames are done.
 """
@@ -13,6 +14,8 @@ import os
 import sys
 import time
 from pathlib import Path
+
+from sd2app.background.run_command import CommandFolder, run_in_folder
 
 STAGES = ["find", "refine", "fit", "write"]
 
@@ -56,6 +59,7 @@ def main() -> int:
     parser.add_argument("--body", action="store_true")
     parser.add_argument("--width", type=int, default=160)
     parser.add_argument("--height", type=int, default=120)
+    parser.add_argument("folder", type=Path)
     parser.add_argument("command", choices=["fit"])
     parser.add_argument("video", type=Path)
     parser.add_argument("--out", type=Path, required=True)
@@ -65,6 +69,10 @@ def main() -> int:
     parser.add_argument("--person")
     parser.add_argument("--person-frame")
     options = parser.parse_args()
+    return run_in_folder(CommandFolder(options.folder), lambda: fit(options))
+
+
+def fit(options: argparse.Namespace) -> int:
     partial = options.out.with_name(options.out.name + ".partial")
     first = int(partial.read_text()) if partial.exists() else 0
     size = {"width": options.width, "height": options.height}

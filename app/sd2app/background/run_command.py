@@ -15,15 +15,17 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_write_text
 from sd2core.processes import ONE_THREAD, ProcessId, lower_priority
 from sd2core.runs.control import read_control, write_control
-from sd2core.runs.folder import RunFolder, State
+from sd2core.runs.folder import LIVE, RunFolder, State
 
 COMMAND = (sys.executable, "-u", "-m", "sd2app.background.run_command")
 COMMAND_IN_FOLDER = (*COMMAND, "--folder")
@@ -112,6 +114,20 @@ class CommandFolder(RunFolder):
         return code if isinstance(code, int) else None
 
     @property
+    def taken(self) -> bool:
+        """True while a process works in the folder, or was started and has not got there."""
+        if self.live:
+            return True
+        launched = self._read_launch("process")
+        return launched is not None and launched.is_alive and self.facts.get("state") in LIVE
+
+    @property
+    def is_followed(self) -> bool:
+        """True while the window is there that started the command, or took it up."""
+        window = self._read_launch("window")
+        return window is not None and window.is_alive
+
+    @property
     def stop_wanted(self) -> bool:
         """True once the command was told to end."""
         return read_control(self.control) in ("stop", "cancel")
@@ -145,12 +161,14 @@ class CommandFolder(RunFolder):
             When the folder cannot be made.
         """
         self.path.mkdir(parents=True, exist_ok=True)
-        for path in (self.description, self.output, *self._of_yesterday):
+        for path in (self.description, self.output, self._launched, *self._of_yesterday):
             path.unlink(missing_ok=True)
         write_control(self.control, "run")
         told = {"started_unix_s": time.time(), "arguments": list(arguments), **about}
         self._describe("starting", **told)
-        return launch([*command, str(self.path), *arguments], self.output, environment)
+        process = launch([*command, str(self.path), *arguments], self.output, environment)
+        self._note_launch(process)
+        return process
 
     def about(self) -> dict[str, Any]:
         """Content of the description; that of an earlier version has its state elsewhere."""
@@ -174,6 +192,27 @@ class CommandFolder(RunFolder):
         """Note the exit code of the command, which this process has run."""
         with suppress(OSError, Sd2Error):  # deleted meanwhile
             self.set_state(_STATES.get(code, "failed"), code=code)
+
+    def take_up(self) -> None:
+        """Note that this window follows the command."""
+        process = self._read_launch("process") or self.process
+        if process is not None:
+            self._note_launch(process)
+
+    # The process has a file of its own, so that neither overwrites what the other notes.
+    def _note_launch(self, process: ProcessId) -> None:
+        told = {"process": asdict(process), "window": asdict(ProcessId.current())}
+        atomic_write_text(self._launched, json.dumps(told) + "\n")
+
+    def _read_launch(self, part: str) -> ProcessId | None:
+        try:
+            return ProcessId(**json.loads(self._launched.read_text("utf-8"))[part])
+        except (OSError, ValueError, KeyError, TypeError):
+            return None
+
+    @property
+    def _launched(self) -> Path:
+        return self.path / "launched.json"
 
     @property
     def _of_yesterday(self) -> tuple[Path, Path]:
@@ -201,6 +240,17 @@ def main() -> int:
         from sd2app.command_line import main as run
 
         return run()
+
+    def command() -> int:
+        from sd2app.command_line import main as run
+
+        return run(words)
+
+    return run_in_folder(folder, command)
+
+
+def run_in_folder(folder: CommandFolder, command: Callable[[], int]) -> int:
+    """Run a command as the process of a folder, and note its end."""
     # What was started in the background of a script has Ctrl-C switched off.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
@@ -213,9 +263,7 @@ def main() -> int:
     try:
         folder.set_state("running")
         threading.Thread(target=_watch, args=(folder, over), daemon=True).start()
-        from sd2app.command_line import main as run
-
-        code = run(words)
+        code = command()
     except KeyboardInterrupt:
         code = _INTERRUPTED
     except SystemExit as error:  # what was typed wrong
@@ -230,7 +278,10 @@ def _watch(folder: CommandFolder, over: threading.Event) -> None:
     """Interrupt the command as Ctrl-C does, once it is told to stop."""
     while not over.wait(_POLL_S):
         if folder.stop_wanted:
-            _thread.interrupt_main()
+            if sys.platform == "win32":
+                _thread.interrupt_main()
+            else:  # wakes it from what it waits for
+                signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
             return
 
 

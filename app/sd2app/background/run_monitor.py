@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Generic, Literal, NamedTuple, TypeVar
+from typing import Any, ClassVar, Generic, Literal, NamedTuple, TypeVar
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
@@ -139,6 +139,9 @@ class RunMonitor(QObject, Generic[F]):
     phase_changed = Signal()
     ended = Signal()
 
+    stop_patience_s: ClassVar[float | None] = None
+    """A process that does not stop within this time is killed; None: it may take its time."""
+
     def __init__(
         self,
         folder: F,
@@ -158,6 +161,7 @@ class RunMonitor(QObject, Generic[F]):
         self._text = ""
         self._wish: Word | None = None
         self._cancelled_s: float | None = None
+        self._stopped_s: float | None = None
         self._poll_ms = poll_ms or POLL_MS
         self._poller = Poller("run", self._look, self._poll_ms, self)
         self._poller.found.connect(self._take)
@@ -204,6 +208,11 @@ class RunMonitor(QObject, Generic[F]):
         return self.folder.path
 
     @property
+    def process(self) -> ProcessId | None:
+        """Process that was started for it, or that the folder names."""
+        return self._launched or self.folder.process
+
+    @property
     def loaded(self) -> bool:
         """True once the folder has been looked at."""
         return self._loaded
@@ -248,6 +257,8 @@ class RunMonitor(QObject, Generic[F]):
         self._wish = word
         if word == "cancel" and self._cancelled_s is None:
             self._cancelled_s = self._clock_s()
+        elif word == "stop":
+            self._stopped_s = self._clock_s()
         if self.path.is_dir():
             write_control(self.folder.control, word)
         elif word in ("stop", "cancel") and self._launched is not None:
@@ -359,9 +370,13 @@ class RunMonitor(QObject, Generic[F]):
             self._launched.terminate()
         if self._phase == {"run": "running", "pause": "paused"}.get(self._wish):
             self._wish = None
+        process = found.process if found.live else self._launched
+        if self._stopped_s is not None and self.stop_patience_s is not None:
+            waited_s = self._clock_s() - self._stopped_s
+            if waited_s > self.stop_patience_s and process is not None:
+                process.terminate(at_once=True)
         if self._cancelled_s is not None:
             waited_s = self._clock_s() - self._cancelled_s
-            process = found.process if found.live else self._launched
             if waited_s > _ASK_AGAIN_S and process is not None:
                 process.terminate(at_once=waited_s > _GIVE_UP_S)
 

@@ -1,52 +1,31 @@
-"""A body fitted to a video, in a process beside the window."""
+"""A body fitted to a video, in a background process."""
 
 from __future__ import annotations
 
-import sys
+import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QLockFile, QObject, QTimer, Signal
+from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.line_process import Ending, LineProcess
-from sd2app.fit.messages import (
-    Done,
-    Found,
-    Noted,
-    Progressed,
-    Refused,
-    Started,
-    message_of,
-)
+from sd2app.background.run_command import COMMAND_IN_FOLDER, CommandFolder
 from sd2app.fit.progress import FitProgress
-from sd2app.fit.request import LOCK_NAME, FitRequest, read_request, settled
+from sd2app.fit.request import FitRequest, read_request, settled
+from sd2app.fit.run import FitRun
 from sd2app.settings import Settings
 from sd2core.errors import Sd2Error
 
 State = Literal["idle", "running", "cancelling", "stopped", "failed", "finished"]
 
-COMMAND = (sys.executable, "-u", "-m", "sd2app.background.run_command")
-_TICK_MS = 100
-
-
-@dataclass(eq=False)
-class Run:
-    """What one run has told so far."""
-
-    request: FitRequest
-    landmarks: dict[int, NDArray[np.float32]]
-    progress: FitProgress = field(default_factory=FitProgress)
-    notes: list[str] = field(default_factory=list)
-    started: Started | None = None
-    done: Done | None = None
+COMMAND = COMMAND_IN_FOLDER
+_CLOSING_S = 2.0
 
 
 class FitModel(QObject):
-    """At most one fit at a time; what was stopped can be continued, also after a restart.
+    """At most one fit at a time; one that was stopped can be continued, also after a restart.
 
     Signals
     -------
@@ -76,46 +55,40 @@ class FitModel(QObject):
         self._command = tuple(command)
         self._state: State = "idle"
         self._text = ""
-        self._run: Run | None = None
-        self._process: LineProcess | None = None
-        self._lock: QLockFile | None = None
-        self._newest: int | None = None
-        self._stale = False
-        # Twenty lines a second are more than anybody can follow.
-        self._tick = QTimer(self)
-        self._tick.setInterval(_TICK_MS)
-        self._tick.timeout.connect(self._tell)
+        self._request: FitRequest | None = None
+        self._run: FitRun | None = None
+        self._landmarks: dict[int, NDArray[np.float32]] = {}
 
     # --- what is there --------------------------------------------------------------------
 
     @property
     def state(self) -> State:
-        """What it is doing."""
+        """Current state."""
         return self._state
 
     @property
     def busy(self) -> bool:
-        """Whether a process is there."""
+        """True while a process works."""
         return self._state in ("running", "cancelling")
 
     @property
     def request(self) -> FitRequest | None:
-        """What is being fitted, or was last."""
-        return self._run.request if self._run else None
+        """Request that is being fitted, or was last."""
+        return self._request
 
     @property
     def progress(self) -> FitProgress | None:
-        """How far it is."""
+        """Progress over all stages."""
         return self._run.progress if self._run else None
 
     @property
     def text(self) -> str:
-        """Why it failed."""
+        """Reason why it failed."""
         return self._text
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the user should know of the last run."""
+        """Sentences of the last run that the user should read."""
         return tuple(self._run.notes) if self._run else ()
 
     @property
@@ -126,7 +99,7 @@ class FitModel(QObject):
 
     def landmarks_at(self, frame: int) -> NDArray[np.float32] | None:
         """X, y in pixels and visibility, (33, 3), as far as they were told; see ``Found``."""
-        return self._run.landmarks.get(frame) if self._run else None
+        return self._landmarks.get(frame)
 
     # --- what one can do ------------------------------------------------------------------
 
@@ -145,54 +118,52 @@ class FitModel(QObject):
                 "A body is being fitted already", "one at a time", "Wait for it, or cancel it"
             )
         request = settled(request)
-        made = not request.folder.exists()
-        request.save()
-        lock = QLockFile(str(request.folder / LOCK_NAME))
-        lock.setStaleLockTime(0)
-        if not lock.tryLock(0):
-            if made:
-                request.discard()
+        if CommandFolder(request.run).taken:
             raise Sd2Error(
                 f"{request.folder} is being fitted in another window",
                 remedy="Wait for it, or save elsewhere",
             )
-        self._lock = lock
+        request.save()
         self._settings.set_unfinished_fit(request.folder)
+        if request != self._request:
+            # Otherwise what was found before it was stopped is still so.
+            self._landmarks = {}
+        self._request = request
         if request.mesh.exists():
             # Fitted, and the program ended before the recording was made.
-            self._run = Run(request, {})
-            self._complete(request)
+            self._follow(None)
+            self._complete()
         else:
             self._begin(request)
 
     def resume(self) -> None:
         """Continue what was stopped or failed; raises what :meth:`start` does."""
-        if self._run is not None and self._state in ("stopped", "failed"):
-            self.start(self._run.request)
+        if self._request is not None and self._state in ("stopped", "failed"):
+            self.start(self._request)
 
     def cancel(self) -> None:
         """Stop; what was done is kept."""
-        if self._state == "running" and self._process is not None:
+        if self._state == "running" and self._run is not None:
             self._set_state("cancelling")
-            self._process.stop()
+            self._run.stop()
 
     def discard(self) -> None:
         """Give up what was stopped, and remove it."""
-        if self._run is not None and not self.busy:
-            self._run.request.discard()
+        if self._request is not None and not self.busy:
+            self._request.discard()
             self.dismiss()
 
     def dismiss(self) -> None:
-        """Say no more of it; what a stopped fit left stays on disk."""
+        """Put it away; what a stopped fit left stays on disk."""
         if not self.busy:
-            request = self.request
+            request = self._request
             if self._state == "failed" and request is not None and not request.partial.exists():
                 request.discard()
             self._settings.set_unfinished_fit(None)
             self._set_state("idle")
 
     def report_failure(self, text: str) -> None:
-        """What came after the fit went wrong."""
+        """Fail for a reason that came after the fit."""
         self._text = text
         self._set_state("failed")
 
@@ -203,106 +174,87 @@ class FitModel(QObject):
             self.take_up(folder)
 
     def take_up(self, folder: Path) -> bool:
-        """Offer to continue what was stopped in a folder; whether there is such a thing."""
+        """Offer to continue what was stopped in a folder; False if there is no such thing.
+
+        A fit that goes on although its window was killed is followed.
+        """
         request = read_request(folder) if folder.is_dir() else None
         if request is None or not request.unfinished or self.busy:
             return False
-        lock = QLockFile(str(folder / LOCK_NAME))
-        lock.setStaleLockTime(0)
-        if not lock.tryLock(0):
-            return False  # another window is at it
-        lock.unlock()
-        self._run = Run(request, {})
+        run = CommandFolder(request.run)
+        if run.taken:
+            if run.is_followed:
+                return False  # by another window
+            self._request, self._landmarks = request, {}
+            run.take_up()
+            self._follow(FitRun(run, self._landmarks, self))
+            self._set_state("running")
+            return True
+        self._follow(None)
+        self._request = request
         self._set_state("stopped")
         return True
 
     def close(self) -> None:
         """End the process at once; what it has done is kept."""
-        self._tick.stop()
-        if self._process is not None:
-            self._process.close()
-        self._unlock()
+        if self._run is None:
+            return
+        self._run.close()
+        process = self._run.process
+        if self.busy and process is not None:
+            process.terminate(at_once=True)
+            until_s = time.monotonic() + _CLOSING_S
+            while process.is_alive and time.monotonic() < until_s:
+                time.sleep(0.01)
 
     # --- the process ----------------------------------------------------------------------
 
     def _begin(self, request: FitRequest) -> None:
-        before = self._run
-        same = before is not None and before.request == request
-        # What was found before it was stopped is still so.
-        landmarks = before.landmarks if before is not None and same else {}
-        self._run = Run(request, landmarks)
-        self._text, self._newest = "", None
-        if self._process is not None:
-            self._process.deleteLater()
-        self._process = LineProcess(self)
-        self._process.line.connect(self._read)
-        self._process.ended.connect(self._end)
-        self._set_state("running")
-        self._tick.start()
-        self._process.start([*self._command, *request.arguments()])
-
-    def _read(self, line: str) -> None:
-        run, message = self._run, message_of(line)
-        if run is None or message is None:
+        self._text = ""
+        folder = CommandFolder(request.run)
+        try:
+            process = folder.start(request.arguments(), {"what": "fit"}, self._command, {})
+        except Sd2Error as error:
+            self._follow(None)
+            self.report_failure(str(error))
             return
-        match message:
-            case Started():
-                run.started = message
-                run.progress.start(message)
-            case Progressed():
-                run.progress.report(message)
-            case Found():
-                run.landmarks[message.frame] = message.points
-                self._newest = message.frame
-            case Noted() if message.text not in run.notes:
-                run.notes.append(message.text)
-            case Done():
-                run.done = message
-            case Refused():
-                self._text = message.text
-        self._stale = True
+        self._follow(FitRun(folder, self._landmarks, self, process=process))
+        self._set_state("running")
+
+    def _follow(self, run: FitRun | None) -> None:
+        if self._run is not None:
+            self._run.close()
+            self._run.deleteLater()
+        self._run = run
+        if run is not None:
+            run.changed.connect(self._tell)
+            run.ended.connect(self._end)
 
     def _tell(self) -> None:
-        if self._stale:
-            self._stale = False
-            self.changed.emit()
-        if self._newest is not None:
-            newest, self._newest = self._newest, None
+        self.changed.emit()
+        newest = self._run.take_newest() if self._run is not None else None
+        if newest is not None:
             self.advanced.emit(newest)
 
-    def _end(self, ending: Ending) -> None:
-        self._tick.stop()
-        self._unlock()
-        run = self._run
+    def _end(self) -> None:
+        run, request = self._run, self._request
         assert run is not None
-        if ending.code == 0 and run.request.mesh.exists():
-            self._complete(run.request)
+        assert request is not None
+        run.close()
+        if run.phase == "finished" and request.mesh.exists():
+            self._complete()
         elif self._state == "cancelling":
             self._set_state("stopped")
         else:
-            self._text = self._text or _reason(ending)
-            self._set_state("failed")
+            silent = "The fit ended without saying why. What it has done is kept."
+            self.report_failure(run.text or silent)
 
-    def _complete(self, request: FitRequest) -> None:
-        self._unlock()
+    def _complete(self) -> None:
         self._settings.set_unfinished_fit(None)
         self._set_state("finished")
-        self.finished.emit(request)
-
-    def _unlock(self) -> None:
-        if self._lock is not None:
-            self._lock.unlock()
-            self._lock = None
+        self.finished.emit(self._request)
 
     def _set_state(self, state: State) -> None:
         self._state = state
         self.state_changed.emit()
         self.changed.emit()
-
-
-def _reason(ending: Ending) -> str:
-    """What the command said, as it said it."""
-    said = ending.errors.removeprefix("sd2: ")
-    if ending.code is None:
-        return said or "The fit ended without a word. What it has done is kept."
-    return said or f"The fit ended with exit code {ending.code} and without a word."

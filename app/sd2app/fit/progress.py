@@ -1,30 +1,156 @@
-"""How far a fit is, over all of its stages, and how long it will still take."""
+"""Lines of ``sd2 fit --progress-json`` (see ``docs/formats.md``) and the progress they tell."""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
 
-from sd2app.fit.messages import Progressed, Started
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.body.track import LANDMARKS
+
+FORMAT, VERSION = "sd2-fit-progress", 1
+
+
+@dataclass(frozen=True)
+class Started:
+    """The video is open."""
+
+    frames: int
+    width: int
+    height: int
+    stages: tuple[str, ...]
+    resumed: bool
+
+
+@dataclass(frozen=True)
+class Progressed:
+    """``done`` of ``total`` (0: not known) of one stage."""
+
+    stage: str
+    done: int
+    total: int
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Landmarks of one frame.
+
+    Parameters
+    ----------
+    frame : int
+    points : float32 array, shape (33, 3)
+        x and y in pixels of the upright picture, and visibility from 0 to 1; NaN
+        where there is nobody.
+    """
+
+    frame: int
+    points: NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Noted:
+    """A sentence the user should read."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Done:
+    """The mesh is written."""
+
+    frames: int
+    present: int
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Refused:
+    """A sentence on what is wrong; the process ends."""
+
+    text: str
+
+
+Message = Started | Progressed | Found | Noted | Done | Refused
+
+
+def message_of(content: Mapping[str, Any]) -> Message | None:
+    """Read one line; None for what this version does not know or cannot read."""
+    reader = _READERS.get(str(content.get("event")))
+    if reader is None:
+        return None
+    try:
+        return reader(content)
+    except (KeyError, TypeError, ValueError):
+        return None
+
+
+def _started(content: Mapping[str, Any]) -> Message | None:
+    if content["format"] != FORMAT or content["version"] > VERSION:
+        return None
+    return Started(
+        int(content["frames"]),
+        int(content["width"]),
+        int(content["height"]),
+        tuple(map(str, content["stages"])),
+        bool(content.get("resumed", False)),
+    )
+
+
+def _progressed(content: Mapping[str, Any]) -> Message:
+    return Progressed(
+        str(content["stage"]),
+        int(content["done"]),
+        int(content["total"]),
+        str(content.get("unit", "")),
+    )
+
+
+def _found(content: Mapping[str, Any]) -> Message | None:
+    image_px = np.array(content["image_px"], np.float32)  # null becomes NaN
+    visibility = np.array(content["visibility"], np.float32)
+    if image_px.shape != (len(LANDMARKS), 2) or visibility.shape != (len(LANDMARKS),):
+        return None
+    points = np.concatenate([image_px, visibility[:, None]], axis=1)
+    return Found(int(content["frame"]), points)
+
+
+def _done(content: Mapping[str, Any]) -> Message:
+    return Done(int(content["frames"]), int(content["present"]), float(content["seconds"]))
+
+
+_READERS: dict[str, Any] = {
+    "start": _started,
+    "progress": _progressed,
+    "landmarks": _found,
+    "note": lambda content: Noted(str(content["text"])),
+    "done": _done,
+    "error": lambda content: Refused(str(content["text"])),
+}
+
 
 WORDS = {
     "models": "fetching the landmark models",
     "find": "finding the person",
     "refine": "looking again",
-    "lift": "working out depth",
+    "lift": "estimating depth",
     "fit": "fitting the body",
     "write": "writing the mesh",
 }
 _WEIGHTS = {"models": 0.0, "find": 1.0, "refine": 4.0, "lift": 0.1, "fit": 3.0, "write": 0.3}
-"""About how long a frame takes in each stage, relative to the others."""
+"""Time of a frame in each stage, relative to the others."""
 _UNKNOWN_WEIGHT = 0.5
 _SETTLING_S = 2.0
-"""Before that, an estimate says nothing."""
+"""An estimate from less time says nothing."""
 
 
 class FitProgress:
-    """Follows the messages of one run."""
+    """Progress of one fit over all of its stages, and its time left."""
 
     def __init__(self, clock_s: Callable[[], float] = time.monotonic) -> None:
         self._clock_s = clock_s
@@ -36,7 +162,7 @@ class FitProgress:
         self.unit = ""
 
     def start(self, message: Started) -> None:
-        """Learn which stages are to come."""
+        """Take the stages that are to come."""
         self._stages = message.stages
 
     def report(self, message: Progressed) -> None:

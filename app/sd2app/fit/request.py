@@ -13,7 +13,9 @@ from sd2core.files.paths import free_path, plain_path, remove
 from sd2core.recording.recording import FILE_NAME, SUFFIX, open_recording
 
 REQUEST_NAME = "fit-request.json"
+RUN_NAME = "fit-run"
 LOCK_NAME = "fit.lock"
+"""File of earlier versions."""
 MESH_NAME = "mesh.zarr"
 _VERSION = 1
 _SAME_FOCAL_PX = 0.01
@@ -67,6 +69,11 @@ class FitRequest:
         """What a stopped fit leaves, and continues with."""
         return self.folder / f"{self.mesh_name}.partial"
 
+    @property
+    def run(self) -> Path:
+        """Folder of the process."""
+        return self.folder / RUN_NAME
+
     def arguments(self) -> list[str]:
         """The same as a command line."""
         words = ["fit", str(self.video), "--out", str(self.mesh), "--progress-json"]
@@ -102,7 +109,9 @@ class FitRequest:
 
     def forget(self) -> None:
         """Remove what was kept; the recording is made."""
-        (self.folder / REQUEST_NAME).unlink(missing_ok=True)
+        for name in (REQUEST_NAME, LOCK_NAME):
+            (self.folder / name).unlink(missing_ok=True)
+        remove(self.run)
 
     def discard(self) -> None:
         """Remove all that a stopped fit has left."""

@@ -113,6 +113,28 @@ def test_another_start_of_the_program_offers_to_continue(made, qtbot, request_, 
     assert later._run.started.resumed
 
 
+def test_a_fit_that_goes_on_without_its_window_is_found_again(
+    made, qtbot, request_, settings
+) -> None:
+    model = made("--frames", 30, "--stop-at", 12)
+    model.start(request_)
+    qtbot.waitUntil(lambda: model.landmarks_at(12) is not None, timeout=20_000)
+    launched = request_.run / "launched.json"
+    told = json.loads(launched.read_text())
+    told["window"]["started_unix_s"] -= 3600.0  # it was killed, and its number given away
+    launched.write_text(json.dumps(told))
+    model._run.close()
+    later = made()
+    later.look_for_unfinished()
+    assert later.state == "running"
+    # It is this window's now.
+    assert not made().take_up(request_.folder)
+    qtbot.waitUntil(lambda: later.landmarks_at(12) is not None, timeout=20_000)
+    later.cancel()
+    until(qtbot, later, "stopped")
+    assert request_.partial.read_text() == "13"
+
+
 def test_discarding_leaves_nothing(made, qtbot, request_, settings) -> None:
     model = made("--frames", 30, "--stop-at", 2)
     model.start(request_)

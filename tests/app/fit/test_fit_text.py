@@ -7,8 +7,18 @@ import json
 import numpy as np
 import pytest
 
-from sd2app.fit.messages import Done, Found, Noted, Progressed, Refused, Started, message_of
-from sd2app.fit.progress import FitProgress, left_in_words
+from sd2app.fit.progress import (
+    Done,
+    FitProgress,
+    Found,
+    Noted,
+    Progressed,
+    Refused,
+    Started,
+    left_in_words,
+    message_of,
+)
+from sd2core.runs.progress import read_events
 
 START = {
     "event": "start",
@@ -23,11 +33,11 @@ START = {
 
 
 def said(**content: object):
-    return message_of(json.dumps(content))
+    return message_of(content)
 
 
 def test_every_event_of_the_format_is_read() -> None:
-    assert message_of(json.dumps(START)) == Started(
+    assert message_of(START) == Started(
         90, 640, 480, ("find", "refine", "lift", "fit", "write"), False
     )
     assert said(event="progress", stage="find", done=3, total=90, unit="frame") == Progressed(
@@ -72,8 +82,9 @@ def test_landmarks_are_pixels_and_visibility() -> None:
         '{"event": {"a": 1}}',
     ],
 )
-def test_what_cannot_be_read_is_ignored(line: str) -> None:
-    assert message_of(line) is None
+def test_what_cannot_be_read_is_ignored(line: str, tmp_path) -> None:
+    (tmp_path / "lines").write_text(f"{line}\n")
+    assert all(message_of(event) is None for event in read_events(tmp_path / "lines"))
 
 
 @pytest.fixture
@@ -81,7 +92,7 @@ def run():
     """Progress on a clock that is set by hand."""
     now = [0.0]
     progress = FitProgress(lambda: now[0])
-    progress.start(message_of(json.dumps(START)))
+    progress.start(message_of(START))
     return progress, now
 
 
