@@ -26,7 +26,7 @@ def main() -> int:
     lower_priority()
     first, *rest = sys.argv[1:]
     took_s = (
-        _of_classifier(*rest[:2], int(rest[2]))
+        _of_classifier(rest[0], rest[1], int(rest[2]))
         if first == CLASSIFIER
         else _of_denoiser(first, int(rest[0]))
     )

@@ -8,6 +8,7 @@ from PySide6.QtWidgets import (
     QGridLayout,
     QHBoxLayout,
     QLabel,
+    QLayout,
     QMenu,
     QToolButton,
     QVBoxLayout,
@@ -137,10 +138,10 @@ class ClassSetupView(QWidget):
             )
         ):
             grid.addWidget(QLabel(text, self), row, 0)
-            if isinstance(part, QWidget):
-                grid.addWidget(part, row, 1)
-            else:
+            if isinstance(part, QLayout):
                 grid.addLayout(part, row, 1)
+            elif isinstance(part, QWidget):
+                grid.addWidget(part, row, 1)
         layout.addLayout(grid)
 
     def _choice(self, name: str, tip: str, known: tuple[str, ...], words: dict[str, str]) -> Choice:

@@ -100,7 +100,8 @@ class ClassStrip(QWidget):
 
     def _say(self) -> None:
         model = self._classify
-        if not self.isVisibleTo(self.parentWidget()):
+        parent = self.parentWidget()
+        if not (self.isVisible() if parent is None else self.isVisibleTo(parent)):
             return
         if model.problem:
             self._status.setText(model.problem)

@@ -78,13 +78,13 @@ class NewFromVideoDialog(QDialog):
         self._person = QLabel(self)
         self._person.setWordWrap(True)
         self._clear = _small_button("Clear", "Have the person chosen", setup.clear_person)
+        self._stature = NumberBox(*STATURES_M, " m", "Height of the person", step=0.01)
+        self._stature.setValue(DEFAULT_STATURE_M)
+        self._stature.valueChanged.connect(setup.set_stature)
         self._known = QCheckBox("known:", self)
         self._known.toggled.connect(
             lambda known: setup.set_stature(self._stature.value() if known else None)
         )
-        self._stature = NumberBox(*STATURES_M, " m", "Height of the person", step=0.01)
-        self._stature.setValue(DEFAULT_STATURE_M)
-        self._stature.valueChanged.connect(setup.set_stature)
         self._camera = Choice("How the focal length of the camera is known", self)
         for way, text in _CAMERAS:
             self._camera.addItem(text.format(angle=setup.angle_deg), way)

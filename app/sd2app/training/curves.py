@@ -159,15 +159,13 @@ class TrainingCurves(SteppedPlot):
     def _paint_line(
         self, painter: QPainter, points: list[tuple[float, float]], pen: QPen, scale: _Scale
     ) -> None:
-        line = QPolygonF(
-            [scale.place_of(at, rmse) for at, rmse in points if math.isfinite(rmse) and rmse > 0]
-        )
+        line = [scale.place_of(at, rmse) for at, rmse in points if math.isfinite(rmse) and rmse > 0]
         painter.setPen(pen)
         if len(line) == 1:
             painter.setBrush(pen.color())
             painter.drawEllipse(line[0], 2.0, 2.0)
         painter.setBrush(Qt.BrushStyle.NoBrush)
-        painter.drawPolyline(line)
+        painter.drawPolyline(QPolygonF(line))
 
     def _paint_marks(self, painter: QPainter, plot: QRectF, scale: _Scale) -> None:
         """A ring around the best epoch; a line where somebody points."""
