@@ -21,7 +21,8 @@ from sd2core.errors import Sd2Error
 State = Literal["idle", "running", "cancelling", "stopped", "failed", "finished"]
 
 COMMAND = COMMAND_IN_FOLDER
-_CLOSING_S = 2.0
+_CLOSING_S = 10.0
+"""A killed process is gone at once, unless the machine is busy."""
 
 
 class FitModel(QObject):
