@@ -60,7 +60,7 @@ def export_dataset(folder: BatchFolder, export: Export, progress: Progress) -> N
     """Write the data set with its card, or continue one that was begun.
 
     Sources that have been there stay. Where one of them has changed, or the settings have,
-    it is written anew.
+    the whole data set is written again.
     """
     from sd2core.datasets.card import write_card
     from sd2core.datasets.options import DatasetOptions

@@ -252,7 +252,7 @@ class _Look:
         key = key_of("inspect", {"mesh": identity}) if self._folder is not None else ""
         if is_large_npz(path):
             if self._folder is None:
-                # Where the body is would take reading it; nobody asks before it is streamed.
+                # The place of the body needs the whole file; it is not asked for before streaming.
                 return MeshInput(str(path), "", *npz_vertices(path), 30.0, (0.0, 0.0, 0.0))
             path = self._unpacked(path)
         return mesh_input_of(path, key, None if faces is None else str(faces), reading)

@@ -60,8 +60,8 @@ class Recordings(_Section):
         Recordings (``.sd2``), videos and meshes, by name or by pattern; ``**`` is any
         number of folders. Relative to the plan's folder.
     subjects : {"recording", "folder"}
-        Who is in a recording that ``subject_of`` does not name: somebody of its own, or
-        whoever is in all that lie in the same folder.
+        Subject of a recording that ``subject_of`` does not name: one per recording, or one
+        per folder.
     subject_of : mapping of str to str
         Pattern of a file's name, or of the end of its path, to a subject; the first that
         fits holds.
@@ -78,7 +78,7 @@ class Fit(_Section):
     Parameters
     ----------
     stature_m : float, optional
-        Of everybody who is not in ``stature_of``.
+        Stature of subjects who are not in ``stature_of``.
     stature_of : mapping of str to float
         Subject to stature in metres.
     focal_px, field_of_view_deg : float, optional

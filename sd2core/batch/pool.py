@@ -35,7 +35,7 @@ _LOCAL_SETTINGS = {
     "distributed.worker.memory.pause": False,
     "distributed.scheduler.http.routes": [],
     "distributed.worker.http.routes": [],
-    # Looking at themselves costs every process 3 % of a core, and nobody sees it.
+    # Self-monitoring costs every process 3 % of a core, and is not shown anywhere.
     "distributed.worker.profile.enabled": False,
     "distributed.admin.tick.interval": "1s",
     "distributed.admin.system-monitor.interval": "5s",
@@ -221,7 +221,7 @@ def _check_worker(address: str, about: Any, folder: Path) -> None:
 def local_pool(folder: BatchFolder, processes: int) -> Iterator[DaskPool]:
     """Start processes on this machine, one thread each, that end with this one.
 
-    Reachable on the loopback interface only, with keys that nobody else has, without a
+    Reachable on the loopback interface only, with keys of its own, without a
     dashboard.
     """
     with _dask_log(folder), local_client(folder.path / BEGUN, processes) as client:

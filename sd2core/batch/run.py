@@ -34,7 +34,7 @@ Watch = Callable[[Event], None]
 _LINE_EVERY_S = 0.5
 _KINDS = ("inputs", "meshes", "plans", "synthetic", "denoised", "simulated")
 _OLD_S = 3600.0
-"""A write takes seconds. What is older belongs to nobody, also where a worker of an earlier run
+"""A write takes seconds. Older temporary files are abandoned, also where a worker of an earlier run
 may still be at its last task on another machine."""
 
 
@@ -360,7 +360,7 @@ def _remove(entry: os.DirEntry[str], before_s: float) -> None:
             shutil.rmtree(entry.path, ignore_errors=True)
         else:
             os.unlink(entry.path)
-    except OSError:  # somebody else's, or gone meanwhile
+    except OSError:  # of another user, or gone meanwhile
         return
 
 

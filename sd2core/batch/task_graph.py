@@ -24,6 +24,9 @@ from sd2core.sensor import VirtualSensor
 if TYPE_CHECKING:
     from sd2core.datasets.simulating import Simulation
 
+_View = tuple[Origin, MeshInput, int, VirtualSensor]
+"""Recording, its mesh, number of the placement, and sensor."""
+
 _MAPS: tuple[Step, ...] = ("synthesise", "denoise", "simulate")
 
 
@@ -79,15 +82,15 @@ class TaskGraph:
 
     def __init__(self, plan: BatchPlan, folder: BatchFolder, origins: Sequence[Origin]) -> None:
         self.plan, self.folder, self.origins = plan, folder, origins
-        told = plan.synthesise
-        self._told = None if told is None else told.model_dump(mode="json")
+        section = plan.synthesise
+        self._section = None if section is None else section.model_dump(mode="json")
         self._scene = (
             {}
-            if told is None
+            if section is None
             else {
-                "options": asdict(told.options()),
-                "tolerance": told.tolerance,
-                "vertices_kept": told.vertices_kept,
+                "options": asdict(section.options()),
+                "tolerance": section.tolerance,
+                "vertices_kept": section.vertices_kept,
             }
         )
         self._model = None if plan.denoise is None else _model_of(plan.denoise.model)
@@ -228,18 +231,11 @@ class TaskGraph:
         sensors = self.plan.sensors(own, mesh.target_m)
         choosing = self._choosing(mesh, list(sensors.values()))
         for placement, sensor in sensors.items():
-            synthesis = tuple(
-                self._synthesis_task(origin, mesh, placement, sensor, one, choosing)
-                for one in stretches
-            )
+            where = (origin, mesh, placement, sensor)
+            synthesis = tuple(self._synthesis_task(where, one, choosing) for one in stretches)
             denoising = None if self._model is None else self._denoising_task(synthesis)
-            simulation = (
-                ()
-                if self._simulation is None
-                else tuple(
-                    self._simulation_task(origin, mesh, placement, sensor, one) for one in stretches
-                )
-            )
+            simulated = () if self._simulation is None else stretches
+            simulation = tuple(self._simulation_task(where, one) for one in simulated)
             yield PlannedMap(placement, sensor, stretches, synthesis, denoising, simulation)
 
     def _choosing(self, mesh: MeshInput, sensors: Sequence[VirtualSensor]) -> dict[str, Any] | None:
@@ -254,27 +250,37 @@ class TaskGraph:
         return about | {"path": str(self.folder.result("plans", key, ".json"))}
 
     def _synthesis_task(
-        self,
-        origin: Origin,
-        mesh: MeshInput,
-        placement: int,
-        sensor: VirtualSensor,
-        stretch: Stretch,
-        choosing: dict[str, Any] | None,
+        self, where: _View, stretch: Stretch, choosing: dict[str, Any] | None
     ) -> Task:
-        scene = {"mesh": mesh.identity, "sensor": asdict(sensor), **self._scene}
-        key = key_of("synthesise", scene | {"stretch": stretch})
-        out = str(self.folder.result("synthetic", key, ".npz"))
-        details = {
-            "mesh": asdict(mesh),
-            "sensor": asdict(sensor),
-            "told": self._told,
-            "stretch": list(stretch),
-            "choosing": choosing,
-            "out": out,
-        }
+        details = {"section": self._section, "choosing": choosing}
+        return self._map_task("synthesise", "synthetic", where, stretch, self._scene, details)
+
+    def _simulation_task(self, where: _View, stretch: Stretch) -> Task:
+        assert self._simulation is not None
+        assert self.plan.synthesise is not None
+        axis = asdict(self.plan.synthesise.options().axis)
+        content = {"axis": axis, "simulation": self._simulation.as_json()}
+        radar = asdict(self._simulation.radar)
+        details = {"axis": axis, "radar": radar, "seed": self._simulation.seed}
+        return self._map_task("simulate", "simulated", where, stretch, content, details)
+
+    def _map_task(
+        self,
+        step: Step,
+        kind: str,
+        where: _View,
+        stretch: Stretch,
+        content: dict[str, Any],
+        details: dict[str, Any],
+    ) -> Task:
+        """Return the task for a stretch of a map; its key hashes ``content``, mesh and sensor."""
+        origin, mesh, placement, sensor = where
+        view = {"sensor": asdict(sensor), "stretch": list(stretch)}
+        key = key_of(step, {"mesh": mesh.identity, **view, **content})
+        out = str(self.folder.result(kind, key, ".npz"))
+        details = {"mesh": asdict(mesh), **view, **details, "out": out}
         frames = stretch[1] - stretch[0]
-        return Task("synthesise", key, origin, details, placement, frames, origin.name, out)
+        return Task(step, key, origin, details, placement, frames, origin.name, out)
 
     def _denoising_task(self, synthesis: Sequence[Task]) -> Task:
         model, digest = self.model
@@ -290,40 +296,6 @@ class TaskGraph:
         one = synthesis[0]
         frames = sum(each.frames for each in synthesis)
         return Task("denoise", key, one.origin, details, one.placement, frames, one.group, outs[-1])
-
-    def _simulation_task(
-        self,
-        origin: Origin,
-        mesh: MeshInput,
-        placement: int,
-        sensor: VirtualSensor,
-        stretch: Stretch,
-    ) -> Task:
-        assert self._simulation is not None
-        assert self.plan.synthesise is not None
-        axis = asdict(self.plan.synthesise.options().axis)
-        key = key_of(
-            "simulate",
-            {
-                "mesh": mesh.identity,
-                "sensor": asdict(sensor),
-                "axis": axis,
-                "simulation": self._simulation.as_json(),
-                "stretch": stretch,
-            },
-        )
-        out = str(self.folder.result("simulated", key, ".npz"))
-        details = {
-            "mesh": asdict(mesh),
-            "sensor": asdict(sensor),
-            "axis": axis,
-            "radar": asdict(self._simulation.radar),
-            "seed": self._simulation.seed,
-            "stretch": list(stretch),
-            "out": out,
-        }
-        frames = stretch[1] - stretch[0]
-        return Task("simulate", key, origin, details, placement, frames, origin.name, out)
 
     def all_maps(self) -> Iterator[tuple[Origin, str, MeshInput, PlannedMap]]:
         """Yield every map of every recording that is inspected and fitted, in order.
@@ -349,12 +321,12 @@ def _changing(origin: Origin) -> Sd2Error:
     )
 
 
-def simulation_of(told: Simulate) -> Simulation:
+def simulation_of(section: Simulate) -> Simulation:
     """Read the radar of a plan; errors come before the work begins."""
     from sd2core.datasets.simulating import Simulation
     from sd2core.io.radar import named_radar
 
-    return Simulation(named_radar(told.radar), told.seed)
+    return Simulation(named_radar(section.radar), section.seed)
 
 
 def _model_of(name: str) -> tuple[str, str]:

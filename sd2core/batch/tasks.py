@@ -211,7 +211,7 @@ def _synthesise(
     origin: Origin,
     mesh: Mapping[str, Any],
     sensor: Mapping[str, Any],
-    told: Mapping[str, Any],
+    section: Mapping[str, Any],
     stretch: list[int],
     choosing: Mapping[str, Any] | None,
     out: str,
@@ -221,7 +221,7 @@ def _synthesise(
     synthesise(
         mesh_input(mesh),
         VirtualSensor(**sensor),
-        Synthesise.model_validate(dict(told), strict=False),
+        Synthesise.model_validate(dict(section), strict=False),
         (stretch[0], stretch[1]),
         None if choosing is None else choosing_of(choosing),
         Path(out),

@@ -107,7 +107,7 @@ class ClassifierCard:
         """Index of the background class; None where there is none."""
         return self.classes.index(BACKGROUND) if BACKGROUND in self.classes else None
 
-    def nobody(self) -> NDArray[np.float32]:
+    def no_person(self) -> NDArray[np.float32]:
         """Answer to a frame without a person, (classes,).
 
         Background, or where that is none of the classes nothing is known: all the same.

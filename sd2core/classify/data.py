@@ -150,11 +150,6 @@ def clips_of_pairs(
         The radar's are simulated or real, as the pairs say.
     denoiser : TrainedDenoiser, optional
         For denoised ones.
-
-    Raises
-    ------
-    Sd2Error
-        When the pairs hold no such maps, or the denoiser does not fit.
     """
     if kind in ("simulated", "real") and kind != pairs.kind:
         raise Sd2Error(f"The pairs hold a {pairs.kind} radar", f"a {kind} one")
@@ -204,11 +199,6 @@ def clips_of_map(
         Suggestions do not count.
     frame_rate_hz : float, optional
         Brought to that rate where it is another; its own by default.
-
-    Raises
-    ------
-    Sd2Error
-        When the rates are too different.
     """
     own_hz = doppler.timebase.frames_per_s
     rate_hz = frame_rate_hz or own_hz
@@ -256,13 +246,7 @@ def frame_labels(timebase: Timebase, labels: Labels) -> tuple[NDArray[np.int8], 
 
 
 def merged(sets: Sequence[ClipSet]) -> ClipSet:
-    """Merge several sets; a bin that is zero in one of them is nulled in all.
-
-    Raises
-    ------
-    Sd2Error
-        When axes or frame rates differ, or there is none.
-    """
+    """Merge several sets; a bin that is zero in one of them is nulled in all."""
     if not sets:
         raise Sd2Error("Nothing to learn from is given", "pairs, recordings or radar files")
     first = sets[0]

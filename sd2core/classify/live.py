@@ -20,7 +20,7 @@ from sd2core.maps import DopplerMap
 from sd2core.progress import Progress, silent
 
 CHUNK = 512
-"""Frames of a long map that are worked out at once, with the state from before."""
+"""Frames of a long map that are computed at once; the state carries over."""
 
 Probabilities = NDArray[np.float32]
 
@@ -79,7 +79,7 @@ class TrainedClassifier:
         """
         matching.check_bins(doppler, self.card)
         energies = np.ascontiguousarray(doppler.values.T)  # (frames, bins)
-        found = np.tile(self.card.nobody(), (len(energies), 1))
+        found = np.tile(self.card.no_person(), (len(energies), 1))
         done, total = 0, len(energies)
 
         def work(values: NDArray[np.float32]) -> Probabilities:
@@ -138,7 +138,7 @@ class TrainedClassifier:
             are owed when the person has gone.
         """
         if not present:
-            answers = np.concatenate([self.finish(memory), self.card.nobody()[None]])
+            answers = np.concatenate([self.finish(memory), self.card.no_person()[None]])
             return answers, self.initial_memory()
         return self.advance(np.asarray(frame)[None], memory)
 

@@ -17,13 +17,7 @@ Confusion = NDArray[np.int64]
 
 
 def confusion_of(truth: NDArray[np.integer], found: NDArray[np.integer], classes: int) -> Confusion:
-    """Compute the confusion matrix; unknown frames do not count.
-
-    Raises
-    ------
-    Sd2Error
-        When there are not as many answers as frames.
-    """
+    """Compute the confusion matrix; unknown frames do not count."""
     if truth.shape != found.shape:
         raise Sd2Error(f"{len(found)} answers for {len(truth)} frames", "one for each")
     counted = truth != UNKNOWN

@@ -20,7 +20,7 @@ class Classifier(nn.Module):
     """Base of the classifiers: layers along time, then a common head.
 
     The head is the paper's: layer norm, dense, dropout, dense (softmax is left to the loss
-    and to whoever asks for probabilities).
+    and to :func:`probabilities_of`).
 
     Parameters
     ----------
@@ -166,13 +166,7 @@ _LARGEST = 1024
 
 
 def options(name: str) -> dict[str, Any]:
-    """Return the options of a model with their defaults.
-
-    Raises
-    ------
-    Sd2Error
-        When there is no such model.
-    """
+    """Return the options of a model with their defaults."""
     if name not in _MODELS:
         raise Sd2Error(f"There is no classifier {name!r}", f"one of {', '.join(MODELS)}")
     return dict(_OPTIONS[name])
@@ -189,11 +183,6 @@ def build(name: str, size: int, classes: int, **given: Any) -> Classifier:
         Features per frame.
     **given
         Options in place of :func:`options`.
-
-    Raises
-    ------
-    Sd2Error
-        When there is no such model or option, or an option is not of its kind.
     """
     known = options(name)
     for option, value in given.items():

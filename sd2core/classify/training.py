@@ -100,7 +100,7 @@ class Trained(NamedTuple):
     classifier : TrainedClassifier
         The best one on validation, or the last where nothing validates.
     events : list of dict
-        What was told while training.
+        Events of the training.
     """
 
     classifier: TrainedClassifier
@@ -147,7 +147,7 @@ def train(
     """Train a classifier on clips.
 
     The loss is the cross entropy, every class weighted by the inverse of its number of
-    frames, so that all of them count the same. A batch is drawn anew when all clips have
+    frames, so that all of them count the same. The clips are shuffled again when all have
     been seen. The best on validation is the one with the highest mean recall of frames.
 
     Parameters
@@ -158,11 +158,6 @@ def train(
         Axis, frame rate and classes of the clips.
     about : mapping, optional
         For the card.
-
-    Raises
-    ------
-    Sd2Error
-        When there is no labelled frame to learn from.
     """
     chosen = chosen or TrainOptions()
     weights = _class_weights(training, known.classes)

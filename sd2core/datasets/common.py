@@ -85,7 +85,7 @@ def check_fits(source: Source, header: Header) -> None:
             raise Sd2Error(
                 f"{title}: bins {', '.join(map(str, extra))} of the {one.kind} map were emptied",
                 "energy there, as in the sources before",
-                "Export with --null-bins that name them, or make the maps anew",
+                "Export with --null-bins that name them, or make the maps again",
             )
     rate_hz = next(iter(source.maps.values())).timebase.frames_per_s
     factor = rate_hz / header.frame_rate_hz

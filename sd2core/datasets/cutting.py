@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.source import KINDS, Outline, Source
 from sd2core.denoise.resample_to_model import clips, interpolated, is_regular
-from sd2core.maps import MapKind
 from sd2core.pairs.segments import cut, segment_starts
 
 _BLOCK = 256
@@ -175,11 +174,6 @@ def label_of_segments(
         named = np.where(enough, gesture, 0)
     purity = np.take_along_axis(counts, named[:, None], axis=1)[:, 0] / windows.shape[1]
     return named.astype(np.int16), purity.astype(np.float32)
-
-
-def spectra_kinds(arrays: Arrays) -> list[MapKind]:
-    """Return the kinds of maps in a block."""
-    return [kind for kind in KINDS if kind in arrays]
 
 
 def _values(

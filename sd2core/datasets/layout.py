@@ -54,7 +54,7 @@ class Header:
     length, overlap : int
         Frames of a segment, and how many neighbours share.
     null_bins : tuple of int
-        Zero on purpose, in all kinds.
+        Bins set to zero in all kinds.
     label_rule, min_share
         As :class:`~sd2core.datasets.options.DatasetOptions` has them.
     kinds_wanted, kinds : tuple of str

@@ -75,7 +75,7 @@ class Making:
         are simulated maps only where a recording's radar file holds one.
     model : str, optional
         Denoiser, by file or name; None: that of the recording, or the bundled one where
-        nobody has chosen. A recording that is set to be shown without has no denoised map.
+        none is chosen. A recording that is set to have no denoiser has no denoised map.
     """
 
     kinds: tuple[MapKind, ...] = KINDS

@@ -8,11 +8,11 @@ from collections.abc import Callable, Mapping, Sequence
 from sd2core.train.data import Split, split_subjects
 
 RULE = (
-    "Everybody has a number from 0 to 1, the first eight bytes of the SHA-256 of their name: below"
-    " a sixth they test, below a third they validate, otherwise they are learnt from. So a person"
-    " who is added moves nobody else. But at least one person tests (where there are three) and"
-    " one validates, and at most a third of all each: where numbers alone would have it otherwise,"
-    " the nearest ones go."
+    "Each person's number, from 0 to 1, is the first eight bytes of the SHA-256 of their name:"
+    " below a sixth they test, below a third they validate, otherwise they train. So adding a"
+    " person moves no one else. But at least one person tests (where there are three) and one"
+    " validates, and at most a third of all each: where the numbers alone would give another"
+    " split, the people with the nearest numbers are moved."
 )
 
 _SHARE = 1 / 6

@@ -42,7 +42,7 @@ Item = tuple[torch.Tensor, torch.Tensor]
 class SegmentDataset(TorchDataset[Item]):
     """Pairs of a segment and its target.
 
-    Only segments that have both are in it. The file is opened anew in every process that
+    Only segments that have both are in it. The file is opened again in every process that
     reads from it, so it can be pickled and given to a ``DataLoader`` with workers.
 
     Parameters

@@ -106,7 +106,7 @@ def write_dataset(
     work.mkdir(exist_ok=True)
     lock = FileLock(work / LOCK_NAME)
     if not lock.take():
-        raise Sd2Error(f"Somebody is writing to {out}", "a data set of its own", "Wait for that")
+        raise Sd2Error(f"A process is writing to {out}", "one at a time", "Wait until it ends")
     writer: _Writer | None = None
     try:
         writer = _Writer(out, work, form, options)

@@ -17,11 +17,6 @@ def segment_starts(frames: int, length: int = LENGTH, overlap: int = OVERLAP) ->
 
     Neighbours share ``overlap`` frames; the last window ends with the stretch and may
     share more. A stretch shorter than a window has none.
-
-    Raises
-    ------
-    Sd2Error
-        When the overlap is not smaller than the length.
     """
     if not 0 <= overlap < length:
         raise Sd2Error(

@@ -110,7 +110,7 @@ class PairSet:
     Parameters
     ----------
     null_bins : tuple of int
-        Bins that are zero on purpose, in input and target.
+        Bins set to zero in input and target.
     labels : tuple of str
         The first is the background.
     provenance : dict

@@ -65,13 +65,7 @@ class PairFacts:
 
 
 def pair_facts(path: Path) -> PairFacts:
-    """Read the description of a store of pairs.
-
-    Raises
-    ------
-    Sd2Error
-        When it is none, of another version or kind, empty, or its description is damaged.
-    """
+    """Read the description of a store of pairs."""
     path = Path(path)
     header, index = read_description(path)
     takes = tuple(

@@ -289,7 +289,7 @@ class ClassTrack(QObject):
         self._given, self._known = replace(doppler, values=values), known.copy()
         if doppler.present is not None:
             nobody = known & ~doppler.present
-            self._shares[nobody] = self._card.nobody()
+            self._shares[nobody] = self._card.no_person()
             self._done[nobody] = True
         self.changed.emit()
 
