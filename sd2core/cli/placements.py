@@ -15,8 +15,7 @@ if TYPE_CHECKING:
     from sd2core.accuracy import Choice
     from sd2core.mesh.sequence import MeshSequence
     from sd2core.placements.body_extent import SensorCoverage
-    from sd2core.placements.cost import PlacementCost
-    from sd2core.placements.placements import Placements
+    from sd2core.placements.placements import PlacementCost, Placements
     from sd2core.radar_config import RadarConfig
     from sd2core.recording.recording import Recording
     from sd2core.sensor import VirtualSensor
@@ -191,7 +190,7 @@ def _cost(
     from sd2core.accuracy.choosing import check_options
     from sd2core.cli.ladder import chosen
     from sd2core.doppler import PRESETS
-    from sd2core.placements.cost import PlacementCost
+    from sd2core.placements.placements import PlacementCost
 
     places = placements.places()
     middle = sorted(range(len(places)), key=lambda number: places[number].range_m)[len(places) // 2]

@@ -170,7 +170,7 @@ def legs_kernel(
     """
     if matrix is None:
         matrix = legs_state_matrix(C.shape[-1], C.device)
-    return _nplr_kernel(matrix, to_normal_basis(C), dt, length, C.dtype)
+    return nplr_kernel(matrix, to_normal_basis(C), dt, length, C.dtype)
 
 
 def to_normal_basis(C: Tensor) -> Tensor:
@@ -180,7 +180,13 @@ def to_normal_basis(C: Tensor) -> Tensor:
     return torch.view_as_complex((C.double() @ basis).unflatten(-1, (-1, 2)))
 
 
-def nplr_kernel(matrix: StateMatrix, C: Tensor, dt: Tensor | float, length: int) -> Tensor:
+def nplr_kernel(
+    matrix: StateMatrix,
+    C: Tensor,
+    dt: Tensor | float,
+    length: int,
+    precision: torch.dtype | None = None,
+) -> Tensor:
     """Kernel of any normal matrix less one of rank one, discretised bilinearly.
 
     With z for the shift by one frame and R = (1 − Δ/2 Λ − z (1 + Δ/2 Λ))⁻¹ (Gu et al. 2022,
@@ -203,14 +209,9 @@ def nplr_kernel(matrix: StateMatrix, C: Tensor, dt: Tensor | float, length: int)
 
     Returns
     -------
-    (…, length) float32 or float64, by the type of C.
+    (…, length) of type ``precision``, by default float32 or float64 by the type of C.
     """
-    return _nplr_kernel(matrix, C, dt, length, C.real.dtype)
-
-
-def _nplr_kernel(
-    matrix: StateMatrix, C: Tensor, dt: Tensor | float, length: int, precision: torch.dtype
-) -> Tensor:
+    precision = precision or C.real.dtype
     check_length(length)
     dt = torch.as_tensor(dt, dtype=torch.float64, device=C.device)[..., None]
     everything = (matrix.poles, matrix.low_rank, matrix.inputs, C, dt)

@@ -1,4 +1,4 @@
-"""Sensor placements around a body: a grid, or a random cloud.
+"""Sensor placements around a body, a grid or a random cloud, and the cost of their maps.
 
 A place is a range, an azimuth and an elevation as seen from the body, in the convention of
 :func:`sd2core.sensor.position_from_spherical` and of the sensor panel: 0°, 0° is on the
@@ -334,3 +334,42 @@ def _bounded(
                     f"{least:g} to {most:g}{unit}",
                 )
     return (("ranges", ranges_m), ("azimuths", azimuths_deg), ("elevations", elevations_deg))
+
+
+_VALUE_BYTES, _TIME_BYTES = 4, 8
+"""Single precision for values, double for times."""
+
+
+@dataclass(frozen=True)
+class PlacementCost:
+    """Time and memory of one map per placement.
+
+    Parameters
+    ----------
+    maps, frames : int
+        Maps, and frames of each.
+    frame_ms : float
+        Measured time per frame on all cores of the plan that holds the tolerance.
+    bins : int
+        Velocity bins of a map.
+    """
+
+    maps: int
+    frames: int
+    frame_ms: float
+    bins: int = 32
+
+    @property
+    def map_s(self) -> float:
+        """Seconds per map."""
+        return 1e-3 * self.frame_ms * self.frames
+
+    @property
+    def total_s(self) -> float:
+        """Seconds for all maps, without the preparation of the clip."""
+        return self.maps * self.map_s
+
+    @property
+    def total_bytes(self) -> int:
+        """Bytes of the values and times of all maps, before compression."""
+        return self.maps * self.frames * (_VALUE_BYTES * self.bins + _TIME_BYTES)

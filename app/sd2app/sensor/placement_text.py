@@ -5,7 +5,7 @@ from __future__ import annotations
 from sd2app.accuracy.text import InUse
 from sd2app.sensor.placements import PlacementsModel
 from sd2app.widgets.text import bytes_text, counted, duration_text, seconds
-from sd2core.placements.cost import PlacementCost
+from sd2core.placements.placements import PlacementCost
 
 _SHORT_S = 10.0
 

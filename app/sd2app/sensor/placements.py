@@ -13,8 +13,7 @@ from sd2app.session.document import DocumentModel
 from sd2app.session.sensor import SensorModel
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.placements.body_extent import BodyExtent, SensorCoverage
-from sd2core.placements.cost import PlacementCost
-from sd2core.placements.placements import Place, Placements
+from sd2core.placements.placements import Place, PlacementCost, Placements
 from sd2core.radar_config import PAPER_RADAR, RadarConfig
 from sd2core.sensor import VelocityAxis, VirtualSensor
 
