@@ -1,9 +1,9 @@
-"""The compiled inner loops of counting.
+"""Compiled inner loops of counting.
 
-Each frame is gone through in runs of vertices that stay in the second-level
+Each frame is processed in runs of vertices that stay in the second-level
 cache. Each step of a run is a loop of its own with few streams, which the compiler
-turns into vector instructions. :mod:`sd2core.doppler.histogram` says what the
-numbers mean. Positions, sensor and scale are all in single precision, or all in
+turns into vector instructions. :mod:`sd2core.doppler.histogram` explains the
+numbers. Positions, sensor and scale are all in single precision, or all in
 double: the compiler makes two forms of each loop, and constants are in single
 precision, so that they do not widen the first (docs/decisions/0013).
 """
@@ -44,7 +44,7 @@ def _relative_ranges(x, y, z, sx, sy, sz, distance, ranges):  # type: ignore[no-
 
 @compiled
 def _distance(sensor):  # type: ignore[no-untyped-def]
-    """Of the sensor from the origin, in the sensor's precision."""
+    """Distance of the sensor from the origin, in the sensor's precision."""
     away = np.sqrt(
         np.float64(sensor[0]) ** 2 + np.float64(sensor[1]) ** 2 + np.float64(sensor[2]) ** 2
     )
@@ -53,7 +53,7 @@ def _distance(sensor):  # type: ignore[no-untyped-def]
 
 @compiled
 def _extend(positions, sensor, distance, known, upto, ring):  # type: ignore[no-untyped-def]
-    """Work out the knots from ``known`` to ``upto``; the ring keeps the newest few."""
+    """Compute the knots from ``known`` to ``upto``; the ring keeps the newest few."""
     for knot in range(known, upto + 1):
         points = positions[knot]
         _relative_ranges(
@@ -72,9 +72,9 @@ def _axis_positions(before, after, scale, offset, f):  # type: ignore[no-untyped
 
 @compiled
 def _slots(f, seen, bins, beyond, slot):  # type: ignore[no-untyped-def]
-    """Slot per vertex: its bin, ``bins`` when beyond the axis, ``bins + 1`` when hidden.
+    """Set the slot of each vertex: its bin, ``bins`` beyond the axis, ``bins + 1`` if hidden.
 
-    Returns how many seen vertices lie beyond the axis.
+    Returns the number of visible vertices beyond the axis.
     """
     end = np.float32(bins)
     inner = end - np.float32(1e-3)
@@ -112,7 +112,7 @@ def _slots(f, seen, bins, beyond, slot):  # type: ignore[no-untyped-def]
 
 @compiled
 def _squared_ratios(ranges, distance, reference, weight):  # type: ignore[no-untyped-def]
-    """(R_ref / R)² of a run of vertices."""
+    """Squared ratios (R_ref / R)² of a run of vertices."""
     for v in range(weight.shape[0]):
         ratio = reference / max(ranges[v] + distance, _NEAREST)
         weight[v] = ratio * ratio
@@ -120,7 +120,7 @@ def _squared_ratios(ranges, distance, reference, weight):  # type: ignore[no-unt
 
 @compiled
 def _raise_to(weight, exponent, spare):  # type: ignore[no-untyped-def]
-    """Squared ratios to ratios to the power of ``exponent``, in place."""
+    """Raise ratios, given squared, to the power of ``exponent``, in place."""
     if exponent != np.floor(exponent):
         power = np.float32(exponent * 0.5)
         for v in range(weight.shape[0]):
@@ -157,7 +157,7 @@ def _projected(x, y, z, ax, ay, az, sx, sy, sz, weight):  # type: ignore[no-unty
 
 @compiled
 def _heads_beyond(f, seen, heads, bins):  # type: ignore[no-untyped-def]
-    """How many vertices the seen ones beyond the axis stand for."""
+    """Number of vertices that the visible ones beyond the axis stand for."""
     end, total = np.float32(bins), np.int32(0)
     for v in range(f.shape[0]):
         outside = (seen[v] != 0) & ((f[v] < np.float32(0)) | (f[v] > end))
@@ -167,7 +167,7 @@ def _heads_beyond(f, seen, heads, bins):  # type: ignore[no-untyped-def]
 
 @compiled
 def _heads_seen(seen, heads):  # type: ignore[no-untyped-def]
-    """How many vertices the seen ones stand for."""
+    """Number of vertices that the visible ones stand for."""
     total = np.int32(0)
     for v in range(seen.shape[0]):
         total += np.int32(heads[v]) if seen[v] != 0 else np.int32(0)
@@ -200,9 +200,9 @@ def count_kernel(  # type: ignore[no-untyped-def]
     positions, centre, before, after, scale, normals, mask, areas, vectors, heads, sensor,
     which, weighting, bins, beyond, exponent, reference, histogram, visible, outside,
 ):  # fmt: skip
-    """See :func:`sd2core.doppler.histogram.count`; the last three are written.
+    """Compiled form of :func:`sd2core.doppler.histogram.count`; the last three are written.
 
-    ``heads`` (V,) says how many vertices each stands for, and is empty where each
+    ``heads`` (V,) is the number of vertices that each stands for, and is empty if each
     stands for itself.
     """
     vertices = positions.shape[2]
@@ -302,7 +302,7 @@ def count_kernel(  # type: ignore[no-untyped-def]
 def needed_kernel(  # type: ignore[no-untyped-def]
     positions, before, after, scale, sensor, bins, beyond, live, needed
 ) -> None:
-    """See :func:`sd2core.doppler.histogram.mark_needed`; ``needed`` starts as zeros."""
+    """Compiled :func:`sd2core.doppler.histogram.mark_needed`; ``needed`` starts as zeros."""
     vertices = positions.shape[2]
     offset = np.float32(0.5 * bins)
     f = np.empty(_RUN, positions.dtype)

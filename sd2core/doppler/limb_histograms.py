@@ -1,4 +1,4 @@
-"""Fine histograms of velocity, limb by limb: what is left of a map if a limb were faster."""
+"""Fine histograms of velocity, limb by limb, to shift the velocities of a limb."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from sd2core.doppler.kernels import CLIP, WRAP
 from sd2core.numerics.compiled import compiled, kernels_ready
 
 PARTS = 8
-"""A bin is cut into so many."""
+"""Number of parts per bin."""
 
 
 @dataclass(frozen=True)
 class FineAxis:
-    """The velocity axis cut finely, with room for what may come in from beyond.
+    """Finely divided velocity axis, with room for velocities from beyond the axis.
 
     Parameters
     ----------
     room_bins : int
-        Bins added at each end; none where velocities fold back.
+        Bins added at each end; zero where velocities fold back.
     """
 
     counting: Counting
@@ -31,20 +31,20 @@ class FineAxis:
 
     @property
     def periodic(self) -> bool:
-        """Whether what leaves at one end comes in at the other."""
+        """True if velocities beyond one end fold back to the other."""
         return self.counting.beyond == WRAP
 
     @property
     def parts(self) -> int:
-        """How many parts there are."""
+        """Number of parts."""
         return PARTS * (self.counting.bins + 2 * self.room_bins)
 
     def shifted(
         self, fine: NDArray[np.float64], shift_bins: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Coarse histograms after the velocities have changed.
+        """Coarse histograms after a change of all velocities.
 
-        Within a part everything is taken as spread evenly.
+        Within a part the velocities are taken as evenly distributed.
 
         Parameters
         ----------
@@ -83,14 +83,14 @@ def fine_histograms(
     vertex_limb: NDArray[np.uint8],
     limbs: int,
 ) -> NDArray[np.float64]:
-    """What every limb counts in every part of a fine axis; the mean over a frame's samples.
+    """Count every limb in every part of a fine axis; the mean over a frame's samples.
 
     Parameters
     ----------
     sensor : float64 array, shape (3,)
         In the frame of the positions.
     weights : float32 array, shape (n, V)
-        What each vertex counts; 0 where it is not seen.
+        Weight of each vertex; 0 if it is hidden.
     vertex_limb : uint8 array, shape (V,)
 
     Returns
@@ -126,7 +126,7 @@ def fine_histograms_of(
     vertex_limb: NDArray[np.uint8],
     limbs: int,
 ) -> NDArray[np.float64]:
-    """The same of given velocities (n, V), in the frames that are ``measured`` (n,)."""
+    """Count given velocities (n, V), in the frames that are ``measured`` (n,)."""
     fine = np.zeros((limbs, len(velocity_mps), axis.parts))
     per_bin = 0.5 * axis.counting.bins / axis.counting.v_max_mps
     offset = 0.5 * axis.counting.bins + axis.room_bins

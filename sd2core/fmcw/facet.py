@@ -1,4 +1,4 @@
-"""The echo of a flat facet in closed form, compiled: mean of a weighted phasor over a triangle.
+"""Echo of a flat facet in closed form, compiled: mean of a weighted phasor over a triangle.
 
 With barycentric coordinates l the phase on a facet is the sum of l_i p_i, minus
 the sum of l_i l_j h_ij for the curvature of the wave front. Its exponential is
@@ -26,7 +26,7 @@ _MANY_QUARTERS = 100_000
 
 @compiled
 def unit_phasor(phase_rad: float) -> Any:
-    """exp(j phase) to 3e-14, in a third of the time of the C library's sine and cosine.
+    """Compute exp(j phase) to 3e-14, in a third of the time of the C library's sine and cosine.
 
     Taylor's series within an eighth of a turn of a quarter turn.
     """
@@ -52,7 +52,7 @@ def unit_phasor(phase_rad: float) -> Any:
 
 @compiled
 def _edge_moments(start: complex, end: complex, half_rad: float) -> Any:
-    """Means of exp(jx), x exp(jx), x^2 exp(jx) along an edge, x from -1 to 1 in ``half_rad``.
+    """Compute the means of exp(jx), x exp(jx), x^2 exp(jx) along an edge, x = -1 to 1 half_rad.
 
     ``start`` and ``end`` are exp(j phase) at its ends, ``half_rad`` half their difference in
     phase.
@@ -98,9 +98,9 @@ def facet_mean(
     weight_a, weight_b, weight_c : float
         Weight at the corners; linear between them.
     turn_a, turn_b, turn_c : float
-        How fast the phase at the corners grows.
+        Rate of change of the phase at the corners.
     bend_ab, bend_bc, bend_ca : float
-        What the phase lacks of being linear: along an edge it sags by a quarter of this.
+        Deviation of the phase from linearity: along an edge it sags by a quarter of this.
 
     Returns
     -------
@@ -164,7 +164,7 @@ def bent_facet_mean(
     bend_bc: float,
     bend_ca: float,
 ) -> Any:
-    """The same with a facet that bends much cut in four, each bent by a quarter."""
+    """Compute :func:`facet_mean`; a strongly bent facet is cut in four, bent by a quarter each."""
     if max(bend_ab, bend_bc, bend_ca) < _CUT_ABOVE_RAD:
         return facet_mean(
             a, b, c, weight_a, weight_b, weight_c, turn_a, turn_b, turn_c,

@@ -50,7 +50,7 @@ def _turning(
 ) -> None:
     """Echo of a facet whose corners recede at different rates, as a parabola in time.
 
-    How far the phases of its corners part decides between a constant, the tangent, and a
+    The difference of the phases of its corners decides between a constant, the tangent, and a
     parabola through three moments; see docs/decisions/0011 for what that costs.
     """
     now, change = _mean_at(phase, turn, weight, bend, 0.0)
@@ -103,9 +103,9 @@ def facet_echoes(
     wave_number : float
         4 pi / lambda: phase per metre of range.
     half_s : float
-        Half the time that is looked at.
+        Half the duration.
     index, range_m, rate_mps : (F,)
-        Results: number of the facet, half the path and how fast it grows.
+        Results: number of the facet, half the path and its rate of change.
     amplitude : (F,) per term
         Result: echo as a polynomial in time over ``half_s``; one term, or three
         for a facet that turns meanwhile.
@@ -113,7 +113,7 @@ def facet_echoes(
     Returns
     -------
     int
-        How many facets were found.
+        Number of facets found.
     """
     same = True
     for k in range(3):
@@ -271,7 +271,7 @@ def recurrent_sum(
     real_total: Floats,
     imaginary_total: Floats,
 ) -> None:
-    """The sum of :func:`direct_sum` with one phasor per chirp, turned from sample to sample.
+    """Compute :func:`direct_sum` with one phasor per chirp, turned from sample to sample.
 
     Totals are (samples, chirps) each; rounding grows with the number of samples, to some
     1e-14 times it.

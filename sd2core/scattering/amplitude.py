@@ -1,4 +1,4 @@
-"""How much a vertex sends back: its share of the surface, how it is turned, the range law."""
+"""Echo of a vertex: its share of the surface, its orientation, the range law."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from sd2core.numerics.compiled import compiled
 from sd2core.scattering.visibility import sum_cross_products
 
 NEAREST_RANGE_M = 0.1
-"""The range law is a far-field law; whatever is nearer counts as at this range."""
+"""Least range of the range law, which is a far-field law; nearer vertices count as here."""
 
 
 def vertex_areas(positions: NDArray[Any], faces: NDArray[np.int32]) -> NDArray[np.float32]:
@@ -120,7 +120,7 @@ def projected_areas(
     points : float array, shape (3, V)
         Metres.
     vectors : float32 array, shape (3, V)
-        Of :func:`vertex_area_vectors`.
+        Area vectors from :func:`vertex_area_vectors`.
     sensor : float64 array, shape (3,)
 
     Returns

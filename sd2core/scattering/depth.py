@@ -7,7 +7,7 @@ by exact's own search, among the triangles there. A vertex counts only when one 
 its triangles faces the sensor, and of a closed surface only such triangles are
 drawn: faces must be oriented outwards (see docs/decisions/0010).
 
-Where one image plane does not serve (the body more than 63 degrees off the axis,
+Where one image plane does not suffice (the body more than 63 degrees off the axis,
 or around the sensor), the frame is decided exactly.
 """
 
@@ -42,7 +42,7 @@ BEHIND_PIXELS = 0.5
 """A vertex deeper by this than all four pixels is hidden."""
 
 LOOSE = 2
-"""Facing is unknown: no triangle with an area belongs to the vertex."""
+"""Value of ``facing`` for a vertex without a triangle that has an area."""
 
 THINNEST = 1e-9
 """A triangle thinner than this, in pixels, covers none."""
@@ -198,7 +198,7 @@ def _look_up(  # type: ignore[no-untyped-def]
 
 @compiled
 def _beside_doubt(drawn, bounds, triangles, upto) -> int:  # type: ignore[no-untyped-def]
-    """Move the triangles that touch a pixel with a doubtful vertex to the front; how many."""
+    """Move triangles on a pixel with a doubtful vertex to the front; returns their number."""
     count = 0
     for f in range(triangles):
         left, right, top, bottom = bounds[f, 0], bounds[f, 1] + 1, bounds[f, 2], bounds[f, 3] + 1

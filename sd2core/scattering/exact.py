@@ -3,8 +3,8 @@
 All rays meet at the sensor. Vertices are sorted into the cells of the sensor's
 image plane; each triangle then meets only the few vertices in the cells that it
 covers, and leaves out those in front of it. This search is single precision with
-a safety margin, so it can only propose too much. What hides a vertex is decided
-in double precision, in space: the triangle must cross the open segment between
+a safety margin, so it can only propose too much. The final test of a vertex is
+in double precision, in space: a triangle must cross the open segment between
 vertex and sensor (see docs/decisions/0003).
 """
 
@@ -50,7 +50,7 @@ LANES = 8
 def hides(  # type: ignore[no-untyped-def]
     x, y, z, i: int, j: int, k: int, v: int, gx: float, gy: float, gz: float, contact: float
 ) -> bool:
-    """Whether triangle (i, j, k) crosses the open segment from vertex v along g.
+    """True if triangle (i, j, k) crosses the open segment from vertex v along g.
 
     ``g`` is the vector from the vertex to the sensor. Möller and Trumbore's test
     in double precision, with everything relative to the vertex.
@@ -115,9 +115,9 @@ def _proposed(  # type: ignore[no-untyped-def]
     sorted_x, sorted_y, sorted_depth, order, begin,
     x0, y0, x1, y1, x2, y2, left, right, top, bottom, least, nearest, i, j, k,
 ) -> np.int32:  # fmt: skip
-    """Which of the :data:`LANES` vertices from ``begin`` triangle (i, j, k) may hide, as bits.
+    """Bits of the :data:`LANES` vertices from ``begin`` that triangle (i, j, k) may hide.
 
-    Nearly every vertex fails some condition, and which one cannot be predicted:
+    Nearly every vertex fails some condition, but not a predictable one:
     without branches, the compiler judges all lanes at once.
     """
     found = np.int32(0)
@@ -139,12 +139,12 @@ def search_view(  # type: ignore[no-untyped-def]
     x, y, z, faces, g, axes, near, contact, owned, owned_count, image, depth, cell, start,
     order, sorted_image, sorted_depth, hidden,
 ) -> None:  # fmt: skip
-    """Find what hides the owned vertices in one view and clear their ``hidden`` flag.
+    """Set the ``hidden`` flag of the owned vertices that a triangle hides in one view.
 
     ``g`` (3, V) float64 is sensor − vertex, ``axes`` (3, 3) the view's right, up
     and forward; ``image`` (2, V) and ``depth`` (V,) float32 hold each vertex's
     image coordinates and depth. In a view that looks in one direction only,
-    ``near`` cuts what lies behind. What is sorted has room for :data:`LANES` more.
+    ``near`` cuts off triangles behind it. Sorted arrays have room for :data:`LANES` more.
     """
     vertices = depth.shape[0]
     xmin = ymin = dmin = np.float32(np.inf)

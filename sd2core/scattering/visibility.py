@@ -1,7 +1,7 @@
-"""Which vertices a sensor sees: facing it, or truly not hidden.
+"""Visibility of vertices by their normals: those that face a sensor.
 
-``facing`` asks each vertex's normal and relies on faces that are oriented
-outwards. ``exact`` asks whether anything stands between vertex and sensor and
+``facing`` tests each vertex's normal and relies on faces that are oriented
+outwards. ``exact`` tests if a triangle lies between vertex and sensor and
 does not care about orientation. A vertex without a surface around it (loose, or
 with zero-area faces only) has no normal and counts as facing.
 """
@@ -48,7 +48,7 @@ def vertex_normals(positions: NDArray[Any], faces: NDArray[np.int32]) -> NDArray
 
 
 def encloses(faces: NDArray[np.int32]) -> bool:
-    """Whether faces are a closed surface, alike oriented all over.
+    """True if faces are a closed surface of consistent orientation.
 
     Every edge then belongs to two triangles that run along it in opposite
     directions, and what looks onto the body from outside meets a face that is
@@ -72,7 +72,7 @@ def sum_cross_products(
     faces: NDArray[np.int32],
     total: NDArray[np.float64],  # (V, 3), written
 ) -> None:
-    """Around every vertex, the sum of its triangles' edge cross products: six area vectors."""
+    """Sum the edge cross products of every vertex's triangles: six times its area vector."""
     x, y, z = points[0], points[1], points[2]
     total[:] = 0
     for f in range(faces.shape[0]):
@@ -110,7 +110,7 @@ def vertex_normals_kernel(
 def facing_mask(
     positions: NDArray[np.float32], normals: NDArray[np.int8], sensor: NDArray[np.float64]
 ) -> NDArray[np.uint8]:
-    """1 where a vertex's normal does not point away from the sensor.
+    """Mask of the vertices whose normal does not point away from the sensor.
 
     Parameters
     ----------
