@@ -9,7 +9,7 @@ from PySide6.QtCore import QObject, Signal
 
 from sd2app.accuracy.ladder import Ladder
 from sd2app.background.latest import Emit, LatestRunner
-from sd2app.session.tasks import Job, JobsModel
+from sd2app.session.tasks import Job, TaskList
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import VirtualSensor
@@ -31,7 +31,7 @@ class MeasuredModel(QObject):
     changed = Signal()
     failed = Signal(str)
 
-    def __init__(self, jobs: JobsModel, ladder: Ladder, parent: QObject | None = None) -> None:
+    def __init__(self, jobs: TaskList, ladder: Ladder, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._jobs = jobs
         self._ladder = ladder

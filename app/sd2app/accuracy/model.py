@@ -10,7 +10,7 @@ from sd2app.accuracy.ladder import Ladder
 from sd2app.accuracy.measurements import MeasuredModel, serves_at_rest
 from sd2app.accuracy.text import InUse
 from sd2app.background.latest import LatestRunner
-from sd2app.session.tasks import Job, JobsModel
+from sd2app.session.tasks import Job, TaskList
 from sd2app.settings import Settings
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.mesh.sequence import MeshSequence
@@ -40,7 +40,7 @@ class _Surveyed(NamedTuple):
     survey: Any
 
 
-class TradeModel(QObject):
+class AccuracyModel(QObject):
     """Chooses a plan for the scene that is open, in the background; the newest wish wins.
 
     At rest the tolerance rules, unless the user clicked a point: then that plan
@@ -70,7 +70,7 @@ class TradeModel(QObject):
 
     def __init__(
         self,
-        jobs: JobsModel,
+        jobs: TaskList,
         settings: Settings,
         ladder: Ladder,
         parent: QObject | None = None,

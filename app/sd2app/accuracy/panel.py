@@ -1,4 +1,4 @@
-"""The Trade panel: how much error is accepted, what that costs here, and why."""
+"""The Accuracy panel: how much error is accepted, what that costs here, and why."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from sd2app.accuracy.model import PRESETS, TradeModel
+from sd2app.accuracy.model import PRESETS, AccuracyModel
 from sd2app.widgets.inputs import NumberBox
 from sd2app.widgets.panel import title
 from sd2app.widgets.text import milliseconds, number, percent
@@ -30,7 +30,7 @@ from PySide6.QtWidgets import (
 )
 
 from sd2app.accuracy.measurements import FAMILIES
-from sd2app.accuracy.plot import TradePlot
+from sd2app.accuracy.plot import AccuracyPlot
 from sd2app.accuracy.text import deviation
 from sd2app.session.display import DisplayModel
 from sd2app.widgets.inputs import Choice
@@ -47,12 +47,12 @@ _NOT_MEASURED = {
 }
 
 
-class TradePanel(QWidget):
+class AccuracyPanel(QWidget):
     """Tolerance, plan in use, plot of all plans, reasons."""
 
     def __init__(
         self,
-        trade: TradeModel,
+        trade: AccuracyModel,
         display: DisplayModel,
         measure: QAction,
         parent: QWidget | None = None,
@@ -102,7 +102,7 @@ class TradePanel(QWidget):
         part, layout = _part(self)
         self._empty = sentence("")
         layout.addWidget(self._empty)
-        self._plot = TradePlot(self._trade, display, self)
+        self._plot = AccuracyPlot(self._trade, display, self)
         layout.addWidget(self._plot)
         self._source = sentence("")
         row = QHBoxLayout()
@@ -268,7 +268,7 @@ class ReasonList(QWidget):
 class ToleranceRow(QWidget):
     """How much of the map may differ from the reference."""
 
-    def __init__(self, trade: TradeModel, parent: QWidget | None = None) -> None:
+    def __init__(self, trade: AccuracyModel, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._trade = trade
         self._box = NumberBox(

@@ -9,7 +9,7 @@ from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPen, QPolyg
 from PySide6.QtWidgets import QWidget
 
 from sd2app.accuracy.measurements import front_at_rest, serves_at_rest
-from sd2app.accuracy.model import TradeModel
+from sd2app.accuracy.model import AccuracyModel
 from sd2app.accuracy.text import point_text
 from sd2app.session.display import DisplayModel
 from sd2app.widgets.plot import LogAxis, PointPlot, tick_text
@@ -28,7 +28,7 @@ _STEPS = {
 }
 
 
-class TradePlot(PointPlot):
+class AccuracyPlot(PointPlot):
     """Every plan as a point: the cheaper the further left, the nearer the lower.
 
     Hovering says what a point is, a click uses it. With the keyboard Left and
@@ -41,7 +41,7 @@ class TradePlot(PointPlot):
     KEYS = frozenset({Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Escape, *_STEPS})
 
     def __init__(
-        self, trade: TradeModel, display: DisplayModel, parent: QWidget | None = None
+        self, trade: AccuracyModel, display: DisplayModel, parent: QWidget | None = None
     ) -> None:
         super().__init__(display, "Error against cost of every plan", parent)
         self._trade = trade

@@ -11,7 +11,7 @@ from PySide6.QtCore import QObject, Signal
 from sd2app.background.latest import Emit, LatestRunner
 from sd2app.labels.model import LabelsModel
 from sd2app.session.playback import PlaybackModel
-from sd2app.session.time_window import VisibleSpanModel
+from sd2app.session.time_window import TimeWindow
 from sd2core.labels.agreement import Agreement, Disagreement, agreement, disagreements
 from sd2core.labels.formats import read_labels
 from sd2core.labels.import_labels import Incoming
@@ -43,7 +43,7 @@ class AgreementModel(QObject):
         self,
         labels: LabelsModel,
         playback: PlaybackModel,
-        span: VisibleSpanModel,
+        span: TimeWindow,
         parent: QObject | None = None,
     ) -> None:
         super().__init__(parent)

@@ -11,7 +11,7 @@ from sd2app.labels.painting import paint_spans
 from sd2app.labels.rows import LabelRows
 from sd2app.session.display import DisplayModel
 from sd2app.session.playback import PlaybackModel
-from sd2app.session.time_window import VisibleSpanModel
+from sd2app.session.time_window import TimeWindow
 from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, paint_cursor
 
 _MARKS_PX = 7.0
@@ -26,7 +26,7 @@ class OtherTimeline(QWidget):
     def __init__(
         self,
         model: AgreementModel,
-        span: VisibleSpanModel,
+        span: TimeWindow,
         playback: PlaybackModel,
         display: DisplayModel,
         parent: QWidget | None = None,

@@ -116,7 +116,7 @@ class BatchSetupModel(QObject):
 
     @property
     def tolerance(self) -> float:
-        """Error that is allowed where a plan is chosen: that of the Trade panel."""
+        """Error that is allowed where a plan is chosen: that of the Accuracy panel."""
         return self._settings.tolerance
 
     @property

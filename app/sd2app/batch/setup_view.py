@@ -47,7 +47,7 @@ _SUBJECT_TEXT = {
 }
 _ACCURACY_TEXT: dict[Accuracy, str] = {
     "exact": "as exactly as possible",
-    "tolerance": "within the tolerance of the Trade panel, {percent}, which takes time to plan",
+    "tolerance": "within the tolerance of the Accuracy panel, {percent}, which takes time to plan",
 }
 _STEP_TEXT: dict[OptionalStep, tuple[str, str]] = {
     "fit": ("Fit bodies", "To the person in videos that have no mesh"),

@@ -8,7 +8,7 @@ from dataclasses import replace
 from PySide6.QtCore import SignalInstance
 
 from sd2app.classify.model import ClassifyModel
-from sd2app.session.tracks import TrackModel
+from sd2app.session.tracks import MapModel
 from sd2app.suggestions.finders import Found, Threshold
 from sd2core.classify.spans import SpanOptions, predicted_spans
 
@@ -34,16 +34,16 @@ class GestureFinder:
         return self._classify.problem
 
     @property
-    def sources(self) -> tuple[TrackModel, ...]:
+    def sources(self) -> tuple[MapModel, ...]:
         """Maps to look in."""
         return self._classify.sources
 
     @property
-    def source(self) -> TrackModel | None:
+    def source(self) -> MapModel | None:
         """The map that the classifier looks at."""
         return self._classify.source
 
-    def set_source(self, source: TrackModel | None) -> None:
+    def set_source(self, source: MapModel | None) -> None:
         """Let the classifier look at another map; None: at the one it chooses."""
         self._classify.set_source(source)
 

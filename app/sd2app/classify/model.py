@@ -11,10 +11,10 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from sd2app.background.latest import LatestRunner
 from sd2app.classify.library import Classifier, ClassifierLibrary
 from sd2app.classify.track import ClassReading, ClassTrack
-from sd2app.denoise.validity import Standing
+from sd2app.denoise.validity import MapValidity
 from sd2app.labels.model import LabelsModel
 from sd2app.session.playback import PlaybackModel
-from sd2app.session.tracks import TrackModel
+from sd2app.session.tracks import MapModel
 from sd2app.settings import Settings
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ class ClassifyModel(QObject):
 
     Parameters
     ----------
-    maps : sequence of TrackModel
+    maps : sequence of MapModel
         Synthetic, denoised, and the radar's.
 
     Signals
@@ -58,9 +58,9 @@ class ClassifyModel(QObject):
 
     def __init__(
         self,
-        maps: Sequence[TrackModel],
+        maps: Sequence[MapModel],
         playback: PlaybackModel,
-        standing: Standing,
+        validity: MapValidity,
         labels: LabelsModel,
         settings: Settings,
         library: ClassifierLibrary,
@@ -70,12 +70,12 @@ class ClassifyModel(QObject):
         self._synthetic, self._denoised, self._real = self._maps = tuple(maps)
         self._playback, self._labels = playback, labels
         self._settings, self._library = settings, library
-        self.track = ClassTrack(standing.of, self)
+        self.track = ClassTrack(validity.is_current, self)
         self._path: Path | None = next(iter(settings.paths(_MODEL)), None)
         self._card: ClassifierCard | None = None
         self._problem = ""
         self._shown = settings.flag(_SHOWN, True)
-        self._chosen: TrackModel | None = None
+        self._chosen: MapModel | None = None
         self._runner = LatestRunner("classifier", self)
         self._runner.finished.connect(self._set_loaded)
         self._runner.failed.connect(self._fail)
@@ -87,7 +87,7 @@ class ClassifyModel(QObject):
         for track in self._maps:
             track.changed.connect(self._follow)
         playback.frame_changed.connect(lambda _: self.moved.emit())
-        standing.changed.connect(self.counts_changed)
+        validity.changed.connect(self.counts_changed)
         self.counts_changed.connect(self.moved)
 
     # --- what is known --------------------------------------------------------------------
@@ -118,12 +118,12 @@ class ClassifyModel(QObject):
         return self._problem or self.track.problem
 
     @property
-    def sources(self) -> tuple[TrackModel, ...]:
+    def sources(self) -> tuple[MapModel, ...]:
         """Maps that can be looked at."""
         return tuple(track for track in self._maps if track.map is not None)
 
     @property
-    def source(self) -> TrackModel | None:
+    def source(self) -> MapModel | None:
         """The map that is looked at: the one chosen, else one of a kind that was learnt from."""
         there = self.sources
         if self._chosen in there:
@@ -193,7 +193,7 @@ class ClassifyModel(QObject):
         self._follow()
         self.changed.emit()
 
-    def set_source(self, source: TrackModel | None) -> None:
+    def set_source(self, source: MapModel | None) -> None:
         """Look at another map; None leaves it to the classifier."""
         self._chosen = source
         self._follow()
@@ -214,7 +214,7 @@ class ClassifyModel(QObject):
 
     # --- following ------------------------------------------------------------------------
 
-    def _knows(self, track: TrackModel) -> bool:
+    def _knows(self, track: MapModel) -> bool:
         kinds = {track.map.kind} if track.map is not None else set()
         if track is self._real:
             kinds |= {"simulated", "real"}

@@ -24,8 +24,8 @@ from sd2app.classify.track import ClassReading
 from sd2app.labels.model import LabelsModel
 from sd2app.session.display import DisplayModel
 from sd2app.session.playback import PlaybackModel
-from sd2app.session.time_window import VisibleSpanModel
-from sd2app.widgets.cached_paint import Still
+from sd2app.session.time_window import TimeWindow
+from sd2app.widgets.cached_paint import CachedPaint
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.model_menu import ModelButton
 from sd2app.widgets.panel import ElidedLabel
@@ -54,7 +54,7 @@ class ClassStrip(QWidget):
         self,
         classify: ClassifyModel,
         labels: LabelsModel,
-        span: VisibleSpanModel,
+        span: TimeWindow,
         playback: PlaybackModel,
         display: DisplayModel,
         button: ModelButton,
@@ -214,7 +214,7 @@ class ClassPlot(QWidget):
         self,
         classify: ClassifyModel,
         labels: LabelsModel,
-        span: VisibleSpanModel,
+        span: TimeWindow,
         playback: PlaybackModel,
         display: DisplayModel,
         parent: QWidget | None = None,
@@ -222,7 +222,7 @@ class ClassPlot(QWidget):
         super().__init__(parent)
         self._classify, self._labels = classify, labels
         self._span, self._playback, self._display = span, playback, display
-        self._still = Still(self)
+        self._still = CachedPaint(self)
         self.setFixedHeight(_PLOT_PX)
         self.setAccessibleName("Probability of each gesture over time")
         for signal in (

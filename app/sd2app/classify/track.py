@@ -13,7 +13,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from sd2app.background.latest import Emit, LatestRunner
 from sd2app.classify.library import Classifier, LiveClasses
 from sd2app.denoise.map import AT_ONCE, cut_out, known_frames
-from sd2app.session.tracks import TrackModel
+from sd2app.session.tracks import MapModel
 from sd2core.denoise.resample_to_model import check_bins, is_regular, stretches
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
@@ -95,10 +95,10 @@ class ClassTrack(QObject):
 
     changed = Signal()
 
-    def __init__(self, counts: Callable[[TrackModel], bool], parent: QObject | None = None) -> None:
+    def __init__(self, counts: Callable[[MapModel], bool], parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._counts = counts
-        self._source: TrackModel | None = None
+        self._source: MapModel | None = None
         self._classifier: Classifier | None = None
         self._card: ClassifierCard | None = None
         self._problem = ""
@@ -157,7 +157,7 @@ class ClassTrack(QObject):
         return self._done
 
     @property
-    def source(self) -> TrackModel | None:
+    def source(self) -> MapModel | None:
         """The map that is looked at."""
         return self._source
 
@@ -204,7 +204,7 @@ class ClassTrack(QObject):
         self._classifier, self._card = classifier, card if classifier is not None else None
         self._begin_anew()
 
-    def look_at(self, source: TrackModel | None) -> None:
+    def look_at(self, source: MapModel | None) -> None:
         """Look at another map, or at none."""
         if source is self._source:
             return

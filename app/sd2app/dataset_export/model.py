@@ -12,7 +12,7 @@ from PySide6.QtCore import QObject, Signal
 from sd2app.background.latest import Emit, LatestRunner
 from sd2app.background.run_command import COMMAND_IN_FOLDER, CommandFolder, commands_in
 from sd2app.dataset_export.run import Exported, ExportRun, user_exports_folder
-from sd2app.session.tasks import Job, JobsModel
+from sd2app.session.tasks import Job, TaskList
 from sd2core.datasets.forecast import Counting, Forecast
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.recording_sources import Making
@@ -112,7 +112,7 @@ class ExportModel(QObject):
 
     Parameters
     ----------
-    jobs : JobsModel
+    jobs : TaskList
     command : sequence of str
         What runs ``sd2`` commands in a folder.
     folder : Path, optional
@@ -134,7 +134,7 @@ class ExportModel(QObject):
 
     def __init__(
         self,
-        jobs: JobsModel,
+        jobs: TaskList,
         parent: QObject | None = None,
         command: Sequence[str] = COMMAND_IN_FOLDER,
         folder: Path | None = None,

@@ -13,7 +13,7 @@ from sd2app.background.latest import LatestRunner
 from sd2app.denoise.library import Denoiser, LiveSession
 from sd2app.denoise.model import DenoiseModel
 from sd2app.session.playback import PlaybackModel
-from sd2app.session.tracks import TrackModel
+from sd2app.session.tracks import MapModel
 from sd2app.settings import Settings
 from sd2core.denoise.resample_to_model import is_regular
 
@@ -40,7 +40,7 @@ class LiveDenoiseModel(QObject):
     def __init__(
         self,
         playback: PlaybackModel,
-        synthetic: TrackModel,
+        synthetic: MapModel,
         denoise: DenoiseModel,
         settings: Settings,
         parent: QObject | None = None,

@@ -17,8 +17,8 @@ from sd2app.denoise.library import Denoiser, LiveSession
 from sd2app.maps.partial_map import View
 from sd2app.maps.quality import Companion
 from sd2app.session.content import reference_of
-from sd2app.session.tasks import Job, JobsModel
-from sd2app.session.tracks import TrackModel
+from sd2app.session.tasks import Job, TaskList
+from sd2app.session.tracks import MapModel
 from sd2core.denoise.resample_to_model import is_regular
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
@@ -86,9 +86,9 @@ class DenoisedMap(QObject):
 
     def __init__(
         self,
-        track: TrackModel,
+        track: MapModel,
         view: Callable[[], View],
-        jobs: JobsModel,
+        jobs: TaskList,
         parent: QObject | None = None,
     ) -> None:
         super().__init__(parent)

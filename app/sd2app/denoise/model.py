@@ -18,9 +18,9 @@ from sd2app.maps.partial_map import Part, View
 from sd2app.maps.quality import Companion
 from sd2app.session.denoiser_choice import NO_MODEL, UNSAID, DenoiserChoice
 from sd2app.session.document import DocumentModel
-from sd2app.session.tasks import JobsModel
-from sd2app.session.time_window import VisibleSpanModel
-from sd2app.session.tracks import TrackModel
+from sd2app.session.tasks import TaskList
+from sd2app.session.time_window import TimeWindow
+from sd2app.session.tracks import MapModel
 from sd2core.denoise.files import DEFAULT_NAME
 from sd2core.errors import Sd2Error
 
@@ -58,11 +58,11 @@ class DenoiseModel(QObject):
         self,
         document: DocumentModel,
         synthesis: SynthesisModel,
-        span: VisibleSpanModel,
-        synthetic: TrackModel,
-        track: TrackModel,
-        before: TrackModel,
-        jobs: JobsModel,
+        span: TimeWindow,
+        synthetic: MapModel,
+        track: MapModel,
+        before: MapModel,
+        jobs: TaskList,
         library: DenoiserLibrary,
         choose: Callable[[DenoiserChoice], None],
         parent: QObject | None = None,

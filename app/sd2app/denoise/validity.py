@@ -7,15 +7,15 @@ from PySide6.QtCore import QObject, Signal
 from sd2app.denoise.model import DenoiseModel
 from sd2app.maps.model import SynthesisModel
 from sd2app.session.sensor import SensorModel
-from sd2app.session.tracks import TrackModel
+from sd2app.session.tracks import MapModel
 
 
-class Standing(QObject):
+class MapValidity(QObject):
     """A map stays on screen until there is a better one, also when the sensor has moved on.
 
     Parameters
     ----------
-    synthetic, denoised : TrackModel
+    synthetic, denoised : MapModel
         Maps that follow the sensor; all others do not.
 
     Signals
@@ -30,8 +30,8 @@ class Standing(QObject):
         sensor: SensorModel,
         synthesis: SynthesisModel,
         denoise: DenoiseModel,
-        synthetic: TrackModel,
-        denoised: TrackModel,
+        synthetic: MapModel,
+        denoised: MapModel,
         parent: QObject | None = None,
     ) -> None:
         super().__init__(parent)
@@ -41,7 +41,7 @@ class Standing(QObject):
             signal.connect(self.changed)
         synthesis.painted.connect(lambda _: self.changed.emit())
 
-    def of(self, track: TrackModel) -> bool:
+    def is_current(self, track: MapModel) -> bool:
         """Whether a map is of the sensor where it stands, and no hand moves that."""
         if track is self._synthetic:
             return self._rests

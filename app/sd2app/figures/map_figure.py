@@ -12,7 +12,7 @@ from PySide6.QtCore import QObject
 from sd2app.figures.preview import DrawnFigure
 from sd2app.maps.difference import DifferenceModel
 from sd2app.session.display import HeatmapLevels
-from sd2app.session.tracks import TrackModel
+from sd2app.session.tracks import MapModel
 from sd2core.errors import Sd2Error
 from sd2core.figures.maps import Levels, MapRow, draw_maps, save_maps
 from sd2core.files.figure_files import check_figure
@@ -48,7 +48,7 @@ class FigureModel(DrawnFigure):
 
     Parameters
     ----------
-    tracks : sequence of (TrackModel, str)
+    tracks : sequence of (MapModel, str)
         From top to bottom, each with what is to be said beside its title; those without
         a map are left out.
     difference : DifferenceModel
@@ -62,7 +62,7 @@ class FigureModel(DrawnFigure):
 
     def __init__(
         self,
-        tracks: Sequence[tuple[TrackModel, str]],
+        tracks: Sequence[tuple[MapModel, str]],
         difference: DifferenceModel,
         levels: HeatmapLevels,
         labels: Labels,

@@ -10,8 +10,8 @@ from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import Emit, LatestRunner
 from sd2app.session.document import DocumentModel
-from sd2app.session.tasks import Job, JobsModel
-from sd2app.session.tracks import TrackModel
+from sd2app.session.tasks import Job, TaskList
+from sd2app.session.tracks import MapModel
 from sd2core.cutouts.cutting import Cut, cut_out, plan_cuts
 from sd2core.cutouts.source import CutSource, Part
 from sd2core.labels.spans import Labels, Span
@@ -54,8 +54,8 @@ class CutOutModel(QObject):
     def __init__(
         self,
         document: DocumentModel,
-        maps: dict[str, TrackModel],
-        jobs: JobsModel,
+        maps: dict[str, MapModel],
+        jobs: TaskList,
         parent: QObject | None = None,
     ) -> None:
         super().__init__(parent)

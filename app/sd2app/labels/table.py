@@ -15,7 +15,7 @@ from sd2app.labels.edits import LabelEdits
 from sd2app.labels.model import LabelsModel
 from sd2app.labels.table_model import SpanTableModel
 from sd2app.session.playback import PlaybackModel
-from sd2app.session.time_window import VisibleSpanModel
+from sd2app.session.time_window import TimeWindow
 from sd2app.settings import Settings
 from sd2app.widgets.icons import swatch_icon
 from sd2app.widgets.table import CellTable, Choosable, FramedCells
@@ -63,7 +63,7 @@ class SpanTable(CellTable):
         labels: LabelsModel,
         edits: LabelEdits,
         playback: PlaybackModel,
-        visible: VisibleSpanModel,
+        visible: TimeWindow,
         settings: Settings,
         parent: QWidget | None = None,
     ) -> None:

@@ -16,8 +16,8 @@ from sd2app.labels.painting import lane_box, paint_span, paint_spans
 from sd2app.labels.rows import ROW_PX, LabelRows
 from sd2app.session.display import DisplayModel
 from sd2app.session.playback import PlaybackModel
-from sd2app.session.time_window import VisibleSpanModel
-from sd2app.widgets.cached_paint import Still
+from sd2app.session.time_window import TimeWindow
+from sd2app.widgets.cached_paint import CachedPaint
 from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, paint_cursor, turn_wheel
 from sd2core.labels.spans import Span
 
@@ -94,7 +94,7 @@ class LabelTimeline(QWidget):
         edits: LabelEdits,
         dragging: LabelDragging,
         loop: SpanLoop,
-        span: VisibleSpanModel,
+        span: TimeWindow,
         playback: PlaybackModel,
         display: DisplayModel,
         parent: QWidget | None = None,
@@ -106,7 +106,7 @@ class LabelTimeline(QWidget):
         self._pointer_px = 0.0
         self._attracted = self._cutting = False
         self._rows = LabelRows.of(labels.labels.tracks, labels.arrays, labels.marks)
-        self._still = Still(self)
+        self._still = CachedPaint(self)
         self._scroll = QTimer(self)
         self._scroll.setInterval(_SCROLL_MS)
         self._scroll.timeout.connect(self._scroll_on)

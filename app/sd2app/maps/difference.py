@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.session.display import DisplayModel, HeatmapLevels
-from sd2app.session.tracks import Reading, TrackModel
+from sd2app.session.tracks import MapModel, Reading
 from sd2app.settings import Settings
 
 _SHOWN = "difference"
@@ -33,8 +33,8 @@ class DifferenceModel(QObject):
 
     def __init__(
         self,
-        denoised: TrackModel,
-        real: TrackModel,
+        denoised: MapModel,
+        real: MapModel,
         display: DisplayModel,
         settings: Settings,
         parent: QObject | None = None,

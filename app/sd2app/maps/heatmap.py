@@ -20,9 +20,9 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from sd2app.maps.map_widget import MapWidget
 from sd2app.session.display import DisplayModel
 from sd2app.session.playback import PlaybackModel
-from sd2app.session.time_window import VisibleSpanModel
-from sd2app.session.tracks import UNCERTAIN_SHARE, PointerModel, Reading, TrackModel
-from sd2app.widgets.cached_paint import Still
+from sd2app.session.time_window import TimeWindow
+from sd2app.session.tracks import UNCERTAIN_SHARE, MapModel, PointerModel, Reading
+from sd2app.widgets.cached_paint import CachedPaint
 from sd2app.widgets.colour_maps import lookup_table
 from sd2app.widgets.time_axis import (
     GUTTER_PX,
@@ -51,8 +51,8 @@ class HeatmapView(MapWidget):
 
     def __init__(
         self,
-        track: TrackModel,
-        span: VisibleSpanModel,
+        track: MapModel,
+        span: TimeWindow,
         playback: PlaybackModel,
         display: DisplayModel,
         pointer: PointerModel,
@@ -72,7 +72,7 @@ class HeatmapView(MapWidget):
         self._button: QWidget | None = None
         self.setMinimumHeight(96)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self._still = Still(self)
+        self._still = CachedPaint(self)
         self._room_px = 0
         span.changed.connect(self.invalidate)
         shown = [signal for overlay in overlays for signal in overlay.changed]

@@ -11,7 +11,7 @@ from PySide6.QtGui import QImage
 
 from sd2app.maps.difference import DifferenceModel
 from sd2app.session.display import HeatmapLevels
-from sd2app.session.tracks import TrackModel
+from sd2app.session.tracks import MapModel
 from sd2app.widgets.colour_maps import lookup_table, uncertain_table
 
 
@@ -49,7 +49,7 @@ class Columns:
     starts: NDArray[np.int64]
 
     @classmethod
-    def of(cls, track: TrackModel, start_s: float, stop_s: float, columns: int) -> Columns:
+    def of(cls, track: MapModel, start_s: float, stop_s: float, columns: int) -> Columns:
         """Of the stretch in view."""
         assert track.map is not None
         timebase = track.map.timebase
@@ -77,7 +77,7 @@ class Columns:
 
 
 def shade_columns(
-    track: TrackModel, levels: HeatmapLevels, start_s: float, stop_s: float, columns: int
+    track: MapModel, levels: HeatmapLevels, start_s: float, stop_s: float, columns: int
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
     """Shades of the stretch in view, and which columns have something to show.
 
@@ -94,7 +94,7 @@ def shade_columns(
 
 
 def uncertain_columns(
-    track: TrackModel, levels: HeatmapLevels, start_s: float, stop_s: float, columns: int
+    track: MapModel, levels: HeatmapLevels, start_s: float, stop_s: float, columns: int
 ) -> NDArray[np.bool_] | None:
     """Where what is shown is uncertain, bool (bins, columns); None where that is not known.
 
@@ -115,7 +115,7 @@ def uncertain_columns(
 
 
 def heatmap_image(
-    track: TrackModel,
+    track: MapModel,
     levels: HeatmapLevels,
     start_s: float,
     stop_s: float,
@@ -157,7 +157,7 @@ def difference_image(
 
 
 def _strongest_columns(
-    track: TrackModel, start_s: float, stop_s: float, columns: int
+    track: MapModel, start_s: float, stop_s: float, columns: int
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
     """Values of every pixel column (bins, columns), and which columns have some."""
     assert track.map is not None

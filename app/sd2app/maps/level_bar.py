@@ -13,7 +13,7 @@ from PySide6.QtWidgets import (
 )
 
 from sd2app.session.display import COLOUR_MAPS, DisplayModel
-from sd2app.session.tracks import TrackModel
+from sd2app.session.tracks import MapModel
 from sd2app.widgets.colour_maps import lookup_table, uncertain_table
 from sd2app.widgets.inputs import Choice, NumberBox, action_button
 from sd2app.widgets.panel import ElidedLabel
@@ -27,7 +27,7 @@ class _ColourStrip(QWidget):
     def __init__(
         self,
         display: DisplayModel,
-        tracks: tuple[TrackModel, ...],
+        tracks: tuple[MapModel, ...],
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
@@ -63,7 +63,7 @@ class LevelBar(QWidget):
     def __init__(
         self,
         display: DisplayModel,
-        tracks: tuple[TrackModel, ...],
+        tracks: tuple[MapModel, ...],
         uncertain: QAction,
         parent: QWidget | None = None,
     ) -> None:

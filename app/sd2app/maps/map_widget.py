@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QWidget
 
 from sd2app.maps.heatmap_image import heatmap_image
 from sd2app.session.display import DisplayModel
-from sd2app.session.tracks import TrackModel
+from sd2app.session.tracks import MapModel
 from sd2app.widgets.time_axis import TimeScale
 from sd2app.widgets.time_plot import TimePlot
 
@@ -19,7 +19,7 @@ class MapWidget(TimePlot):
     """Keeps the picture of a map until map, stretch, levels, theme or size change."""
 
     def __init__(
-        self, track: TrackModel, display: DisplayModel, parent: QWidget | None = None
+        self, track: MapModel, display: DisplayModel, parent: QWidget | None = None
     ) -> None:
         super().__init__(parent)
         self._track = track

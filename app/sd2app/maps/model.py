@@ -9,30 +9,30 @@ from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from sd2app.accuracy.model import TradeModel
+from sd2app.accuracy.model import AccuracyModel
 from sd2app.background.latest import LatestRunner
-from sd2app.maps.partial_map import FINAL, PaintedMap, Part, View
+from sd2app.maps.partial_map import FINAL, Part, ShownMap, View
 from sd2app.maps.quality import (
     Companion,
-    Way,
+    QualityLevel,
     budget_ms,
+    compute_part,
     distance_m,
-    final_way,
+    final_quality,
     final_words,
     is_swept_whole,
+    preview_quality,
     refine,
-    rough_way,
-    worked_out,
 )
 from sd2app.maps.readout import FrameReader, Readout
-from sd2app.maps.synthesizers import Carriers
-from sd2app.maps.warm_up import CompilerModel, Readier
+from sd2app.maps.synthesizers import SynthesizerCache
+from sd2app.maps.warm_up import CompilerModel, MaskPrefetcher
 from sd2app.session.document import DocumentModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.sensor import SensorModel
-from sd2app.session.tasks import Job, JobsModel
-from sd2app.session.time_window import VisibleSpanModel
-from sd2app.session.tracks import TrackModel
+from sd2app.session.tasks import Job, TaskList
+from sd2app.session.time_window import TimeWindow
+from sd2app.session.tracks import MapModel
 from sd2core.doppler.options import PRESETS
 from sd2core.doppler.synthesizer import FrameScattering, Synthesizer
 from sd2core.errors import Sd2Error
@@ -75,10 +75,10 @@ class SynthesisModel(QObject):
         document: DocumentModel,
         sensor: SensorModel,
         playback: PlaybackModel,
-        span: VisibleSpanModel,
-        track: TrackModel,
-        jobs: JobsModel,
-        trade: TradeModel,
+        span: TimeWindow,
+        track: MapModel,
+        jobs: TaskList,
+        trade: AccuracyModel,
         parent: QObject | None = None,
     ) -> None:
         super().__init__(parent)
@@ -86,16 +86,16 @@ class SynthesisModel(QObject):
         self._sensor = sensor
         self._span = span
         self._track = track
-        self._painted = PaintedMap(track)
+        self._shown_map = ShownMap(track)
         self._companion: Callable[[], Companion | None] = lambda: None
         self._jobs = jobs
         self._trade = trade
         self._reader = FrameReader(document, sensor, playback)
         self._job: Job | None = None
-        self._carriers: Carriers | None = None
+        self._synthesizers: SynthesizerCache | None = None
         self._moving = False
-        self._readier = Readier(self)
-        self._readier.failed.connect(self.failed)
+        self._prefetcher = MaskPrefetcher(self)
+        self._prefetcher.failed.connect(self.failed)
         self._forget()
         self._runner = LatestRunner("synthesis", self)
         self._runner.partial.connect(self._receive)
@@ -120,11 +120,11 @@ class SynthesisModel(QObject):
     @property
     def v_max_mps(self) -> float:
         """Edge of the velocity axis."""
-        return self._carriers.options.axis.v_max_mps if self._carriers else 2.0
+        return self._synthesizers.options.axis.v_max_mps if self._synthesizers else 2.0
 
     @property
     def busy(self) -> bool:
-        """Whether a better map is on its way."""
+        """True while a better map is being computed."""
         return self._runner.busy or self._compiler.busy
 
     @property
@@ -135,13 +135,13 @@ class SynthesisModel(QObject):
     @property
     def complete(self) -> bool:
         """Whether every frame is as the plan says for the sensor where it stands."""
-        canvas = self._painted.canvas
-        return canvas.final and canvas.sensor == self._sensor.sensor
+        partial = self._shown_map.partial
+        return partial.final and partial.sensor == self._sensor.sensor
 
     @property
     def shows_sensor(self) -> bool:
         """Whether what is on the map is of the sensor where it stands, exact or not."""
-        return self._painted.canvas.sensor == self._sensor.sensor
+        return self._shown_map.partial.sensor == self._sensor.sensor
 
     @property
     def torso_m(self) -> Vector | None:
@@ -151,17 +151,17 @@ class SynthesisModel(QObject):
     @property
     def frame(self) -> FrameScattering | None:
         """Velocity, range and visibility of every vertex in the frame on screen."""
-        if self._carriers is None:
+        if self._synthesizers is None:
             return None
-        full = self._carriers.full
+        full = self._synthesizers.full
         if full.options.visibility == "none":
             return self._reader.scattering(full, "none")
         if self._compiler.ready and not self._moving:
             return self._reader.scattering(full, full.options.visibility)
         # The mask of the map, where the map has one and all vertices.
-        carrier = self._carriers.ready(self._plan)
-        same = carrier is not None and carrier.mesh is full.mesh
-        return self._reader.scattering(carrier if same and carrier else full, "frozen")
+        synthesizer = self._synthesizers.ready(self._plan)
+        same = synthesizer is not None and synthesizer.mesh is full.mesh
+        return self._reader.scattering(synthesizer if same and synthesizer else full, "frozen")
 
     def readout(self) -> Readout | None:
         """Numbers beside the sensor, None without a mesh on screen."""
@@ -172,7 +172,7 @@ class SynthesisModel(QObject):
     def take_over(self) -> None:
         """Start on the mesh of the document that is open now."""
         self._stop()
-        self._carriers = None
+        self._synthesizers = None
         self._forget()
         self._set_moving(False)
         self._track.set_map(None)
@@ -184,11 +184,11 @@ class SynthesisModel(QObject):
             self._announce()
             return
         try:
-            self._carriers = Carriers(mesh, options, self._trade.ladder)
+            self._synthesizers = SynthesizerCache(mesh, options, self._trade.ladder)
         except Sd2Error as error:
             self.failed.emit(str(error))
             return
-        self._painted.begin(options, mesh)
+        self._shown_map.begin(options, mesh)
         self._compiler.start()
         self._announce()
         self._follow()
@@ -198,10 +198,10 @@ class SynthesisModel(QObject):
 
         Asking for the synthesizer may take long.
         """
-        carriers, plan = self._carriers, self._plan
-        if carriers is None or self._moving or not self.complete:
+        synthesizers, plan = self._synthesizers, self._plan
+        if synthesizers is None or self._moving or not self.complete:
             return None
-        return lambda: carriers.of(plan), self._sensor.sensor
+        return lambda: synthesizers.of(plan), self._sensor.sensor
 
     def accompany(self, companion: Callable[[], Companion | None]) -> None:
         """Ask ``companion`` before each sweep what is to be made of it, in step with it."""
@@ -219,9 +219,9 @@ class SynthesisModel(QObject):
         Sd2Error
             When it is not complete.
         """
-        if self._carriers is None or not self.complete:
+        if self._synthesizers is None or not self.complete:
             raise Sd2Error("The synthetic map is not complete yet", "a final map", "Wait for it")
-        made = self._carriers.of(self._plan).map(self._sensor.sensor)
+        made = self._synthesizers.of(self._plan).map(self._sensor.sensor)
         in_use = self._trade.in_use
         if in_use is not None:
             made = replace(made, meta=made.meta | in_use.plan.provenance(in_use.error))
@@ -232,22 +232,22 @@ class SynthesisModel(QObject):
         self._stop()
         self._compiler.stop()
         self._runner.close()
-        self._readier.close()
+        self._prefetcher.close()
 
     def _stop(self) -> None:
         self._rest.stop()
         self._runner.cancel()
-        self._readier.cancel()
+        self._prefetcher.cancel()
         self._end_job()
 
     # --- following ------------------------------------------------------------------------
 
     def _forget(self) -> None:
-        self._painted.forget()
+        self._shown_map.forget()
         self._reader.forget()
         self._plan: AccuracyPlan | None = None
         self._dragging_plan: AccuracyPlan | None = None
-        self._readier.forget()
+        self._prefetcher.forget()
         self._again = False
         self._sweeping = False
 
@@ -257,17 +257,17 @@ class SynthesisModel(QObject):
         self.readout_changed.emit()
 
     def _follow_clock(self) -> None:
-        if self._carriers is not None:
+        if self._synthesizers is not None:
             self._announce()
 
     def _follow(self) -> None:
-        if self._carriers is None:
+        if self._synthesizers is None:
             return
         self._trade.hold()
-        self._readier.cancel()
+        self._prefetcher.cancel()
         if self._sensor.dragging:
             self._rest.start()
-            self._set_moving(self._moving or self._sensor.sensor != self._painted.canvas.sensor)
+            self._set_moving(self._moving or self._sensor.sensor != self._shown_map.partial.sensor)
             self._follow_clock()
             if self._sweeping and self._runner.busy:
                 self._again = True
@@ -286,49 +286,54 @@ class SynthesisModel(QObject):
         """One rough pass for the sensor where it is now, never interrupted."""
         self._end_job()
         self._again, self._sweeping = False, True
-        sensor, way, (start, stop) = self._sensor.sensor, self._rough_way(), self._swept()
+        sensor, level, (start, stop) = self._sensor.sensor, self._preview_quality(), self._swept()
         companion = self._companion()
-        self._runner.submit(lambda emit: worked_out(way, sensor, start, stop, companion=companion))
+        self._runner.submit(
+            lambda emit: compute_part(level, sensor, start, stop, companion=companion)
+        )
 
     def _settle(self) -> None:
         """Rough where nothing is known yet, then as planned; the stretch in view first."""
-        if self._carriers is None:
+        if self._synthesizers is None:
             return
         self._rest.stop()
         self._end_job()
         self._again = self._sweeping = False
         sensor = self._sensor.sensor
         self._trade.rest_at(sensor)
-        rank = self._painted.canvas.ranks_for(sensor)
-        if rank.min() >= FINAL:
+        quality = self._shown_map.partial.quality_for(sensor)
+        if quality.min() >= FINAL:
             self._set_moving(False)
             self._go_on()
             return
-        view, rough, vertices = self._frames_in_view(), self._rough_way(), self._vertices
+        view, rough, vertices = self._frames_in_view(), self._preview_quality(), self._vertices
         self._set_moving(False)
-        final = self._final_way()
+        final = self._final_quality()
         if final is not None:
             self._job = self._jobs.start("Synthesising the map", self._cancel)
         # Much of a long clip can wait until it is known how it is to be done.
-        long = not is_swept_whole(vertices, len(rank))
+        long = not is_swept_whole(vertices, len(quality))
         only_view = final is None and not self._compiler.busy and long
         self._runner.submit(
             lambda emit: refine(
-                sensor, rank, view, rough, final, vertices, emit, only_view=only_view
+                sensor, quality, view, rough, final, vertices, emit, only_view=only_view
             )
         )
 
     def _go_on(self) -> None:
         """What is to be done next while the sensor rests."""
-        if self._carriers is None or self._moving or self.busy:
+        if self._synthesizers is None or self._moving or self.busy:
             return
         if self._may_choose():
             self._trade.choose(self._sensor.sensor, self._budget_ms())
         elif not self.complete:
             self._settle()
-        elif self._dragging_plan is not None and self._readier.ready_at != self._sensor.sensor:
-            self._readier.make_ready(
-                self._carriers, self._dragging_plan, self._sensor.sensor, self._swept()
+        elif (
+            self._dragging_plan is not None
+            and self._prefetcher.prefetched_for != self._sensor.sensor
+        ):
+            self._prefetcher.prefetch(
+                self._synthesizers, self._dragging_plan, self._sensor.sensor, self._swept()
             )
 
     def _may_choose(self) -> bool:
@@ -344,22 +349,22 @@ class SynthesisModel(QObject):
         )
         if dragging != self._dragging_plan:
             self._dragging_plan = dragging
-            self._readier.forget()
-        if self._carriers is None or plan == self._plan:
+            self._prefetcher.forget()
+        if self._synthesizers is None or plan == self._plan:
             self._say_quality()
             return
         self._plan = plan
-        self._painted.demote()
+        self._shown_map.mark_stale()
         if not self._moving:
             self._settle()
 
     def _reorder(self) -> None:
         start, stop = self._frames_in_view()
-        if self._carriers is None or self._moving or stop <= start:
+        if self._synthesizers is None or self._moving or stop <= start:
             return
         self._say_quality()
-        canvas = self._painted.canvas
-        if canvas.rank[start:stop].min() < FINAL and canvas.frames > stop - start:
+        partial = self._shown_map.partial
+        if partial.quality[start:stop].min() < FINAL and partial.frames > stop - start:
             self._settle()
 
     def _cancel(self) -> None:
@@ -388,15 +393,15 @@ class SynthesisModel(QObject):
         self._go_on()
 
     def _take(self, part: Part) -> None:
-        self._painted.take(part)
+        self._shown_map.take(part)
         self._say_quality()
         self.painted.emit(part)
         self.readout_changed.emit()
 
     def _say_quality(self) -> None:
-        if self._carriers is not None:
-            final = final_words(self._carriers, self._trade.in_use)
-            self._painted.say_quality(self._frames_in_view(), final, self._compiler.busy)
+        if self._synthesizers is not None:
+            final = final_words(self._synthesizers, self._trade.in_use)
+            self._shown_map.say_quality(self._frames_in_view(), final, self._compiler.busy)
 
     def _fail(self, error: Exception) -> None:
         self._sweeping = False
@@ -411,27 +416,27 @@ class SynthesisModel(QObject):
 
     # --- helpers --------------------------------------------------------------------------
 
-    def _rough_way(self) -> Way:
-        assert self._carriers is not None
-        moved_m = distance_m(self._readier.ready_at, self._sensor.sensor)
-        return rough_way(self._carriers, self._plan, self._trade.while_dragging, moved_m)
+    def _preview_quality(self) -> QualityLevel:
+        assert self._synthesizers is not None
+        moved_m = distance_m(self._prefetcher.prefetched_for, self._sensor.sensor)
+        return preview_quality(self._synthesizers, self._plan, self._trade.while_dragging, moved_m)
 
-    def _final_way(self) -> Way | None:
+    def _final_quality(self) -> QualityLevel | None:
         """What the tolerance asks for; None while that is open."""
-        if self._carriers is None or self._compiler.busy:
+        if self._synthesizers is None or self._compiler.busy:
             return None
         if self._plan is None and self._may_choose():
             return None
-        return final_way(self._carriers, self._plan, self._trade.in_use)
+        return final_quality(self._synthesizers, self._plan, self._trade.in_use)
 
     @property
     def _vertices(self) -> int:
-        assert self._carriers is not None
-        return self._carriers.mesh.vertex_count
+        assert self._synthesizers is not None
+        return self._synthesizers.mesh.vertex_count
 
     def _swept(self) -> View:
         """Frames that follow a hand: the whole clip when it is short, else what is in view."""
-        frames = self._painted.canvas.frames
+        frames = self._shown_map.partial.frames
         return (0, frames) if is_swept_whole(self._vertices, frames) else self._frames_in_view()
 
     def _budget_ms(self) -> float:

@@ -11,8 +11,8 @@ from PySide6.QtWidgets import QWidget
 from sd2app.maps.map_widget import MapWidget
 from sd2app.session.display import DisplayModel
 from sd2app.session.playback import PlaybackModel
-from sd2app.session.time_window import VisibleSpanModel
-from sd2app.session.tracks import TrackModel
+from sd2app.session.time_window import TimeWindow
+from sd2app.session.tracks import MapModel
 from sd2app.widgets.time_axis import (
     GUTTER_PX,
     MARGIN_PX,
@@ -32,8 +32,8 @@ class Overview(MapWidget):
 
     def __init__(
         self,
-        track: TrackModel,
-        span: VisibleSpanModel,
+        track: MapModel,
+        span: TimeWindow,
         playback: PlaybackModel,
         display: DisplayModel,
         overlays: Sequence[Overlay] = (),
@@ -49,7 +49,7 @@ class Overview(MapWidget):
         for signal in (span.changed, playback.frame_changed, *shown):
             signal.connect(self.update)
 
-    def set_track(self, track: TrackModel) -> None:
+    def set_track(self, track: MapModel) -> None:
         """Show another track."""
         self._track.changed.disconnect(self.invalidate)
         self._track = track

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2app.session.content import reference_of
-from sd2app.session.tracks import TrackModel
+from sd2app.session.tracks import MapModel
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.doppler.synthesizer import Stretch
 from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import VirtualSensor
 
-ROUGH, AS_DRAGGED, FINAL = 1, 2, 3
+ROUGH, PREVIEW, FINAL = 1, 2, 3
 """How good a frame is: a preview, what a hand gets that moves the sensor (or what was
 final for another plan), what the plan in use gives. 0 is not computed."""
 
@@ -25,24 +25,24 @@ View = tuple[int, int]
 
 
 @dataclass(eq=False)
-class Canvas:
+class PartialMap:
     """What is known of the map so far.
 
     Parameters
     ----------
     values : float32 array, shape (bins, T)
-    rank : uint8 array, shape (T,)
+    quality : uint8 array, shape (T,)
         See :data:`FINAL`.
     sensor : VirtualSensor or None
         Placement that all of it is for.
     """
 
     values: NDArray[np.float32]
-    rank: NDArray[np.uint8]
+    quality: NDArray[np.uint8]
     sensor: VirtualSensor | None = None
 
     @classmethod
-    def blank(cls, bins: int, frames: int) -> Canvas:
+    def blank(cls, bins: int, frames: int) -> PartialMap:
         """Nothing known."""
         return cls(
             np.zeros((bins, frames), np.float32),
@@ -52,61 +52,63 @@ class Canvas:
     @property
     def frames(self) -> int:
         """Number of frames T."""
-        return len(self.rank)
+        return len(self.quality)
 
     @property
     def full(self) -> bool:
         """Whether every frame holds something."""
-        return bool(self.frames and self.rank.min() > 0)
+        return bool(self.frames and self.quality.min() > 0)
 
     @property
     def final(self) -> bool:
         """Whether every frame is as good as it gets."""
-        return bool(self.frames and self.rank.min() >= FINAL)
+        return bool(self.frames and self.quality.min() >= FINAL)
 
-    def paint(self, sensor: VirtualSensor, start: int, stretch: Stretch, rank: int) -> None:
+    def paint(self, sensor: VirtualSensor, start: int, stretch: Stretch, quality: int) -> None:
         """Take a stretch over; what was there for another placement is forgotten."""
         if sensor != self.sensor:
             self.sensor = sensor
-            self.rank[:] = 0
+            self.quality[:] = 0
         inside = slice(start, start + stretch.values.shape[1])
         self.values[:, inside] = stretch.values
-        self.rank[inside] = rank
+        self.quality[inside] = quality
 
-    def demote(self) -> None:
+    def mark_stale(self) -> None:
         """What was final no longer is, but stays until it is replaced."""
-        np.minimum(self.rank, AS_DRAGGED, out=self.rank)
+        np.minimum(self.quality, PREVIEW, out=self.quality)
 
-    def ranks_for(self, sensor: VirtualSensor) -> NDArray[np.uint8]:
+    def quality_for(self, sensor: VirtualSensor) -> NDArray[np.uint8]:
         """A copy of the ranks as far as they hold for a placement."""
-        return self.rank.copy() if sensor == self.sensor else np.zeros_like(self.rank)
+        return self.quality.copy() if sensor == self.sensor else np.zeros_like(self.quality)
 
 
-def pieces(rank: NDArray[np.uint8], below: int, start: int, stop: int, size: int) -> Iterator[View]:
-    """Stretches of at most ``size`` frames from ``start`` to ``stop`` whose rank is below.
+def pieces(
+    quality: NDArray[np.uint8], below: int, start: int, stop: int, size: int
+) -> Iterator[View]:
+    """Stretches of at most ``size`` frames from ``start`` to ``stop`` whose quality is below.
 
-    ``rank`` may change while iterating.
+    ``quality`` may change while iterating.
     """
     while start < stop:
-        if rank[start] >= below:
+        if quality[start] >= below:
             start += 1
             continue
-        inside = rank[start : min(stop, start + size)] < below
+        inside = quality[start : min(stop, start + size)] < below
         end = start + (len(inside) if inside.all() else int(inside.argmin()))
         yield start, end
         start = end
 
 
-class PaintedMap:
+class ShownMap:
     """Takes stretches over, and says on the track what they are worth."""
 
-    def __init__(self, track: TrackModel) -> None:
+    def __init__(self, track: MapModel) -> None:
         self._track = track
         self.forget()
 
     def forget(self) -> None:
         """There is no mesh."""
-        self.canvas = Canvas.blank(2, 0)
+        self.partial = PartialMap.blank(2, 0)
         self._scene: tuple[SynthesisOptions, MeshSequence] | None = None
         self._words: dict[int, str] = {}
         self._needs_reference = True
@@ -115,24 +117,24 @@ class PaintedMap:
         """Nothing of this mesh is known yet."""
         self.forget()
         self._scene = options, mesh
-        self.canvas = Canvas.blank(options.axis.bins, mesh.frame_count)
+        self.partial = PartialMap.blank(options.axis.bins, mesh.frame_count)
 
-    def demote(self) -> None:
+    def mark_stale(self) -> None:
         """What was final no longer is, but stays until it is replaced."""
-        self.canvas.demote()
-        self._words[AS_DRAGGED] = self._words.get(FINAL, self._words.get(AS_DRAGGED, ""))
+        self.partial.mark_stale()
+        self._words[PREVIEW] = self._words.get(FINAL, self._words.get(PREVIEW, ""))
 
     def take(self, part: Part) -> None:
         """Paint a stretch; the first whole map says what 0 dB is."""
         assert self._scene is not None
         options, mesh = self._scene
-        self.canvas.paint(part.sensor, part.start, part.stretch, part.rank)
-        self._words[part.rank] = part.words
-        if self._needs_reference and self.canvas.full:
+        self.partial.paint(part.sensor, part.start, part.stretch, part.quality)
+        self._words[part.quality] = part.words
+        if self._needs_reference and self.partial.full:
             self._needs_reference = False
-            self._track.set_reference(reference_of(self.canvas.values))
+            self._track.set_reference(reference_of(self.partial.values))
         painted = DopplerMap(
-            values=self.canvas.values,
+            values=self.partial.values,
             axis=options.axis,
             timebase=mesh.timebase,
             kind="synthetic",
@@ -140,16 +142,16 @@ class PaintedMap:
             null_bins=options.null_bins,
             present=mesh.presence.measured,
         )
-        self._track.set_map(painted, None if self.canvas.full else self.canvas.rank > 0)
+        self._track.set_map(painted, None if self.partial.full else self.partial.quality > 0)
 
     def say_quality(self, view: View, final_words: str, compiling: bool) -> None:
         """Write the lowest quality in view on the track."""
         start, stop = view
-        rank = self.canvas.rank[start:stop]
-        if not rank.any():
+        quality = self.partial.quality[start:stop]
+        if not quality.any():
             return
-        final = float((rank >= FINAL).mean())
-        lowest = int(rank[rank > 0].min())
+        final = float((quality >= FINAL).mean())
+        lowest = int(quality[quality > 0].min())
         words = final_words if lowest == FINAL else self._words.get(lowest, "")
         if 0 < final < 1 and lowest < FINAL:
             words = f"{words}, {100 * final:.0f} % final"
@@ -160,7 +162,7 @@ class PaintedMap:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A computed stretch on its way to the window.
+    """Computed frames on their way to the window.
 
     ``more`` is what a companion made of it.
     """
@@ -168,7 +170,7 @@ class Part:
     sensor: VirtualSensor
     start: int
     stretch: Stretch
-    rank: int
+    quality: int
     words: str
     unit: str
     more: Any = None

@@ -1,4 +1,4 @@
-"""Which way frames are worked out: as a hand needs them, or as the tolerance asks."""
+"""Quality levels of a map: quick while the sensor moves, final as the tolerance asks."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from sd2app.accuracy.text import InUse, deviation, short
 from sd2app.background.latest import Emit
-from sd2app.maps.partial_map import AS_DRAGGED, FINAL, ROUGH, Part, View, pieces
-from sd2app.maps.synthesizers import Carriers
+from sd2app.maps.partial_map import FINAL, PREVIEW, ROUGH, Part, View, pieces
+from sd2app.maps.synthesizers import SynthesizerCache
 from sd2core.doppler.synthesizer import Synthesizer, Visibility
 from sd2core.sensor import VirtualSensor
 
@@ -44,9 +44,12 @@ def distance_m(one: VirtualSensor | None, other: VirtualSensor) -> float:
     return math.inf if one is None else math.dist(one.position_m, other.position_m)
 
 
-def rough_way(
-    carriers: Carriers, plan: AccuracyPlan | None, dragging: InUse | None, moved_m: float
-) -> Way:
+def preview_quality(
+    synthesizers: SynthesizerCache,
+    plan: AccuracyPlan | None,
+    dragging: InUse | None,
+    moved_m: float,
+) -> QualityLevel:
     """For a moving sensor, and where nothing is known yet.
 
     Parameters
@@ -57,43 +60,49 @@ def rough_way(
     moved_m : float
         From where masks for dragging were made.
     """
-    carrier = carriers.ready(dragging.plan) if dragging is not None else None
-    if dragging is not None and carrier is not None:
+    synthesizer = synthesizers.ready(dragging.plan) if dragging is not None else None
+    if dragging is not None and synthesizer is not None:
         words = f"while dragging: {short(dragging.plan)}, {deviation(dragging.error)}"
         if dragging.plan.mask_reuse_m == 0:
-            return Way(lambda: carrier, AS_DRAGGED, words)
+            return QualityLevel(lambda: synthesizer, PREVIEW, words)
         if moved_m <= dragging.plan.mask_reuse_m:
-            return Way(lambda: carrier, AS_DRAGGED, words, "frozen")
-    newest = carriers.ready(plan) or carriers.full
-    if carriers.options.visibility == "none":
-        return Way(lambda: newest, AS_DRAGGED, "all vertices of the point cloud", "none")
+            return QualityLevel(lambda: synthesizer, PREVIEW, words, "frozen")
+    newest = synthesizers.ready(plan) or synthesizers.full
+    if synthesizers.options.visibility == "none":
+        return QualityLevel(lambda: newest, PREVIEW, "all vertices of the point cloud", "none")
     if dragging is not None:
-        return Way(lambda: newest, AS_DRAGGED, "preview: vertices facing the sensor", "facing")
-    return Way(lambda: newest, AS_DRAGGED, "preview: visibility of the nearest place", "frozen")
+        return QualityLevel(
+            lambda: newest, PREVIEW, "preview: vertices facing the sensor", "facing"
+        )
+    return QualityLevel(
+        lambda: newest, PREVIEW, "preview: visibility of the nearest place", "frozen"
+    )
 
 
-def final_way(carriers: Carriers, plan: AccuracyPlan | None, in_use: InUse | None) -> Way:
+def final_quality(
+    synthesizers: SynthesizerCache, plan: AccuracyPlan | None, in_use: InUse | None
+) -> QualityLevel:
     """As the plan says; without one, as well as it gets."""
-    return Way(lambda: carriers.of(plan), FINAL, final_words(carriers, in_use))
+    return QualityLevel(lambda: synthesizers.of(plan), FINAL, final_words(synthesizers, in_use))
 
 
-def final_words(carriers: Carriers, in_use: InUse | None) -> str:
+def final_words(synthesizers: SynthesizerCache, in_use: InUse | None) -> str:
     """What a map of the plan in use is worth."""
     if in_use is not None:
         return f"{short(in_use.plan)}, {deviation(in_use.error)}"
-    cloud = carriers.options.visibility == "none"
+    cloud = synthesizers.options.visibility == "none"
     return "all vertices of the point cloud" if cloud else "exact visibility"
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
+class QualityLevel:
     """How frames are worked out.
 
     Parameters
     ----------
     synthesizer : callable
         Gives the synthesizer; the first call may take long.
-    rank : int
+    quality : int
         What the frames are worth.
     words : str
         The same for people.
@@ -102,28 +111,28 @@ class Way:
     """
 
     synthesizer: Callable[[], Synthesizer]
-    rank: int
+    quality: int
     words: str
     visibility: Visibility | None = None
 
 
-def worked_out(
-    way: Way,
+def compute_part(
+    level: QualityLevel,
     sensor: VirtualSensor,
     start: int,
     stop: int,
     proceed: Callable[[], None] = lambda: None,
     companion: Companion | None = None,
 ) -> Part:
-    """Frames ``start`` to ``stop``; ``proceed`` is called on the way and may raise."""
-    synthesizer = way.synthesizer()
-    stretch = synthesizer.stretch(sensor, start, stop, way.visibility, lambda *_: proceed())
-    rank, words = way.rank, way.words
-    if way.visibility == "frozen" and stretch.quality == "facing":
+    """Compute frames ``start`` to ``stop``; ``proceed`` is called in between and may raise."""
+    synthesizer = level.synthesizer()
+    stretch = synthesizer.stretch(sensor, start, stop, level.visibility, lambda *_: proceed())
+    quality, words = level.quality, level.words
+    if level.visibility == "frozen" and stretch.quality == "facing":
         # No mask is kept.
-        rank, words = ROUGH, _ROUGH_WORDS
+        quality, words = ROUGH, _ROUGH_WORDS
     more = companion(start, stretch.values) if companion is not None else None
-    return Part(sensor, start, stretch, rank, words, synthesizer.unit, more)
+    return Part(sensor, start, stretch, quality, words, synthesizer.unit, more)
 
 
 def is_swept_whole(vertices: int, frames: int) -> bool:
@@ -133,26 +142,26 @@ def is_swept_whole(vertices: int, frames: int) -> bool:
 
 def refine(
     sensor: VirtualSensor,
-    rank: NDArray[np.uint8],
+    quality: NDArray[np.uint8],
     view: View,
-    rough: Way,
-    final: Way | None,
+    rough: QualityLevel,
+    final: QualityLevel | None,
     vertices: int,
     emit: Emit,
     *,
     only_view: bool = False,
 ) -> None:
-    """Raise the rank of every frame, what is in view first.
+    """Raise the quality of every frame, what is in view first.
 
     Parameters
     ----------
-    rank : uint8 array, shape (T,)
+    quality : uint8 array, shape (T,)
         What is known already; raised in place.
     view : tuple of int
         Frames on screen: these first, then those that follow, then those before.
-    rough : Way
+    rough : QualityLevel
         For frames of which nothing is known.
-    final : Way, optional
+    final : QualityLevel, optional
         What every frame ends as; None stops at rough ones.
     vertices : int
         How many the mesh has: decides how much is done at once.
@@ -162,22 +171,22 @@ def refine(
         Leave the others for later.
     """
     rough_size = max(AT_ONCE // vertices, 64)
-    final_size = min(max(len(rank) // _EXACT_PARTS, 8), max(rough_size // 16, 8))
-    done, total = 0, int((rank < FINAL).sum())
+    final_size = min(max(len(quality) // _EXACT_PARTS, 8), max(rough_size // 16, 8))
+    done, total = 0, int((quality < FINAL).sum())
 
-    def run(below: int, part: View, size: int, way: Way) -> None:
+    def run(below: int, part: View, size: int, level: QualityLevel) -> None:
         nonlocal done
-        for start, stop in pieces(rank, below, *part, size):
-            made = worked_out(way, sensor, start, stop, lambda: emit(None))
-            rank[start:stop] = made.rank
+        for start, stop in pieces(quality, below, *part, size):
+            made = compute_part(level, sensor, start, stop, lambda: emit(None))
+            quality[start:stop] = made.quality
             emit(made)
-            if way.rank == FINAL:
+            if level.quality == FINAL:
                 done += stop - start
                 emit((done, total))
 
-    others = () if only_view else ((view[1], len(rank)), (0, view[0]))
+    others = () if only_view else ((view[1], len(quality)), (0, view[0]))
     for part in (view, *others):
-        if rough.rank < FINAL:
+        if rough.quality < FINAL:
             run(ROUGH, part, rough_size, rough)
         if final is not None:
             run(FINAL, part, final_size, final)

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QWidget
 
 from sd2app.session.display import DisplayModel
 from sd2app.session.playback import PlaybackModel
-from sd2app.session.tracks import PointerModel, TrackModel
+from sd2app.session.tracks import MapModel, PointerModel
 from sd2app.widgets.time_axis import signed_text, ticks
 from sd2core.maps import DopplerMap
 
@@ -23,7 +23,7 @@ _LEGEND_PX = 20
 class Curve:
     """A track and the name of its colour in the palette."""
 
-    track: TrackModel
+    track: MapModel
     colour: str
 
 

@@ -19,7 +19,7 @@ _KEPT = 3
 """The plan at rest, the one for dragging, and the one before."""
 
 
-class Carriers:
+class SynthesizerCache:
     """Makes a synthesizer per plan where it is asked for, and keeps the newest.
 
     Those that count as many vertices share what is prepared, as far as they can.

@@ -6,12 +6,12 @@ from typing import Any
 
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.accuracy.model import TradeModel
+from sd2app.accuracy.model import AccuracyModel
 from sd2app.background.latest import LatestRunner
 from sd2app.maps.model import SynthesisModel
 from sd2app.session.document import DocumentModel
-from sd2app.session.tasks import Job, JobsModel
-from sd2app.session.tracks import TrackModel
+from sd2app.session.tasks import Job, TaskList
+from sd2app.session.tracks import MapModel
 from sd2app.settings import Settings
 from sd2core.maps import CellUncertainty, DopplerMap
 from sd2core.progress import Cancelled
@@ -33,9 +33,9 @@ class UncertaintyModel(QObject):
         self,
         document: DocumentModel,
         synthesis: SynthesisModel,
-        trade: TradeModel,
-        track: TrackModel,
-        jobs: JobsModel,
+        trade: AccuracyModel,
+        track: MapModel,
+        jobs: TaskList,
         settings: Settings,
         parent: QObject | None = None,
     ) -> None:

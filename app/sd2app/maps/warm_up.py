@@ -9,7 +9,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 
 from sd2app.background.latest import Emit, LatestRunner
 from sd2app.maps.partial_map import View
-from sd2app.maps.synthesizers import Carriers
+from sd2app.maps.synthesizers import SynthesizerCache
 from sd2core.numerics.compiled import compile_in_background, kernels_ready
 from sd2core.sensor import VirtualSensor
 
@@ -19,31 +19,35 @@ if TYPE_CHECKING:
 _POLL_MS = 500
 
 
-class Readier(QObject):
+class MaskPrefetcher(QObject):
     """Prepares the mesh of the plan for dragging, and its masks from where the sensor rests."""
 
     failed = Signal(str)
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._ready_at: VirtualSensor | None = None
+        self._prefetched_for: VirtualSensor | None = None
         self._runner = LatestRunner("ready", self)
         self._runner.finished.connect(self._note)
         self._runner.failed.connect(lambda error: self.failed.emit(str(error)))
 
     @property
-    def ready_at(self) -> VirtualSensor | None:
+    def prefetched_for(self) -> VirtualSensor | None:
         """Where masks for dragging were made."""
-        return self._ready_at
+        return self._prefetched_for
 
-    def make_ready(
-        self, carriers: Carriers, plan: AccuracyPlan, sensor: VirtualSensor, frames: View
+    def prefetch(
+        self,
+        synthesizers: SynthesizerCache,
+        plan: AccuracyPlan,
+        sensor: VirtualSensor,
+        frames: View,
     ) -> None:
         """Carry a plan out once, for frames that will follow a hand."""
 
         def work(emit: Emit) -> VirtualSensor:
-            carrier = carriers.of(plan)
-            carrier.stretch(sensor, *frames, progress=lambda *_: emit(None))
+            synthesizer = synthesizers.of(plan)
+            synthesizer.stretch(sensor, *frames, progress=lambda *_: emit(None))
             return sensor
 
         self._runner.submit(work)
@@ -51,7 +55,7 @@ class Readier(QObject):
     def forget(self) -> None:
         """What was made ready is for another plan or mesh."""
         self._runner.cancel()
-        self._ready_at = None
+        self._prefetched_for = None
 
     def cancel(self) -> None:
         """Stop: the machine is needed for something else."""
@@ -62,7 +66,7 @@ class Readier(QObject):
         self._runner.close()
 
     def _note(self, sensor: VirtualSensor) -> None:
-        self._ready_at = sensor
+        self._prefetched_for = sensor
 
 
 class CompilerModel(QObject):
@@ -79,12 +83,12 @@ class CompilerModel(QObject):
 
     @property
     def ready(self) -> bool:
-        """Whether there is machine code."""
+        """True once the machine code is there."""
         return kernels_ready()
 
     @property
     def busy(self) -> bool:
-        """Whether machine code is on its way."""
+        """True while machine code is being compiled."""
         return not self.ready and self._process is not None and self._process.poll() is None
 
     def start(self) -> None:

@@ -11,7 +11,7 @@ from sd2app.mesh_comparison.model import ComparisonModel
 from sd2app.mesh_comparison.pictures import colour_of
 from sd2app.session.display import DisplayModel
 from sd2app.session.playback import PlaybackModel
-from sd2app.session.time_window import VisibleSpanModel
+from sd2app.session.time_window import TimeWindow
 from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, signed_text, ticks
 from sd2core.mesh.presence import runs
 
@@ -26,7 +26,7 @@ class JointCurves(QWidget):
     def __init__(
         self,
         comparison: ComparisonModel,
-        span: VisibleSpanModel,
+        span: TimeWindow,
         playback: PlaybackModel,
         display: DisplayModel,
         parent: QWidget | None = None,

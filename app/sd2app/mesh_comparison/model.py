@@ -14,8 +14,8 @@ from sd2app.background.latest import Emit, LatestRunner
 from sd2app.session.content import UNTITLED, reference_of
 from sd2app.session.document import DocumentModel
 from sd2app.session.sensor import SensorModel
-from sd2app.session.tasks import Job, JobsModel
-from sd2app.session.tracks import TrackModel
+from sd2app.session.tasks import Job, TaskList
+from sd2app.session.tracks import MapModel
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.recording.recording import MeshReading, Recording, is_recording, open_recording
 
@@ -58,7 +58,7 @@ class ComparisonModel(QObject):
         self,
         document: DocumentModel,
         sensor: SensorModel,
-        jobs: JobsModel,
+        jobs: TaskList,
         other: Path,
         parent: QObject | None = None,
     ) -> None:
@@ -73,7 +73,7 @@ class ComparisonModel(QObject):
         self._result: _Result | None = None
         self._problem = ""
         self._closed = False
-        self.tracks = (TrackModel("", self), TrackModel("", self))
+        self.tracks = (MapModel("", self), MapModel("", self))
         self._runner = LatestRunner("compare", self)
         self._runner.partial.connect(self._report)
         self._runner.finished.connect(self._receive)

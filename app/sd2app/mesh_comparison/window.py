@@ -24,8 +24,8 @@ from sd2app.mesh_comparison.table import JointTable
 from sd2app.session.display import DisplayModel
 from sd2app.session.document import DocumentModel
 from sd2app.session.playback import PlaybackModel
-from sd2app.session.time_window import VisibleSpanModel
-from sd2app.session.tracks import TrackModel
+from sd2app.session.time_window import TimeWindow
+from sd2app.session.tracks import MapModel
 from sd2app.session.video import VideoModel
 from sd2app.video.overlay_settings import OverlayModel
 from sd2app.widgets.dialogs import FIGURES
@@ -43,12 +43,12 @@ class ComparisonWindow(QWidget):
         model: ComparisonModel,
         document: DocumentModel,
         video: VideoModel,
-        span: VisibleSpanModel,
+        span: TimeWindow,
         playback: PlaybackModel,
         display: DisplayModel,
         overlay: OverlayModel,
         *,
-        map_view: Callable[[TrackModel], QWidget],
+        map_view: Callable[[MapModel], QWidget],
         ruler: QWidget,
         keys: list[QAction],
         attempt: Callable[[Callable[[], None]], object],

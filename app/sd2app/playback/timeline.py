@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QWidget
 
 from sd2app.session.display import DisplayModel
 from sd2app.session.playback import PlaybackModel
-from sd2app.session.time_window import VisibleSpanModel
+from sd2app.session.time_window import TimeWindow
 from sd2app.widgets.time_axis import (
     GUTTER_PX,
     MARGIN_PX,
@@ -24,7 +24,7 @@ class TimeRuler(QWidget):
 
     def __init__(
         self,
-        span: VisibleSpanModel,
+        span: TimeWindow,
         playback: PlaybackModel,
         display: DisplayModel,
         parent: QWidget | None = None,

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, Protocol
 
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.accuracy.model import TradeModel
+from sd2app.accuracy.model import AccuracyModel
 from sd2app.background.latest import Emit, LatestRunner
 from sd2app.session.document import DocumentModel
 from sd2app.session.sensor import SensorModel
@@ -82,7 +82,7 @@ class PlacementsModel(QObject):
         self,
         document: DocumentModel,
         sensor: SensorModel,
-        trade: TradeModel,
+        trade: AccuracyModel,
         edits: PlanEdits,
         parent: QObject | None = None,
     ) -> None:

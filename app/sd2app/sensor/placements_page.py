@@ -9,7 +9,7 @@ from PySide6.QtCore import QRectF, QSignalBlocker, QSize, Qt
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
 from PySide6.QtWidgets import QCheckBox, QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
-from sd2app.accuracy.model import TradeModel
+from sd2app.accuracy.model import AccuracyModel
 from sd2app.sensor.placement_fields import KINDS, NAMES, Kind, Name, PlacementFields
 from sd2app.sensor.placement_text import (
     cost_source_text,
@@ -57,7 +57,7 @@ class PlacementsPage(QWidget):
     Parameters
     ----------
     placements : PlacementsModel
-    trade : TradeModel
+    trade : AccuracyModel
     take, export, batch : callable
         Ask for a file with a plan; ask where to write one; set up a batch with it.
     """
@@ -65,7 +65,7 @@ class PlacementsPage(QWidget):
     def __init__(
         self,
         placements: PlacementsModel,
-        trade: TradeModel,
+        trade: AccuracyModel,
         take: Callable[[], None],
         export: Callable[[], None],
         batch: Callable[[], None],

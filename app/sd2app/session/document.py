@@ -13,7 +13,7 @@ from PySide6.QtGui import QUndoStack
 from sd2app.background.latest import Emit, LatestRunner
 from sd2app.session.content import Content, load_content, recording_of
 from sd2app.session.denoiser_choice import DenoiserChoice
-from sd2app.session.tasks import Job, JobsModel
+from sd2app.session.tasks import Job, TaskList
 from sd2core.body.camera import PinholeCamera
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap
@@ -51,7 +51,7 @@ class DocumentModel(QObject):
     noted = Signal(str)
     failed = Signal(str)
 
-    def __init__(self, jobs: JobsModel, parent: QObject | None = None) -> None:
+    def __init__(self, jobs: TaskList, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self.undo_stack = QUndoStack(self)
         self._jobs = jobs

@@ -19,7 +19,7 @@ class Job:
     cancelling: bool = False
 
 
-class JobsModel(QObject):
+class TaskList(QObject):
     """All jobs, the oldest first."""
 
     changed = Signal()

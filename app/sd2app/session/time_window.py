@@ -7,7 +7,7 @@ from PySide6.QtCore import QObject, Signal
 _SHORTEST_S = 0.2
 
 
-class VisibleSpanModel(QObject):
+class TimeWindow(QObject):
     """The time axis that all tracks share: its whole extent and the stretch in view."""
 
     changed = Signal()

@@ -42,7 +42,7 @@ class Reading:
     text: str = ""
 
 
-class TrackModel(QObject):
+class MapModel(QObject):
     """One Doppler map on the shared time axis.
 
     ``reference`` is the value shown as 0 dB. It is set when a recording is

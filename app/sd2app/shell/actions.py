@@ -249,9 +249,9 @@ ACTIONS: tuple[Action, ...] = (
         lambda w: w.show_sensor(), separator_before=True,
     ),
     Action(
-        "show_trade", "View", "Trade panel", ("T",),
+        "show_trade", "View", "Accuracy panel", ("T",),
         "How exact the synthetic map is to be, and what that costs",
-        lambda w: w.side.bring_up("Trade"),
+        lambda w: w.side.bring_up("Accuracy"),
     ),
     Action(
         "show_train", "View", "Train panel", ("Shift+T",),

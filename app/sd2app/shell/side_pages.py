@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from sd2app.accuracy.panel import TradePanel
+from sd2app.accuracy.panel import AccuracyPanel
 from sd2app.agreement.panel import AgreementPanel
 from sd2app.classify.panel import ClassPanel
 from sd2app.labels.label_set_dialog import LabelSetDialogs
@@ -57,7 +57,7 @@ def side_pages(window: MainWindow, actions: ActionSet) -> SidePages:
     side = SidePanel(
         {
             "Sensor": sensor,
-            "Trade": TradePanel(c.trade, c.display, actions["measure"]),
+            "Accuracy": AccuracyPanel(c.trade, c.display, actions["measure"]),
             "Train": train,
             "Labels": labels,
             "Agree": AgreementPanel(c.agreement, c.playback, actions),

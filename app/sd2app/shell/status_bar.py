@@ -5,9 +5,9 @@ from __future__ import annotations
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QToolButton, QWidget
 
-from sd2app.accuracy.model import TradeModel
+from sd2app.accuracy.model import AccuracyModel
 from sd2app.maps.model import SynthesisModel
-from sd2app.session.tasks import JobsModel
+from sd2app.session.tasks import TaskList
 from sd2app.session.tracks import PointerModel, Reading
 from sd2app.widgets.panel import ElidedLabel
 from sd2app.widgets.time_axis import clock_text
@@ -21,8 +21,8 @@ class StatusLine(QWidget):
     def __init__(
         self,
         pointer: PointerModel,
-        jobs: JobsModel,
-        trade: TradeModel,
+        jobs: TaskList,
+        trade: AccuracyModel,
         synthesis: SynthesisModel,
         parent: QWidget | None = None,
     ) -> None:

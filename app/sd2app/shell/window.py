@@ -348,7 +348,7 @@ class MainWindow(QMainWindow):
 
     def measure_scene(self) -> None:
         """Measure every plan, where one can watch it."""
-        self.side.bring_up("Trade")
+        self.side.bring_up("Accuracy")
         self.context.trade.measured.measure()
 
     def show_labels(self, page: Literal["spans", "search", "label set"] = "spans") -> None:

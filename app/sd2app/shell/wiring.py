@@ -9,7 +9,7 @@ from pathlib import Path
 from PySide6.QtCore import QObject
 
 from sd2app.accuracy.ladder import CORE, Ladder
-from sd2app.accuracy.model import TradeModel
+from sd2app.accuracy.model import AccuracyModel
 from sd2app.agreement.model import AgreementModel
 from sd2app.background.model_worker.client import DenoiseProcess
 from sd2app.batch.estimate import COMMAND as BATCH_COMMAND
@@ -22,7 +22,7 @@ from sd2app.dataset_export.model import ExportModel
 from sd2app.denoise.library import DenoiserLibrary, core_library
 from sd2app.denoise.live import LiveDenoiseModel
 from sd2app.denoise.model import DenoiseModel
-from sd2app.denoise.validity import Standing
+from sd2app.denoise.validity import MapValidity
 from sd2app.fit.clock import FitFollower
 from sd2app.fit.importer import FitTaker
 from sd2app.fit.model import COMMAND, FitModel
@@ -45,9 +45,9 @@ from sd2app.session.display import DisplayModel
 from sd2app.session.document import DocumentModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.sensor import SensorModel
-from sd2app.session.tasks import JobsModel
-from sd2app.session.time_window import VisibleSpanModel
-from sd2app.session.tracks import PointerModel, TrackModel
+from sd2app.session.tasks import TaskList
+from sd2app.session.time_window import TimeWindow
+from sd2app.session.tracks import MapModel, PointerModel
 from sd2app.session.undo import Edits
 from sd2app.session.video import VideoModel
 from sd2app.settings import Settings
@@ -68,20 +68,20 @@ class Context:
     """Everything a window is about."""
 
     settings: Settings
-    jobs: JobsModel
+    jobs: TaskList
     document: DocumentModel
     playback: PlaybackModel
     video: VideoModel
     sensor: SensorModel
     display: DisplayModel
     overlay: OverlayModel
-    span: VisibleSpanModel
+    span: TimeWindow
     pointer: PointerModel
-    synthetic: TrackModel
-    denoised: TrackModel
-    before: TrackModel
-    real: TrackModel
-    trade: TradeModel
+    synthetic: MapModel
+    denoised: MapModel
+    before: MapModel
+    real: MapModel
+    trade: AccuracyModel
     synthesis: SynthesisModel
     placements: PlacementsModel
     uncertainty: UncertaintyModel
@@ -114,7 +114,7 @@ class Context:
     export: ExportModel
 
     @property
-    def tracks(self) -> tuple[TrackModel, ...]:
+    def tracks(self) -> tuple[MapModel, ...]:
         """All maps, from top to bottom."""
         return (self.synthetic, self.denoised, self.before, self.real)
 
@@ -164,15 +164,15 @@ def build_context(
     Ladder, denoisers and classifiers are the library's, the commands that fit, train and work
     in batches ``sd2`` itself, and the recovery folder of labels is the user's by default.
     """
-    jobs = JobsModel(parent)
+    jobs = TaskList(parent)
     document = DocumentModel(jobs, parent)
     playback = PlaybackModel(parent)
     sensor = SensorModel(parent)
-    span = VisibleSpanModel(parent)
-    synthetic = TrackModel("Synthetic", parent)
-    denoised, before = TrackModel("Denoised", parent), TrackModel("Denoised before", parent)
-    real = TrackModel("Real", parent)
-    trade = TradeModel(jobs, settings, ladder or CORE, parent)
+    span = TimeWindow(parent)
+    synthetic = MapModel("Synthetic", parent)
+    denoised, before = MapModel("Denoised", parent), MapModel("Denoised before", parent)
+    real = MapModel("Real", parent)
+    trade = AccuracyModel(jobs, settings, ladder or CORE, parent)
     fit = FitModel(settings, parent, fit_command or COMMAND)
     follower = FitFollower(fit, document, playback, parent)
     synthesis = SynthesisModel(document, sensor, playback, span, synthetic, jobs, trade, parent)
@@ -197,8 +197,8 @@ def build_context(
     reaction = ReactionModel(settings, parent)
     maps = (synthetic, denoised, real)
     library = classifiers or core_classifiers(process)
-    standing = Standing(sensor, synthesis, denoise, synthetic, denoised, parent)
-    classify = ClassifyModel(maps, playback, standing, labels, settings, library, parent)
+    validity = MapValidity(sensor, synthesis, denoise, synthetic, denoised, parent)
+    classify = ClassifyModel(maps, playback, validity, labels, settings, library, parent)
     gestures = GestureFinder(classify)
     context = Context(
         settings=settings,

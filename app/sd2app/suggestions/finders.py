@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from PySide6.QtCore import SignalInstance
 
-from sd2app.session.tracks import TrackModel
+from sd2app.session.tracks import MapModel
 from sd2core.labels.spans import Span
 from sd2core.labels.suggest import SuggestOptions, motion_energy_db, suggest_spans
 
@@ -43,14 +43,14 @@ class SpanFinder(Protocol):
         """Reason why it cannot be used; empty where it can."""
 
     @property
-    def sources(self) -> tuple[TrackModel, ...]:
+    def sources(self) -> tuple[MapModel, ...]:
         """Maps to choose from."""
 
     @property
-    def source(self) -> TrackModel | None:
+    def source(self) -> MapModel | None:
         """Map that is searched."""
 
-    def set_source(self, source: TrackModel | None) -> None:
+    def set_source(self, source: MapModel | None) -> None:
         """Search another map; None: the default."""
 
     @property
@@ -74,9 +74,9 @@ class MotionFinder:
         "How far over the quiet level a suggestion must reach",
     )  # fmt: skip
 
-    def __init__(self, maps: Sequence[TrackModel]) -> None:
+    def __init__(self, maps: Sequence[MapModel]) -> None:
         self._maps = tuple(maps)
-        self._source: TrackModel | None = None
+        self._source: MapModel | None = None
 
     @property
     def why_not(self) -> str:
@@ -84,19 +84,19 @@ class MotionFinder:
         return "" if self.sources else "There is no map to look in"
 
     @property
-    def sources(self) -> tuple[TrackModel, ...]:
+    def sources(self) -> tuple[MapModel, ...]:
         """Maps that are there."""
         return tuple(track for track in self._maps if track.map is not None)
 
     @property
-    def source(self) -> TrackModel | None:
+    def source(self) -> MapModel | None:
         """Map that is searched: the one chosen, else the first."""
         there = self.sources
         if self._source in there:
             return self._source
         return there[0] if there else None
 
-    def set_source(self, source: TrackModel | None) -> None:
+    def set_source(self, source: MapModel | None) -> None:
         """Search another map; None: the first."""
         self._source = source
 

@@ -10,7 +10,7 @@ from PySide6.QtGui import QUndoStack
 from sd2app.background.latest import LatestRunner
 from sd2app.labels.model import LabelsModel
 from sd2app.session.playback import PlaybackModel
-from sd2app.session.tracks import TrackModel
+from sd2app.session.tracks import MapModel
 from sd2app.suggestions.finders import Found, SpanFinder, Threshold
 from sd2core.labels.edits import Edit
 from sd2core.labels.field_edits import offer, pending, reject, take
@@ -102,12 +102,12 @@ class SuggestionsModel(QObject):
         return self._finder
 
     @property
-    def sources(self) -> tuple[TrackModel, ...]:
+    def sources(self) -> tuple[MapModel, ...]:
         """Maps to choose from."""
         return self._finder.sources
 
     @property
-    def source(self) -> TrackModel | None:
+    def source(self) -> MapModel | None:
         """Map that is searched."""
         return self._finder.source
 
@@ -172,7 +172,7 @@ class SuggestionsModel(QObject):
             self._thresholds[self._finders.index(self._finder)] = threshold
             self._look()
 
-    def set_source(self, source: TrackModel) -> None:
+    def set_source(self, source: MapModel) -> None:
         """Search another map."""
         if source is not self.source:
             self._finder.set_source(source)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, QTimer, Signal, SignalInstance
 
-from sd2app.session.tracks import TrackModel
+from sd2app.session.tracks import MapModel
 from sd2app.training.model import TrainingModel
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
@@ -77,7 +77,7 @@ class TrainingUse(QObject):
     ----------
     training : TrainingModel
     denoise : Denoising
-    plain, before, now, radar : TrackModel
+    plain, before, now, radar : MapModel
         The synthetic map, that denoised by the model before, by the model in use, and
         the radar's.
     models : callable
@@ -99,10 +99,10 @@ class TrainingUse(QObject):
         self,
         training: TrainingModel,
         denoise: Denoising,
-        plain: TrackModel,
-        before: TrackModel,
-        now: TrackModel,
-        radar: TrackModel,
+        plain: MapModel,
+        before: MapModel,
+        now: MapModel,
+        radar: MapModel,
         models: Callable[[], Path],
         parent: QObject | None = None,
     ) -> None:

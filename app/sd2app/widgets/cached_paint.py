@@ -8,7 +8,7 @@ from PySide6.QtGui import QPainter, QPixmap
 from PySide6.QtWidgets import QWidget
 
 
-class Still:
+class CachedPaint:
     """Painted once, until it is forgotten or the view has another size."""
 
     def __init__(self, view: QWidget) -> None:

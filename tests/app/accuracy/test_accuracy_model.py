@@ -7,8 +7,8 @@ import pytest
 from fake_ladder import COUNTING, EXACT, FACING, WAVES, FakeLadder, measurement_of, result_of, stale
 from PySide6.QtCore import QObject
 
-from sd2app.accuracy.model import TradeModel
-from sd2app.session.tasks import JobsModel
+from sd2app.accuracy.model import AccuracyModel
+from sd2app.session.tasks import TaskList
 from sd2app.settings import DEFAULT_TOLERANCE, Settings
 from sd2core.accuracy.plans import AccuracyPlan
 from sd2core.doppler.options import PRESETS
@@ -32,9 +32,9 @@ class Desk:
     def __init__(self, settings=None, **answers):
         self.parent = QObject()
         self.fake = FakeLadder(**answers)
-        self.jobs = JobsModel(self.parent)
+        self.jobs = TaskList(self.parent)
         self.settings = settings or Settings.forgetful()
-        self.trade = TradeModel(self.jobs, self.settings, self.fake.ladder, self.parent)
+        self.trade = AccuracyModel(self.jobs, self.settings, self.fake.ladder, self.parent)
         self.failures, self.notes = [], []
         self.trade.failed.connect(self.failures.append)
         self.trade.noted.connect(self.notes.append)

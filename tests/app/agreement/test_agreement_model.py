@@ -10,7 +10,7 @@ from sd2app.agreement.model import AgreementModel
 from sd2app.agreement.text import facts, label_facts, verdict, where
 from sd2app.labels.model import LabelsModel
 from sd2app.session.playback import PlaybackModel
-from sd2app.session.time_window import VisibleSpanModel
+from sd2app.session.time_window import TimeWindow
 from sd2core.labels.formats import write_labels
 from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
@@ -31,7 +31,7 @@ class Compared:
 
     def __init__(self, qtbot) -> None:
         self._qtbot = qtbot
-        self.labels, self.playback, self.span = LabelsModel(), PlaybackModel(), VisibleSpanModel()
+        self.labels, self.playback, self.span = LabelsModel(), PlaybackModel(), TimeWindow()
         self.playback.set_timebase(FRAMES)
         self.span.set_extent(0.0, 10.0)
         self.labels.open(MINE)

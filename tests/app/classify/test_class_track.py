@@ -12,7 +12,7 @@ from fake_classifiers import CLASSES, FakeClassifier, FakeClassifiers, class_car
 from sd2app.classify.text import reading_text
 from sd2app.classify.track import ClassTrack
 from sd2app.denoise.map import AT_ONCE
-from sd2app.session.tracks import TrackModel
+from sd2app.session.tracks import MapModel
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis
@@ -30,7 +30,7 @@ def a_map(frames=90, seed=0, rate=RATE, **more):
 
 @pytest.fixture
 def set_up(qtbot):
-    fake, source, state = FakeClassifiers(), TrackModel("Denoised"), SimpleNamespace(counts=True)
+    fake, source, state = FakeClassifiers(), MapModel("Denoised"), SimpleNamespace(counts=True)
     track = ClassTrack(lambda _: state.counts)
     track.look_at(source)
     track.use(FakeClassifier(fake), class_card("/a.safetensors"))

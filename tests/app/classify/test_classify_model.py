@@ -13,7 +13,7 @@ from sd2app.classify.model import ClassifyModel
 from sd2app.classify.text import classifier_page, reading_text
 from sd2app.labels.model import LabelsModel
 from sd2app.session.playback import PlaybackModel
-from sd2app.session.tracks import TrackModel
+from sd2app.session.tracks import MapModel
 from sd2app.settings import Settings
 from sd2core.errors import Sd2Error
 from sd2core.labels.label_set import Label, LabelSet
@@ -23,8 +23,8 @@ from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 
 
-class Standing(QObject):
-    """Of which maps it is said that they are of the sensor where it stands."""
+class MapValidity(QObject):
+    """Validity of maps, as the test says."""
 
     changed = Signal()
 
@@ -32,7 +32,7 @@ class Standing(QObject):
         super().__init__()
         self.others = []
 
-    def of(self, track):
+    def is_current(self, track):
         return track not in self.others
 
 
@@ -44,13 +44,13 @@ def a_map(kind, seed=0):
 @pytest.fixture
 def set_up(qtbot):
     fake, settings, labels = FakeClassifiers("a"), Settings.forgetful(), LabelsModel()
-    tracks = [TrackModel(name) for name in ("Synthetic", "Denoised", "Radar (simulated)")]
-    playback, standing = PlaybackModel(), Standing()
+    tracks = [MapModel(name) for name in ("Synthetic", "Denoised", "Radar (simulated)")]
+    playback, validity = PlaybackModel(), MapValidity()
     playback.set_timebase(Timebase.regular(60, 30.0))
     made = []
 
     def model():
-        made.append(ClassifyModel(tracks, playback, standing, labels, settings, fake.library))
+        made.append(ClassifyModel(tracks, playback, validity, labels, settings, fake.library))
         return made[-1]
 
     def settle():
@@ -58,7 +58,7 @@ def set_up(qtbot):
 
     (path,) = fake.cards
     yield SimpleNamespace(
-        model=model, fake=fake, tracks=tracks, playback=playback, standing=standing,
+        model=model, fake=fake, tracks=tracks, playback=playback, validity=validity,
         labels=labels, settle=settle, path=path,
     )  # fmt: skip
     fake.gate.set()
@@ -75,7 +75,7 @@ def test_the_frame_on_screen_is_followed(set_up):
     for frame in (0, 17, 59):
         set_up.playback.seek_frame(frame)
         assert model.reading.shares == pytest.approx(told[frame])
-    set_up.standing.others = [set_up.tracks[1]]
+    set_up.validity.others = [set_up.tracks[1]]
     assert not model.reading.current
     # What the sensor does is nothing to the radar's own map.
     set_up.tracks[2].set_map(doppler)

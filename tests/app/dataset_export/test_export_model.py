@@ -17,7 +17,7 @@ from sd2app.background.run_command import commands_in
 from sd2app.dataset_export.model import ExportModel
 from sd2app.dataset_export.run import Exported, ExportRun
 from sd2app.dataset_export.text import bytes_words, label_words, size_words, split_words
-from sd2app.session.tasks import JobsModel
+from sd2app.session.tasks import TaskList
 from sd2core.errors import Sd2Error
 from sd2core.placements.placements import PlacementGrid
 
@@ -31,7 +31,7 @@ def made(qtbot, tmp_path: Path):
 
     def make(how: str = "done") -> ExportModel:
         command = [sys.executable, str(FAKE), how]
-        models.append(ExportModel(JobsModel(parent), parent, command, tmp_path / "exports"))
+        models.append(ExportModel(TaskList(parent), parent, command, tmp_path / "exports"))
         return models[-1]
 
     yield make

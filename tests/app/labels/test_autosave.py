@@ -19,7 +19,7 @@ from sd2app.labels.model import LabelsModel
 from sd2app.labels.reaction import ReactionModel
 from sd2app.session.document import DocumentModel
 from sd2app.session.playback import PlaybackModel
-from sd2app.session.tasks import JobsModel
+from sd2app.session.tasks import TaskList
 from sd2app.settings import Settings
 from sd2core.labels import edits as core_edits
 from sd2core.labels.files import read_labels, write_labels
@@ -32,7 +32,7 @@ class Desk:
 
     def __init__(self, qtbot, root: Path) -> None:
         self.qtbot, self.root = qtbot, root
-        self.document = DocumentModel(JobsModel())
+        self.document = DocumentModel(TaskList())
         self.labels, self.playback = LabelsModel(), PlaybackModel()
         self.session = LabelSession(self.document, self.labels, root)
         self.edits = LabelEdits(self.document, self.labels, self.playback, self.session)

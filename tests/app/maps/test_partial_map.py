@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sd2app.maps.partial_map import AS_DRAGGED, FINAL, ROUGH, Canvas, pieces
+from sd2app.maps.partial_map import FINAL, PREVIEW, ROUGH, PartialMap, pieces
 from sd2core.doppler.synthesizer import Stretch
 from sd2core.sensor import VirtualSensor
 
@@ -22,43 +22,43 @@ def stretch_of(frames, value):
     st.data(),
 )
 def test_pieces_cover_what_is_below_once_and_nothing_else(ranks, below, size, data):
-    rank = np.array(ranks, np.uint8)
+    quality = np.array(ranks, np.uint8)
     start = data.draw(st.integers(0, len(ranks)))
     stop = data.draw(st.integers(start, len(ranks)))
     covered = np.zeros(len(ranks), int)
-    for first, last in pieces(rank, below, start, stop, size):
+    for first, last in pieces(quality, below, start, stop, size):
         assert 0 < last - first <= size
         covered[first:last] += 1
     inside = np.zeros(len(ranks), bool)
     inside[start:stop] = True
-    np.testing.assert_array_equal(covered, (inside & (rank < below)).astype(int))
+    np.testing.assert_array_equal(covered, (inside & (quality < below)).astype(int))
 
 
 def test_a_new_placement_forgets_the_old_one():
-    canvas = Canvas.blank(2, 10)
+    partial = PartialMap.blank(2, 10)
     here, there = VirtualSensor(), VirtualSensor(position_m=(1, 0, 0))
-    canvas.paint(here, 0, stretch_of(10, 1.0), FINAL)
-    assert canvas.final
-    canvas.paint(there, 4, stretch_of(3, 2.0), ROUGH)
-    assert not canvas.full
-    assert canvas.rank.tolist() == [0] * 4 + [ROUGH] * 3 + [0] * 3
-    assert not canvas.ranks_for(here).any()
-    np.testing.assert_array_equal(canvas.ranks_for(there), canvas.rank)
+    partial.paint(here, 0, stretch_of(10, 1.0), FINAL)
+    assert partial.final
+    partial.paint(there, 4, stretch_of(3, 2.0), ROUGH)
+    assert not partial.full
+    assert partial.quality.tolist() == [0] * 4 + [ROUGH] * 3 + [0] * 3
+    assert not partial.quality_for(here).any()
+    np.testing.assert_array_equal(partial.quality_for(there), partial.quality)
 
 
 def test_ranks_rise_to_final():
-    canvas = Canvas.blank(2, 4)
-    assert not canvas.full
-    canvas.paint(VirtualSensor(), 0, stretch_of(4, 1.0), ROUGH)
-    assert canvas.full
-    assert not canvas.final
-    canvas.paint(VirtualSensor(), 0, stretch_of(4, 1.0), FINAL)
-    assert canvas.rank.min() == FINAL
+    partial = PartialMap.blank(2, 4)
+    assert not partial.full
+    partial.paint(VirtualSensor(), 0, stretch_of(4, 1.0), ROUGH)
+    assert partial.full
+    assert not partial.final
+    partial.paint(VirtualSensor(), 0, stretch_of(4, 1.0), FINAL)
+    assert partial.quality.min() == FINAL
 
 
 def test_another_plan_leaves_the_values_until_they_are_replaced():
-    canvas, here = Canvas.blank(2, 4), VirtualSensor()
-    canvas.paint(here, 0, stretch_of(3, 1.0), FINAL)
-    canvas.demote()
-    assert canvas.rank.tolist() == [AS_DRAGGED] * 3 + [0]
-    assert canvas.values[0].tolist() == [1.0] * 3 + [0.0]
+    partial, here = PartialMap.blank(2, 4), VirtualSensor()
+    partial.paint(here, 0, stretch_of(3, 1.0), FINAL)
+    partial.mark_stale()
+    assert partial.quality.tolist() == [PREVIEW] * 3 + [0]
+    assert partial.values[0].tolist() == [1.0] * 3 + [0.0]

@@ -63,7 +63,7 @@ def test_rough_comes_before_exact(context, qtbot, ball):
     ranks = []
     context.synthetic.changed.connect(
         lambda: (
-            ranks.append(context.synthesis._painted.canvas.rank.copy())
+            ranks.append(context.synthesis._shown_map.partial.quality.copy())
             if context.synthetic.map
             else 0
         )
@@ -72,7 +72,7 @@ def test_rough_comes_before_exact(context, qtbot, ball):
     qtbot.waitUntil(lambda: context.synthesis.complete, timeout=10_000)
     assert (ranks[0] == ROUGH).all()
     assert (ranks[-1] == FINAL).all()
-    lowest = [rank.min() for rank in ranks]
+    lowest = [quality.min() for quality in ranks]
     assert lowest == sorted(lowest)
 
 
@@ -89,7 +89,7 @@ def test_every_sweep_of_a_fast_hand_is_for_one_placement(context, qtbot, ball):
     qtbot.waitUntil(lambda: context.synthesis.complete, timeout=10_000)
     shown = []
     context.synthetic.changed.connect(
-        lambda: shown.append(context.synthesis._painted.canvas.sensor)
+        lambda: shown.append(context.synthesis._shown_map.partial.sensor)
     )
     context.edits.begin_sensor_drag()
     for step in range(200):
@@ -267,7 +267,9 @@ def test_a_hand_gets_the_plan_for_dragging(context, fake, qtbot, ball):
     fake.dragging = AccuracyPlan(visibility="depth", depth_resolution=128, mask_stride=5)
     open_ball(context, qtbot, ball)
     wait_until_done(context, qtbot)
-    qtbot.waitUntil(lambda: context.synthesis._readier.ready_at is not None, timeout=10_000)
+    qtbot.waitUntil(
+        lambda: context.synthesis._prefetcher.prefetched_for is not None, timeout=10_000
+    )
     context.edits.begin_sensor_drag()
     assert not context.synthesis.moving  # the hand has hold of it; nothing moves yet
     context.edits.drag_sensor((0.2, 0.0, 0.0))
@@ -287,7 +289,9 @@ def test_masks_are_kept_within_their_reach_and_not_beyond(context, fake, qtbot, 
     fake.dragging = AccuracyPlan(mask_reuse_m=0.1)
     open_ball(context, qtbot, ball)
     wait_until_done(context, qtbot)
-    qtbot.waitUntil(lambda: context.synthesis._readier.ready_at is not None, timeout=10_000)
+    qtbot.waitUntil(
+        lambda: context.synthesis._prefetcher.prefetched_for is not None, timeout=10_000
+    )
     context.edits.begin_sensor_drag()
     for x_m, words in ((0.05, "while dragging: visibility exact"), (0.15, "facing the sensor")):
         context.edits.drag_sensor((x_m, 0.0, 0.0))

@@ -7,7 +7,7 @@ import pytest
 
 from sd2app.maps.heatmap_image import heatmap_image, uncertain_columns
 from sd2app.session.display import COLOUR_MAPS, HeatmapLevels
-from sd2app.session.tracks import TrackModel
+from sd2app.session.tracks import MapModel
 from sd2app.widgets.colour_maps import lookup_table, uncertain_table
 from sd2core.maps import CellUncertainty, DopplerMap
 from sd2core.sensor import VelocityAxis
@@ -16,10 +16,10 @@ from sd2core.timebase import Timebase
 DB = HeatmapLevels(low_db=-30.0, high_db=0.0)
 
 
-def track_of(values, sd) -> TrackModel:
+def track_of(values, sd) -> MapModel:
     """A map of two bins: what is given above, and nothing below."""
     values, sd = (np.concatenate([0.0 * np.array(part), part]) for part in (values, sd))
-    track = TrackModel("Synthetic")
+    track = MapModel("Synthetic")
     timebase = Timebase.regular(values.shape[1], 10.0)
     track.set_map(DopplerMap(values, VelocityAxis(len(values), 2.0), timebase, "synthetic"))
     track.set_uncertainty(CellUncertainty(values, sd))

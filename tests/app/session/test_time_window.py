@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sd2app.session.time_window import VisibleSpanModel
+from sd2app.session.time_window import TimeWindow
 
 moves = st.one_of(
     st.tuples(st.just("zoom"), st.floats(0.01, 100), st.floats(-20, 50)),
@@ -16,7 +16,7 @@ moves = st.one_of(
 
 @given(st.lists(moves, max_size=30))
 def test_the_span_never_leaves_the_recording(sequence):
-    span = VisibleSpanModel()
+    span = TimeWindow()
     span.set_extent(0.0, 30.0)
     for name, first, second in sequence:
         getattr(span, name)(*(value for value in (first, second) if value is not None))
@@ -27,7 +27,7 @@ def test_the_span_never_leaves_the_recording(sequence):
 
 
 def test_zooming_keeps_the_anchor_in_place():
-    span = VisibleSpanModel()
+    span = TimeWindow()
     span.set_extent(0.0, 30.0)
     span.zoom(0.5, 10.0)
     share = (10.0 - span.start_s) / span.duration_s

@@ -5,14 +5,14 @@ import pytest
 
 from sd2app.maps.heatmap_image import shade_columns
 from sd2app.session.display import HeatmapLevels
-from sd2app.session.tracks import TrackModel
+from sd2app.session.tracks import MapModel
 from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 
 
-def track_of(values, rate=10.0, **changes) -> TrackModel:
-    track = TrackModel("Synthetic")
+def track_of(values, rate=10.0, **changes) -> MapModel:
+    track = MapModel("Synthetic")
     values = np.asarray(values, np.float32)
     track.set_map(
         DopplerMap(

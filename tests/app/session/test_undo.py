@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from sd2app.session.content import load_content, recording_of
 from sd2app.session.document import DocumentModel
 from sd2app.session.sensor import SensorModel
-from sd2app.session.tasks import JobsModel
+from sd2app.session.tasks import TaskList
 from sd2app.session.undo import Edits
 from sd2core.sensor import VirtualSensor
 
@@ -21,7 +21,7 @@ def write_points(path):
 
 
 def open_document(qtbot, path):
-    document = DocumentModel(JobsModel())
+    document = DocumentModel(TaskList())
     write_points(path)
     with qtbot.waitSignal(document.opened):
         document.open([path])
@@ -71,7 +71,7 @@ def test_a_drag_back_to_the_start_is_no_step(document):
 @settings(max_examples=20)
 @given(moves=st.lists(st.one_of(positions, st.floats(-3, 3)), max_size=30))
 def test_undo_restores_every_former_state(moves, qapp, tmp_path_factory):
-    document = DocumentModel(JobsModel())
+    document = DocumentModel(TaskList())
     sensor = SensorModel()
     edits = Edits(document, sensor)
     path = write_points(tmp_path_factory.mktemp("points") / "points.npz")

@@ -11,7 +11,7 @@ from sd2app.labels.dragging import LabelDragging
 from sd2app.labels.edits import LabelEdits
 from sd2app.labels.model import LabelsModel
 from sd2app.session.playback import PlaybackModel
-from sd2app.session.tracks import TrackModel
+from sd2app.session.tracks import MapModel
 from sd2app.suggestions.finders import Found, MotionFinder, Threshold
 from sd2app.suggestions.model import SuggestionsModel
 from sd2core.labels.spans import Labels, LabelTrack, Span
@@ -61,13 +61,13 @@ def set_up(qtbot):
     labels, playback = LabelsModel(), PlaybackModel()
     playback.set_timebase(Timebase.regular(600, RATE))
     labels.open(Labels((LabelTrack("Gestures"),), (Span(1, "Gestures", 20.0, 21.0, "up-to-down"),)))
-    real = TrackModel("Real")
+    real = MapModel("Real")
     real.set_map(moving((100, 130, 100.0), (200, 230, 20.0), (300, 330, 100.0), (400, 420, 100.0)))
     edits = LabelEdits(document, labels, playback, session)
     model = SuggestionsModel(
         labels,
         playback,
-        (MotionFinder((TrackModel("Synthetic"), real)), KnownSpans(real)),
+        (MotionFinder((MapModel("Synthetic"), real)), KnownSpans(real)),
         document.undo_stack,
         edits.apply,
     )

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.session.tracks import TrackModel
+from sd2app.session.tracks import MapModel
 from sd2app.training import result as training_use
 from sd2app.training.result import TrainingUse
 from sd2app.training.text import gain_rows, gain_summary
@@ -74,8 +74,8 @@ def run(tmp_path) -> Path:
 def made(qtbot, run, tmp_path, monkeypatch):
     monkeypatch.setattr(training_use, "CALM_MS", 1)
 
-    def make(denoise: FakeDenoising) -> tuple[TrainingUse, dict[str, TrackModel]]:
-        tracks = {name: TrackModel(name) for name in ("plain", "before", "now", "radar")}
+    def make(denoise: FakeDenoising) -> tuple[TrainingUse, dict[str, MapModel]]:
+        tracks = {name: MapModel(name) for name in ("plain", "before", "now", "radar")}
         use = TrainingUse(FakeTraining(run), denoise, *tracks.values(), lambda: tmp_path / "models")
         return use, tracks
 

@@ -1,4 +1,4 @@
-"""The Trade panel by real mouse and key events; the models are what is asserted on."""
+"""The Accuracy panel by real mouse and key events; the models are what is asserted on."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from fake_ladder import COUNTING, EXACT, FACING, WAVES, measurement_of, result_o
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QLabel, QTabBar, QToolButton, QToolTip
 
-from sd2app.accuracy.panel import ReasonList, ToleranceRow, TradePanel
-from sd2app.accuracy.plot import TradePlot
+from sd2app.accuracy.panel import AccuracyPanel, ReasonList, ToleranceRow
+from sd2app.accuracy.plot import AccuracyPlot
 from sd2app.widgets.inputs import Choice as ChoiceBox
 from sd2app.widgets.inputs import NumberBox
 from sd2app.widgets.panel import ElidedLabel
@@ -22,7 +22,7 @@ STRIDE = AccuracyPlan(mask_stride=5)
 def panel(window, fake, qtbot):
     """The panel in front, the ball chosen for."""
     qtbot.keyClick(window, Qt.Key.Key_T)
-    panel = window.findChild(TradePanel)
+    panel = window.findChild(AccuracyPanel)
     assert panel.isVisible()
     return panel
 
@@ -33,7 +33,7 @@ def plot(panel, window, qtbot):
     measured = window.context.trade.measured
     measured.measure()
     qtbot.waitUntil(lambda: measured.job is None, timeout=5_000)
-    plot = panel.findChild(TradePlot)
+    plot = panel.findChild(AccuracyPlot)
     assert plot.isVisible()
     return plot
 
@@ -61,16 +61,16 @@ def test_a_tab_and_a_key_bring_the_panel_up(window, qtbot):
     tabs = window.side.findChild(QTabBar)
     assert window.side.shown == "Sensor"
     qtbot.mouseClick(tabs, Qt.MouseButton.LeftButton, pos=tabs.tabRect(1).center())
-    assert window.side.shown == "Trade"
+    assert window.side.shown == "Accuracy"
     qtbot.keyClick(window, Qt.Key.Key_S)
     assert window.side.shown == "Sensor"
     qtbot.keyClick(window, Qt.Key.Key_T)
-    assert window.side.shown == "Trade"
+    assert window.side.shown == "Accuracy"
 
 
 def test_without_a_mesh_the_panel_says_what_it_is_for(empty_window, qtbot):
     qtbot.keyClick(empty_window, Qt.Key.Key_T)
-    panel = empty_window.findChild(TradePanel)
+    panel = empty_window.findChild(AccuracyPanel)
     assert "Open a mesh" in texts(panel)
     assert not panel.findChild(ToleranceRow).isVisible()
 
@@ -131,7 +131,7 @@ def test_measuring_shows_progress_and_then_the_points(panel, window, fake, qtbot
     assert measured.job is not None
     fake.gate.set()
     qtbot.waitUntil(lambda: measured.measurement is not None, timeout=5_000)
-    assert panel.findChild(TradePlot).isVisible()
+    assert panel.findChild(AccuracyPlot).isVisible()
     # Under each tolerance the cheapest plan within it; the one chosen costs 0.6 ms.
     assert button(panel, "2 %").text() == "2 %\n0.6"
     assert button(panel, "0.5 %").text() == "0.5 %\n0.6"
@@ -239,7 +239,7 @@ def test_many_points_are_painted_in_both_themes(panel, window, fake, qtbot):
     window.context.trade.measured._place = None
     window.context.trade.rest_at(here)
     qtbot.waitUntil(lambda: window.context.trade.measured.measurement is not None)
-    plot = panel.findChild(TradePlot)
+    plot = panel.findChild(AccuracyPlot)
     pictures = set()
     for dark in (False, True):
         window.set_dark(dark)

@@ -223,7 +223,7 @@ def test_the_panel_is_as_wide_as_its_table_needs_and_others_are_as_before(labell
     labelled.side.bring_up("Sensor")
     narrow = labelled.side.width()
     assert wide > narrow + 100
-    labelled.side.bring_up("Trade")
+    labelled.side.bring_up("Accuracy")
     assert labelled.side.width() == narrow
     labelled.side.bring_up("Labels")
     assert labelled.side.width() >= wide  # as far as the scene gives way

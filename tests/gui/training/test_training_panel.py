@@ -23,7 +23,7 @@ from training_pairs import write_pairs
 
 from sd2app.background import run_monitor
 from sd2app.session.display import DisplayModel
-from sd2app.session.tracks import TrackModel
+from sd2app.session.tracks import MapModel
 from sd2app.settings import Settings
 from sd2app.shell.side_panel import SidePanel
 from sd2app.training.curves import TrainingCurves
@@ -71,7 +71,7 @@ class Window:
         timing = [sys.executable, "-c", "print('{\"step_s\": 0.25}')"]
         self.training = TrainingModel(settings, None, command, timing, folder / "runs")
         self.denoise = FakeDenoising()
-        self.tracks = [TrackModel(name) for name in ("Synthetic", "Before", "Denoised", "Real")]
+        self.tracks = [MapModel(name) for name in ("Synthetic", "Before", "Denoised", "Real")]
         self.use = TrainingUse(self.training, self.denoise, *self.tracks, lambda: folder / "models")
         self.said: list[str] = []
         self.display = DisplayModel()
