@@ -1,4 +1,4 @@
-"""What the window remembers from one start to the next."""
+"""Settings of the window, kept between sessions."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ DEFAULT_TOLERANCE = 0.05
 
 
 class Store(Protocol):
-    """What settings need: QSettings, or a substitute that forgets."""
+    """Interface of a store of settings: QSettings, or one in memory."""
 
     def value(self, key: str, default: Any = None, /) -> Any:
-        """What was stored under a key."""
+        """Value stored under a key."""
 
     def setValue(self, key: str, value: Any, /) -> None:
         """Store a value."""

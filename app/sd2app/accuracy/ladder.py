@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Ladder:
-    """What the models ask of :mod:`sd2core.accuracy`; a test puts its own answers here."""
+    """Functions of :mod:`sd2core.accuracy` that the models call; tests replace them."""
 
     survey: Callable[[MeshSequence, VirtualSensor, SynthesisOptions, Progress, Any], Any]
     choose: Callable[..., Choice]

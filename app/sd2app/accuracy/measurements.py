@@ -1,4 +1,4 @@
-"""What was measured of every sensible plan on the scene that is open."""
+"""Measured error and cost of every sensible plan on the open recording."""
 
 from __future__ import annotations
 
@@ -57,12 +57,12 @@ class MeasuredModel(QObject):
 
     @property
     def measurement(self) -> Measurement | None:
-        """What was measured of the family that is shown."""
+        """Measurement of the family on screen."""
         return self._known.get(self._family)
 
     @property
     def counting(self) -> Measurement | None:
-        """What was measured of the plans that the window can carry out."""
+        """Measurement of the plans that the window can apply."""
         return self._known.get("histogram")
 
     @property
@@ -72,7 +72,7 @@ class MeasuredModel(QObject):
 
     @property
     def can_measure(self) -> bool:
-        """Whether there is a scene at rest, and no measurement under way."""
+        """True if the sensor is at rest and no measurement is running."""
         return self._scene is not None and self._place is not None and self._job is None
 
     # --- requests -------------------------------------------------------------------------
@@ -172,7 +172,7 @@ class MeasuredModel(QObject):
 
 
 def serves_at_rest(result: PlanResult) -> bool:
-    """Whether a plan is one for a sensor at rest; kept masks only serve one that moves."""
+    """True if a plan suits a sensor at rest; reused masks are for a sensor that moves."""
     return result.plan.mask_reuse_m == 0
 
 

@@ -25,7 +25,7 @@ PRESETS = (0.005, 0.01, 0.02, 0.05, 0.1)
 
 
 class _Wish(NamedTuple):
-    """What a choice is for; without a tolerance a clicked point rules at rest."""
+    """Request for a plan; without a tolerance the clicked plan stays in use at rest."""
 
     tolerance: float | None
     budget_ms: float
@@ -33,7 +33,7 @@ class _Wish(NamedTuple):
 
 
 class _Surveyed(NamedTuple):
-    """What the library found out about a place, for further choices there."""
+    """Survey of a sensor position, reused by later choices there."""
 
     mesh: MeshSequence
     sensor: VirtualSensor
@@ -138,12 +138,12 @@ class AccuracyModel(QObject):
 
     @property
     def choosing(self) -> bool:
-        """Whether a choice is under way."""
+        """True while a plan is being chosen."""
         return self._job is not None
 
     @property
     def current_point(self) -> PlanResult | None:
-        """What was measured of the plan at rest."""
+        """Measured point of the plan at rest."""
         measurement, in_use = self.measured.measurement, self.in_use
         return measurement.of(in_use.plan) if measurement and in_use else None
 
@@ -165,7 +165,7 @@ class AccuracyModel(QObject):
         return min((cost_ms for error, cost_ms in known if error <= tolerance), default=None)
 
     def is_decided(self, sensor: VirtualSensor, budget_ms: float) -> bool:
-        """Whether the plans are for this place, this budget, and the tolerance as it is."""
+        """True if the plans were chosen for this sensor, budget and tolerance."""
         return self._decided_for == self._wish(sensor, budget_ms)
 
     def _wish(self, sensor: VirtualSensor, budget_ms: float) -> _Wish:

@@ -266,7 +266,7 @@ class ReasonList(QWidget):
 
 
 class ToleranceRow(QWidget):
-    """How much of the map may differ from the reference."""
+    """Row of the panel that sets the tolerance: the accepted error of the map."""
 
     def __init__(self, trade: AccuracyModel, parent: QWidget | None = None) -> None:
         super().__init__(parent)

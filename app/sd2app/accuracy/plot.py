@@ -58,11 +58,11 @@ class AccuracyPlot(PointPlot):
         return self._trade.current_point
 
     def tip_place(self, point: PlanResult) -> QPointF:
-        """Where the plan stands."""
+        """Pixel of the plan."""
         return self.point_of(point)
 
     def words_of(self, point: PlanResult) -> str:
-        """What a plan costs and misses."""
+        """Error and cost of a plan."""
         return point_text(point)
 
     def tip_of(self, point: PlanResult) -> str:
@@ -165,7 +165,7 @@ class AccuracyPlot(PointPlot):
         painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)
 
     def _paint_in_use(self, painter: QPainter, costs: LogAxis, errors: LogAxis) -> None:
-        """Where the plan in use was measured; else where the choice of it found it to be."""
+        """Mark the plan in use where it was measured, otherwise where it was estimated."""
         in_use, current = self._trade.in_use, self._trade.current_point
         if in_use is None or self._trade.measured.family != in_use.plan.family:
             return

@@ -53,7 +53,7 @@ def deviation(error: float) -> str:
 
 
 def short(plan: AccuracyPlan) -> str:
-    """What of a plan tells maps of one scene apart: visibility, masks, geometry, time."""
+    """Short description of a plan: visibility, masks, geometry, time."""
     sight = plan.visibility
     words = [f"visibility {sight}"]
     if sight in ("depth", "none"):
@@ -68,7 +68,7 @@ def short(plan: AccuracyPlan) -> str:
 
 
 def point_text(result: PlanResult) -> str:
-    """What a point of the plot is: its plan, errors and cost, one fact a line."""
+    """Plan, errors and cost of a point of the plot, one fact a line."""
     errors, cost = result.errors, result.cost
     return "\n".join(
         (

@@ -44,7 +44,7 @@ class ClassifierChooser:
         ]
 
     def face(self) -> Face:
-        """Which one is in use."""
+        """Text and tooltip for the model in use."""
         card, path = self._classify.card, self._classify.path
         if self._classify.problem:
             return Face("Classifier not usable", self._classify.problem)

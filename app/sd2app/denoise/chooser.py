@@ -44,7 +44,7 @@ class DenoiserChooser:
         ]
 
     def face(self) -> Face:
-        """Which one is in use."""
+        """Text and tooltip for the model in use."""
         card, path = self._denoise.card, self._denoise.path
         if self._denoise.problem:
             return Face("Denoiser not usable", self._denoise.problem)

@@ -46,7 +46,7 @@ class Denoiser(Protocol):
     frame_rate_hz: float
 
     def denoise(self, doppler: DopplerMap) -> DopplerMap:
-        """What a radar would show in place of a synthetic map."""
+        """Denoise a synthetic map."""
 
     def live(self) -> LiveSession:
         """For frames as they come."""
@@ -54,7 +54,7 @@ class Denoiser(Protocol):
 
 @dataclass(frozen=True)
 class DenoiserLibrary:
-    """What the models ask of :mod:`sd2core.denoise`.
+    """Functions of :mod:`sd2core.denoise` that the models call; tests replace them.
 
     Parameters
     ----------

@@ -65,12 +65,12 @@ class LiveDenoiseModel(QObject):
 
     @property
     def wanted(self) -> bool:
-        """Whether playing is to be live."""
+        """True if the user wants denoising to follow playback."""
         return self._wanted
 
     @property
     def running(self) -> bool:
-        """Whether frames are denoised one by one now."""
+        """True while frames are denoised one by one."""
         return self._denoiser is not None
 
     def set_wanted(self, wanted: bool) -> None:
@@ -115,7 +115,7 @@ class LiveDenoiseModel(QObject):
         return self._synthetic.frame_at(self._playback.time_s)
 
     def _begin_at(self, frame: int | None) -> None:
-        """What was before is forgotten."""
+        """Start at a frame and forget the frames before."""
         self._session = None
         self._next = frame or 0
         self._anew = True

@@ -43,7 +43,7 @@ CONTEXT = 288
 
 
 class Swept(NamedTuple):
-    """What a model made of a sweep."""
+    """Denoised preview of a part of the map."""
 
     denoiser: Denoiser
     doppler: DopplerMap
@@ -142,17 +142,17 @@ class DenoisedMap(QObject):
 
     @property
     def busy(self) -> bool:
-        """Whether something is being denoised or about to be."""
+        """True while something is being denoised or about to be."""
         return self._runner.busy or self._again.isActive()
 
     @property
     def shows_source(self) -> bool:
-        """Whether some of it is of the synthetic map as it is now, and none of another sensor's."""
+        """True if the denoised frames are all of the current synthetic map and sensor."""
         return bool(self._shown.any())
 
     @property
     def keeps_up(self) -> bool:
-        """Whether the model is fast enough to follow a hand."""
+        """True if the model is fast enough to follow a mouse drag."""
         # The best of some: a busy machine is not a slow model.
         return len(self._took_s) < _TRIED or min(self._took_s) <= _TOO_SLOW_S
 
@@ -213,7 +213,7 @@ class DenoisedMap(QObject):
             self._go_on()
 
     def companion(self) -> Companion | None:
-        """What denoises a sweep in the sweep's own task; None where nothing is to be."""
+        """Function that denoises a preview in the same background task; None without a model."""
         denoiser, source = self._denoiser, self._source
         if denoiser is None or source is None or self._held or not self.keeps_up:
             return None

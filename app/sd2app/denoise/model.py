@@ -105,7 +105,7 @@ class DenoiseModel(QObject):
 
     @property
     def choice(self) -> DenoiserChoice:
-        """What the recording says."""
+        """Choice stored in the recording."""
         return self._choice
 
     @property
@@ -115,38 +115,38 @@ class DenoiseModel(QObject):
 
     @property
     def card(self) -> ModelCard | None:
-        """Of the model in use."""
+        """Card of the model in use."""
         return self._loaded.card if self._loaded else None
 
     @property
     def before(self) -> ModelCard | None:
-        """Of the model that was in use before this one."""
+        """Card of the model that was in use before this one."""
         return self._before.card if self._before else None
 
     @property
     def comparing(self) -> bool:
-        """Whether the map of the model before is shown as well."""
+        """True while the previous model's map is shown as well."""
         return self._comparing and self._before is not None
 
     @property
     def loading(self) -> bool:
-        """Whether a model is being loaded."""
+        """True while a model is being loaded."""
         return self._runner.busy
 
     @property
     def busy(self) -> bool:
-        """Whether a model or a map is on its way."""
+        """True while a model is being loaded or a map denoised."""
         waiting = self._path is not None and self._patience.isActive()
         return waiting or self.loading or self.map.busy or self.before_map.busy
 
     @property
     def problem(self) -> str:
-        """Why the chosen model is not in use; empty where it is."""
+        """Reason why the chosen model is not in use; empty where it is."""
         return self._problem
 
     @property
     def can_export(self) -> bool:
-        """Whether there is a map to write."""
+        """True if there is a map to write."""
         return self._loaded is not None and self._synthesis.complete
 
     def available(self) -> Sequence[ModelCard]:

@@ -28,17 +28,17 @@ _KINDS = {
 
 
 def model_title(card: ModelCard) -> str:
-    """What to call a model in a list."""
+    """Title of a model in a list."""
     return card.title or card.name
 
 
 def kind_words(card: ModelCard) -> str:
-    """What sort of network it is."""
+    """Kind of network."""
     return _KINDS.get(card.model, card.model)
 
 
 def origin_words(card: ModelCard) -> str:
-    """What it learned from; simulation is called so."""
+    """Origin of the training data; simulation is named as such."""
     if card.trained_on == "simulated":
         return "learned from simulated data only"
     return "learned from real captures"
@@ -51,12 +51,12 @@ def track_words(card: ModelCard) -> str:
 
 
 def denoised_words(card: ModelCard | None) -> str:
-    """Of a map that this model made; nothing without one."""
+    """Description of a map made by this model; empty without a model."""
     return "" if card is None else track_words(card)
 
 
 def denoiser_page(card: ModelCard) -> ModelPage:
-    """Of a denoiser."""
+    """Page of facts about a denoiser."""
     return ModelPage(
         model_title(card),
         card.trained_on == "simulated",

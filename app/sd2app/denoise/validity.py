@@ -1,4 +1,4 @@
-"""Whether a map is of the sensor where it stands."""
+"""Validity of maps: current or of an earlier sensor."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class MapValidity(QObject):
         synthesis.painted.connect(lambda _: self.changed.emit())
 
     def is_current(self, track: MapModel) -> bool:
-        """Whether a map is of the sensor where it stands, and no hand moves that."""
+        """True while a map is of the current sensor and the sensor is not dragged."""
         if track is self._synthetic:
             return self._rests
         if track is self._denoised:

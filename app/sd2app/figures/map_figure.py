@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class FigureChoice:
-    """What a figure shows.
+    """Content of a figure.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ class FigureModel(DrawnFigure):
 
     @property
     def choice(self) -> FigureChoice:
-        """What is shown."""
+        """Chosen content of the figure."""
         return self._choice
 
     @property
@@ -99,12 +99,12 @@ class FigureModel(DrawnFigure):
 
     @property
     def has_labels(self) -> bool:
-        """Whether anything is labelled."""
+        """True if there are labels."""
         return bool(self._labels.spans)
 
     @property
     def has_difference(self) -> bool:
-        """Whether the difference to the radar is on screen."""
+        """True while the difference to the radar is on screen."""
         return self._pair is not None
 
     def choose(self, **changes: object) -> None:

@@ -97,17 +97,17 @@ class DrawnFigure(QObject):
 
     @property
     def problem(self) -> str:
-        """Why it cannot be drawn."""
+        """Reason why the figure cannot be drawn."""
         return self._problem
 
     @property
     def busy(self) -> bool:
-        """Whether it is being drawn or written."""
+        """True while the figure is being drawn or written."""
         return self._runner.busy
 
     @property
     def exporting(self) -> bool:
-        """Whether it is being written."""
+        """True while the figure is being written."""
         return self._exporting
 
     def close(self) -> None:

@@ -30,7 +30,7 @@ Way = Literal["spread", "around", "list"]
 
 @dataclass(frozen=True)
 class StripChoice:
-    """What the user chose.
+    """Frames and layout of a strip, as the user chose them.
 
     Parameters
     ----------
@@ -67,12 +67,12 @@ class StripModel(DrawnFigure):
 
     @property
     def choice(self) -> StripChoice:
-        """Which frames."""
+        """Chosen frames."""
         return self._choice
 
     @property
     def options(self) -> StripOptions:
-        """How they are drawn."""
+        """Chosen layout."""
         return self._options
 
     @property

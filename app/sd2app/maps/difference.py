@@ -58,12 +58,12 @@ class DifferenceModel(QObject):
 
     @property
     def wanted(self) -> bool:
-        """Whether it is to be shown where it can be."""
+        """True while the user wants to see the difference."""
         return self._wanted
 
     @property
     def why_not(self) -> str:
-        """Why there is no difference; empty where there is one."""
+        """Reason why there is no difference; empty where there is one."""
         if self.denoised.map is None:
             return "There is no denoised map: choose a model under Model"
         if self.real.map is None:
@@ -74,12 +74,12 @@ class DifferenceModel(QObject):
 
     @property
     def shown(self) -> bool:
-        """Whether it is on screen."""
+        """True while it is on screen."""
         return self._wanted and not self.why_not
 
     @property
     def against(self) -> str:
-        """What it is taken from, as it is called."""
+        """Name of the map that is subtracted."""
         return self.real.title.lower()
 
     @property
@@ -116,7 +116,7 @@ class DifferenceModel(QObject):
         return difference
 
     def read(self, time_s: float, velocity_mps: float) -> Reading | None:
-        """What stands under the pointer, both levels included."""
+        """Cell under the pointer, with both levels."""
         if self.why_not:
             return None
         one = self.denoised.read(time_s, velocity_mps)

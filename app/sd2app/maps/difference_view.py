@@ -23,7 +23,7 @@ _BAR_PX = 72
 
 
 class DifferenceView(HeatmapView):
-    """As the heatmaps above it, on the clock of the denoised one.
+    """Heatmap of the difference, on the clock of the denoised map.
 
     A colour names the track that shows more there: it is that of its curve.
     """
@@ -45,7 +45,7 @@ class DifferenceView(HeatmapView):
         difference.changed.connect(self.invalidate)
 
     def title(self) -> str:
-        """Which is taken from which."""
+        """Title: the two maps that are compared."""
         return f"Denoised − {self._difference.against}"
 
     def make_image(self, start_s: float, end_s: float, columns: int) -> QImage:
@@ -82,7 +82,7 @@ class DifferenceView(HeatmapView):
         return "each relative to its own 0 dB, as shown above"
 
     def _paint_corner(self, painter: QPainter, box: QRectF, left: float) -> float:
-        """What the colours mean."""
+        """Paint the colour bar; returns its width."""
         full, unit = self._difference.full_scale(self._display.levels)
         metrics, against = painter.fontMetrics(), self._difference.against
         for ends in (

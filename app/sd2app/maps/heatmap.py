@@ -96,7 +96,7 @@ class HeatmapView(MapWidget):
         self.update()
 
     def set_hint(self, hint: str) -> None:
-        """What to say while there is no map."""
+        """Text shown while there is no map."""
         self._hint = hint
         self.redraw()
 
@@ -107,7 +107,7 @@ class HeatmapView(MapWidget):
         self.redraw()
 
     def title(self) -> str:
-        """What is shown."""
+        """Title of the map."""
         return self._track.title
 
     def null_colour(self) -> QColor:
@@ -115,7 +115,7 @@ class HeatmapView(MapWidget):
         return QColor.fromRgb(int(lookup_table(self._display.levels.colour_map)[0]))
 
     def hatch_colour(self) -> QColor:
-        """Of the lines over bins that say nothing."""
+        """Colour of the hatching over bins without information."""
         return QColor(255, 255, 255, 80)
 
     def marked_bins(self) -> tuple[tuple[tuple[int, ...], Qt.BrushStyle], ...]:
@@ -128,7 +128,7 @@ class HeatmapView(MapWidget):
         )
 
     def plot_rect(self) -> QRectF:
-        """Where the map is drawn."""
+        """Rectangle of the map, in pixels."""
         return QRectF(
             GUTTER_PX,
             _HEADER_PX,
@@ -220,7 +220,7 @@ class HeatmapView(MapWidget):
         return self._room_px
 
     def _paint_corner(self, painter: QPainter, box: QRectF, left: float) -> float:
-        """What stands on the right of the header; returns its width."""
+        """Paint the right end of the header; returns its width."""
         text = "approaching +  /  receding −   m/s"
         width = painter.fontMetrics().horizontalAdvance(text)
         if self.width() - 16 - left - width <= 60:
@@ -229,7 +229,7 @@ class HeatmapView(MapWidget):
         return width
 
     def _status(self) -> str:
-        """What the map is worth, and why nothing shows where nothing shows."""
+        """Quality of the map, and the reason where nothing shows."""
         strongest_db, lowest_db = self._track.strongest_db, self._display.levels.low_db
         parts = [self._track.status]
         if gaps_s := self._track.gaps_s:
@@ -358,5 +358,5 @@ class HeatmapView(MapWidget):
         self._pointer.point_at(time_s, velocity_mps, self.read(time_s, velocity_mps))
 
     def read(self, time_s: float, velocity_mps: float) -> Reading | None:
-        """What stands at a time and velocity."""
+        """Cell at a time and velocity."""
         return self._track.read(time_s, velocity_mps)

@@ -31,7 +31,7 @@ def column_frames(
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """Which frames of a map share a pixel column.
+    """Frames of a map that share a pixel column.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class Columns:
 
     @classmethod
     def of(cls, track: MapModel, start_s: float, stop_s: float, columns: int) -> Columns:
-        """Of the stretch in view."""
+        """Columns of the time range in view."""
         assert track.map is not None
         timebase = track.map.timebase
         frames = column_frames(
@@ -96,7 +96,7 @@ def shade_columns(
 def uncertain_columns(
     track: MapModel, levels: HeatmapLevels, start_s: float, stop_s: float, columns: int
 ) -> NDArray[np.bool_] | None:
-    """Where what is shown is uncertain, bool (bins, columns); None where that is not known.
+    """Mask of uncertain cells, bool (bins, columns); None where that is not known.
 
     Of several frames that share a column the one that is shown decides.
     """

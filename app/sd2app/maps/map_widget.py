@@ -1,4 +1,4 @@
-"""What the views that draw a Doppler map over time have in common."""
+"""Base class of the views that draw a Doppler map over time."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class MapWidget(TimePlot):
         return heatmap_image(self._track, self._display.levels, start_s, end_s, columns, background)
 
     def paint_gaps(self, painter: QPainter, plot: QRectF, scale: TimeScale) -> None:
-        """Where there was no person nothing was measured: hatched, not the colour of nothing."""
+        """Hatch the frames without a person, in which nothing was measured."""
         colours = self._display.palette
         painter.save()
         painter.setClipRect(plot)

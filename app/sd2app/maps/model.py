@@ -129,18 +129,18 @@ class SynthesisModel(QObject):
 
     @property
     def moving(self) -> bool:
-        """Whether the sensor moves, so that the budget rules; else the tolerance does."""
+        """True while the sensor moves: then the time budget decides, otherwise the tolerance."""
         return self._moving
 
     @property
     def complete(self) -> bool:
-        """Whether every frame is as the plan says for the sensor where it stands."""
+        """True once every frame has its final quality for the current sensor."""
         partial = self._shown_map.partial
         return partial.final and partial.sensor == self._sensor.sensor
 
     @property
     def shows_sensor(self) -> bool:
-        """Whether what is on the map is of the sensor where it stands, exact or not."""
+        """True while the map is of the current sensor, at any quality."""
         return self._shown_map.partial.sensor == self._sensor.sensor
 
     @property
@@ -194,7 +194,7 @@ class SynthesisModel(QObject):
         self._follow()
 
     def made_by(self) -> tuple[Callable[[], Synthesizer], VirtualSensor] | None:
-        """What made the map that is shown, and from where; None until it is complete.
+        """Synthesizer and sensor of the map on screen; None until it is complete.
 
         Asking for the synthesizer may take long.
         """
@@ -321,7 +321,7 @@ class SynthesisModel(QObject):
         )
 
     def _go_on(self) -> None:
-        """What is to be done next while the sensor rests."""
+        """Start the next task while the sensor rests."""
         if self._synthesizers is None or self._moving or self.busy:
             return
         if self._may_choose():
@@ -337,7 +337,7 @@ class SynthesisModel(QObject):
             )
 
     def _may_choose(self) -> bool:
-        """Whether the plans are for another place, and there is machine code to find others."""
+        """True if the plans are for another sensor and the kernels are compiled."""
         decided = self._trade.is_decided(self._sensor.sensor, self._budget_ms())
         return self._compiler.ready and not decided
 
@@ -422,7 +422,7 @@ class SynthesisModel(QObject):
         return preview_quality(self._synthesizers, self._plan, self._trade.while_dragging, moved_m)
 
     def _final_quality(self) -> QualityLevel | None:
-        """What the tolerance asks for; None while that is open."""
+        """Quality that the tolerance asks for; None until it is chosen."""
         if self._synthesizers is None or self._compiler.busy:
             return None
         if self._plan is None and self._may_choose():

@@ -26,7 +26,7 @@ View = tuple[int, int]
 
 @dataclass(eq=False)
 class PartialMap:
-    """What is known of the map so far.
+    """Doppler map of which some frames are computed.
 
     Parameters
     ----------
@@ -56,12 +56,12 @@ class PartialMap:
 
     @property
     def full(self) -> bool:
-        """Whether every frame holds something."""
+        """True once every frame is computed, at any quality."""
         return bool(self.frames and self.quality.min() > 0)
 
     @property
     def final(self) -> bool:
-        """Whether every frame is as good as it gets."""
+        """True once every frame has its final quality."""
         return bool(self.frames and self.quality.min() >= FINAL)
 
     def paint(self, sensor: VirtualSensor, start: int, stretch: Stretch, quality: int) -> None:
@@ -74,7 +74,7 @@ class PartialMap:
         self.quality[inside] = quality
 
     def mark_stale(self) -> None:
-        """What was final no longer is, but stays until it is replaced."""
+        """Lower final frames to previews; they stay on screen until they are replaced."""
         np.minimum(self.quality, PREVIEW, out=self.quality)
 
     def quality_for(self, sensor: VirtualSensor) -> NDArray[np.uint8]:
@@ -120,7 +120,7 @@ class ShownMap:
         self.partial = PartialMap.blank(options.axis.bins, mesh.frame_count)
 
     def mark_stale(self) -> None:
-        """What was final no longer is, but stays until it is replaced."""
+        """Lower final frames to previews; they stay on screen until they are replaced."""
         self.partial.mark_stale()
         self._words[PREVIEW] = self._words.get(FINAL, self._words.get(PREVIEW, ""))
 

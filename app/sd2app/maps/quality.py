@@ -40,7 +40,7 @@ def budget_ms(frames: int) -> float:
 
 
 def distance_m(one: VirtualSensor | None, other: VirtualSensor) -> float:
-    """How far two places are from each other; infinity without the first."""
+    """Distance between two sensors; infinite without the first."""
     return math.inf if one is None else math.dist(one.position_m, other.position_m)
 
 
@@ -82,12 +82,12 @@ def preview_quality(
 def final_quality(
     synthesizers: SynthesizerCache, plan: AccuracyPlan | None, in_use: InUse | None
 ) -> QualityLevel:
-    """As the plan says; without one, as well as it gets."""
+    """Quality of the plan in use; exact without a plan."""
     return QualityLevel(lambda: synthesizers.of(plan), FINAL, final_words(synthesizers, in_use))
 
 
 def final_words(synthesizers: SynthesizerCache, in_use: InUse | None) -> str:
-    """What a map of the plan in use is worth."""
+    """Text about the quality of a map of the plan in use."""
     if in_use is not None:
         return f"{short(in_use.plan)}, {deviation(in_use.error)}"
     cloud = synthesizers.options.visibility == "none"
@@ -96,7 +96,7 @@ def final_words(synthesizers: SynthesizerCache, in_use: InUse | None) -> str:
 
 @dataclass(frozen=True, eq=False)
 class QualityLevel:
-    """How frames are worked out.
+    """Synthesizer and visibility with which frames are computed.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def compute_part(
 
 
 def is_swept_whole(vertices: int, frames: int) -> bool:
-    """Whether a clip is so short that a hand moves all of it, not only what is in view."""
+    """True if a clip is short enough to be recomputed whole while the sensor is dragged."""
     return vertices * frames <= AT_ONCE
 
 

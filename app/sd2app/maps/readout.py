@@ -1,4 +1,4 @@
-"""What the sensor makes of the frame on screen, vertex by vertex."""
+"""Range, velocity and visibility of each vertex in the frame on screen."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from sd2core.sensor import Vector
 
 @dataclass(frozen=True)
 class Readout:
-    """What the sensor makes of the frame on screen."""
+    """Scattering of the frame on screen as the sensor sees it."""
 
     torso_range_m: float
     visible_share: float

@@ -55,7 +55,7 @@ class SpectrumView(QWidget):
             signal.connect(self.update)
 
     def sizeHint(self) -> QSize:
-        """As wide as the level bar under it."""
+        """Width of the level bar below."""
         return QSize(240, 280)
 
     def _shown(self) -> list[Curve]:
@@ -171,7 +171,7 @@ class SpectrumView(QWidget):
     def _paint_band(
         self, painter: QPainter, plot: QRectF, curve: Curve, frame: int, v_max: float
     ) -> None:
-        """What is expected, one standard deviation up and down, where that is known."""
+        """Paint one standard deviation up and down, where it is known."""
         doppler_map, known = curve.track.map, curve.track.uncertainty
         if known is None or doppler_map is None:
             return

@@ -1,4 +1,4 @@
-"""How well the cells of the synthetic map are known, worked out when the map stands."""
+"""Standard deviation of the cells of the synthetic map, computed once the map is complete."""
 
 from __future__ import annotations
 
@@ -60,17 +60,17 @@ class UncertaintyModel(QObject):
 
     @property
     def shown(self) -> bool:
-        """Whether uncertain cells are to be shown."""
+        """True while the user wants uncertain cells marked."""
         return self._shown
 
     @property
     def busy(self) -> bool:
-        """Whether it is being worked out."""
+        """True while it is being computed."""
         return self._job is not None
 
     @property
     def why_not(self) -> str:
-        """Why it cannot be known for what is open; empty where it can."""
+        """Reason why it cannot be computed for this recording; empty where it can."""
         mesh = self._document.mesh
         if mesh is None:
             return "There is no mesh"

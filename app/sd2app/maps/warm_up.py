@@ -33,7 +33,7 @@ class MaskPrefetcher(QObject):
 
     @property
     def prefetched_for(self) -> VirtualSensor | None:
-        """Where masks for dragging were made."""
+        """Sensor for which visibility masks were prefetched."""
         return self._prefetched_for
 
     def prefetch(
@@ -53,7 +53,7 @@ class MaskPrefetcher(QObject):
         self._runner.submit(work)
 
     def forget(self) -> None:
-        """What was made ready is for another plan or mesh."""
+        """Drop the masks: plan or mesh have changed."""
         self._runner.cancel()
         self._prefetched_for = None
 

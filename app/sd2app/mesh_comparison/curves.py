@@ -47,7 +47,7 @@ class JointCurves(QWidget):
             signal.connect(self.update)
 
     def sizeHint(self) -> QSize:
-        """As wide as the maps above."""
+        """Width of the maps above."""
         return QSize(640, 140)
 
     @property

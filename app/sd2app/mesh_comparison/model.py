@@ -86,7 +86,7 @@ class ComparisonModel(QObject):
 
     @property
     def labels(self) -> tuple[str, str]:
-        """What the two are called."""
+        """Names of the two meshes."""
         recording = self._document.recording
         own = name_of(recording.mesh) if recording and recording.mesh else "this recording"
         other = name_of(self._other)
@@ -94,22 +94,22 @@ class ComparisonModel(QObject):
 
     @property
     def reference(self) -> int:
-        """Which of the two the other is measured against."""
+        """Index of the mesh that the other is measured against."""
         return self._reference
 
     @property
     def busy(self) -> bool:
-        """Whether it is being worked out."""
+        """True while the comparison is being computed."""
         return self._runner.busy
 
     @property
     def problem(self) -> str:
-        """Why it cannot be worked out."""
+        """Reason why the meshes cannot be compared."""
         return self._problem
 
     @property
     def comparison(self) -> Comparison | None:
-        """What was found."""
+        """Result of the comparison."""
         return self._result.comparison if self._result else None
 
     @property
@@ -263,7 +263,7 @@ class ComparisonModel(QObject):
 
 
 def name_of(path: Path) -> str:
-    """What a mesh is called: by its folder where the file's own name says nothing."""
+    """Name of a mesh: that of its folder where the file's own name says nothing."""
     plain = path.name in ("mesh.zarr", "mesh.npz") and path.parent != UNTITLED
     return path.parent.name if plain else path.name
 

@@ -1,4 +1,4 @@
-"""What the two ways to draw have in common."""
+"""Interface of the two renderers of the scene."""
 
 from __future__ import annotations
 

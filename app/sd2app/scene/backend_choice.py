@@ -1,4 +1,4 @@
-"""Which of the two ways to draw suits this machine.
+"""Choice of the renderer that suits this machine.
 
 ``gl`` draws into the window itself (pyvistaqt's QtInteractor): best where a
 GPU draws. ``image`` draws off-screen and paints the picture: with software
@@ -48,7 +48,7 @@ def _has_no_window() -> bool:
 
 
 def _has_gpu_device() -> bool:
-    """Whether the kernel offers a GPU to draw with; true where it cannot be told."""
+    """Tell if the system offers a GPU; True where that is unknown."""
     if not sys.platform.startswith("linux"):
         return True
     if any(Path("/dev").glob("nvidia[0-9]*")) or Path("/dev/dxg").exists():
@@ -71,7 +71,7 @@ def opengl_renderer() -> str | None:
 
 
 def is_software(renderer: str) -> bool:
-    """Whether an OpenGL renderer computes on the CPU."""
+    """True if an OpenGL renderer computes on the CPU."""
     return any(name in renderer.lower() for name in _SOFTWARE)
 
 

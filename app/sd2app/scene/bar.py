@@ -1,4 +1,4 @@
-"""What the colour of the mesh means, over the 3D view."""
+"""Bar over the 3D view: colour of the mesh, dots, views."""
 
 from __future__ import annotations
 

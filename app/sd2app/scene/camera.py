@@ -36,7 +36,7 @@ class Margins:
 
 @dataclass(frozen=True)
 class EyePose:
-    """Where the eye is: it looks at ``focus`` from ``distance_m`` behind it.
+    """Pose of the virtual camera that looks at ``focus`` from ``distance_m``.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def _triple(values: Vector) -> tuple[float, float, float]:
 def drag_in_view(
     start: ArrayLike, pose: EyePose, x_px: float, y_px: float, size_px: ArrayLike
 ) -> Vector:
-    """Where the pointer's ray meets the plane through ``start`` parallel to the picture."""
+    """Point at which the pointer's ray meets the plane through ``start`` along the picture."""
     depth = float((np.asarray(start, np.float64) - pose.position) @ pose.axes[2])
     return pose.position + depth * pose.ray(x_px, y_px, size_px)
 

@@ -1,4 +1,4 @@
-"""What the colours of the mesh mean, as arrays; no VTK."""
+"""Colours of the mesh as arrays; no VTK."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a body is during a clip; no VTK."""
+"""Space that a body takes up during a clip; no VTK."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _SAMPLED_VERTICES = 400
 
 @dataclass(frozen=True, eq=False)
 class Extent:
-    """Where the body is during the whole clip, from a few frames.
+    """Bounds of the body during the whole clip, from a few frames.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a pointer does in the scene: turn it, or take hold of the sensor; no Qt, no VTK.
+"""Mouse in the scene: rotate, pan, zoom, drag the sensor; no Qt, no VTK.
 
 Positions are device-independent pixels of the view.
 """
@@ -70,12 +70,12 @@ class Navigator:
 
     @property
     def holds_sensor(self) -> bool:
-        """Whether the sensor is in the hand."""
+        """True while the sensor is dragged."""
         return self._held is not None
 
     @property
     def hovers_sensor(self) -> bool:
-        """Whether a press would take hold of the sensor."""
+        """True while the pointer is over the sensor."""
         return self._hovering
 
     @property
@@ -85,11 +85,11 @@ class Navigator:
 
     @property
     def turning(self) -> bool:
-        """Whether the view is being turned or shifted."""
+        """True while the view is rotated or panned."""
         return self._moving is not None
 
     def sensor_at(self, x_px: float, y_px: float) -> bool:
-        """Whether the sensor is within reach of a pointer."""
+        """True if the sensor is close enough to the pointer."""
         size = self._size_px()
         x, y, depth = self._scene.pose.project(self._scene.sensor.position_m, size)[0]
         if not depth > 0.0 or not self._scene.sensor_shown:

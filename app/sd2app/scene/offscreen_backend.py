@@ -68,7 +68,7 @@ class ImageBackend(QWidget):
 
     @property
     def renderings(self) -> int:
-        """How often the scene was rendered."""
+        """Number of times the scene was rendered."""
         return self._renderings
 
     def sizeHint(self) -> QSize:
@@ -168,7 +168,7 @@ def _off_screen_window() -> vtkRenderWindow:
 
 
 def _answers(window: vtkRenderWindow) -> bool:
-    """Whether OpenGL works."""
+    """True if OpenGL works."""
     return bool(window.SupportsOpenGL())
 
 

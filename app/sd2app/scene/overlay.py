@@ -141,7 +141,7 @@ class Overlay(QWidget):
         return boxes
 
     def _body_box(self) -> QRectF:
-        """Where in the picture the body moves; empty when it is behind the eye."""
+        """Rectangle of the body in the picture; empty when it is behind the virtual camera."""
         box = self._scene.body_box_px(self._size())
         return QRectF() if box is None else QRectF(QPointF(*box[:2]), QPointF(*box[2:]))
 

@@ -173,7 +173,7 @@ class Body(Shape):
 
     @property
     def drawn_as_dots(self) -> bool:
-        """Whether vertices are drawn, by choice or because there are no faces."""
+        """True if vertices are drawn, by choice or because there are no faces."""
         return self._dots or not self._has_faces
 
     def set_as_dots(self, dots: bool) -> None:

@@ -77,12 +77,12 @@ class Scene:
 
     @property
     def has_mesh(self) -> bool:
-        """Whether there is a mesh."""
+        """True if there is a mesh."""
         return self._has_mesh
 
     @property
     def mode(self) -> MeshColour:
-        """What the colour of the mesh means."""
+        """Quantity that the colour of the mesh shows."""
         return self._mode
 
     @property
@@ -281,18 +281,18 @@ class Scene:
 
     @property
     def sensor_shown(self) -> bool:
-        """Whether the sensor is drawn: not while the eye is inside it."""
+        """True if the sensor is drawn: not while the virtual camera is inside it."""
         offset = self.pose.position - np.asarray(self.sensor.position_m)
         return bool(np.linalg.norm(offset) > _INSIDE_M)
 
     @property
     def camera_shown(self) -> bool:
-        """Whether the camera is drawn."""
+        """True if the camera is drawn."""
         return bool(np.linalg.norm(self.pose.position) > _INSIDE_M)
 
     @property
     def knows_hidden(self) -> bool:
-        """Whether it is known which vertices the sensor sees."""
+        """True once the visibility of the vertices is known."""
         return self._visible is not None
 
     @property

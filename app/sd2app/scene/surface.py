@@ -10,7 +10,7 @@ _FEW_FACES = 4000
 
 
 def is_closed_outward(vertices: NDArray[np.floating], faces: NDArray[np.integer]) -> bool:
-    """Whether the surface has no rim and its faces look outwards.
+    """True if the surface is closed and its faces point outwards.
 
     Then the back of no face can be seen from outside, and drawing them is
     wasted. Every edge of such a surface is walked once in either direction.

@@ -25,7 +25,7 @@ _FIRST: dict[Kind, Placements | None] = {
 
 
 class PlacementFields(QObject):
-    """What was typed, and what is wrong with it; what is right becomes the plan.
+    """Typed fields of a plan of placements; valid ones become the plan.
 
     Another plan, as after an undo or in another recording, takes the place of what was typed.
     """
@@ -44,7 +44,7 @@ class PlacementFields(QObject):
 
     @property
     def kind(self) -> Kind:
-        """What is planned."""
+        """Kind of the plan."""
         return "none" if self._plan is None else _kind(self._plan)
 
     @property
@@ -54,11 +54,11 @@ class PlacementFields(QObject):
 
     @property
     def problem(self) -> str:
-        """Why what was typed is not the plan; empty when it is."""
+        """Reason why the typed values are no plan; empty when they are."""
         return self._problem
 
     def text(self, name: Name) -> str:
-        """What a field holds."""
+        """Text of a field."""
         return self._texts.get(name, "")
 
     def set_kind(self, kind: Kind) -> None:

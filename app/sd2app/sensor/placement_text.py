@@ -11,7 +11,7 @@ _SHORT_S = 10.0
 
 
 def count_text(model: PlacementsModel) -> str:
-    """How many places there are."""
+    """Number of placements."""
     if model.plan is None:
         return ""
     count = len(model.planned.places)
@@ -19,7 +19,7 @@ def count_text(model: PlacementsModel) -> str:
 
 
 def limit_facts(model: PlacementsModel) -> list[tuple[str, str]]:
-    """What is wrong with how many of them."""
+    """Number of placements with each problem."""
     coverage, radar = model.planned.coverage, model.radar
     if coverage is None:
         return []
@@ -43,7 +43,7 @@ def limits_text(model: PlacementsModel) -> str:
 
 
 def current_text(model: PlacementsModel) -> str:
-    """Which of the places the sensor is at."""
+    """Number of the placement that the sensor is at."""
     current, places = model.current, model.planned.places
     if current is None:
         return "The sensor is elsewhere"
@@ -57,7 +57,7 @@ def cost_text(cost: PlacementCost) -> str:
 
 
 def cost_source_text(cost: PlacementCost, in_use: InUse) -> str:
-    """Where that is known from."""
+    """Explanation of the estimated cost."""
     return (
         f"{counted(cost.frames, 'frame')} each, with the plan in use on this machine: {in_use}."
         " Bytes before compression."

@@ -1,4 +1,4 @@
-"""Where else sensors are planned: their places, what they see, and what their maps cost."""
+"""Planned placements of further sensors: positions, coverage, cost of their maps."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Planned:
 
 
 class PlanEdits(Protocol):
-    """What the user can change here, as steps that can be undone."""
+    """Undoable edits of the plan."""
 
     def plan_placements(self, placements: Placements | None) -> None:
         """Plan other places, or none."""
@@ -114,12 +114,12 @@ class PlacementsModel(QObject):
 
     @property
     def possible(self) -> bool:
-        """Whether there is a body to place sensors around."""
+        """True if there is a body to place sensors around."""
         return self._document.mesh is not None
 
     @property
     def busy(self) -> bool:
-        """Whether places are being worked out."""
+        """True while placements are being computed."""
         return self._runner.busy
 
     @property
@@ -135,7 +135,7 @@ class PlacementsModel(QObject):
 
     @property
     def current(self) -> int | None:
-        """Which of the places the sensor is at."""
+        """Index of the placement that the sensor is at; None elsewhere."""
         position = self._sensor.sensor.position_m
         for number, sensor in enumerate(self._planned.sensors):
             if sensor.position_m == position:
@@ -144,7 +144,7 @@ class PlacementsModel(QObject):
 
     @property
     def cost(self) -> PlacementCost | None:
-        """Of a map per place with the plan in use; None while the ladder has none."""
+        """Cost of one map per placement with the plan in use; None while there is no plan."""
         in_use = self._trade.in_use
         if in_use is None or not self._planned.sensors:
             return None
@@ -154,7 +154,7 @@ class PlacementsModel(QObject):
 
     @property
     def shown(self) -> bool:
-        """Whether the places are drawn in the scene."""
+        """True while the placements are drawn in the scene."""
         return self._shown
 
     # --- requests -------------------------------------------------------------------------

@@ -194,7 +194,7 @@ class PlacementsPage(QWidget):
 
 
 class RangeScale(QWidget):
-    """What the colours of places in the scene mean: near to far."""
+    """Colour scale of the placements in the scene: near to far."""
 
     _BAR = 8
 
@@ -239,7 +239,7 @@ class RangeScale(QWidget):
 
 
 def _apart(wide: QWidget, *others: QWidget) -> QHBoxLayout:
-    """What takes the room there is, and others at the right edge."""
+    """Row with one widget that stretches and others at the right edge."""
     row = QHBoxLayout()
     row.setSpacing(6)
     row.addWidget(wide, 1)

@@ -1,4 +1,4 @@
-"""What a window shows of one recording, read from disk in the background."""
+"""Content of one recording, read from disk in the background."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Content:
 
     @property
     def saved(self) -> bool:
-        """Whether the recording has a folder of its own that may be written to."""
+        """True if the recording has a folder of its own that may be written to."""
         return self.recording.folder != UNTITLED and not is_bundled(self.recording.folder)
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Which model a recording is denoised with, as it is kept in the recording."""
+"""Model that a recording is denoised with, as stored in the recording."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class DenoiserChoice:
 
     @classmethod
     def of(cls, recording: Recording | None) -> DenoiserChoice:
-        """What was chosen for a recording."""
+        """Choice stored in a recording."""
         if recording is None:
             return UNSAID
         return cls(recording.denoiser, None if recording.denoiser else recording.bundled_denoiser)

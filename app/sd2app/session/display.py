@@ -1,4 +1,4 @@
-"""How things are shown: levels, colours, theme."""
+"""Display settings: levels, colours, theme."""
 
 from __future__ import annotations
 
@@ -51,17 +51,17 @@ class DisplayModel(QObject):
 
     @property
     def mesh_colour(self) -> MeshColour:
-        """What the colour of the mesh means."""
+        """Quantity that the colour of the mesh shows."""
         return self._mesh_colour
 
     @property
     def as_dots(self) -> bool:
-        """Whether vertices are drawn as dots instead of a surface."""
+        """True if vertices are drawn as dots instead of a surface."""
         return self._as_dots
 
     @property
     def dark(self) -> bool:
-        """Whether the dark theme is on."""
+        """True while the dark theme is on."""
         return self._dark
 
     @property

@@ -112,7 +112,7 @@ class DocumentModel(QObject):
 
     @property
     def simulated(self) -> bool:
-        """Whether no camera and no radar was there."""
+        """True if the recording is simulated, without camera and radar."""
         return self._content is not None and self._content.recording.simulated
 
     @property
@@ -139,17 +139,17 @@ class DocumentModel(QObject):
 
     @property
     def clutter(self) -> Clutter:
-        """How static echoes are removed from the capture."""
+        """Method that removes static echoes from the capture."""
         return self._clutter
 
     @property
     def modified(self) -> bool:
-        """Whether there are edits that were not saved."""
+        """True if there are unsaved edits."""
         return self._content is not None and not self.undo_stack.isClean()
 
     @property
     def goes_on(self) -> bool:
-        """Whether what was opened is what was open before, with other files."""
+        """True if the opened recording is the one that was open before, with other files."""
         return self._goes_on
 
     # --- opening --------------------------------------------------------------------------
@@ -327,7 +327,7 @@ class DocumentModel(QObject):
 
 
 def _keep_edits(before: Recording, after: Recording) -> None:
-    """What was edited while files were read holds for what was read."""
+    """Apply edits made while files were read to what was read."""
     kept = "labels", "sensor", "placements", "radar_offset_s", "denoiser", "bundled_denoiser"
     for name in kept:
         setattr(after, name, getattr(before, name))

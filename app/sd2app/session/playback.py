@@ -56,7 +56,7 @@ class PlaybackModel(QObject):
 
     @property
     def playing(self) -> bool:
-        """Whether the clock runs."""
+        """True while the clock runs."""
         return self._timer.isActive()
 
     @property
@@ -66,7 +66,7 @@ class PlaybackModel(QObject):
 
     @property
     def loop(self) -> bool:
-        """Whether playing starts again at the end."""
+        """True if playback starts again at the end."""
         return self._loop
 
     @property

@@ -1,4 +1,4 @@
-"""Where the virtual sensor stands."""
+"""Pose of the virtual sensor."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class SensorModel(QObject):
 
     @property
     def dragging(self) -> bool:
-        """Whether more moves are about to follow."""
+        """True while the sensor is dragged."""
         return self._dragging
 
     def set_sensor(self, sensor: VirtualSensor) -> None:

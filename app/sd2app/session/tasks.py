@@ -30,7 +30,7 @@ class TaskList(QObject):
 
     @property
     def jobs(self) -> tuple[Job, ...]:
-        """What is under way."""
+        """Running tasks."""
         return tuple(self._jobs)
 
     def start(self, title: str, cancel: Callable[[], None]) -> Job:

@@ -1,4 +1,4 @@
-"""Which stretch of time the tracks show."""
+"""Time window that the tracks show."""
 
 from __future__ import annotations
 

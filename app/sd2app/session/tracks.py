@@ -78,7 +78,7 @@ class MapModel(QObject):
 
     @property
     def offset_s(self) -> float:
-        """How much later the map's clock starts than the recording's."""
+        """Start of the map's clock on the recording's clock, in seconds."""
         return self._offset_s
 
     @property
@@ -93,7 +93,7 @@ class MapModel(QObject):
 
     @property
     def uncertainty(self) -> CellUncertainty | None:
-        """How well the map's cells are known; None while that is not known or not asked for."""
+        """Uncertainty of the map's cells; None while it is unknown or switched off."""
         return self._uncertainty
 
     @property
@@ -216,7 +216,7 @@ class MapModel(QObject):
         return found
 
     def read(self, time_s: float, velocity_mps: float) -> Reading | None:
-        """What stands at a time and velocity, or None where there is nothing."""
+        """Cell at a time and velocity, or None where there is none."""
         frame = self.frame_at(time_s)
         if self._map is None or frame is None:
             return None
@@ -244,7 +244,7 @@ class MapModel(QObject):
 
 
 class PointerModel(QObject):
-    """What the pointer reads from the tracks."""
+    """Reading under the pointer."""
 
     changed = Signal()
 

@@ -38,7 +38,7 @@ class Assign(QUndoCommand):
 
 
 class Edits:
-    """What the user can change. A drag is one step in the history."""
+    """Undoable edits of a recording. A drag is one step in the history."""
 
     def __init__(self, document: DocumentModel, sensor: SensorModel) -> None:
         self._document = document

@@ -43,7 +43,7 @@ class VideoModel(QObject):
 
     @property
     def busy(self) -> bool:
-        """Whether a picture is being decoded."""
+        """True while a picture is being decoded."""
         return self._runner.busy
 
     @property

@@ -1,4 +1,4 @@
-"""What is drawn over the video, above the video."""
+"""Bar above the video: mesh on or off, dots, opacity."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is drawn over the video, remembered from one start to the next."""
+"""Settings of the mesh over the video, kept between sessions."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from sd2app.settings import Settings
 
 @dataclass(frozen=True)
 class OverlayStyle:
-    """How the mesh is drawn over the video.
+    """Style of the mesh over the video.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class OverlayModel(QObject):
 
     @property
     def style(self) -> OverlayStyle:
-        """How the mesh is drawn."""
+        """Style of the mesh."""
         return self._style
 
     def set_style(self, **changes: object) -> None:

@@ -89,7 +89,7 @@ class VideoView(QWidget):
         return "The video cannot be shown"
 
     def _landmarks(self) -> NDArray[np.float32] | None:
-        """What the fit has found in this frame, until the mesh takes its place."""
+        """Landmarks that the fit found in this frame, until there is a mesh."""
         if self._fit.state == "idle" or not self._follower.on_screen:
             return None
         if self._document.mesh is not None:

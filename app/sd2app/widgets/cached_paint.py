@@ -1,4 +1,4 @@
-"""What of a view stands still while it plays, kept as a picture."""
+"""Picture of the parts of a view that do not change during playback."""
 
 from __future__ import annotations
 

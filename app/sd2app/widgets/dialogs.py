@@ -13,7 +13,7 @@ FIGURES = ";;".join(f"{suffix[1:].upper()} (*{suffix})" for suffix in SUFFIXES)
 
 
 def may_delete(parent: QWidget, title: str, what: str) -> bool:
-    """Whether something may be deleted; Escape and Return keep it."""
+    """Ask if something may be deleted; Escape and Return keep it."""
     buttons = QMessageBox.StandardButton
     either = buttons.Discard | buttons.Cancel
     answer = QMessageBox.question(parent, title, what, either, buttons.Cancel)
@@ -38,7 +38,7 @@ class ExportButtons(QDialogButtonBox):
         self.rejected.connect(dialog.reject)
 
     def show_state(self, *, possible: bool, exporting: bool) -> None:
-        """Whether there is something to export, and whether it is being written."""
+        """Follow the state: something can be exported, or is being written."""
         self._export.setEnabled(possible and not exporting)
         self._export.setText("Exporting…" if exporting else "Export…")
 

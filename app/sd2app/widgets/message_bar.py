@@ -28,7 +28,7 @@ class MessageBar(QFrame):
 
     @property
     def text(self) -> str:
-        """What is said, empty while hidden."""
+        """Message on screen; empty while hidden."""
         return "" if self.isHidden() else self._text.text()
 
     def warn(self, text: str) -> None:

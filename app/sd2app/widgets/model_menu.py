@@ -24,14 +24,14 @@ class Entry(NamedTuple):
 
 
 class Face(NamedTuple):
-    """What the button says."""
+    """Text and tooltip of the button."""
 
     text: str
     tip: str
 
 
 class Chooser(Protocol):
-    """What there is to choose from, in words.
+    """Models to choose from, as texts.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Chooser(Protocol):
         """The models as they are on disk now."""
 
     def face(self) -> Face:
-        """Which one is in use."""
+        """Text and tooltip for the model in use."""
 
 
 class ModelMenu(QMenu):

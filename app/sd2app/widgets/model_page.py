@@ -14,7 +14,7 @@ _UNITS = {"mps": "m/s", "db": "dB", "s": "s", "hz": "Hz"}
 
 
 class ModelPage(NamedTuple):
-    """What a model says about itself.
+    """Facts of a model file, as rows of a page.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def map_and_file_rows(
 def about_sections(
     content: Mapping[str, Any],
 ) -> Iterator[tuple[str, list[tuple[str, str]]]]:
-    """What its makers say of it, by heading: what they measured and where it fails first."""
+    """Notes of a model's makers by heading, limits and measurements first."""
     about = dict(content)
     for name in ("limits", "metrics", "data", "command"):
         if name in about:

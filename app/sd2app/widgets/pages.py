@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
 
 
 class InnerPage(NamedTuple):
-    """What is on its button, what that says, and the page."""
+    """Button text, tooltip and content of a page."""
 
     name: str
     tip: str
@@ -84,7 +84,7 @@ class InnerPages(QWidget):
         self._pages.setCurrentIndex(place)
 
     def name_page(self, place: int, name: str) -> None:
-        """What is on the button of a page from now on."""
+        """Rename the button of a page."""
         button = self._buttons.button(place)
         button.setText(name)
         button.setAccessibleName(name)

@@ -47,7 +47,7 @@ class LogAxis:
         return self.start_px + share * (self.end_px - self.start_px)
 
     def is_below(self, value: float) -> bool:
-        """Whether a value has no place but the edge."""
+        """True if a value lies below the axis and is drawn on its edge."""
         return value < self.low
 
     def ticks(self, most: int) -> list[float]:
@@ -120,7 +120,7 @@ class PointPlot(QWidget):
         raise NotImplementedError
 
     def words_of(self, point: Any) -> str:
-        """What a point means."""
+        """Description of a point, for the screen reader."""
         raise NotImplementedError
 
     def tip_of(self, point: Any) -> str:
@@ -134,7 +134,7 @@ class PointPlot(QWidget):
     # --- painting -------------------------------------------------------------------------
 
     def plot_rect(self) -> QRectF:
-        """Where points are drawn."""
+        """Rectangle of the plot, in pixels."""
         left, top, right, bottom = self.MARGINS_PX
         return QRectF(self.rect()).adjusted(left, top, -right, -bottom)
 
@@ -180,7 +180,7 @@ class PointPlot(QWidget):
         )
 
     def most_upwards(self, painter: QPainter) -> int:
-        """How many numbers have room beside each other on the axis to the left."""
+        """Number of ticks for which the left axis has room."""
         return max(int(self.plot_rect().height() / (1.8 * painter.fontMetrics().height())), 2)
 
     # --- pointing -------------------------------------------------------------------------

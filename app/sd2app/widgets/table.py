@@ -101,14 +101,14 @@ class FramedCells(QStyledItemDelegate):
         editor.setGeometry(place)
 
     def setEditorData(self, editor: QWidget, index: QModelIndex) -> None:
-        """What the cell says."""
+        """Show the value of the cell."""
         if isinstance(editor, ListedEditor):
             editor.setCurrentIndex(editor.findData(index.data(Qt.ItemDataRole.EditRole)))
         else:
             super().setEditorData(editor, index)
 
     def setModelData(self, editor: QWidget, model: QAbstractItemModel, index: QModelIndex) -> None:
-        """What was chosen or typed."""
+        """Hand the chosen or typed value to the model."""
         if isinstance(editor, ListedEditor):
             model.setData(index, editor.currentData())
         else:

@@ -65,7 +65,7 @@ def milliseconds(value_ms: float) -> str:
 
 
 def seconds(value_s: float) -> str:
-    """How long a clip takes, in the unit one would say it in."""
+    """Duration in seconds or milliseconds."""
     return milliseconds(1e3 * value_s) if value_s < 1 else f"{number(value_s)} s"
 
 
