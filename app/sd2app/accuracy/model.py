@@ -54,7 +54,7 @@ class AccuracyModel(QObject):
     decided
         A choice came back, whether it is another plan or not, or failed to.
     wished
-        Another tolerance: somebody who knows whether the sensor rests is to choose.
+        Another tolerance; the receiver knows if the sensor rests, and asks for a choice.
     changed
         Anything that is shown.
     noted, failed : str
@@ -187,13 +187,13 @@ class AccuracyModel(QObject):
         self.measured.rest_at(sensor)
 
     def choose(self, sensor: VirtualSensor, budget_ms: float) -> None:
-        """Choose for the sensor where it rests, and for a hand that moves it from there.
+        """Choose for the sensor at rest, and for a drag from there.
 
         Parameters
         ----------
         sensor : VirtualSensor
         budget_ms : float
-            Per frame, for what keeps up with a hand.
+            Per frame, for a plan that keeps up with a mouse drag.
         """
         wish = self._wish(sensor, budget_ms)
         if self._scene is None or wish == self._decided_for:
@@ -231,7 +231,7 @@ class AccuracyModel(QObject):
         self.changed.emit()
 
     def use(self, result: PlanResult) -> None:
-        """Carry out a plan that was measured, whatever the tolerance is."""
+        """Use a plan that was measured, whatever the tolerance is."""
         if result.plan.family != "histogram":
             self.noted.emit(
                 "The window counts vertices; FMCW plans are shown for comparison. "
@@ -241,7 +241,7 @@ class AccuracyModel(QObject):
         if not serves_at_rest(result):
             self.noted.emit(
                 "That plan keeps a mask while the sensor moves; it is used for dragging where it "
-                "is the best. At rest the mask is made anew: click a filled point."
+                "is the best. At rest the mask is recomputed: click a filled point."
             )
             return
         self.hold()

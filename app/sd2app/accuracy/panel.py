@@ -161,7 +161,7 @@ class AccuracyPanel(QWidget):
         warning = ""
         if in_use is None:
             self._figures.setText("Choosing what this scene requires…" if trade.choosing else "–")
-            self._plan.setText("Until then occlusion is worked out exactly.")
+            self._plan.setText("Until then occlusion is computed exactly.")
         else:
             off, cost = deviation(in_use.error), milliseconds(in_use.cost_ms)
             clip = seconds(1e-3 * in_use.cost_ms * trade.frames)

@@ -16,7 +16,7 @@ Origin = Literal["chosen", "clicked"]
 
 @dataclass(frozen=True)
 class InUse:
-    """A plan that is carried out, and what is known of it.
+    """Plan in use with its error and cost.
 
     Parameters
     ----------

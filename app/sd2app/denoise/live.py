@@ -19,7 +19,7 @@ from sd2core.denoise.resample_to_model import is_regular
 
 _WANTED = "denoise_live"
 _JUMP_S = 1.0
-"""Frames that are skipped when the clock is late still arrive; a jump begins anew."""
+"""Frames that are skipped when the clock is late still arrive; a jump starts again."""
 
 
 class _Stepped(NamedTuple):
@@ -54,7 +54,7 @@ class LiveDenoiseModel(QObject):
         self._denoiser: Denoiser | None = None
         self._session: LiveSession | None = None
         self._next = 0
-        self._anew = True
+        self._fresh = True
         self._runner = LatestRunner("live", self)
         self._runner.finished.connect(self._receive)
         self._runner.failed.connect(lambda _: self._end())
@@ -118,7 +118,7 @@ class LiveDenoiseModel(QObject):
         """Start at a frame and forget the frames before."""
         self._session = None
         self._next = frame or 0
-        self._anew = True
+        self._fresh = True
 
     def _advance(self) -> None:
         """Ask for the frames up to the one on screen, one after another."""
@@ -154,8 +154,8 @@ class LiveDenoiseModel(QObject):
         self._session = stepped.session
         self._next = stepped.start + stepped.values.shape[1]
         shown = self._denoise.map
-        shown.put(stepped.start, stepped.values, self._anew)
-        self._anew = False
+        shown.put(stepped.start, stepped.values, self._fresh)
+        self._fresh = False
         # A model that looks at a window of frames knows no later ones here.
         past = "" if stepped.session.equals_batch else ", from past frames only"
         source = self._synthetic.map

@@ -26,7 +26,7 @@ from sd2core.pairs.segments import LENGTH, OVERLAP
 from sd2core.timebase import Timebase
 
 _TOO_SLOW_S = 0.15
-"""A model that takes longer for what follows a hand waits until the hand rests."""
+"""A model that takes longer than a drag allows waits until the drag pauses."""
 
 _TRIED = 3
 """Sweeps in which that is found out."""
@@ -39,7 +39,7 @@ _WAITS = "too slow to be dragged, follows when the sensor rests"
 AT_ONCE = 2048
 """Frames that are denoised together; a clip up to this length always is whole."""
 CONTEXT = 288
-"""Frames around a stretch that its preview is made with: four windows of training."""
+"""Frames around a part that its preview is made with: four windows of training."""
 
 
 class Swept(NamedTuple):
@@ -65,7 +65,7 @@ class _InOrder(NamedTuple):
 class DenoisedMap(QObject):
     """Denoises what changed of the synthetic map, what is in view first.
 
-    While a hand moves the sensor the model is asked in the same background task that
+    While the sensor is dragged the model is asked in the same background task that
     sweeps the map (:meth:`companion`), so that both are of the same place and are shown
     together. At rest one piece after another is denoised behind the synthetic map. Pieces
     of a long clip are a preview, where a model remembers more than is around them: when
@@ -118,9 +118,9 @@ class DenoisedMap(QObject):
         self._made: DopplerMap | None = None
         self._needs_reference = True
         self._revision = 0
-        self._start_anew()
+        self._restart()
 
-    def _start_anew(self) -> None:
+    def _restart(self) -> None:
         """Nothing is denoised."""
         frames = self._known.size
         self._shown = np.zeros(frames, bool)
@@ -167,7 +167,7 @@ class DenoisedMap(QObject):
         self.track.set_status(words)
         self._needs_reference = True
         self._made = None
-        self._start_anew()
+        self._restart()
         if denoiser is None:
             self.track.set_map(None)
         else:
@@ -182,7 +182,7 @@ class DenoisedMap(QObject):
     def take(
         self, source: DopplerMap, known: NDArray[np.bool_], sensor: object, piece: View
     ) -> None:
-        """A stretch of the synthetic map changed while nobody waits for it.
+        """A part of the synthetic map changed in the background.
 
         Parameters
         ----------
@@ -238,7 +238,7 @@ class DenoisedMap(QObject):
         start: int,
         swept: Swept | None,
     ) -> None:
-        """A hand moved the sensor; ``swept`` is what the companion made of the sweep."""
+        """The sensor was dragged; ``swept`` is what the companion made of the preview."""
         self._runner.cancel()
         self._again.stop()
         self._follow(source, known, sensor)
@@ -258,23 +258,23 @@ class DenoisedMap(QObject):
         self._publish()
 
     def hold(self, held: bool) -> None:
-        """Leave the track to somebody else for a while."""
+        """Leave the map to live denoising for a while."""
         if held == self._held:
             return
         self._held = held
         self._stop()
-        self._start_anew()
+        self._restart()
         if held:
             self._publish()
         else:
             self.track.set_status(self.words)
             self._go_on()
 
-    def put(self, start: int, values: NDArray[np.float32], anew: bool = False) -> None:
-        """Show frames (bins, n) that somebody else denoised; ``anew``: no others."""
+    def put(self, start: int, values: NDArray[np.float32], fresh: bool = False) -> None:
+        """Show frames (bins, n) that were denoised elsewhere; ``fresh``: no others."""
         if self._source is None or not self._held:
             return
-        if anew:
+        if fresh:
             self._shown[:] = False
         if self._made is None:
             self._blank(replace(self._source, kind="denoised", meta={}, uncertainty=None))
@@ -294,7 +294,7 @@ class DenoisedMap(QObject):
     def _follow(self, source: DopplerMap, known: NDArray[np.bool_], sensor: object) -> None:
         self._source, self._known = source, known
         if self._shown.size != known.size:
-            self._start_anew()
+            self._restart()
         if sensor != self._sensor:
             self._sensor = sensor
             self._shown[:] = False  # of another place; on screen until there is better
@@ -440,7 +440,7 @@ class DenoisedMap(QObject):
 
 
 def next_piece(wanted: NDArray[np.bool_], view: View) -> View | None:
-    """The stretch to be denoised next, half-open; None when there is none.
+    """Part to be denoised next, half-open; None when there is none.
 
     Parameters
     ----------
@@ -461,7 +461,7 @@ def next_piece(wanted: NDArray[np.bool_], view: View) -> View | None:
 
 
 def with_context(known: NDArray[np.bool_], piece: View) -> View:
-    """A stretch with what comes before and after it, as far as that is known.
+    """Part with the known frames before and after it.
 
     It begins where a window does that is cut from the whole clip.
     """
@@ -481,7 +481,7 @@ def touched(piece: View, frames: int) -> slice:
 
 
 def cut_out(doppler: DopplerMap, start: int, values: NDArray[np.float32]) -> DopplerMap:
-    """A stretch of a map, with values (bins, frames) of its own, as a map."""
+    """Part of a map, with other values (bins, frames)."""
     stop = start + values.shape[1]
     whole = (start, stop) == (0, len(doppler.timebase))
     return replace(

@@ -192,7 +192,7 @@ class DenoiseModel(QObject):
             self.changed.emit()
 
     def export(self, path: Path) -> None:
-        """Write the denoised map that is shown, made anew with its provenance.
+        """Write the denoised map on screen, computed again with its provenance.
 
         Raises
         ------
@@ -219,15 +219,15 @@ class DenoiseModel(QObject):
         previous, self._loaded, self._before = self._loaded, None, None
         self._comparing = False
         self._show_before()
-        self._follow(anew=True)
+        self._follow(fresh=True)
         if previous is not None and previous.card.path == self._path:
             self._loaded = previous
         else:
             self.map.use(None)
 
-    def _follow(self, anew: bool = False) -> None:
+    def _follow(self, fresh: bool = False) -> None:
         choice = DenoiserChoice.of(self._document.recording)
-        if choice == self._choice and not anew:
+        if choice == self._choice and not fresh:
             return
         self._choice = choice
         self._problem = ""
@@ -314,7 +314,7 @@ class DenoiseModel(QObject):
         self._problem = words
         if self._loaded is not None:
             self._loaded = None
-        # Nobody asked for the default; that it cannot be used here is no failure.
+        # The user did not ask for the default; that it cannot be used here is no failure.
         if self._choice != UNSAID:
             self.failed.emit(words)
         self.changed.emit()

@@ -45,7 +45,7 @@ class MapFigureDialog(QDialog):
             self._box(title, lambda on, title=title: model.set_shown(title, on))
             for title in model.titles
         ]
-        stretch = Choice("Which stretch of the recording", self)
+        stretch = Choice("Time range of the recording", self)
         stretch.addItem("what is in view", False)
         stretch.addItem("the whole recording", True)
         stretch.currentIndexChanged.connect(lambda at: model.choose(whole=stretch.itemData(at)))

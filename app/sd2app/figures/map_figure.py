@@ -31,7 +31,7 @@ class FigureChoice:
     left_out : frozenset of str
         Titles of maps that are there and not shown.
     whole : bool
-        The whole recording instead of the stretch in view.
+        The whole recording instead of the time window.
     with_labels : bool
     with_difference : bool
         Where the difference to the radar is on screen.
@@ -55,7 +55,7 @@ class FigureModel(DrawnFigure):
     levels : HeatmapLevels
     labels : Labels
     view_s, whole_s : (float, float)
-        The stretch in view, and all of the recording.
+        The time window, and all of the recording.
     about : dict
         Goes into the file, fit for JSON; ``recording`` and ``simulated`` are its heading.
     """

@@ -86,12 +86,12 @@ class HeatmapView(MapWidget):
         return QSize(640, _HEADER_PX + 160)
 
     def invalidate(self) -> None:
-        """Draw the map anew, and all that is around it."""
+        """Draw the map again, and all that is around it."""
         self._still.forget()
         super().invalidate()
 
     def redraw(self) -> None:
-        """Draw what is on the map and around it anew."""
+        """Draw overlays and surroundings of the map again."""
         self._still.forget()
         self.update()
 

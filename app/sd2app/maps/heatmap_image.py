@@ -1,4 +1,4 @@
-"""From a Doppler map to the pixels of the stretch in view."""
+"""Pixels of a Doppler map in the time window."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class Columns:
 def shade_columns(
     track: MapModel, levels: HeatmapLevels, start_s: float, stop_s: float, columns: int
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Shades of the stretch in view, and which columns have something to show.
+    """Shades of the time window, and which columns have something to show.
 
     Where several frames share a column the strongest value is shown, so that a
     short gesture does not vanish when zoomed out.

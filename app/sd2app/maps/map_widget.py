@@ -30,12 +30,12 @@ class MapWidget(TimePlot):
             signal.connect(self.invalidate)
 
     def invalidate(self) -> None:
-        """Draw the map anew."""
+        """Draw the map again."""
         self._image = None
         self.update()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Draw the map anew for the new number of columns."""
+        """Draw the map again for the new number of columns."""
         self.invalidate()
 
     def paint_map(self, painter: QPainter, plot: QRectF, start_s: float, end_s: float) -> None:
@@ -46,7 +46,7 @@ class MapWidget(TimePlot):
         painter.drawImage(plot, self._image)
 
     def make_image(self, start_s: float, end_s: float, columns: int) -> QImage:
-        """The stretch in view, one pixel per column and bin."""
+        """Image of the time window, one pixel per column and bin."""
         background = QColor(self._display.palette.well).rgb()
         return heatmap_image(self._track, self._display.levels, start_s, end_s, columns, background)
 

@@ -44,16 +44,16 @@ if TYPE_CHECKING:
     from sd2core.accuracy.plans import AccuracyPlan
 
 _REST_MS = 300
-"""A hand that holds the sensor still for so long is at rest."""
+"""A drag that pauses for so long counts as rest."""
 
 
 class SynthesisModel(QObject):
-    """Recomputes when the sensor moves: at once roughly, as the plan says when the hand rests.
+    """Recomputes when the sensor moves: a preview at once, the final quality at rest.
 
-    While a hand moves the sensor, one sweep runs at a time and the newest
-    position follows it. At rest the plan in use is carried out in the
-    background, the stretch in view first; then a plan is chosen for the new
-    place, carried out if it is another, and at last one for the next drag. Any
+    While the sensor is dragged, one sweep runs at a time and the newest
+    position follows it. At rest the plan in use is applied in the
+    background, the time window first; then a plan is chosen for the new
+    place, applied if it is another, and at last one for the next drag. Any
     new move interrupts all of it. A map stays until it is replaced.
 
     Signals
@@ -212,7 +212,7 @@ class SynthesisModel(QObject):
         self.whole_map().save(path)
 
     def whole_map(self) -> DopplerMap:
-        """The map that is shown, made anew with its provenance, the plan included.
+        """Recompute the map on screen with its provenance, the plan included.
 
         Raises
         ------
@@ -293,7 +293,7 @@ class SynthesisModel(QObject):
         )
 
     def _settle(self) -> None:
-        """Rough where nothing is known yet, then as planned; the stretch in view first."""
+        """Compute previews where nothing is known, then the final quality; time window first."""
         if self._synthesizers is None:
             return
         self._rest.stop()
@@ -435,7 +435,7 @@ class SynthesisModel(QObject):
         return self._synthesizers.mesh.vertex_count
 
     def _swept(self) -> View:
-        """Frames that follow a hand: the whole clip when it is short, else what is in view."""
+        """Frames that follow a drag: the whole clip when it is short, else those in view."""
         frames = self._shown_map.partial.frames
         return (0, frames) if is_swept_whole(self._vertices, frames) else self._frames_in_view()
 

@@ -71,7 +71,7 @@ class Overview(MapWidget):
         )
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Small map, spans, frame of the stretch in view, cursor."""
+        """Small map, spans, frame around the time window, cursor."""
         with QPainter(self) as painter:
             self._paint(painter)
 

@@ -1,4 +1,4 @@
-"""A Doppler map that is filled stretch by stretch, each frame with its quality."""
+"""Doppler map that is filled part by part, each frame with its quality."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import VirtualSensor
 
 ROUGH, PREVIEW, FINAL = 1, 2, 3
-"""How good a frame is: a preview, what a hand gets that moves the sensor (or what was
+"""How good a frame is: rough, the preview while the sensor is dragged (or what was
 final for another plan), what the plan in use gives. 0 is not computed."""
 
 View = tuple[int, int]
@@ -65,7 +65,7 @@ class PartialMap:
         return bool(self.frames and self.quality.min() >= FINAL)
 
     def paint(self, sensor: VirtualSensor, start: int, stretch: Stretch, quality: int) -> None:
-        """Take a stretch over; what was there for another placement is forgotten."""
+        """Take computed frames over; those of another sensor are forgotten."""
         if sensor != self.sensor:
             self.sensor = sensor
             self.quality[:] = 0

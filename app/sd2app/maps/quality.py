@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from sd2core.accuracy.plans import AccuracyPlan
 
 _MAP_BUDGET_MS = 15.0
-"""For one map while a hand moves the sensor and the video plays: 20 of them a second, with most
+"""For one map while the sensor is dragged and the video plays: 20 of them a second, with most
 of the time left to drawing."""
 
 AT_ONCE = 12_000_000

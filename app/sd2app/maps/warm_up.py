@@ -43,7 +43,7 @@ class MaskPrefetcher(QObject):
         sensor: VirtualSensor,
         frames: View,
     ) -> None:
-        """Carry a plan out once, for frames that will follow a hand."""
+        """Apply a plan once to the frames that will follow a drag."""
 
         def work(emit: Emit) -> VirtualSensor:
             synthesizer = synthesizers.of(plan)

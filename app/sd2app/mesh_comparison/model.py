@@ -149,7 +149,7 @@ class ComparisonModel(QObject):
         return comparison.differences[1 - self._reference].map_l1 if comparison else None
 
     def curve(self, number: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Times, and velocities of the joint towards the sensor; NaN where nobody is."""
+        """Times, and velocities of the joint towards the sensor; NaN without a person."""
         comparison = self.comparison
         if comparison is None:
             return np.zeros(0), np.zeros(0)
@@ -173,7 +173,7 @@ class ComparisonModel(QObject):
             self.work_out()
 
     def work_out(self) -> None:
-        """Compare anew, with the sensor where it is."""
+        """Compare again, with the sensor where it is."""
         recording = self._document.recording
         own = self._document.mesh
         if recording is None or own is None:

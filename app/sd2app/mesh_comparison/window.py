@@ -139,7 +139,7 @@ class ComparisonWindow(QWidget):
         error = (sum(row.velocity_rms_mps**2 for row in hands) / len(hands)) ** 0.5
         return (
             f"Joints {distance_cm:.1f} cm apart · hands' velocity off by {error:.2f} m/s ·"
-            f" Doppler maps differ by {model.map_l1:.2f}"
+            f" Doppler maps differ by {model.map_l1:.2f} (relative L1)"
         )
 
     def _say(self, text: str, role: str) -> None:

@@ -30,7 +30,7 @@ class Backend(Protocol):
         """Draw from now on."""
 
     def request_render(self) -> None:
-        """Draw anew in the next turn of the event loop, once, if visible."""
+        """Draw again in the next turn of the event loop, once, if visible."""
 
     def shut_down(self) -> None:
         """Release everything of VTK; the widget stays, blank."""

@@ -2,7 +2,7 @@
 
 ``gl`` draws into the window itself (pyvistaqt's QtInteractor): best where a
 GPU draws. ``image`` draws off-screen and paints the picture: with software
-OpenGL the window would be composited anew for every frame (12 instead of 28
+OpenGL the window would be composited again for every frame (12 instead of 28
 frames/s), and Qt's ``offscreen`` platform has no OpenGL window at all.
 ``SD2_SCENE`` decides when it is set.
 """

@@ -22,7 +22,7 @@ Constraint = Literal["view", "vertical", "sight"]
 LEAST_GRAB_PX = 14.0
 _MARKER_PX = 9.0
 _CLICK_PX = 4.0
-"""A hand that moves less has clicked."""
+"""A mouse that moves less has clicked."""
 _ZOOM_PER_NOTCH = 0.88
 
 
@@ -175,7 +175,7 @@ class Navigator:
         self._hover_marker(None)
 
     def wheel(self, x_px: float, y_px: float, notches: float) -> None:
-        """The wheel turned; positive is away from the hand and comes nearer."""
+        """Zoom with the wheel; positive comes nearer."""
         if self._held is None:
             factor = _ZOOM_PER_NOTCH**notches
             self._scene.pose = self._scene.pose.zoomed(factor, x_px, y_px, self._size_px())

@@ -81,7 +81,7 @@ class ImageBackend(QWidget):
         self.request_render()
 
     def request_render(self) -> None:
-        """Draw anew in the next turn of the event loop, once, if visible."""
+        """Draw again in the next turn of the event loop, once, if visible."""
         self._dirty = True
         self._fine = False
         self.update()

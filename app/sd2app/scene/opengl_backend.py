@@ -52,7 +52,7 @@ class InteractorBackend:
         self.request_render()
 
     def request_render(self) -> None:
-        """Draw anew in the next turn of the event loop, once, if visible."""
+        """Draw again in the next turn of the event loop, once, if visible."""
         if not self._closed:
             self._interactor.update()
 

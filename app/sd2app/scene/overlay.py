@@ -48,7 +48,7 @@ class Overlay(QWidget):
         return words + 2 * _PAD + 2 * _GAP + 4.0
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Everything there is to say; drawn anew only when it changed."""
+        """Paint all texts; repainted only after a change."""
         scene = self._scene
         state = (
             self.message,

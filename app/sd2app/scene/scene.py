@@ -172,7 +172,7 @@ class Scene:
         self._lay_ground()
 
     def set_hot(self, hot: bool) -> None:
-        """Show that the sensor is under the pointer or in the hand."""
+        """Show that the sensor is under the pointer or dragged."""
         if hot != self._hot:
             self._hot = hot
             self.sensor_glyph.set_colours(self.colours, hot)

@@ -143,7 +143,7 @@ class SceneView(QWidget):
         self.set_view("overview")
 
     def request_render(self) -> None:
-        """Draw anew."""
+        """Draw again."""
         if self._backend is not None:
             self._backend.request_render()
             self.overlay.update()

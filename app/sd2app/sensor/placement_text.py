@@ -15,7 +15,7 @@ def count_text(model: PlacementsModel) -> str:
     if model.plan is None:
         return ""
     count = len(model.planned.places)
-    return counted(count, "placement") if count else "Working out the placements…"
+    return counted(count, "placement") if count else "Computing the placements…"
 
 
 def limit_facts(model: PlacementsModel) -> list[tuple[str, str]]:

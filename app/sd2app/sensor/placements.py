@@ -58,7 +58,7 @@ class _Wish(NamedTuple):
 
 
 class PlacementsModel(QObject):
-    """Follows the plan of the recording that is open; places are worked out beside the window.
+    """Plan of the open recording; its placements are computed in the background.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ class PlacementsModel(QObject):
 
     @property
     def planned(self) -> Planned:
-        """Places of the plan; empty until they are worked out."""
+        """Placements of the plan; empty until they are computed."""
         return self._planned
 
     @property

@@ -189,7 +189,7 @@ def load_content(recording: Recording, clutter: Clutter, progress: Progress) -> 
 def common_clock(clocks: Sequence[Timebase]) -> Timebase:
     """Frames of the first clock, and of the others where they reach beyond it.
 
-    A clock that does not touch the ones before it is left out: nobody wants to
+    A clock that does not touch the ones before it is left out: no user wants to
     play through the gap.
     """
     times_s = clocks[0].times_s

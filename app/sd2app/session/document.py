@@ -310,7 +310,7 @@ class DocumentModel(QObject):
         return relinked
 
     def read_labels_again(self) -> None:
-        """Take over what somebody else has made of the labels meanwhile.
+        """Take over what another program has made of the labels meanwhile.
 
         Raises
         ------

@@ -11,7 +11,7 @@ _TICK_MS = 5
 
 
 class PlaybackModel(QObject):
-    """Time, play state, speed, loop, and the stretch that is played again and again.
+    """Time, play state, speed, loop, and the time range that is repeated.
 
     The frame on screen follows from elapsed time, so a late frame is dropped
     rather than slowing the clock.
@@ -71,7 +71,7 @@ class PlaybackModel(QObject):
 
     @property
     def stretch_s(self) -> tuple[float, float] | None:
-        """Half-open stretch that is played again and again; seeking beyond it ends that."""
+        """Half-open time range that is repeated; seeking beyond it ends that."""
         return self._stretch_s
 
     def set_timebase(self, timebase: Timebase) -> None:
@@ -92,13 +92,13 @@ class PlaybackModel(QObject):
         self.playing_changed.emit(True)
 
     def play_stretch(self, start_s: float, end_s: float) -> None:
-        """Play a stretch from its start, again and again."""
+        """Repeat a time range from its start."""
         self.set_stretch((start_s, end_s))
         self.seek(start_s)
         self.play()
 
     def set_stretch(self, stretch_s: tuple[float, float] | None) -> None:
-        """Play this stretch again and again from now on, or none."""
+        """Repeat this time range from now on, or none."""
         if stretch_s != self._stretch_s:
             self._stretch_s = stretch_s
             self.stretch_changed.emit()

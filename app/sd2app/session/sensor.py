@@ -8,7 +8,7 @@ from sd2core.sensor import VirtualSensor
 
 
 class SensorModel(QObject):
-    """The sensor, and whether a hand is moving it right now."""
+    """Virtual sensor, and a flag while it is dragged."""
 
     changed = Signal()
     dragging_changed = Signal(bool)
@@ -35,7 +35,7 @@ class SensorModel(QObject):
             self.changed.emit()
 
     def set_dragging(self, dragging: bool) -> None:
-        """Say that a hand took hold of the sensor, or let go of it."""
+        """Note that a drag of the sensor began or ended."""
         if dragging != self._dragging:
             self._dragging = dragging
             self.dragging_changed.emit(dragging)

@@ -8,7 +8,7 @@ _SHORTEST_S = 0.2
 
 
 class TimeWindow(QObject):
-    """The time axis that all tracks share: its whole extent and the stretch in view."""
+    """Time axis that all tracks share: its whole extent and the part in view."""
 
     changed = Signal()
 
@@ -34,7 +34,7 @@ class TimeWindow(QObject):
 
     @property
     def duration_s(self) -> float:
-        """Length of the stretch in view."""
+        """Length of the time window, in seconds."""
         return self._span[1] - self._span[0]
 
     def set_extent(self, start_s: float, end_s: float) -> None:
@@ -54,7 +54,7 @@ class TimeWindow(QObject):
             self.changed.emit()
 
     def zoom(self, factor: float, anchor_s: float) -> None:
-        """Scale the stretch by ``factor`` (< 1 shows less), keeping ``anchor_s`` in place."""
+        """Scale the window by ``factor`` (< 1 shows less), keeping ``anchor_s`` in place."""
         duration = min(
             max(self.duration_s * factor, _SHORTEST_S), self._extent[1] - self._extent[0]
         )
@@ -63,7 +63,7 @@ class TimeWindow(QObject):
         self.set_span(start, start + duration)
 
     def pan(self, seconds: float) -> None:
-        """Move the stretch without changing its length."""
+        """Move the window without changing its length."""
         self.set_span(self.start_s + seconds, self.end_s + seconds)
 
     def fit(self) -> None:

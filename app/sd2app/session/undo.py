@@ -64,16 +64,16 @@ class Edits:
         self.place_sensor(aimed_at(self._sensor.sensor, target_m), "Aim sensor")
 
     def begin_sensor_drag(self) -> None:
-        """A hand takes hold of the sensor."""
+        """Begin a drag of the sensor."""
         self._before = self._sensor.sensor
         self._sensor.set_dragging(True)
 
     def drag_sensor(self, position_m: Vector) -> None:
-        """The hand moves it."""
+        """Move the sensor during a drag."""
         self._assign_sensor(replace(self._sensor.sensor, position_m=position_m))
 
     def end_sensor_drag(self) -> None:
-        """The hand lets go."""
+        """End the drag; it becomes one step in the history."""
         self._sensor.set_dragging(False)
         self._push("Move sensor", self._assign_sensor, self._before, self._sensor.sensor)
 
@@ -102,7 +102,7 @@ class Edits:
         """It has been typed."""
         recording, before = self._document.recording, self._planned_before
         self._planned_before = None
-        # Another recording may have been opened while somebody typed.
+        # Another recording may have been opened while the user typed.
         if recording is not None and before is not None and before[0] is recording:
             self._push(
                 "Plan placements", self._document.set_placements, before[1], recording.placements
@@ -119,16 +119,16 @@ class Edits:
         self._push("Align radar", self._document.set_radar_offset, before, offset_s)
 
     def begin_offset_drag(self) -> None:
-        """A hand takes hold of the real track."""
+        """Begin a drag of the measured map."""
         if self._document.recording is not None:
             self._before = self._document.recording.radar_offset_s
 
     def drag_offset(self, seconds: float) -> None:
-        """The hand has moved it by ``seconds`` since it took hold."""
+        """Shift the measured map by ``seconds`` since the drag began."""
         self._document.set_radar_offset(round(self._before + seconds, 3))
 
     def end_offset_drag(self) -> None:
-        """The hand lets go."""
+        """End the drag; it becomes one step in the history."""
         recording = self._document.recording
         if recording is not None:
             self._push(

@@ -1,4 +1,4 @@
-"""The picture on screen, decoded beside the window."""
+"""Video frame on screen, decoded in the background."""
 
 from __future__ import annotations
 

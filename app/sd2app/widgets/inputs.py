@@ -60,7 +60,7 @@ class NumberBox(QDoubleSpinBox):
         self.editingFinished.connect(self._end_typing)
 
     def show_value(self, value: float) -> None:
-        """Follow a model, unless somebody is typing; emits nothing."""
+        """Follow a model, unless the user is typing; emits nothing."""
         if self._typing:
             return
         if abs(value - self.value()) >= 0.5 * 10.0 ** -self.decimals():

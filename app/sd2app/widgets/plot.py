@@ -23,7 +23,7 @@ Tick = tuple[float, str]
 class LogAxis:
     """Values from ``low`` to ``high`` on pixels from ``start_px`` to ``end_px``.
 
-    What lies below ``low``, nought included, stands on the edge.
+    What lies below ``low``, zero included, stands on the edge.
     """
 
     low: float

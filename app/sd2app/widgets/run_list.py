@@ -25,7 +25,7 @@ class Runs(Protocol):
         """Show a run; None is a new one, to be set up."""
 
     def set_watched(self, watched: bool) -> None:
-        """Somebody looks at the panel, or no longer."""
+        """Note that the panel is on screen, or no longer."""
 
 
 class RunPanel(QWidget):
@@ -90,7 +90,7 @@ class RunPanel(QWidget):
         self._model.set_watched(True)
 
     def hideEvent(self, event: QHideEvent) -> None:
-        """Nobody looks."""
+        """Note that the panel is hidden."""
         super().hideEvent(event)
         self._model.set_watched(False)
 

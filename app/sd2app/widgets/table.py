@@ -1,4 +1,4 @@
-"""Cells of tables that are edited in place; what is typed there is nobody else's."""
+"""Tables whose cells are edited in place, by mouse and keyboard."""
 
 from __future__ import annotations
 

@@ -59,7 +59,7 @@ def ticks(low: float, high: float, most: int) -> list[float]:
 
 
 def signed_text(value: float) -> str:
-    """A tick with its sign, and nought without."""
+    """Text of a tick with its sign; zero without."""
     return f"{value:+g}".replace("-", "−") if abs(value) > 1e-9 else "0"
 
 
