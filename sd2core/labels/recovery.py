@@ -303,7 +303,7 @@ class RecoveryPlace:
 
 
 def offers_in(root: Path, *, declined: bool = False) -> Found:
-    """Find unsaved labels of all recordings that nobody edits now, the newest first.
+    """Find unsaved labels of all recordings not being edited, the newest first.
 
     ``declined`` ones only when asked for.
     """

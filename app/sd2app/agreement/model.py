@@ -24,7 +24,7 @@ class _Compared(NamedTuple):
 
 
 class AgreementModel(QObject):
-    """Reads a file, and compares again whenever the labels of the recording change.
+    """Agreement with the labels of a file, compared again when the recording's labels change.
 
     Suggestions that nobody has accepted are no answers and are left out.
 

@@ -1,4 +1,4 @@
-"""How long the user takes to press a key, which marks are put back by."""
+"""Reaction time of the user, by which marks are put back."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _NAME = "reaction_ms"
 
 
 class ReactionModel(QObject):
-    """The reaction time of the user, remembered from one start to the next."""
+    """The user's reaction time, kept in the settings."""
 
     changed = Signal()
 
@@ -23,16 +23,16 @@ class ReactionModel(QObject):
 
     @property
     def reaction_ms(self) -> int:
-        """0 to :data:`LONGEST_MS`."""
+        """Reaction time, 0 to :data:`LONGEST_MS`."""
         return min(max(self._settings.stored(_NAME, 0), 0), LONGEST_MS)
 
     @property
     def reaction_s(self) -> float:
-        """The same in seconds."""
+        """Reaction time in seconds."""
         return self.reaction_ms / 1000.0
 
     def set_reaction_ms(self, reaction_ms: int) -> None:
-        """Put marks back by so much from now on."""
+        """Set the reaction time."""
         if reaction_ms != self.reaction_ms:
             self._settings.set_value(_NAME, min(max(reaction_ms, 0), LONGEST_MS))
             self.changed.emit()

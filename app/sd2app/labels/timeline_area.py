@@ -16,7 +16,7 @@ _HIGHEST_PX = round(8.5 * ROW_PX)
 
 
 class LabelArea(QScrollArea):
-    """Scrolls when the tracks are too high; keeps the track for new spans in view.
+    """Scroll area for many tracks; keeps the track for new spans in view.
 
     The scroll bar stands in the margin beside the tracks, so the time axis keeps its width.
     """

@@ -1,4 +1,4 @@
-"""What the user can do to the tracks of labels, each one step in the history."""
+"""Edits of the tracks of labels, each one step in the history."""
 
 from __future__ import annotations
 
@@ -11,39 +11,39 @@ from sd2core.labels.spans import Overlap
 
 
 class LabelTracks:
-    """Edits of the track on which new spans come, and the choice of it."""
+    """Edits of the track for new spans, and the choice of it."""
 
     def __init__(self, labels: LabelsModel, edits: LabelEdits) -> None:
         self._labels, self._edits = labels, edits
 
     @property
     def free(self) -> bool:
-        """Whether spans of the track may overlap."""
+        """True if spans of the track may overlap."""
         track = self._labels.track
         return bool(track) and self._labels.labels.track(track).overlap == "free"
 
     @property
     def new_name(self) -> str:
-        """A name that no track has."""
+        """Name that no track has."""
         taken = {track.name for track in self._labels.labels.tracks}
         names = (f"Track {number}" for number in range(len(taken) + 1, 2 * len(taken) + 3))
         return next(name for name in names if name not in taken)
 
     def step(self, towards: Literal[-1, 1]) -> None:
-        """Let new spans come on the next track, or the one before."""
+        """Make the next or the previous track the one for new spans."""
         names, place = self._names, self._place + towards
         if 0 <= place < len(names):
             self._labels.set_track(names[place])
 
     def add(self, name: str, overlap: Overlap) -> bool:
-        """Add a track, and let new spans come there; False where it was refused."""
+        """Add a track for new spans; False where it was refused."""
         done = self._edits.apply(lambda labels, _: field_edits.add_track(labels, name, overlap))
         if done:
             self._labels.set_track(name)
         return done
 
     def rename(self, name: str) -> bool:
-        """Give the track another name; False where it was refused."""
+        """Rename the track; False where it was refused."""
         old = self._labels.track
         done = self._edits.apply(lambda labels, _: field_edits.rename_track(labels, old, name))
         if done:
@@ -56,19 +56,19 @@ class LabelTracks:
         return self._edits.apply(lambda labels, _: field_edits.remove_track(labels, gone))
 
     def move(self, towards: Literal[-1, 1]) -> None:
-        """Put the track above the one before it, or below the one after."""
+        """Move the track up or down."""
         track, place = self._labels.track, self._place + towards
         if 0 <= place < len(self._names):
             self._edits.apply(lambda labels, _: field_edits.move_track(labels, track, place))
 
     def toggle_overlap(self) -> None:
-        """Let spans of the track overlap, or no longer."""
+        """Allow or forbid that spans of the track overlap."""
         track = self._labels.track
         overlap: Overlap = "exclusive" if self.free else "free"
         self._edits.apply(lambda labels, _: field_edits.set_overlap(labels, track, overlap))
 
     def put_spans(self, towards: Literal[-1, 1]) -> None:
-        """Put the selected spans on the track below theirs, or above."""
+        """Move the selected spans to the track below or above."""
         names, chosen = self._names, self._labels.selected
         place = names.index(chosen[0].track) + towards if chosen else -1
         if 0 <= place < len(names):

@@ -182,9 +182,7 @@ class PlacementsPage(QWidget):
         with QSignalBlocker(self._shown):
             self._shown.setChecked(model.shown)
         cost, in_use = model.cost, self._trade.in_use
-        self._cost.setText(
-            "Their cost is being computed…" if cost is None else cost_text(cost)
-        )
+        self._cost.setText("Their cost is being computed…" if cost is None else cost_text(cost))
         known = cost is not None and in_use is not None
         _say(self._source, cost_source_text(cost, in_use) if known else "")  # type: ignore[arg-type]
 

@@ -21,7 +21,7 @@ def killed(small_recording: Path, tmp_path: Path, kills: int) -> int:
         [sys.executable, str(TESTS / "labelled_until_killed.py"), str(made.folder), str(kills)],
         capture_output=True,
         text=True,
-        env=os.environ | {"PYTHONPATH": str(TESTS.parent)},
+        env=os.environ | {"PYTHONPATH": f"{TESTS.parent}{os.pathsep}{TESTS.parent / 'app'}"},
         check=False,
     )
     assert done.returncode == 0, done.stdout + done.stderr
