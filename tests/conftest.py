@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,8 @@ from hypothesis import settings
 
 from sd2core.body.landmark_models import LandmarkModels, landmark_models
 from sd2core.errors import Sd2Error
+from sd2core.files.lock import FileLock
+from sd2core.numerics.compiled import cache_directory, kernels_ready, warm_up
 
 # A busy machine is no failure: no test asserts a time.
 settings.register_profile("sd2", deadline=None)
@@ -28,6 +31,22 @@ def shared_data() -> Path:
     if os.environ.get("SD2_REQUIRE_SHARED") == "1":
         pytest.fail(reason)
     pytest.skip(reason)
+
+
+@pytest.fixture(scope="session")
+def compiled_kernels() -> None:
+    """Machine code in memory; what is not on disk yet is compiled by one worker alone."""
+    folder = cache_directory()
+    if folder is not None and not kernels_ready():
+        lock = FileLock(folder / "tests.lock")
+        while not lock.take():
+            time.sleep(0.2)
+        try:
+            warm_up()
+        finally:
+            lock.release()
+    else:
+        warm_up()
 
 
 @pytest.fixture(scope="session")

@@ -92,14 +92,6 @@ def own_data(tmp_path_factory, monkeypatch) -> Path:
     return folder
 
 
-@pytest.fixture(scope="session")
-def compiled_kernels() -> None:
-    """Machine code on disk, as after set-up."""
-    from sd2core.numerics.compiled import warm_up
-
-    warm_up()
-
-
 @pytest.fixture
 def fake() -> FakeLadder:
     """Chooses exact visibility unless a test tells it otherwise."""
@@ -134,7 +126,7 @@ def empty_window(qtbot, compiled_kernels, fake, fake_models, fake_classes):
     window.resize(1280, 800)
     window.show()
     window.populate()
-    qtbot.waitUntil(lambda: window.settled, timeout=20_000)
+    qtbot.waitUntil(lambda: window.settled, timeout=120_000)
     yield window
     fake.gate.set()
     fake_classes.gate.set()
@@ -146,19 +138,22 @@ def empty_window(qtbot, compiled_kernels, fake, fake_models, fake_classes):
     QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 
+def opened(window, qtbot, recording):
+    """The window on a recording, everything computed."""
+    with qtbot.waitSignal(window.context.document.opened, timeout=120_000):
+        window.open_paths([recording])
+    qtbot.waitUntil(lambda: window.settled, timeout=120_000)
+    qtbot.waitUntil(lambda: window.context.synthesis.complete, timeout=120_000)
+    return window
+
+
 @pytest.fixture
 def window(empty_window, small_recording, qtbot):
     """The window on the small recording, everything computed."""
-    with qtbot.waitSignal(empty_window.context.document.opened, timeout=20_000):
-        empty_window.open_paths([small_recording])
-    qtbot.waitUntil(lambda: empty_window.settled, timeout=20_000)
-    qtbot.waitUntil(lambda: empty_window.context.synthesis.complete, timeout=20_000)
-    return empty_window
+    return opened(empty_window, qtbot, small_recording)
 
 
 @pytest.fixture
-def labelled(window, qtbot, recording_copy):
+def labelled(empty_window, qtbot, recording_copy):
     """The window on the small recording: "there" 0.2 to 0.8 s, "back" 1 to 2 s, 60 frames."""
-    window.open_paths([recording_copy])
-    qtbot.waitUntil(lambda: window.settled and window.context.synthesis.complete, timeout=20_000)
-    return window
+    return opened(empty_window, qtbot, recording_copy)

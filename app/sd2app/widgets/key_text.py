@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 from PySide6.QtGui import QKeySequence
 
 
@@ -12,6 +14,7 @@ def canonical(key: str) -> str:
     return sequence.toString(QKeySequence.SequenceFormat.PortableText) if one else ""
 
 
+@functools.lru_cache
 def native(key: str) -> str:
     """A key as it is written on this machine."""
     return QKeySequence(key).toString(QKeySequence.SequenceFormat.NativeText)

@@ -20,7 +20,6 @@ from sd2core.errors import Sd2Error
 from sd2core.io.mesh import save_mesh
 from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.numerics.compiled import warm_up
 from sd2core.recording.recording import Recording, open_recording
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
@@ -59,9 +58,8 @@ def models(tmp_path):
 
 
 @pytest.fixture
-def make(qapp):
+def make(qapp, compiled_kernels):
     """Makes contexts on a library of models."""
-    warm_up()
     made = []
 
     def context(models):
@@ -93,9 +91,9 @@ def open_it(context, qtbot, path):
 
 def rest(context, qtbot):
     qtbot.waitUntil(
-        lambda: context.synthesis.complete and not context.synthesis.busy, timeout=20_000
+        lambda: context.synthesis.complete and not context.synthesis.busy, timeout=120_000
     )
-    qtbot.waitUntil(lambda: not context.denoise.busy, timeout=20_000)
+    qtbot.waitUntil(lambda: not context.denoise.busy, timeout=120_000)
 
 
 def is_of(context, gain):
@@ -409,7 +407,9 @@ def test_closing_lets_go_of_the_models(context, models, qtbot, ball):
 # --- the library's own --------------------------------------------------------------------
 
 
-def test_a_real_model_gives_the_map_that_the_library_gives(qapp, qtbot, ball, tmp_path):
+def test_a_real_model_gives_the_map_that_the_library_gives(
+    qapp, compiled_kernels, qtbot, ball, tmp_path
+):
     import torch
 
     from sd2core.denoise.files import load_model, save_model
@@ -427,7 +427,7 @@ def test_a_real_model_gives_the_map_that_the_library_gives(qapp, qtbot, ball, tm
     context = build_context(parent, Settings.forgetful(), FakeLadder().ladder)
     open_it(context, qtbot, ball)
     context.denoise.use(tmp_path / "own.safetensors")
-    qtbot.waitUntil(lambda: not context.denoise.busy, timeout=60_000)
+    qtbot.waitUntil(lambda: not context.denoise.busy, timeout=120_000)
     expected = load_model(tmp_path / "own.safetensors").denoise(context.synthetic.map).values
     assert expected.any()
     np.testing.assert_allclose(

@@ -19,7 +19,6 @@ from sd2core.accuracy.trial import synthesizer_for
 from sd2core.doppler.synthesizer import Synthesizer
 from sd2core.io.mesh import load_mesh
 from sd2core.maps import DopplerMap
-from sd2core.numerics.compiled import warm_up
 from sd2core.sensor import VirtualSensor
 
 
@@ -40,10 +39,9 @@ def fake():
 
 
 @pytest.fixture
-def context(qapp, fake):
+def context(qapp, compiled_kernels, fake):
     from PySide6.QtCore import QObject
 
-    warm_up()
     parent = QObject()
     context = build_context(
         parent, Settings.forgetful(), fake.ladder, None, FakeDenoisers().library
@@ -340,11 +338,10 @@ def test_the_exported_map_names_its_plan(context, fake, qtbot, ball, tmp_path):
     assert saved.meta["plan_error_l1"] == 0.008
 
 
-def test_the_library_chooses_for_a_small_scene(qapp, qtbot, ball):
+def test_the_library_chooses_for_a_small_scene(qapp, qtbot, ball, compiled_kernels):
     """The real ladder: it finds a plan within the tolerance, and the map is that plan's."""
     from PySide6.QtCore import QObject
 
-    warm_up()
     parent = QObject()
     context = build_context(parent, Settings.forgetful(), denoisers=FakeDenoisers().library)
     try:

@@ -17,11 +17,8 @@ CAMERA = PinholeCamera(160, 120, 150.0)
 
 
 @pytest.fixture(scope="module", autouse=True)
-def compiled_kernels() -> None:
+def kernels(compiled_kernels: None) -> None:
     """Surfaces are drawn as dots until there is machine code."""
-    from sd2core.numerics.compiled import warm_up
-
-    warm_up()
 
 
 @pytest.fixture(scope="module")

@@ -1,8 +1,6 @@
 import pytest
 
-from sd2core.numerics.compiled import warm_up
-
 
 @pytest.fixture(scope="session", autouse=True)
-def kernels() -> None:
-    warm_up()
+def kernels(compiled_kernels: None) -> None:
+    """Compiled before the first test."""
