@@ -20,7 +20,7 @@ PROGRESS_VERSION = 1
 
 @dataclass(frozen=True)
 class BatchStatus:
-    """How a batch stands.
+    """State and counts of a batch.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class BatchFolder(RunFolder):
         return self.path / "results.jsonl"
 
     def result(self, kind: str, key: str, suffix: str) -> Path:
-        """Where what a task makes is kept: in 256 folders, so that none gets too long."""
+        """Path of a task's result: in one of 256 folders, so that none gets too long."""
         return self.path / kind / key[:2] / f"{key}{suffix}"
 
     def prepare(self) -> None:
@@ -108,7 +108,7 @@ class BatchFolder(RunFolder):
         self.path.mkdir(exist_ok=True)
 
     def status(self) -> BatchStatus:
-        """How it stands; reads all of its progress.
+        """Current status, from all lines of progress.
 
         Raises
         ------
@@ -120,7 +120,7 @@ class BatchFolder(RunFolder):
 
 
 def status_of(state: State, about: dict[str, Any], events: list[Event]) -> BatchStatus:
-    """How a batch stands, from what it wrote; only the last run counts."""
+    """Status of a batch from its lines; only the last run counts."""
     starts = [number for number, event in enumerate(events) if event["event"] == "start"]
     events = events[starts[-1] :] if starts else []
     last = last_of([one for one in events if one["event"] in ("progress", "end")], "end")

@@ -1,4 +1,4 @@
-"""What happens between the steps of a run: lines, validation, checkpoints, being steered."""
+"""Callbacks between the steps of a run: progress lines, validation, checkpoints, control."""
 
 from __future__ import annotations
 
@@ -84,14 +84,14 @@ class Course:
 
     @property
     def total_steps(self) -> int | None:
-        """Of the run; None where time limits it."""
+        """Steps of the whole run; None where time limits it."""
         if self.config.training.minutes is not None:
             return None
         return self.order.steps * self.config.training.epochs
 
     @property
     def over(self) -> bool:
-        """Whether nothing is left to do at this position."""
+        """True if nothing is left to do at this position."""
         training, position = self.config.training, self.position
         patience = training.early_stopping_epochs
         if patience is not None and position.epochs_since_best >= patience:
@@ -168,7 +168,7 @@ class Course:
         return True
 
     def _share_done(self) -> float:
-        """How much of the run is done, 0 to 1."""
+        """Share of the run that is done, 0 to 1."""
         minutes, total = self.config.training.minutes, self.total_steps
         if total is None:
             assert minutes is not None
@@ -293,7 +293,7 @@ class Course:
 
     @property
     def _leads(self) -> bool:
-        """Of several processes one writes."""
+        """True in the one of several processes that writes files."""
         return bool(self._learner.trainer.is_global_zero)
 
     def _agreed(self, word: Word, number: float) -> tuple[Word, float]:

@@ -1,4 +1,4 @@
-"""Where a run goes on after a kill: one file that is replaced in one step, no pickle."""
+"""Checkpoint of a run: one file that is replaced in one step, without pickle."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _KEY = "sd2"
 
 @dataclass
 class Position:
-    """How far a run is, with all that its further course depends on but the weights.
+    """Position of a run: all that its continuation depends on besides the weights.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class Position:
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """What is kept.
+    """Weights, optimiser moments and position of a run.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a training run is told: a frozen record, to and from TOML."""
+"""Settings of a training run: a frozen record, to and from TOML."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def _setting(
 
 @dataclass(frozen=True)
 class DataConfig:
-    """What is learnt from; :func:`settings` has the meaning of every field."""
+    """Data to learn from; :func:`settings` has the meaning of every field."""
 
     pairs: tuple[Path, ...] = _setting("stores of pairs; several are mixed", paths())
     validation_subjects: tuple[str, ...] | None = _setting(
@@ -97,7 +97,7 @@ class DataConfig:
 
 @dataclass(frozen=True)
 class ModelConfig:
-    """What learns."""
+    """Model to train."""
 
     name: str = _setting("architecture, see `sd2 train --help`", text(), "s4")
     options: Mapping[str, Any] = _setting("options of the architecture", table(), factory=dict)
@@ -108,7 +108,7 @@ class ModelConfig:
 
 @dataclass(frozen=True)
 class TrainingConfig:
-    """How it learns."""
+    """Optimisation settings."""
 
     batch_size: int = _setting("segments per step", number(1, 100_000, whole=True), 64)
     epochs: int = _setting("passes over all segments", number(1, 1_000_000, whole=True), 500)
@@ -278,7 +278,7 @@ def read_config(path: Path) -> TrainConfig:
 
 
 def config_text(config: TrainConfig, folder: Path) -> str:
-    """As TOML, with paths relative to a folder; :func:`read_config` gives the same again."""
+    """Settings as TOML, with paths relative to a folder; :func:`read_config` reads them back."""
     lines = ["# Settings of `sd2 train`; docs/formats.md says what they mean."]
     for section in _SECTIONS:
         lines += ["", f"[{section}]"]

@@ -23,7 +23,7 @@ RANGE_LAW = 4.0
 
 @dataclass(frozen=True)
 class Split:
-    """Who is learnt from, who chooses the best epoch, who stays unseen.
+    """People for training, for choosing the best epoch, and for testing.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class Windows:
         return len(self.earliest)
 
     def places(self, indices: NDArray[np.int64], shares: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Where segments are cut: shares from 0 to below 1 of the way from earliest to latest."""
+        """Start frames of segments, from shares in [0, 1) of the range from earliest to latest."""
         earliest = self.earliest[indices]
         room = self.latest[indices] - earliest + 1
         return earliest + (shares * room).astype(np.int64)
@@ -92,7 +92,7 @@ class Windows:
 
 @dataclass(frozen=True, eq=False)
 class TrainingData:
-    """What a run learns from.
+    """Training and validation data of a run.
 
     Parameters
     ----------
@@ -179,7 +179,7 @@ def split_subjects(
     validation: Sequence[str] | None = None,
     test: Sequence[str] | None = None,
 ) -> Split:
-    """Who is learnt from and who is kept out.
+    """Division of people into training and held-out parts.
 
     By default a sixth of the subjects, at least one, is kept for the test (where there
     are three or more) and as many for validation, from the end of the list.
@@ -342,7 +342,7 @@ class Order:
         return -(-self.segments // self.batch_size)
 
     def epoch(self, number: int) -> Draw:
-        """What an epoch learns from, in that order."""
+        """Segments of an epoch, in training order."""
         rng = np.random.default_rng([self.seed, number])
         indices = rng.permutation(self.segments)
         exponent = rng.uniform(-1.0, 1.0, self.segments)
@@ -350,7 +350,7 @@ class Order:
         return Draw(indices, gains, rng.uniform(0.0, 1.0, self.segments))
 
     def part(self, step: int) -> slice:
-        """Where in :meth:`epoch` a batch stands."""
+        """Slice of :meth:`epoch` that is a batch."""
         return slice(step * self.batch_size, (step + 1) * self.batch_size)
 
 

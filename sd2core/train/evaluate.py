@@ -1,4 +1,4 @@
-"""How good models are on people that they have not learnt from.
+"""Evaluation of models on people that they have not learnt from.
 
 Every take is denoised whole, from its first frame on. Velocities are compared frame by
 frame; :mod:`sd2core.denoise.metrics` defines how. Two sets of frames are judged:

@@ -1,4 +1,4 @@
-"""What an evaluation found: numbers by model, gesture and person, and over seeds."""
+"""Results of an evaluation: numbers by model, gesture and person, and over seeds."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ _OURS = (
 
 @dataclass(frozen=True)
 class RunStatus:
-    """How a run stands.
+    """Current state of a run.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ class TrainingFolder(RunFolder):
         self.set_state("starting", model=model, started_unix_s=time.time())
 
     def status(self) -> RunStatus:
-        """How it stands; reads all of its progress.
+        """Current status, from all lines of progress.
 
         Raises
         ------
@@ -156,7 +156,7 @@ class TrainingFolder(RunFolder):
             self.path.rmdir()
 
     def _is_empty(self) -> bool:
-        """Whether it is a folder in which nothing is but the lock of who is about to use it."""
+        """True if the folder holds nothing but a lock."""
         return self.path.is_dir() and all(one.name == "lock" for one in self.path.iterdir())
 
     def _how_to_resume(self, state: State) -> str:

@@ -26,7 +26,7 @@ _BESIDE_THE_POINT = (
 
 
 def device_of(machine: MachineConfig) -> Device:
-    """Where to compute.
+    """Device to compute on.
 
     Raises
     ------
@@ -47,7 +47,7 @@ def device_of(machine: MachineConfig) -> Device:
 
 
 def precision_of(machine: MachineConfig, device: Device) -> Literal["32-true", "bf16-mixed"]:
-    """How matrices are multiplied. State-space kernels are in float32 and above in any case.
+    """Precision of matrix products; state-space kernels use float32 or better in any case.
 
     Half precision (fp16) is not offered: it needs its losses scaled by a factor that
     would have to be kept with every checkpoint, and what has no bf16 is no faster with it

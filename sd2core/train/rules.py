@@ -1,4 +1,4 @@
-"""What a setting may be: each rule in words, and as a check that names key and value."""
+"""Rules for settings: each in words, and as a check that names key and value."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Allowed = tuple[str, Rule]
 
 
 def refused(key: str, value: Any, allowed: str) -> Sd2Error:
-    """Why a value is not taken."""
+    """Error for a value that is not allowed."""
     return Sd2Error(f"{key} is {value!r}", allowed)
 
 

@@ -141,7 +141,7 @@ def order_of(config: TrainConfig, data: TrainingData) -> Order:
 
 
 def local_rank() -> int:
-    """Which of several processes this is; Lightning starts the others with a number."""
+    """Number of this process among several; Lightning starts the others with a number."""
     return int(os.environ.get("LOCAL_RANK", "0"))
 
 
@@ -207,7 +207,7 @@ def _say_start(
 
 @dataclass(frozen=True, eq=False)
 class _About:
-    """What the model file says of the run."""
+    """Facts of the run that the model file keeps."""
 
     config: TrainConfig
     data: TrainingData

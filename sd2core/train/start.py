@@ -35,7 +35,7 @@ Watch = Callable[[Event], None]
 
 @dataclass(frozen=True)
 class Ending:
-    """How a run ended.
+    """Outcome of a run.
 
     Parameters
     ----------
@@ -258,5 +258,5 @@ def _clear_failed(folder: TrainingFolder) -> None:
 
 
 def _is_other_rank() -> bool:
-    """Whether Lightning started this process beside the one that the user started."""
+    """True if Lightning started this process besides the one that the user started."""
     return os.environ.get("LOCAL_RANK", "0") != "0"

@@ -1,4 +1,4 @@
-"""How good a model is on segments that it does not learn from."""
+"""Validation of a model on segments that it does not learn from."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Validation:
 
 @dataclass(frozen=True, eq=False)
 class Exam:
-    """What a model is validated on.
+    """Segments that a model is validated on.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Exam:
     def of(
         cls, segments: Segments, scaling: Scaling, axis: VelocityAxis, null_bins: tuple[int, ...]
     ) -> Exam:
-        """Of segments of energies."""
+        """Build it from segments of energies."""
         energies = segments.targets.reshape(-1, axis.bins).copy()
         energies[:, list(null_bins)] = 0.0
         return cls(

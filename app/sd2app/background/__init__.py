@@ -1,1 +1,1 @@
-"""Work beside the window: threads that report back to the Qt event loop."""
+"""Threads and background processes that report back to the Qt event loop."""

@@ -45,7 +45,7 @@ class LatestRunner(QObject):
 
     @property
     def busy(self) -> bool:
-        """Whether the newest request is still waiting for its result."""
+        """True while the newest request waits for its result."""
         return self._busy
 
     def submit(self, task: Task) -> int:

@@ -15,7 +15,7 @@ _KEPT_BYTES = 64 * 1024
 
 @dataclass(frozen=True)
 class Ending:
-    """How a process ended.
+    """Exit code and error output of a process.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ class Ending:
     errors: str
 
     def reason(self, otherwise: str) -> str:
-        """Why it failed, as ``sd2`` says it in its last line, or else these words."""
+        """Reason of a failure from the last line of ``sd2``, or else these words."""
         said = self.errors.splitlines()[-1:]
         return said[0].removeprefix("sd2: ") if said else otherwise
 

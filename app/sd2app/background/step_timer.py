@@ -1,4 +1,4 @@
-"""Time a few steps of training on random values, as a run beside the window would take them.
+"""Time a few training steps on random values, under the conditions of a background run.
 
 Run as ``python -u -m sd2app.background.step_timer MODEL BATCH_SIZE`` for a denoiser, and as
 ``… classifier MODEL FEATURES WIDTH`` for a classifier; prints one JSON line.

@@ -1,4 +1,4 @@
-"""How long a step of training takes on this machine: from runs, or timed for the purpose."""
+"""Time of a training step on this machine, from runs or timed for the purpose."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _PATIENCE_MS = 500
 
 @dataclass(frozen=True)
 class StepKey:
-    """What the time of a step depends on.
+    """Settings that the time of a step depends on.
 
     Parameters
     ----------
@@ -35,17 +35,17 @@ class StepKey:
 
     @classmethod
     def of_denoiser(cls, model: str, batch_size: int) -> StepKey:
-        """Of training a denoiser."""
+        """Key for training a denoiser."""
         return cls((model, str(batch_size)))
 
     @classmethod
     def of_classifier(cls, model: str, features: str, width: int) -> StepKey:
-        """Of training a classifier."""
+        """Key for training a classifier."""
         return cls((CLASSIFIER, model, features, str(width)))
 
     @property
     def text(self) -> str:
-        """As it is stored."""
+        """Text under which the time is stored."""
         return "/".join(self.words)
 
 
@@ -92,15 +92,15 @@ class StepTimes(QObject):
 
     @property
     def timing(self) -> StepKey | None:
-        """What is being timed."""
+        """Key that is being timed."""
         return self._timing
 
     def of(self, key: StepKey) -> StepTime | None:
-        """What is known."""
+        """Known time of a step; None where there is none."""
         return self._times.get(key.text)
 
     def why_not(self, key: StepKey) -> str:
-        """Why timing failed; empty where it did not."""
+        """Reason why timing failed; empty where it did not."""
         return self._refused.get(key, "")
 
     def learn(self, key: StepKey, seconds: float) -> None:
@@ -163,7 +163,7 @@ class StepTimes(QObject):
 
 
 class PatientTiming(QObject):
-    """Has a step timed when it has been wanted for a while: not while somebody turns a number.
+    """Starts the timing of a step after a delay, so that it waits while the user changes numbers.
 
     Parameters
     ----------

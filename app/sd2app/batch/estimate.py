@@ -1,4 +1,4 @@
-"""What a batch would do and take, as ``sd2 batch --dry-run`` says it, beside the window."""
+"""Tasks and time of a batch, estimated by ``sd2 batch --dry-run`` in a background process."""
 
 from __future__ import annotations
 
@@ -33,21 +33,21 @@ class BatchEstimateModel(QObject):
 
     @property
     def busy(self) -> bool:
-        """Whether it is being worked out."""
+        """True while it is being computed."""
         return self._process is not None
 
     @property
     def facts(self) -> dict[str, Any] | None:
-        """What the command printed; None until it has."""
+        """Output of the command; None until it has ended."""
         return self._facts
 
     @property
     def problem(self) -> str:
-        """Why there is none."""
+        """Reason why there is no estimate."""
         return self._problem
 
     def of(self, plan: BatchPlan, workers: int) -> bool:
-        """Whether what is known, or being worked out, is about this."""
+        """True if the estimate, known or being computed, is for this plan."""
         return self._asked == (plan, workers)
 
     def ask(self, plan: BatchPlan, workers: int) -> None:

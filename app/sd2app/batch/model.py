@@ -69,7 +69,7 @@ class BatchModel(QObject):
 
     @property
     def why_not_start(self) -> str:
-        """Why what is set up cannot be started; empty when it can."""
+        """Reason why the set-up cannot be started; empty when it can."""
         setup, estimate = self.setup, self.estimate
         if setup.problem:
             return setup.problem
@@ -80,7 +80,7 @@ class BatchModel(QObject):
         return estimate.problem
 
     def set_watched(self, watched: bool) -> None:
-        """Somebody looks at it, or no longer."""
+        """Note that it is visible, or hidden."""
         self._watched = watched
 
     # --- one batch after another ----------------------------------------------------------

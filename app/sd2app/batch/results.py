@@ -73,12 +73,12 @@ class BatchResults(QAbstractTableModel):
 
     @property
     def rows(self) -> list[Result]:
-        """What was made or found made by the last run that came to its end."""
+        """Results of the last run that reached its end."""
         return self._rows
 
     @property
     def card(self) -> str:
-        """What the exported data set says of itself, as Markdown; empty where there is none."""
+        """Card of the exported data set as Markdown; empty where there is none."""
         return self._card
 
     def read(self, folder: BatchFolder) -> None:
@@ -107,7 +107,7 @@ class BatchResults(QAbstractTableModel):
         return 0 if parent.isValid() else len(self._rows)
 
     def columnCount(self, parent: Index = _NOWHERE) -> int:
-        """What is said of each."""
+        """Number of facts that are said of each result."""
         return 0 if parent.isValid() else len(_COLUMNS)
 
     def headerData(
@@ -173,7 +173,7 @@ def _vector(values: Any) -> Vector:
 
 
 def _card(folder: BatchFolder) -> str:
-    """What a data set says of itself; empty where none was exported."""
+    """Card of the exported data set; empty where none was exported."""
     from sd2core.datasets.card import card_paths
 
     try:

@@ -31,7 +31,7 @@ _NO_DATASET = "No data set has been exported here yet."
 
 
 class Asks(Protocol):
-    """What the view leaves to dialogs."""
+    """Actions of the view that dialogs carry through."""
 
     def resume(self) -> None:
         """Go on with the batch in view."""

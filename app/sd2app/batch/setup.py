@@ -1,4 +1,4 @@
-"""What a batch is to be: recordings, placements, steps, and where its results go."""
+"""Set-up of a batch: recordings, placements, steps, and the folder of its results."""
 
 from __future__ import annotations
 
@@ -91,17 +91,17 @@ class BatchSetupModel(QObject):
 
     @property
     def entries(self) -> tuple[Entry, ...]:
-        """What is worked on."""
+        """Recordings, videos and meshes to work on."""
         return self._entries
 
     @property
     def placements(self) -> Placements | None:
-        """Where sensors are put; None: where each recording has its own."""
+        """Placements of sensors; None: each recording's own."""
         return self._placements
 
     @property
     def placed(self) -> str:
-        """Where the placements come from, in words."""
+        """Source of the placements in words."""
         return self._placed
 
     @property
@@ -180,7 +180,7 @@ class BatchSetupModel(QObject):
 
     @property
     def problem(self) -> str:
-        """Why there is no plan; empty when there is."""
+        """Reason why there is no plan; empty when there is one."""
         if not self._entries:
             return "Add recordings to work on."
         bad = [entry.problem for entry in self._entries if entry.problem]
@@ -192,11 +192,11 @@ class BatchSetupModel(QObject):
 
     @property
     def files(self) -> int:
-        """How many recordings were found."""
+        """Number of recordings that were found."""
         return sum(entry.count or 0 for entry in self._entries)
 
     def plan(self) -> BatchPlan:
-        """As the library takes it.
+        """Plan in the form that the library takes.
 
         Raises
         ------

@@ -59,7 +59,7 @@ _MOST_FACTS = 8
 
 
 class Asks(Protocol):
-    """What the view leaves to dialogs."""
+    """Actions of the view that dialogs carry through."""
 
     def add_files(self) -> None:
         """Let the user choose recordings, videos or meshes."""
@@ -71,10 +71,10 @@ class Asks(Protocol):
         """Put sensors where one of :meth:`placement_choices` says; it may ask for a file."""
 
     def placement_choices(self) -> Sequence[str]:
-        """Where sensors may be put, in words."""
+        """Choices of sensor placements in words."""
 
     def placement_index(self) -> int:
-        """Which of them holds."""
+        """Index of the current choice."""
 
     def model_names(self) -> Sequence[str]:
         """Models that are installed."""
@@ -190,7 +190,7 @@ class BatchSetupView(QWidget):
     def _buttons(self) -> QHBoxLayout:
         asks = self._asks
         self._save = outlined("Save plan…", "As a file for sd2 batch", asks.save_plan, self)
-        self._start = outlined("Start", "In processes beside the window", asks.start, self)
+        self._start = outlined("Start", "In background processes", asks.start, self)
         self._start.setObjectName("primary")
         row = QHBoxLayout()
         row.setSpacing(6)
@@ -270,7 +270,7 @@ class _Paths(QListWidget):
 
     @property
     def chosen(self) -> list[Path]:
-        """What is selected."""
+        """Selected entries."""
         return [self._shown[self.row(item)][0] for item in self.selectedItems()]
 
     def show_entries(self, entries: list[tuple[Path, str, bool]]) -> None:

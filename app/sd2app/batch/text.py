@@ -30,7 +30,7 @@ _PHASES: dict[Phase, str] = {
 
 
 def entry_text(entry: Entry) -> str:
-    """What was found of an entry."""
+    """Content of an entry in words."""
     if entry.problem:
         return entry.problem
     if entry.count is None:
@@ -39,7 +39,7 @@ def entry_text(entry: Entry) -> str:
 
 
 def headline(batch: BatchMonitor) -> str:
-    """How it stands."""
+    """Current phase of the run in words."""
     status, words = batch.status, _PHASES[batch.phase]
     if batch.phase == "finished" and status is not None and status.failed:
         return f"{words}, but {counted(status.failed, 'task')} could not be done"
@@ -49,7 +49,7 @@ def headline(batch: BatchMonitor) -> str:
 
 
 def time_text(batch: BatchMonitor) -> str:
-    """How long it took, and what is left."""
+    """Elapsed time and time left."""
     status = batch.status
     if status is None or status.elapsed_s is None:
         return ""
@@ -87,7 +87,7 @@ def failure_text(failed: Failed) -> str:
 
 
 def estimate_headline(facts: dict[str, Any]) -> str:
-    """What a dry run said, in a line."""
+    """Summary of a dry run in one line."""
     recordings = counted(facts["recordings"], "recording")
     if not any(step["to_do"] for step in facts["steps"].values()):
         return f"{recordings}: all of it is there already"
@@ -108,7 +108,7 @@ def estimate_facts(facts: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def unusable_text(facts: dict[str, Any]) -> str:
-    """Which recordings cannot be used, and why the first of them; empty where all can."""
+    """Recordings that cannot be used, with the first reason; empty where all can."""
     unusable = facts["unusable"]
     if not unusable:
         return ""

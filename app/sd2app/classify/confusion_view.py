@@ -28,7 +28,7 @@ class ConfusionView(QWidget):
 
     @property
     def matrix(self) -> Matrix | None:
-        """What is shown."""
+        """Matrix that is shown."""
         return self._matrix
 
     def show_matrix(self, matrix: Matrix, classes: tuple[str, ...]) -> None:

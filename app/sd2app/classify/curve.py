@@ -1,4 +1,4 @@
-"""How well a classifier does while it learns: recall of the people who choose the best."""
+"""Recall of a classifier while it learns, on the people held out to choose the best."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class ClassCurve(SteppedPlot):
         return self.place_of(point.step, point.recall)
 
     def words_of(self, point: CheckPoint) -> str:
-        """What a look came to."""
+        """Recall at a check in words."""
         best = ", better than all before" if point.best else ""
         return f"Step {point.step}{best}\nRecall {100 * point.recall:.1f} %"
 

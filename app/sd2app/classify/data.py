@@ -40,17 +40,17 @@ class DataSource:
 
     @property
     def nameable(self) -> bool:
-        """Whether the user can say who it is of: pairs and data sets say it themselves."""
+        """True if the user can name its person: pairs and data sets name theirs."""
         return any(one.kind in ("recording", "radar file") for one in self.facts)
 
     @property
     def people(self) -> tuple[str, ...]:
-        """Who is in it."""
+        """People in it."""
         return people_of(self.facts)
 
     @property
     def text(self) -> str:
-        """What it holds; an ellipsis while that is not known."""
+        """Content in words; an ellipsis while that is not known."""
         if not self.facts:
             return "…"
         parts = [_what(self.facts)]
@@ -72,12 +72,12 @@ class DataSource:
         return " · ".join(parts)
 
     def has(self, name: str) -> bool:
-        """Whether all of it has maps of a kind, or can be given them."""
+        """True if all of it has maps of a kind, or can be given them."""
         return all(name in one.maps for one in self.facts)
 
 
 def looked_into(path: Path, person: str) -> DataSource:
-    """What something holds; may wait for the disk."""
+    """Content of a source of data; may wait for the disk."""
     try:
         sources = unfolded([LabelledSource(path, person)])
         facts = tuple(labelled_facts(one) for one in sources)
@@ -89,7 +89,7 @@ def looked_into(path: Path, person: str) -> DataSource:
 
 
 def division_of(data: Sequence[DataSource]) -> Split | None:
-    """Who is learnt from, who chooses the best moment, who is kept out; None where nobody is.
+    """Division of people into training, validation and test; None where there are none.
 
     As ``sd2 classify train`` has it: data sets say it themselves, where there is nothing else.
 
@@ -112,7 +112,7 @@ def division_of(data: Sequence[DataSource]) -> Split | None:
 
 
 def why_not_together(data: Sequence[DataSource], maps: Sequence[str] = ()) -> str:
-    """Why these cannot be learnt from together, with these maps of each; empty when they can."""
+    """Reason why these sources cannot be mixed with these maps; empty when they can."""
     for source in data:
         for name in maps:
             if not source.has(name):

@@ -14,7 +14,7 @@ from sd2core.classify.spans import SpanOptions, predicted_spans
 
 
 class GestureFinder:
-    """What the classifier takes for a gesture."""
+    """Finder of what the classifier takes for gestures."""
 
     title = "classifier"
     threshold = Threshold(
@@ -26,7 +26,7 @@ class GestureFinder:
 
     @property
     def why_not(self) -> str:
-        """Why it cannot be used; empty where it can."""
+        """Reason why it cannot be used; empty where it can."""
         if self._classify.path is None:
             return "Choose a classifier first, under Model"
         if not self.sources:
@@ -54,11 +54,11 @@ class GestureFinder:
 
     @property
     def ready(self) -> bool:
-        """Whether every frame of the map is classified."""
+        """True once every frame of the map is classified."""
         return self._classify.track.complete
 
     def look(self, threshold: float) -> Callable[[], Found]:
-        """What looks, in the background."""
+        """Search to be called in the background."""
         source, card = self.source, self._classify.track.card
         assert source is not None
         assert source.map is not None

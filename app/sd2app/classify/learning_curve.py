@@ -1,4 +1,4 @@
-"""How good a classifier is by how much real data it had, with and without synthetic data."""
+"""Recall of classifiers against the amount of real data, with and without synthetic data."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class LearningCurve(SteppedPlot):
         return self.place_of(point.share, recall) + QPointF(aside_px, 0)
 
     def words_of(self, point: CurvePoint) -> str:
-        """What a point means."""
+        """Recall at a point in words."""
         return (
             f"{point.title}, {100 * point.share:g} % of the {self._kind} radar's data\n"
             f"Mean recall {point.recall.text()} %"

@@ -22,7 +22,7 @@ class LiveClasses(Protocol):
     """Frames in, probabilities out, as late as the classifier's card says."""
 
     def advance(self, energies: NDArray[np.float32]) -> NDArray[np.float32]:
-        """What became known by the next frames: (frames, bins) → (answers, classes)."""
+        """Probabilities that follow from the next frames: (frames, bins) → (answers, classes)."""
 
     def finish(self) -> NDArray[np.float32]:
         """Answers that are owed, if nothing moves from now on; it goes on all the same."""
@@ -32,7 +32,7 @@ class Classifier(Protocol):
     """A classifier that is loaded; its methods take a while."""
 
     def probabilities(self, doppler: DopplerMap) -> NDArray[np.float32]:
-        """What every frame of a map shows, (frames, classes)."""
+        """Class probabilities of every frame of a map, (frames, classes)."""
 
     def live(self) -> LiveClasses:
         """For frames of one stretch, all with a person, as they come."""
@@ -40,7 +40,7 @@ class Classifier(Protocol):
 
 @dataclass(frozen=True)
 class ClassifierLibrary:
-    """What the models ask of :mod:`sd2core.classify`.
+    """Functions of :mod:`sd2core.classify` that the models call.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class ClassifierLibrary:
 
 
 def user_classifiers_folder() -> Path:
-    """Where the user's classifiers are kept; it need not be there yet."""
+    """Folder of the user's classifiers; it need not exist yet."""
     from sd2core.denoise.files import user_models_folder
 
     return user_models_folder().parent / "classifiers"

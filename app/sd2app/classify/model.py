@@ -99,22 +99,22 @@ class ClassifyModel(QObject):
 
     @property
     def card(self) -> ClassifierCard | None:
-        """Of the classifier in use."""
+        """Card of the classifier in use."""
         return self._card
 
     @property
     def loading(self) -> bool:
-        """Whether it is being loaded."""
+        """True while it is being loaded."""
         return self._runner.busy
 
     @property
     def busy(self) -> bool:
-        """Whether it is being loaded, about to be, or at work."""
+        """True while it is being loaded, is about to be, or is at work."""
         return self._runner.busy or self._patience.isActive() or self.track.busy
 
     @property
     def problem(self) -> str:
-        """Why nothing is classified; empty where something is, or nothing was asked for."""
+        """Reason why nothing is classified; empty where something is, or nothing was asked for."""
         return self._problem or self.track.problem
 
     @property
@@ -135,22 +135,22 @@ class ClassifyModel(QObject):
 
     @property
     def knows_source(self) -> bool:
-        """Whether the map that is looked at is of a kind that was learnt from."""
+        """True if the classified map is of a kind that the classifier learnt from."""
         return self.source is not None and self._knows(self.source)
 
     @property
     def shown(self) -> bool:
-        """Whether the probabilities are to be shown under the maps."""
+        """True if the probabilities are to be shown under the maps."""
         return self._shown
 
     @property
     def visible(self) -> bool:
-        """Whether there is something to show, and it is to be shown."""
+        """True if there are probabilities and they are to be shown."""
         return self._shown and self._path is not None and self.source is not None
 
     @property
     def reading(self) -> ClassReading | None:
-        """What the frame on screen shows; None where that is not known."""
+        """Classes of the frame on screen; None where they are not known."""
         return self.track.at(self._playback.time_s)
 
     def available(self) -> Sequence[ClassifierCard]:
@@ -161,7 +161,7 @@ class ClassifyModel(QObject):
         return cards
 
     def label_of(self, name: str) -> str:
-        """What a span of a class is called: the label of that class where there is just one."""
+        """Label of a span of a class: the class's own where there is just one."""
         offered = self._labels.labels.label_set
         labels = offered.of_class(name)
         if offered.find(name) is None and len(labels) == 1:

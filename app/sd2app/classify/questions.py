@@ -1,4 +1,4 @@
-"""What the panel of classifiers leaves to dialogs."""
+"""Actions of the panel of classifiers that dialogs carry through."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class ClassAsks(Protocol):
         """Learn from the recording that is open."""
 
     def has_this(self) -> bool:
-        """Whether it can be learnt from: it is on disk."""
+        """True if the open recording can be learnt from: it is on disk."""
 
     def train(self) -> None:
         """Begin to train."""

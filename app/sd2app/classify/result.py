@@ -38,7 +38,7 @@ class Spread:
 
 @dataclass(frozen=True, eq=False)
 class Matrix:
-    """What each class was taken for.
+    """Confusion matrix: answers per true class.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class CurvePoint:
 
 @dataclass(frozen=True)
 class ClassResult:
-    """What came of a comparison, or of judging a classifier.
+    """Results of a comparison, or of the evaluation of a classifier.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ class ClassResult:
 
     @property
     def heading(self) -> str:
-        """What all of it is about."""
+        """Title of the results."""
         text = f"Frames of a {self.kind} radar" if self.seeds else f"Judged on {self.kind} maps"
         if self.seeds:
             text += f", mean ± standard deviation of {self.seeds} seeds"
@@ -116,7 +116,7 @@ class ClassResult:
 
     @property
     def summary(self) -> str:
-        """Whether what was added helps, in words."""
+        """Conclusion in words: whether the added data helps."""
         parts = []
         plain = {point.share: point.recall.mean for point in next(iter(self.curves), ())}
         for curve in self.curves[1:]:
@@ -222,7 +222,7 @@ def _of_score(path: Path, content: Mapping[str, Any]) -> ClassResult:
 
 
 def _notes(content: Mapping[str, Any]) -> tuple[str, ...]:
-    """Of whom, and how soon; files of earlier versions need not say it."""
+    """People and delay of an evaluation; files of earlier versions may lack them."""
     found = []
     if subjects := content.get("subjects"):
         found.append(f"People: {', '.join(map(str, subjects))}.")

@@ -1,4 +1,4 @@
-"""What came of a comparison of classifiers: two matrices side by side, and learning curves."""
+"""Results of a comparison of classifiers: two confusion matrices and learning curves."""
 
 from __future__ import annotations
 

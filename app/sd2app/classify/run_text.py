@@ -18,7 +18,7 @@ _PHASES = {
 
 
 def headline(run: ClassRun) -> str:
-    """How it stands."""
+    """Current phase of the run in words."""
     history = run.history
     if run.phase != "running":
         return _PHASES[run.phase]
@@ -39,7 +39,7 @@ def time_text(run: ClassRun) -> str:
 
 
 def note(run: ClassRun) -> str:
-    """What to make of a run that has ended otherwise than well, or that was stopped."""
+    """Advice for a run that was stopped or did not reach its end."""
     if run.phase == "died":
         return "It was killed, or the machine was switched off."
     if run.phase == "stopped" and run.compares:
@@ -50,7 +50,7 @@ def note(run: ClassRun) -> str:
 
 
 def facts(run: ClassRun) -> list[tuple[str, str]]:
-    """What came of a training so far."""
+    """Best recall of a training so far."""
     best = run.history.best
     if best is None:
         return []

@@ -1,4 +1,4 @@
-"""What a classifier is to learn: from which data and maps, with which network, for how long."""
+"""Set-up of the training of a classifier: data, maps, network, steps."""
 
 from __future__ import annotations
 
@@ -56,12 +56,12 @@ class ClassSetup(QObject):
 
     @property
     def data(self) -> tuple[DataSource, ...]:
-        """What is learnt from."""
+        """Data to learn from."""
         return self._data
 
     @property
     def maps(self) -> tuple[str, ...]:
-        """Which maps of it."""
+        """Kinds of maps to learn from."""
         chosen = str(self._values["maps"]).split(",")
         return tuple(name for name in MAPS if name in chosen)
 
@@ -135,7 +135,7 @@ class ClassSetup(QObject):
 
     @property
     def problem(self) -> str:
-        """Why nothing can be started; empty when it can."""
+        """Reason why nothing can be started; empty when something can."""
         if not self._data:
             return "Add labelled data to learn from."
         problems = [one.problem for one in self._data if one.problem]
@@ -147,7 +147,7 @@ class ClassSetup(QObject):
 
     @property
     def train_problem(self) -> str:
-        """Why no classifier can be trained; empty when one can."""
+        """Reason why no classifier can be trained; empty when one can."""
         if self.problem:
             return self.problem
         if not self.maps:
@@ -156,12 +156,12 @@ class ClassSetup(QObject):
 
     @property
     def division(self) -> Split | None:
-        """Who does what in a training; None until the data is known and fits together."""
+        """Division of people in a training; None until the data is known and fits together."""
         return None if self.problem else division_of(self._data)
 
     @property
     def step_key(self) -> StepKey:
-        """What the time of a step depends on."""
+        """Settings that the time of a step depends on."""
         values = self._values
         return StepKey.of_classifier(values["model"], values["features"], values["width"])
 
@@ -199,7 +199,7 @@ class ClassSetup(QObject):
 
 
 def _people(text: str) -> dict[str, str]:
-    """Who sources are of, by their paths, as it was stored."""
+    """Stored names of people by the paths of their sources."""
     try:
         return {str(path): str(name) for path, name in json.loads(text).items()}
     except (ValueError, AttributeError):

@@ -1,4 +1,4 @@
-"""What a classifier is to be trained with, and what is to be compared."""
+"""Page to set up the training and the comparison of classifiers."""
 
 from __future__ import annotations
 
@@ -178,7 +178,7 @@ class ClassSetupView(QWidget):
     def _add_start(self, layout: QVBoxLayout) -> None:
         asks = self._asks
         self._problem = sentence("", "warning")
-        self._start = outlined("Start training", "Train beside the window", asks.train, self)
+        self._start = outlined("Start training", "Train in the background", asks.train, self)
         self._start.setObjectName("primary")
         self._copy = outlined(
             "Copy command", "The same as a command for a terminal", asks.copy_command, self
@@ -198,7 +198,7 @@ class ClassSetupView(QWidget):
             lambda on: self._setup.set_value("quick", "yes" if on else "no")
         )
         self._compare = outlined(
-            "Compare", "Train and compare beside the window", self._asks.compare, self
+            "Compare", "Train and compare in the background", self._asks.compare, self
         )
         show = outlined(
             "Open a result…",
@@ -245,7 +245,7 @@ class ClassSetupView(QWidget):
         self._start.setEnabled(not why_not)
         self._copy.setEnabled(not setup.train_problem)
         self._compare.setEnabled(not training.why_not_compare)
-        self._compare.setToolTip(training.why_not_compare or "Train and compare beside the window")
+        self._compare.setToolTip(training.why_not_compare or "Train and compare in the background")
 
     def _list_data(self) -> None:
         self._shown_data = self._setup.data
@@ -266,14 +266,14 @@ class ClassSetupView(QWidget):
         )  # fmt: skip
 
     def _person(self, one: DataSource) -> QWidget:
-        """Who it is of, to be typed."""
+        """Field for the name of the person."""
         line = TypedLine(
             f"Who {one.path.name} is of",
             "Who it is of: whoever is learnt from is neither chosen by nor judged on.\nThe same"
             " name for everything of one person.",
         )
         line.setText(one.person)
-        itself = one.people[0] if len(one.people) == 1 else "everyone another"
+        itself = one.people[0] if len(one.people) == 1 else "each a different person"
         line.setPlaceholderText("" if one.person else itself)
         line.ended.connect(lambda: self._setup.name_person(one.path, line.text()))
         field = QWidget(self)

@@ -41,7 +41,7 @@ _UNKNOWN_CLASS = "#8a8f98"
 
 
 def class_colour(name: str, offered: LabelSet) -> str:
-    """Of a class: that of the first label which it stands for, as its spans have it."""
+    """Colour of a class: that of the first label that it stands for."""
     labels = offered.of_class(name)
     known = offered.find(name) or (labels[0] if labels else None)
     return _UNKNOWN_CLASS if known is None else known.colour

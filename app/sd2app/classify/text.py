@@ -22,7 +22,7 @@ _KINDS = {
 
 
 def classifier_title(card: ClassifierCard) -> str:
-    """What to call it in a list."""
+    """Title of a classifier in lists."""
     return card.title or card.name
 
 
@@ -32,18 +32,18 @@ def kinds_text(kinds: Iterable[str]) -> str:
 
 
 def learned_text(card: ClassifierCard) -> str:
-    """What it learned from."""
+    """Kinds of maps that it learned from, in words."""
     return f"learned from {kinds_text(card.trained_on)} maps"
 
 
 def network_text(card: ClassifierCard) -> str:
-    """What sort of network looks at what."""
+    """Network and features in words."""
     model = MODEL_WORDS.get(card.model, card.model)
     return f"{model}, {FEATURE_WORDS.get(card.features.kind, card.features.kind)}"
 
 
 def classifier_page(card: ClassifierCard) -> ModelPage:
-    """What it says about itself."""
+    """Page with the card of a classifier."""
     rows = [
         ("Kind", f"{network_text(card)}, {card.parameters:,} parameters"),
         ("Learned from", f"{kinds_text(card.trained_on)} maps"),
@@ -67,7 +67,7 @@ def reading_text(reading: ClassReading | None) -> str:
 
 
 def ago_text(seconds: float) -> str:
-    """How much earlier something was."""
+    """Age of an answer in words."""
     return f"{seconds:.1f} s ago"
 
 

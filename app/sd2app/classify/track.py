@@ -1,4 +1,4 @@
-"""What every frame of a map shows, kept in step with the map."""
+"""Class probabilities of every frame of a map, kept in step with the map."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _BETWEEN_MS = 120
 
 @dataclass(frozen=True)
 class ClassReading:
-    """What one frame shows.
+    """Class probabilities of one frame.
 
     Parameters
     ----------
@@ -126,22 +126,22 @@ class ClassTrack(QObject):
 
     @property
     def card(self) -> ClassifierCard | None:
-        """Of the classifier at work."""
+        """Card of the classifier at work."""
         return self._card
 
     @property
     def busy(self) -> bool:
-        """Whether frames are being classified or about to be."""
+        """True while frames are being classified or about to be."""
         return self._runner.busy or self._calm.isActive()
 
     @property
     def problem(self) -> str:
-        """Why this map cannot be classified; empty where it can."""
+        """Reason why this map cannot be classified; empty where it can."""
         return self._problem
 
     @property
     def complete(self) -> bool:
-        """Whether every frame of the map is classified, as it is now and is to be."""
+        """True once every frame of the current map is classified."""
         source = self._source
         whole = source is not None and source.map is not None and source.covered is None
         return whole and self.current and self._done.size > 0 and bool(self._done.all())
@@ -163,11 +163,11 @@ class ClassTrack(QObject):
 
     @property
     def current(self) -> bool:
-        """Whether what is known counts: the map is of the sensor where it stands."""
+        """True while the map is current for the sensor."""
         return self._source is not None and self._counts(self._source)
 
     def at(self, time_s: float) -> ClassReading | None:
-        """What the frame at a time of the recording shows; None where that is not known.
+        """Classes of the frame at a time of the recording; None where they are not known.
 
         Of a map that is still growing up to there, what its newest frames show.
         """
@@ -296,7 +296,7 @@ class ClassTrack(QObject):
     def _differs(
         self, before: DopplerMap, doppler: DopplerMap, known: NDArray[np.bool_], part: slice
     ) -> NDArray[np.bool_]:
-        """Which frames of a part are others than before."""
+        """Mask of the frames of a part that differ from before."""
         differs = (before.values[:, part] != doppler.values[:, part]).any(axis=0)
         differs |= self._known[part] != known[part]
         if before.present is not None or doppler.present is not None:

@@ -88,17 +88,17 @@ class ClassTraining(QObject):
 
     @property
     def runs(self) -> tuple[KnownRun, ...]:
-        """What lies on disk, the newest first."""
+        """Runs on disk, the newest first."""
         return self._runs
 
     @property
     def under_way(self) -> bool:
-        """Whether the run in view has a process."""
+        """True while the run in view has a process."""
         return self._run is not None and self._run.under_way
 
     @property
     def mark(self) -> str:
-        """How far the run in view is, in a word; empty when none is under way."""
+        """Share of the run in view that is done, as text; empty when none is under way."""
         if self._run is None or not self._run.under_way:
             return ""
         share = self._run.history.share
@@ -106,7 +106,7 @@ class ClassTraining(QObject):
 
     @property
     def in_use(self) -> bool:
-        """Whether the model of the run in view was put to use."""
+        """True if the model of the run in view is in use."""
         return self._run is not None and self._used == self._run.path
 
     @property
@@ -117,7 +117,7 @@ class ClassTraining(QObject):
 
     @property
     def why_not_train(self) -> str:
-        """Why no classifier can be trained; empty when one can."""
+        """Reason why no classifier can be trained; empty when one can."""
         busy = self._busy_with
         return (
             f"{busy} is under way. Wait for it, or stop it." if busy else (self.setup.train_problem)
@@ -125,23 +125,23 @@ class ClassTraining(QObject):
 
     @property
     def why_not_compare(self) -> str:
-        """Why nothing can be compared; empty when it can."""
+        """Reason why nothing can be compared; empty when something can."""
         busy = self._busy_with
         return f"{busy} is under way. Wait for it, or stop it." if busy else self.setup.problem
 
     @property
     def step(self) -> StepTime | None:
-        """What a step of the training takes here; None until that is known."""
+        """Time of a training step on this machine; None until it is known."""
         return self.step_times.of(self.setup.step_key)
 
     @property
     def estimate_s(self) -> float | None:
-        """How long the training will take once the data has been read; None: not known."""
+        """Estimated time of the training once the data has been read; None: not known."""
         return None if self.step is None else self.step.seconds * self.setup.value("steps")
 
     @property
     def command(self) -> str:
-        """What is set up, as a command for a terminal."""
+        """Command for a terminal that does what is set up."""
         return quoted(self.setup.train_arguments(Path(MODEL_NAME)))
 
     # --- one run after another ------------------------------------------------------------
@@ -292,7 +292,7 @@ class ClassTraining(QObject):
                 self.failed.emit(f"{name} did not come to its end. The Train panel says more.")
 
     def _learn_step_time(self, run: ClassRun) -> None:
-        """What a step took here is the best estimate for the next training."""
+        """Store the measured time of a step as the estimate for the next training."""
         step_s, words = run.history.step_s, run.about.get("timed_as")
         if step_s is not None and isinstance(words, list):
             self.step_times.learn(StepKey(tuple(map(str, words))), step_s)

@@ -75,7 +75,7 @@ class ExportDialog(QDialog):
         )  # fmt: skip
         self._people = QLineEdit(self)
         self._people.setAccessibleName("Who each recording is of")
-        self._people.setPlaceholderText("everyone another person; or names, as anna, anna, ben")
+        self._people.setPlaceholderText("each a different person; or names, as anna, anna, ben")
         self._people.editingFinished.connect(self._name_people)
         self._boxes = {name: QCheckBox(name, self) for name in MAPS}
         for box in self._boxes.values():
@@ -180,7 +180,7 @@ class ExportDialog(QDialog):
         self._show_writing()
 
     def _may(self, field: QWidget) -> bool:
-        """Whether a field can be changed now."""
+        """True if a field can be changed now."""
         model = self._model
         if model.exporting:
             return False

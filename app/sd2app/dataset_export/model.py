@@ -36,7 +36,7 @@ MAPS: dict[str, tuple[MapKind, ...]] = {
 
 @dataclass(frozen=True)
 class ExportChoice:
-    """What a data set is to hold.
+    """Choices for a data set.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class ExportChoice:
     planned : bool
         From all places that each recording plans, besides its own sensor.
     subjects : tuple of str
-        Who each recording is of; empty: everyone another person.
+        Who each recording is of; empty: each of a different person.
     length, overlap : int
         Frames.
     ending : str
@@ -69,7 +69,7 @@ class ExportChoice:
 
     @property
     def sources(self) -> tuple[object, ...]:
-        """What decides which sources there are."""
+        """Choices that decide which sources there are."""
         return self.place, self.maps, self.planned, self.subjects
 
     def to_json(self) -> dict[str, Any]:
@@ -156,22 +156,22 @@ class ExportModel(QObject):
 
     @property
     def choice(self) -> ExportChoice:
-        """What was chosen."""
+        """Current choices."""
         return self._choice
 
     @property
     def forecast(self) -> Forecast | None:
-        """What would be written; None while that is counted, or where it cannot be."""
+        """Forecast of the data set; None while it is counted, or where it cannot be."""
         return None if self._counted is None or self.counting else self._counted.forecast
 
     @property
     def counting(self) -> bool:
-        """Whether what would be written is being counted."""
+        """True while the forecast is counted."""
         return self._runner.busy
 
     @property
     def problem(self) -> str:
-        """Why these choices cannot be exported; empty where they can."""
+        """Reason why these choices cannot be exported; empty where they can."""
         return self._problem
 
     @property
@@ -181,7 +181,7 @@ class ExportModel(QObject):
 
     @property
     def exporting(self) -> bool:
-        """Whether a data set is being written."""
+        """True while a data set is written."""
         return self._run is not None
 
     @property
@@ -191,22 +191,22 @@ class ExportModel(QObject):
 
     @property
     def result(self) -> Exported | None:
-        """What was written last, until something else is chosen."""
+        """Data set that was written last, until something else is chosen."""
         return self._result
 
     @property
     def ready(self) -> bool:
-        """Whether there is something to write, and nothing being written."""
+        """True if there is something to write and nothing is being written."""
         forecast = self.forecast
         return forecast is not None and forecast.segments > 0 and not self.exporting
 
     @property
     def stopping(self) -> bool:
-        """Whether the writing was told to stop."""
+        """True once the export was told to stop."""
         return self._run is not None and self._run.phase == "stopping"
 
     def begin(self, place: Path | None) -> None:
-        """Start anew with a recording or a folder, keeping other choices; looks at it again."""
+        """Choose a recording or a folder and read it again; other choices stay."""
         self._counted = None
         self._places = _places(place)
         planned = self._choice.planned and self._places > 0

@@ -1,4 +1,4 @@
-"""What a data set would hold, in words."""
+"""Forecast of a data set in words."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from sd2core.datasets.forecast import Forecast
 
 
 def size_words(forecast: Forecast, length: int) -> str:
-    """How much it is: ``24 segments of 2.4 s from 3 views · 0.7 MB before compression``."""
+    """Size in words: ``24 segments of 2.4 s from 3 views · 0.7 MB before compression``."""
     seconds = length / forecast.frame_rate_hz
     views = f"{forecast.sources:,} view{'s' * (forecast.sources != 1)}"
     return (
@@ -16,13 +16,13 @@ def size_words(forecast: Forecast, length: int) -> str:
 
 
 def label_words(forecast: Forecast) -> str:
-    """How many segments of each label."""
+    """Number of segments of each label."""
     named = " · ".join(f"{name} {count:,}" for name, count in forecast.of_label.items())
     return f"Labels: {named}" if named else ""
 
 
 def split_words(forecast: Forecast) -> str:
-    """How many segments of each split, and of whom."""
+    """Number of segments and people of each split."""
     if not (forecast.split.validation or forecast.split.test):
         who = _named(forecast.split.training)
         return f"Split: all {forecast.segments:,} to train ({who}); nobody is left to judge on"

@@ -1,4 +1,4 @@
-"""The clock goes along with a fit, until somebody moves it otherwise."""
+"""Playback that follows a fit until the user moves the clock."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ class FitFollower(QObject):
 
     @property
     def following(self) -> bool:
-        """Whether the clock goes along."""
+        """True while the clock follows the fit."""
         return self._following
 
     @property
     def on_screen(self) -> bool:
-        """Whether the window shows the video of the fit."""
+        """True if the window shows the video of the fit."""
         request, recording = self._fit.request, self._document.recording
         if request is None or recording is None or recording.video is None:
             return False

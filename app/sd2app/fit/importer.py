@@ -1,4 +1,4 @@
-"""What becomes of a finished fit: a recording, opened where nobody is at something else."""
+"""Import of a finished fit as a recording, opened where nothing else is in use."""
 
 from __future__ import annotations
 

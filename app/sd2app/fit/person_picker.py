@@ -37,7 +37,7 @@ class PersonPicker(QWidget):
 
     @property
     def box(self) -> QRectF:
-        """Where the picture is."""
+        """Rectangle of the picture."""
         size = self._setup.size
         if size is None:
             return QRectF()

@@ -1,4 +1,4 @@
-"""What is to be fitted, and where it is put; kept on disk until the recording is made."""
+"""Request for a fit: video, choices and folder; on disk until the recording is made."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class FitRequest:
 
     @property
     def partial(self) -> Path:
-        """What a stopped fit leaves, and continues with."""
+        """Partial result of a stopped fit, from which it continues."""
         return self.folder / f"{self.mesh_name}.partial"
 
     @property
@@ -88,7 +88,7 @@ class FitRequest:
         return words
 
     def asks_the_same(self, other: FitRequest) -> bool:
-        """Whether the other's work can be continued for this one."""
+        """True if the work of the other request can be continued for this one."""
         focal_px, other_px = self.focal_px or 0.0, other.focal_px or 0.0
         return (
             self.video == other.video
@@ -122,7 +122,7 @@ class FitRequest:
 
     @property
     def unfinished(self) -> bool:
-        """Whether there is something to continue with, or a mesh without its recording."""
+        """True if there is a fit to continue, or a mesh without its recording."""
         return (self.folder / REQUEST_NAME).exists() and self.video.exists()
 
 

@@ -50,7 +50,7 @@ def make_recording(
 
 
 def awaits(recording: Recording, video: Path) -> bool:
-    """Whether a recording is of this video and has no mesh."""
+    """True if a recording is of this video and has no mesh."""
     if recording.video is None or recording.mesh is not None:
         return False
     return plain_path(recording.video) == plain_path(video)

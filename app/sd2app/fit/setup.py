@@ -1,4 +1,4 @@
-"""What the user says before a body is fitted: video, person, height, camera, place."""
+"""Set-up of a fit: video, person, height, camera, folder."""
 
 from __future__ import annotations
 
@@ -67,12 +67,12 @@ class FitSetupModel(QObject):
 
     @property
     def reading(self) -> bool:
-        """Whether it is being opened."""
+        """True while the video is being opened."""
         return self._opener.busy
 
     @property
     def problem(self) -> str:
-        """Why it cannot be shown."""
+        """Reason why the video cannot be shown."""
         return self._problem
 
     @property
@@ -132,7 +132,7 @@ class FitSetupModel(QObject):
 
     @property
     def completes(self) -> bool:
-        """Whether the recording is there and gets the mesh."""
+        """True if the recording exists and gets the mesh."""
         return self._folder is not None and (self._folder / "recording.json").exists()
 
     @property
@@ -142,7 +142,7 @@ class FitSetupModel(QObject):
 
     @property
     def camera(self) -> CameraWay:
-        """How the focal length is known."""
+        """Source of the focal length."""
         return self._camera
 
     @property
@@ -164,18 +164,18 @@ class FitSetupModel(QObject):
 
     @property
     def kept(self) -> FitRequest | None:
-        """What a stopped fit of this video left in the folder."""
+        """Request of a stopped fit of this video in the folder."""
         kept = read_request(self._folder) if self._folder is not None else None
         return kept if kept is not None and kept.video == self._video else None
 
     @property
     def continues(self) -> bool:
-        """Whether that can be continued: it was made with the same choices."""
+        """True if that can be continued: it was made with the same choices."""
         return self.ready and self.kept is not None and self.request().asks_the_same(self.kept)
 
     @property
     def ready(self) -> bool:
-        """Whether the fit can begin."""
+        """True if the fit can begin."""
         return self._reader is not None and self._folder is not None and not self._problem
 
     def set_folder(self, folder: Path) -> None:
@@ -183,7 +183,7 @@ class FitSetupModel(QObject):
         self._change("_folder", folder)
 
     def set_stature(self, stature_m: float | None) -> None:
-        """Say how tall the person is, or that nobody knows."""
+        """Set the height of the person; None to have it estimated."""
         if stature_m is not None:
             stature_m = min(max(stature_m, STATURES_M[0]), STATURES_M[1])
         self._change("_stature_m", stature_m)
@@ -272,7 +272,7 @@ class FitSetupModel(QObject):
 
 
 def folder_for(video: Path, open_now: Recording | None = None) -> Path:
-    """Where to save by default.
+    """Default folder to save in.
 
     The recording that is open where it is saved, is of this video and has no mesh; a
     folder in which a fit of this video was stopped; else a new name beside the video.

@@ -45,7 +45,7 @@ def resume_arguments(run: Path) -> list[str]:
 
 
 def quoted(arguments: list[str]) -> str:
-    """As typed into a terminal."""
+    """Command line for a terminal."""
     words = ["sd2", *arguments]
     if sys.platform == "win32":
         import subprocess

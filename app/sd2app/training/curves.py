@@ -23,7 +23,7 @@ _ROUND = ((1,), (1, 3), (1, 2, 5), (1, 2, 3, 5, 7), (1, 1.5, 2, 3, 4, 5, 6, 8))
 
 @dataclass(frozen=True)
 class _Scale:
-    """Epochs and errors to pixels; worked out once for all that is drawn."""
+    """Map from epochs and errors to pixels, computed once per paint."""
 
     left_px: float
     per_epoch_px: float
@@ -65,7 +65,7 @@ class TrainingCurves(SteppedPlot):
         return QPointF(self._scale().x_of(point.epoch), self.plot_rect().center().y())
 
     def words_of(self, point: EpochPoint) -> str:
-        """What an epoch came to."""
+        """Errors of an epoch in words."""
         return point_text(point)
 
     @property
@@ -168,7 +168,7 @@ class TrainingCurves(SteppedPlot):
         painter.drawPolyline(QPolygonF(line))
 
     def _paint_marks(self, painter: QPainter, plot: QRectF, scale: _Scale) -> None:
-        """A ring around the best epoch; a line where somebody points."""
+        """Draw a ring around the best epoch and a line at the pointed one."""
         colours, best, pointed = self._display.palette, self._history.best, self.pointed
         painter.setBrush(Qt.BrushStyle.NoBrush)
         if best is not None and best.validation_rmse > 0:
@@ -198,7 +198,7 @@ class TrainingCurves(SteppedPlot):
 
 
 def error_ticks(axis: LogAxis, most: int) -> list[float]:
-    """As many round values as there is room for, also on less than a decade."""
+    """Round tick values that fit into the axis, also over less than a decade."""
     first, last = (math.floor(math.log10(end)) for end in (axis.low, axis.high))
     found: list[float] = []
     for steps in _ROUND:

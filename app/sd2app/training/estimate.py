@@ -1,4 +1,4 @@
-"""How long a training will take, and where that is known from."""
+"""Estimated time of a training, and its source."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a training run has told so far, put together from its lines of progress."""
+"""History of a training run, read from its lines of progress."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ class TrainingHistory:
 
     @property
     def epoch(self) -> int:
-        """The epoch under way, from 1; nought before the first."""
+        """Number of the epoch under way, from 1; zero before the first."""
         return self._epoch
 
     @property
@@ -191,7 +191,7 @@ class TrainingHistory:
 
 
 def _count(value: Any, least: int = 0) -> int:
-    """A whole number; nought for what was not told."""
+    """Whole number; zero for what was not told."""
     count = 0 if value is None else int(value)
     if count < least:
         raise ValueError(f"{value!r}")

@@ -1,4 +1,4 @@
-"""What a trained model gains over what was there before, on the recording that is open."""
+"""Improvement of a trained model over the earlier one, on the open recording."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ class KnownRun:
 
     @property
     def live(self) -> bool:
-        """Whether a process is at it."""
+        """True while a process works on it."""
         return self.status.state in LIVE
 
     @property
@@ -42,7 +42,7 @@ class KnownRun:
 
 
 def user_runs_folder() -> Path:
-    """Where runs are kept unless the user says otherwise."""
+    """Default folder of runs."""
     import platformdirs
 
     return Path(platformdirs.user_data_dir("sd2-studio", appauthor=False)) / "runs"
@@ -74,12 +74,12 @@ class TrainingLibrary(QObject):
 
     @property
     def folder(self) -> Path:
-        """Where it looks."""
+        """Folder that is searched for runs."""
         return self._folder
 
     @property
     def runs(self) -> tuple[KnownRun, ...]:
-        """What was found, the newest first."""
+        """Runs that were found, the newest first."""
         return self._runs
 
     @property

@@ -102,7 +102,7 @@ class TrainingModel(QObject):
 
     @property
     def under_way(self) -> bool:
-        """Whether the run in view has a process."""
+        """True while the run in view has a process."""
         return self._monitor is not None and self._monitor.loaded and self._monitor.under_way
 
     def to_be_left(self) -> TrainingMonitor | None:
@@ -119,7 +119,7 @@ class TrainingModel(QObject):
 
     @property
     def mark(self) -> str:
-        """How far the run in view is, in a word; empty when none is under way."""
+        """Share of the run in view that is done, as text; empty when none is under way."""
         if not self.under_way or self._monitor is None:
             return ""
         share = self._monitor.history.share
@@ -129,7 +129,7 @@ class TrainingModel(QObject):
 
     @property
     def closing(self) -> Closing:
-        """What happens to the run when the window is closed."""
+        """Choice of what happens to the run when the window is closed."""
         stored = self._settings.stored("training/closing", "ask")
         return next((name for name in CLOSING if name == stored), "ask")
 
@@ -140,7 +140,7 @@ class TrainingModel(QObject):
 
     @property
     def why_not_start(self) -> str:
-        """Why no run can be started; empty when it can."""
+        """Reason why no run can be started; empty when one can."""
         live = self.library.live
         path = self._monitor.path if self._monitor and self.under_way else None
         if live is not None or path is not None:
@@ -149,7 +149,7 @@ class TrainingModel(QObject):
 
     @property
     def command(self) -> str:
-        """What is set up, as a command for a terminal.
+        """Command for a terminal that does what is set up.
 
         Raises
         ------
@@ -160,7 +160,7 @@ class TrainingModel(QObject):
         return quoted(train_arguments(config, Path(new_run_folder(Path(), config).name)))
 
     def set_watched(self, watched: bool) -> None:
-        """Somebody looks at the panel, or no longer: a step is timed for nobody else."""
+        """Note that the panel is visible or hidden: steps are timed only while it is visible."""
         self._watched = watched
         if watched:
             self.setup.refresh()
@@ -324,7 +324,7 @@ class TrainingModel(QObject):
             self.failed.emit(f"{name} could not be trained to its end. The Train panel says more.")
 
     def _learn_step_time(self, run: TrainingMonitor) -> None:
-        """What a step takes here is the best estimate for the next run."""
+        """Store the measured time of a step as the estimate for the next run."""
         step_s, config = run.history.step_s, run.config
         if step_s is not None and config is not None:
             key = StepKey.of_denoiser(config.model.name, config.training.batch_size)

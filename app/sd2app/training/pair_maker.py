@@ -1,4 +1,4 @@
-"""Pairs made of recordings, in a process beside the window."""
+"""Pairs made of recordings in a background process."""
 
 from __future__ import annotations
 
@@ -55,12 +55,12 @@ class PairMaker(QObject):
 
     @property
     def out(self) -> Path | None:
-        """What is being made."""
+        """Store that is being made."""
         return self._out
 
     @property
     def cancelling(self) -> bool:
-        """Whether it was told to end."""
+        """True once it was told to end."""
         return self._out is not None and self._cancelled
 
     def make(self, place: Path) -> None:

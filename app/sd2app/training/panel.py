@@ -16,7 +16,7 @@ from sd2app.widgets.run_list import RunPanel
 
 
 class Asks(Protocol):
-    """What the panel leaves to dialogs."""
+    """Actions of the panel that dialogs carry through."""
 
     def ask_store(self) -> None:
         """Let the user choose a store of pairs."""

@@ -21,7 +21,7 @@ CALM_MS = 150
 
 
 class Denoising(Protocol):
-    """What is asked of the model that denoises the recording."""
+    """Interface of the model that denoises the recording."""
 
     changed: SignalInstance
 
@@ -31,11 +31,11 @@ class Denoising(Protocol):
 
     @property
     def busy(self) -> bool:
-        """Whether a map is on its way."""
+        """True while a map is computed."""
 
     @property
     def comparing(self) -> bool:
-        """Whether the map of the model before is shown as well."""
+        """True if the earlier model's map is shown as well."""
 
     def use(self, path: Path | None) -> None:
         """Denoise with a model, or with none."""
@@ -133,22 +133,22 @@ class TrainingUse(QObject):
 
     @property
     def gain(self) -> Gain | None:
-        """What it gains; None until it is known, or where no radar was there."""
+        """Improvement over the earlier model; None while unknown or without a radar."""
         return self._gain if self.run is not None else None
 
     @property
     def has_radar(self) -> bool:
-        """Whether there is a map of a radar to compare with."""
+        """True if there is a radar's map to compare with."""
         return self._radar.map is not None
 
     @property
     def comparing(self) -> bool:
-        """Whether the map of the model before is shown as well."""
+        """True if the earlier model's map is shown as well."""
         return self._denoise.comparing
 
     @property
     def can_compare(self) -> bool:
-        """Whether there was a model before."""
+        """True if there was an earlier model."""
         return self._previous is not None
 
     # --- what one can do ------------------------------------------------------------------
@@ -237,7 +237,7 @@ class TrainingUse(QObject):
 def _radar_at(
     doppler: DopplerMap, radar: DopplerMap, offset_s: float
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """What the radar saw at the frames of a map, (frames, bins), and where it was on."""
+    """Values of the radar at the frames of a map, and a mask of those it covers."""
     times_s = doppler.timebase.times_s
     there_s = radar.timebase.times_s + offset_s
     right = np.clip(np.searchsorted(there_s, times_s), 1, max(len(there_s) - 1, 1))

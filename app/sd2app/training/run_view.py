@@ -92,7 +92,7 @@ class TrainingRunView(QWidget):
         self._refresh()
 
     def set_in_use(self, in_use: bool) -> None:
-        """Whether the model of this run denoises the recording already."""
+        """Note that the model of this run denoises the recording, or does not."""
         if in_use != self._in_use:
             self._in_use = in_use
             self._refresh()

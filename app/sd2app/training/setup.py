@@ -1,4 +1,4 @@
-"""What a training run is to be: pairs, kind of model, settings, and how long it will take."""
+"""Set-up of a training run: pairs, kind of model, settings, and the estimated time."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Store:
 
 @dataclass(frozen=True)
 class Estimate:
-    """How long a run will take, and where that is known from.
+    """Estimated time of a run, and its source.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ class TrainingSetupModel(QObject):
 
     @property
     def reading(self) -> bool:
-        """Whether a store has not been looked into yet."""
+        """True while a store has not been read."""
         return self._runner.busy
 
     @property
@@ -119,7 +119,7 @@ class TrainingSetupModel(QObject):
 
     @property
     def differs(self) -> bool:
-        """Whether a setting, the kind of model apart, is not as the paper has it."""
+        """True if a setting, the kind of model apart, differs from the paper's."""
         return bool(self._values.others.keys() - {"model"})
 
     def set_value(self, name: str, value: Any) -> None:
@@ -172,7 +172,7 @@ class TrainingSetupModel(QObject):
 
     @property
     def problem(self) -> str:
-        """Why it cannot be started; empty when it can."""
+        """Reason why it cannot be started; empty when it can."""
         if not self._stores:
             return "Add pairs to learn from."
         problems = [store.problem for store in self._stores if store.problem]
@@ -194,7 +194,7 @@ class TrainingSetupModel(QObject):
 
     @property
     def config(self) -> TrainConfig:
-        """As the library takes it.
+        """Configuration in the form that the library takes.
 
         Raises
         ------
@@ -222,12 +222,12 @@ class TrainingSetupModel(QObject):
 
     @property
     def step_key(self) -> StepKey:
-        """What the time of a step depends on."""
+        """Settings that the time of a step depends on."""
         return StepKey.of_denoiser(self._values["model"], self._values["batch_size"])
 
     @property
     def estimate(self) -> Estimate:
-        """How long it will take."""
+        """Estimated time."""
         segments = self._segments()
         steps = -(-segments // self._values["batch_size"])
         step = self._times.of(self.step_key)
@@ -238,7 +238,7 @@ class TrainingSetupModel(QObject):
 
     @property
     def division(self) -> Split | None:
-        """Who is learnt from and who is kept out; None until the pairs are known."""
+        """Division of people into training and held-out parts; None until the pairs are known."""
         people = self._people()
         return split_subjects([name for name, _, _ in people]) if people else None
 

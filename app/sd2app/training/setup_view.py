@@ -1,4 +1,4 @@
-"""What is to be trained: pairs, kind of model, settings, and how long it will take."""
+"""Page to set up a training: pairs, kind of model, settings, and the estimated time."""
 
 from __future__ import annotations
 
@@ -199,7 +199,7 @@ class TrainingSetupView(QWidget):
     ) -> None:
         self._estimate = EstimateLines(self._training.step_times, self)
         self._problem = sentence("", "warning")
-        self._start = outlined("Start training", "Train beside the window", start, self)
+        self._start = outlined("Start training", "Train in the background", start, self)
         self._start.setObjectName("primary")
         self._copy = outlined(
             "Copy command", "The same as a command for a terminal", copy_command, self
@@ -255,7 +255,7 @@ class TrainingSetupView(QWidget):
         self._problem.setVisible(bool(setup.stores) and bool(why_not))
         self._problem.setObjectName("muted" if setup.reading else "warning")
         self._start.setEnabled(not why_not)
-        self._start.setToolTip(why_not or "Train beside the window, in a process of its own")
+        self._start.setToolTip(why_not or "Train in a background process")
         self._copy.setEnabled(not setup.problem)
 
     def _list_stores(self) -> None:

@@ -44,22 +44,22 @@ _PHASES: dict[Phase, str] = {
 
 
 def model_name(model: str) -> str:
-    """What a kind of model is called."""
+    """Name of a kind of model."""
     return MODEL_WORDS.get(model, (model, ""))[0]
 
 
 def phase_text(phase: Phase) -> str:
-    """How a run stands."""
+    """Current state of a run."""
     return _PHASES[phase]
 
 
 def state_text(state: State) -> str:
-    """How a run stands, in a list."""
+    """State of a run, for a list."""
     return {"died": "ended unexpectedly", "running": "training"}.get(state, state)
 
 
 def point_text(point: EpochPoint) -> str:
-    """What an epoch came to, a line each."""
+    """Errors of an epoch, one row each."""
     lines = [f"Epoch {point.epoch}" + (", better than all before" if point.best else "")]
     for name, value, unit in (
         ("Training RMSE", point.train_rmse, ""),
@@ -72,7 +72,7 @@ def point_text(point: EpochPoint) -> str:
 
 
 def store_text(facts: PairFacts | None) -> str:
-    """What a store of pairs holds."""
+    """Content of a store of pairs in words."""
     if facts is None:
         return "…"
     people = len(facts.subjects)
@@ -89,7 +89,7 @@ def store_text(facts: PairFacts | None) -> str:
 def division_text(
     division: Split, judged_by: str = "sd2 eval", kept_takes: str = "the last takes"
 ) -> str:
-    """Who is learnt from, and who is not; ``kept_takes`` choose where there is one person."""
+    """Division of people in words; ``kept_takes`` are for validation where there is one person."""
     if division.by_take:
         return (
             f"All of it is of one person: {kept_takes} choose the best model, and how good it is"
@@ -110,12 +110,12 @@ def _listed(names: tuple[str, ...]) -> str:
 
 
 def estimate_text(seconds: float | None) -> str:
-    """How long it will take."""
+    """Estimated time."""
     return "Time: not known yet" if seconds is None else f"Takes {about(seconds)}"
 
 
 def estimate_source_text(count: str, step: StepTime | None, key: StepKey, times: StepTimes) -> str:
-    """Where that is known from; ``count`` says of what, and ends with the number of steps."""
+    """Source of the estimate; ``count`` names the data and ends with the number of steps."""
     if step is not None:
         known = "as in the last run here" if step.source == "run" else "timed here"
         return f"{count} of about {step_text(step.seconds)}, {known}."
@@ -138,7 +138,7 @@ def step_text(seconds: float) -> str:
 
 
 def headline(run: TrainingMonitor) -> str:
-    """How a run stands, and how far it is."""
+    """Phase and progress of a run."""
     phase, history = run.phase, run.history
     if not run.loaded:
         return "Looking…"
@@ -164,7 +164,7 @@ def time_text(run: TrainingMonitor) -> str:
 
 
 def remedy_text(run: TrainingMonitor) -> str:
-    """What to do about a run that has not come to its end."""
+    """Advice for a run that did not reach its end."""
     if run.phase == "died":
         text = "Its process is gone: it was killed, or the machine was switched off."
         if run.resumable:
@@ -191,7 +191,7 @@ def metric_rows(history: TrainingHistory) -> list[tuple[str, str]]:
 
 
 def about_text(run: TrainingMonitor) -> str:
-    """What is being trained, on what."""
+    """Model and data of a run."""
     history, config = run.history, run.config
     parts = [model_name(history.model)] if history.model else []
     if history.parameters:
@@ -207,7 +207,7 @@ def about_text(run: TrainingMonitor) -> str:
 
 
 def gain_summary(gain: Gain | None, has_radar: bool) -> str:
-    """What the figures below are, or why there are none."""
+    """Caption of the figures below, or the reason why there are none."""
     if gain is not None:
         radar = "the simulated radar's" if gain.simulated else "the radar's"
         worse = " Here it is worse than no denoising." if gain.now_mps > gain.plain_mps else ""

@@ -30,7 +30,7 @@ COMMAND = (sys.executable, "-m", "sd2app.background.model_worker.server")
 
 
 class DenoiseProcess:
-    """Started with the first model, started anew where it died; one request at a time.
+    """Started with the first model and again when it dies; one request at a time.
 
     Its methods wait for the answer: they belong into background threads.
 
@@ -49,7 +49,7 @@ class DenoiseProcess:
 
     @property
     def running(self) -> bool:
-        """Whether there is a process."""
+        """True while there is a process."""
         return self._process is not None and self._process.poll() is None
 
     def load(self, path: Path) -> RemoteDenoiser:
@@ -159,7 +159,7 @@ class _Remote:
         self._take(content)
 
     def _take(self, content: dict[str, Any]) -> None:
-        """What else was said of it."""
+        """Take further facts from an answer."""
 
     def _ready(self) -> int:
         """Its number, loaded again where the process that had it is gone."""
@@ -174,12 +174,12 @@ class _Remote:
 
 
 class RemoteDenoiser(_Remote):
-    """What it offers is what ``TrainedDenoiser`` does."""
+    """Stand-in for a ``TrainedDenoiser`` that works in the model process."""
 
     _LOAD = "load"
 
     def denoise(self, doppler: DopplerMap) -> DopplerMap:
-        """What a radar would show in place of a synthetic map."""
+        """Denoised map: an estimate of a radar's map from a synthetic one."""
         content, numbers = packed_map(doppler)
         answer, numbers = self._process.ask(
             {"do": "denoise", "model": self._ready(), "map": content}, numbers
@@ -196,12 +196,12 @@ class RemoteDenoiser(_Remote):
 
 
 class RemoteClassifier(_Remote):
-    """What it offers is what ``TrainedClassifier`` does."""
+    """Stand-in for a ``TrainedClassifier`` that works in the model process."""
 
     _LOAD = "load_classifier"
 
     def probabilities(self, doppler: DopplerMap) -> NDArray[np.float32]:
-        """What every frame of a map shows, (frames, classes)."""
+        """Class probabilities of every frame of a map, (frames, classes)."""
         content, numbers = packed_map(doppler)
         _, answer = self._process.ask(
             {"do": "classify", "model": self._ready(), "map": content}, numbers
@@ -243,7 +243,7 @@ class RemoteClasses(_RemoteSession):
     """Frames with a person in; probabilities of the classes out, as late as the card says."""
 
     def advance(self, energies: NDArray[np.float32]) -> NDArray[np.float32]:
-        """What became known by the next frames: (frames, bins) → (answers, classes)."""
+        """Probabilities that follow from the next frames: (frames, bins) → (answers, classes)."""
         return self._advance(energies, np.ones(len(energies), np.bool_))
 
     def finish(self) -> NDArray[np.float32]:

@@ -1,4 +1,4 @@
-"""How the window talks to the process that denoises: JSON with numbers behind it."""
+"""Messages between the window and the model process: JSON followed by binary arrays."""
 
 from __future__ import annotations
 

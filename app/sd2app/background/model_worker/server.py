@@ -140,13 +140,13 @@ class _LiveClasses:
 
 
 def _packed(rows: NDArray[np.float32]) -> Message:
-    """What a session answered; a denoiser's one frame is one row."""
+    """Answer of a session; one frame of a denoiser is one row."""
     shown = np.ascontiguousarray(np.atleast_2d(rows), np.float32)
     return {"shape": list(shown.shape)}, shown.tobytes()
 
 
 def serve(source: BinaryIO, sink: BinaryIO) -> None:
-    """Answer until nobody asks any more."""
+    """Answer requests until the input is closed."""
     worker = Worker()
     while (request := read_message(source)) is not None:
         try:
