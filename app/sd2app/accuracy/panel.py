@@ -210,7 +210,9 @@ class AccuracyPanel(QWidget):
     def _refresh_reasons(self) -> None:
         choice, in_use = self._trade.choice, self._trade.in_use
         shown = choice is not None and in_use is not None and in_use.plan == choice.plan
-        self._reasons.parentWidget().setVisible(shown)
+        around = self._reasons.parentWidget()
+        assert around is not None
+        around.setVisible(shown)
         if shown and choice is not None:
             self._reasons.show_reasons(choice.reasons)
 

@@ -184,7 +184,7 @@ class AccuracyPlot(PointPlot):
         self, painter: QPainter, plot: QRectF, front: tuple[PlanResult, ...], colour: QColor
     ) -> None:
         """Stepped: between two points one gets the error of the cheaper."""
-        line = QPolygonF()
+        line: list[QPointF] = []
         for result in front:
             place = self.point_of(result)
             if line:
@@ -193,7 +193,7 @@ class AccuracyPlot(PointPlot):
         line.append(QPointF(plot.right(), line[-1].y()))
         painter.setBrush(Qt.BrushStyle.NoBrush)
         painter.setPen(QPen(colour, 1.5))
-        painter.drawPolyline(line)
+        painter.drawPolyline(QPolygonF(line))
 
     def _paint_point(
         self, painter: QPainter, result: PlanResult, colour: QColor, radius_px: float

@@ -150,7 +150,7 @@ class SpectrumView(QWidget):
             return
         self._paint_band(painter, plot, curve, frame, v_max)
         shades = curve.track.shade(doppler_map.values[:, frame], self._display.levels)
-        points = QPolygonF()
+        points: list[QPointF] = []
         for velocity, shade in zip(doppler_map.axis.centres_mps, np.asarray(shades), strict=True):
             points.append(
                 QPointF(plot.left() + plot.width() * float(shade), _y_of(plot, velocity, v_max))
@@ -166,7 +166,7 @@ class SpectrumView(QWidget):
         painter.drawPolygon(area)
         painter.setPen(QPen(colour, 2))
         painter.setBrush(Qt.BrushStyle.NoBrush)
-        painter.drawPolyline(points)
+        painter.drawPolyline(QPolygonF(points))
 
     def _paint_band(
         self, painter: QPainter, plot: QRectF, curve: Curve, frame: int, v_max: float

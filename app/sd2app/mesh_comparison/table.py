@@ -40,7 +40,9 @@ class JointTable(QTableWidget):
         self._display = display
         self.setHorizontalHeaderLabels([text for text, _ in _HEADS])
         for column, (_, tip) in enumerate(_HEADS):
-            self.horizontalHeaderItem(column).setToolTip(tip)
+            head = self.horizontalHeaderItem(column)
+            assert head is not None
+            head.setToolTip(tip)
         self.verticalHeader().hide()
         self.verticalHeader().setDefaultSectionSize(22)
         self.setShowGrid(False)

@@ -126,14 +126,14 @@ class PlacementsPage(QWidget):
         model = self._model
         back = outlined("Previous", "Put the sensor there", lambda: model.step(-1), self)
         on = outlined("Next", "Put the sensor there", lambda: model.step(1), self)
-        for widget in (self._how, self._problem, rule()):
-            layout.addWidget(widget)
+        for above in (self._how, self._problem, rule()):
+            layout.addWidget(above)
         layout.addLayout(_apart(self._count, self._shown))
-        for widget in (self._scale, self._limits, self._radar):
-            layout.addWidget(widget)
+        for fact in (self._scale, self._limits, self._radar):
+            layout.addWidget(fact)
         layout.addLayout(_apart(self._current, back, on))
-        for widget in (rule(), self._cost, self._source):
-            layout.addWidget(widget)
+        for below in (rule(), self._cost, self._source):
+            layout.addWidget(below)
 
     def _form(self) -> QGridLayout:
         grid = QGridLayout()

@@ -123,5 +123,6 @@ class ModelButton(QToolButton):
         self.setToolTip(tip)
         self.setAccessibleName(f"{self._chooser.role}: {text}")
         self.updateGeometry()
-        if self.parentWidget() is not None:
-            self.parentWidget().update()
+        parent = self.parentWidget()
+        if parent is not None:
+            parent.update()

@@ -94,7 +94,9 @@ class InnerPages(QWidget):
         policy = QSizePolicy.Policy
         for place in range(self._pages.count()):
             kept = policy.Preferred if place == shown else policy.Ignored
-            self._pages.widget(place).setSizePolicy(policy.Preferred, kept)
+            page = self._pages.widget(place)
+            assert page is not None
+            page.setSizePolicy(policy.Preferred, kept)
 
     def _button(self, page: InnerPage) -> QToolButton:
         button = QToolButton(self)
