@@ -63,7 +63,7 @@ def draw_landmarks(
     scale = box.width() / size[0], box.height() / size[1]
     places = [QPointF(box.x() + x * scale[0], box.y() + y * scale[1]) for x, y, _ in points]
     visibility = np.clip(points[:, 2], 0.0, 1.0)
-    known: NDArray[np.bool_] = np.isfinite(points).all(axis=1)
+    known = np.asarray(np.isfinite(points).all(axis=1))
     painter.save()
     painter.setClipRect(box)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
