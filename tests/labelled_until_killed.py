@@ -22,14 +22,15 @@ from fake_ladder import FakeLadder
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QToolButton
+from window_models import models_of
 
 # Before the fork, so that a window stands in a second.
 import sd2app.scene
-import sd2app.shell.file_dialogs
 import sd2app.shell.wiring  # noqa: F401
 from sd2app.labels.recovery_bar import LabelBar
 from sd2app.labels.timeline import ROW_PX, LabelTimeline
 from sd2app.settings import Settings
+from sd2app.shell.parts import Parts
 from sd2app.shell.window import MainWindow
 from sd2core.labels.entries import labels_entry
 from sd2core.labels.recovery import offers_in, recovery_folder
@@ -66,14 +67,14 @@ class Editor:
 
     def __init__(self, window: MainWindow, seed: int, told: int) -> None:
         self.window, self.rng, self.told = window, random.Random(seed), told
-        self.context = window.context
-        offer = self.context.label_session.offer
+        self.models = models_of(window)
+        offer = self.models.label_session.offer
         self.edits = 0 if offer is None else offer.edits
         if offer is not None:
             buttons = window.findChild(LabelBar).findChildren(QToolButton)
             restore = next(one for one in buttons if one.text() == "Restore")
             QTest.mouseClick(restore, Qt.MouseButton.LeftButton)
-        self.labels = self.context.document.labels
+        self.labels = self.models.document.labels
         self.tell()
 
     def tell(self) -> None:
@@ -87,9 +88,9 @@ class Editor:
             key = None
         else:
             key, modifier = self.rng.choice(KEYS)
-            self.context.playback.seek_frame(self.rng.randrange(60))
+            self.models.playback.seek_frame(self.rng.randrange(60))
             QTest.keyClick(self.window, key, modifier)
-        labels = self.context.labels.labels
+        labels = self.models.labels.labels
         if key == Qt.Key.Key_S:
             self.edits = 0
         elif labels != self.labels:
@@ -112,11 +113,12 @@ class Editor:
 def edit_on(recording: Path, seed: int, told: int) -> None:
     """Open, restore, edit for ever."""
     application = QApplication(sys.argv[:1])
-    window = MainWindow(Settings.forgetful(), FakeLadder().ladder, None, FakeDenoisers().library)
+    parts = Parts(ladder=FakeLadder().ladder, denoisers=FakeDenoisers().library)
+    window = MainWindow(Settings.forgetful(), parts)
     window.show()
     window.populate()
     window.open_paths([recording])
-    while window.context.document.content is None:
+    while models_of(window).document.content is None:
         application.processEvents()
     editor = Editor(window, seed, told)
     while True:

@@ -1,66 +1,30 @@
-"""One row of the table of actions, and when rows are enabled."""
+"""What the window asks of its features, and what it offers them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import Protocol, TypeVar
 
-if TYPE_CHECKING:
-    from sd2app.shell.window import MainWindow
-    from sd2app.shell.wiring import Context
+from PySide6.QtCore import SignalInstance
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QMenu, QWidget
 
-Handler = Callable[["MainWindow"], None]
-Test = Callable[["Context"], bool]
+T = TypeVar("T")
 
 
-def always(context: Context) -> bool:
-    """At any time."""
+def always() -> bool:
+    """True at any time."""
     return True
-
-
-def has_content(context: Context) -> bool:
-    """Something is open."""
-    return context.document.content is not None
-
-
-def has_mesh(context: Context) -> bool:
-    """A mesh is open."""
-    return context.document.mesh is not None
-
-
-def has_spans(context: Context) -> bool:
-    """Something is labelled."""
-    return bool(context.labels.labels.spans)
-
-
-def disagree(context: Context) -> bool:
-    """Two annotators disagree somewhere."""
-    return bool(context.agreement.disagreements)
-
-
-def has_suggestions(context: Context) -> bool:
-    """Something is suggested."""
-    return bool(context.suggestions.pending)
-
-
-def one_selected(context: Context) -> bool:
-    """One span is selected."""
-    return len(context.labels.selected) == 1
-
-
-def some_selected(context: Context) -> bool:
-    """Spans are selected."""
-    return bool(context.labels.selected)
 
 
 @dataclass(frozen=True)
 class Action:
-    """One row.
+    """Command of the user in a menu, with its usual keys.
 
-    ``checked`` makes it checkable and says whether it is on; ``why_not`` says in place
-    of the tip why it is not enabled. What ``edits_labels`` is not enabled where labels
-    cannot be edited, and says that.
+    ``checked`` makes it checkable and tells if it is on; ``why_not`` gives the reason why it is
+    disabled, shown in place of the tip, or nothing. Its place in the menus is the shell's matter.
     """
 
     id: str
@@ -68,10 +32,115 @@ class Action:
     text: str
     keys: tuple[str, ...]
     tip: str
-    run: Handler
-    enabled: Test = always
-    checked: Test | None = None
-    separator_before: bool = False
+    run: Callable[[], object]
+    enabled: Callable[[], bool] = always
+    checked: Callable[[], bool] | None = None
     icon: str = ""
-    why_not: Callable[[Context], str] | None = None
-    edits_labels: bool = False
+    why_not: Callable[[], str] | None = None
+
+
+class Keys(Protocol):
+    """Keys of actions and labels, of which no two are alike."""
+
+    def owner(self, key: str, besides: str = "") -> str:
+        """Action or label that has a key, in words; empty if it is free."""
+
+    def for_label(self, name: str, key: str) -> str:
+        """Key that a label gets, as labels store it; refused with ``Sd2Error``."""
+
+
+class Shell(Protocol):
+    """What the window offers its features: a parent for dialogs, messages, pages, files."""
+
+    @property
+    def dialog_parent(self) -> QWidget:
+        """Parent of dialogs."""
+
+    @property
+    def keys(self) -> Keys:
+        """Keys in use."""
+
+    def action(self, name: str) -> QAction:
+        """Action by its id, of any feature."""
+
+    def note(self, text: str) -> None:
+        """Tell the user about something that was done."""
+
+    def warn(self, text: str) -> None:
+        """Tell the user about something that went wrong."""
+
+    def attempt(self, work: Callable[[], T]) -> T | None:
+        """Result of ``work``; an error is told to the user, and None returned."""
+
+    def bring_up(self, panel: str, page: str = "") -> None:
+        """Show a panel at the side, and a page of it."""
+
+    def save(self) -> bool:
+        """Save the recording, asking where if need be; False where the user cancels."""
+
+    def may_discard(self) -> bool:
+        """True once unsaved edits are saved or given up by the user's decision."""
+
+    def open_paths(self, paths: Sequence[Path]) -> None:
+        """Open files in place of what is open."""
+
+
+class Feature:
+    """One subject of the window: builds, wires and closes its models, and hands over its views.
+
+    A feature overrides what it has. Models are made in the constructor and need no display;
+    panels and bars are made by their methods, which are called once.
+    """
+
+    @property
+    def busy(self) -> bool:
+        """True while something is being computed that a picture of the window should wait for."""
+        return False
+
+    def actions(self) -> Sequence[Action]:
+        """Rows of the menus."""
+        return ()
+
+    def menus(self) -> Mapping[str, Callable[[QMenu], object]]:
+        """Functions that fill the places of the menus that follow a model, by their names."""
+        return {}
+
+    def refresh_menus(self) -> None:
+        """Update what :meth:`menus` filled in."""
+
+    def panels(self) -> Mapping[str, QWidget]:
+        """Views by the name of their place in the window."""
+        return {}
+
+    def bars(self) -> Sequence[QWidget]:
+        """Bars above the content, hidden while they have nothing to say."""
+        return ()
+
+    def warnings(self) -> Sequence[SignalInstance]:
+        """Signals with a sentence about something that went wrong."""
+        return ()
+
+    def notes(self) -> Sequence[SignalInstance]:
+        """Signals with a sentence about something that was done."""
+        return ()
+
+    def changes(self) -> Sequence[SignalInstance]:
+        """Signals after which an action may be possible that was not, or the reverse."""
+        return ()
+
+    def take_over(self) -> None:
+        """Follow a recording that has just been opened."""
+
+    def take_dropped(self, path: Path) -> bool:
+        """Use a file that was dropped on the window; False if it is none of this feature's."""
+        return False
+
+    def look_for_unfinished(self) -> None:
+        """Find runs in the background that an earlier window began."""
+
+    def may_close(self) -> bool:
+        """Ask the user what becomes of running work; False if the window is to stay."""
+        return True
+
+    def close(self) -> None:
+        """Stop every thread and let go of files."""

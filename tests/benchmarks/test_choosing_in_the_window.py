@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from PySide6.QtWidgets import QApplication
+from window_models import models_of
 from window_on_sample import settle, window_on_sample
 
 from sd2core.sensor import VirtualSensor
@@ -25,6 +26,7 @@ def ended():
 @pytest.fixture
 def window(qtbot, ended):
     from sd2app.accuracy.ladder import CORE
+    from sd2app.shell.parts import Parts
 
     def survey(*place):
         try:
@@ -32,7 +34,7 @@ def window(qtbot, ended):
         finally:
             ended.append(time.perf_counter())
 
-    with window_on_sample(qtbot, replace(CORE, survey=survey)) as window:
+    with window_on_sample(qtbot, Parts(ladder=replace(CORE, survey=survey))) as window:
         yield window
 
 
@@ -50,7 +52,7 @@ def spin(until):
 
 def choose_and_drag(window, qtbot, ended):
     """Rest at new places, and take hold of the sensor while they are surveyed."""
-    context, trade, rng = window.context, window.context.trade, random.Random(1)
+    context, trade, rng = models_of(window), models_of(window).trade, random.Random(1)
     turns, drawn, left, maps = [], [], [], []
     context.synthetic.changed.connect(lambda: maps.append(time.perf_counter()))
     for number in range(PLACES):

@@ -14,6 +14,7 @@ import time
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt, QTimer
+from window_models import models_of
 from window_on_sample import settle, window_on_sample
 
 from sd2app.background.model_worker.client import DenoiseProcess
@@ -156,7 +157,7 @@ def window(qtbot):
 
 def test_dragging_with_and_without_a_denoiser(benchmark, model, window, qtbot):
     """Maps a second while a hand moves the sensor at 125 Hz, and the window's tick."""
-    c = window.context
+    c = models_of(window)
 
     def drag(seconds=5.0):
         counts, ticks = {"synthetic": 0, "denoised": 0}, []

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from labelled import even, many_spans
 from test_labelling_speed import told
+from window_models import models_of
 from window_on_sample import window_on_sample
 
 from sd2core.labels.edits import nudge, resize
@@ -33,7 +34,7 @@ def test_an_edit_in_the_window(
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
     rng, begun_s, worked_ms, kept_ms, on_disk_ms = random.Random(1), [0.0], [], [], []
     with window_on_sample(qtbot) as window:
-        c, frames = window.context, even(30 * SPANS)
+        c, frames = models_of(window), even(30 * SPANS)
         c.playback.set_timebase(frames)
         c.span.set_extent(frames.start_s, frames.end_s)
         c.document.recording.labels = many_spans(SPANS)

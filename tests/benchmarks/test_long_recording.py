@@ -33,7 +33,7 @@ apply_theme(application, False)
 window = MainWindow(Settings.forgetful())
 window.show()
 window.populate()
-track, context = window.context.synthetic, window.context
+track, context = models_of(window).synthetic, models_of(window)
 
 def resident_mb():
     status = Path("/proc/self/status").read_text()
@@ -48,7 +48,7 @@ def spin(until, limit_s):
         time.sleep(0.001)
     return worst
 
-spin(lambda: window._scene is not None, 60)
+spin(lambda: window.features.scene.view is not None, 60)
 began = time.time()
 window.open_paths([Path(sys.argv[1])])
 spin(lambda: track.map is not None, 60)

@@ -23,6 +23,7 @@ import numpy as np
 import pytest
 import trimesh
 from PySide6.QtWidgets import QApplication
+from window_models import models_of
 
 from sd2core.io.mesh import save_mesh
 from sd2core.labels.files import write_labels
@@ -88,7 +89,7 @@ def long_window(qtbot: Any, long_recording: Path) -> Iterator[Any]:
     qtbot.waitUntil(lambda: window.settled, timeout=60_000)
     began_s, worked_s, all_s = time.perf_counter(), time.thread_time(), time.process_time()
     window.open_paths([long_recording])
-    c = window.context
+    c = models_of(window)
     qtbot.waitUntil(lambda: len(c.labels.labels.spans) == SPANS, timeout=60_000)
     QApplication.processEvents()
     print(f"\nlabels can be edited after {time.perf_counter() - began_s:.2f} s", end="")
@@ -110,7 +111,7 @@ def long_window(qtbot: Any, long_recording: Path) -> Iterator[Any]:
 
 def steps_of(window: Any, length_s: float) -> Iterator[tuple[float, float]]:
     """To and fro along the recording, closer and farther in turn."""
-    first_s, last_s = window.context.span.extent_s
+    first_s, last_s = models_of(window).span.extent_s
     for step in itertools.count():
         length = length_s * (1.0 - 0.1 * (step % 5) / 5)
         start_s = first_s + (last_s - first_s - length) * (0.5 + 0.4 * np.sin(0.1 * step))
@@ -132,7 +133,7 @@ def timed(work: Callable[[], None]) -> tuple[float, float]:
 
 def test_many_labels(benchmark: Any, long_window: Any) -> None:
     """Target: 25 frames a second, each painted in every view."""
-    c = long_window.context
+    c = models_of(long_window)
     labels = c.labels.labels
     assert len(labels.spans) == SPANS
 

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QTimer
 from training_pairs import write_pairs
+from window_models import models_of
 from window_on_sample import window_on_sample
 
 SECONDS = 10.0
@@ -25,8 +26,8 @@ def sample_window(qtbot, tmp_path, monkeypatch):
     with window_on_sample(qtbot) as window:
         window.side.bring_up("Train")
         yield window
-        window.context.training.cancel()
-        qtbot.waitUntil(lambda: not window.context.training.under_way, timeout=60_000)
+        models_of(window).training.cancel()
+        qtbot.waitUntil(lambda: not models_of(window).training.under_way, timeout=60_000)
 
 
 def intervals_ms(window, qtbot) -> np.ndarray:
@@ -35,7 +36,7 @@ def intervals_ms(window, qtbot) -> np.ndarray:
     timer = QTimer()
     timer.setInterval(TICK_MS)
     timer.timeout.connect(lambda: told.append(time.perf_counter()))
-    playback = window.context.playback
+    playback = models_of(window).playback
     playback.seek(0.0)
     playback.set_loop(True)
     playback.play()
@@ -48,7 +49,7 @@ def intervals_ms(window, qtbot) -> np.ndarray:
 
 def test_playing_while_a_training_runs(benchmark, sample_window, qtbot, tmp_path):
     """Target: 95 % of the ticks within 40 ms; S4 on one thread, nice 10, curves in view."""
-    window, training = sample_window, sample_window.context.training
+    window, training = sample_window, models_of(sample_window).training
     alone = intervals_ms(window, qtbot)
     training.setup.add_store(write_pairs(tmp_path / "campaign.zarr", frames=2000))
     qtbot.waitUntil(lambda: not training.setup.problem)
@@ -79,7 +80,7 @@ def test_an_update_of_the_panel(benchmark, sample_window, qtbot, tmp_path):
     from sd2app.training.curves import TrainingCurves
     from sd2app.training.history import EpochPoint, StepPoint
 
-    window, training = sample_window, sample_window.context.training
+    window, training = sample_window, models_of(sample_window).training
     training.setup.add_store(write_pairs(tmp_path / "campaign.zarr"))
     qtbot.waitUntil(lambda: not training.setup.problem)
     training.step_times.stop()

@@ -16,6 +16,7 @@ import time
 
 import pytest
 from PySide6.QtCore import QEvent, QObject, QTimer
+from window_models import models_of
 from window_on_sample import window_on_sample
 
 from sd2core.files.resources import resource_path
@@ -56,13 +57,13 @@ def spin(until, limit_s=60):
         time.sleep(0.001)
 
 spin(lambda: "skeleton_s" in marks)
-track, video = window.context.synthetic, window.context.video
+track, video = models_of(window).synthetic, models_of(window).video
 spin(lambda: track.map is not None and track.covered is None and video.picture is not None
-     and window._scene is not None)
+     and window.features.scene.view is not None)
 mark("usable_s")
-spin(lambda: window.context.synthesis.complete)
+spin(lambda: models_of(window).synthesis.complete)
 mark("exact_s")
-edits, dragged = window.context.edits, []
+edits, dragged = models_of(window).edits, []
 track.changed.connect(lambda: dragged.append(time.time()))
 moved = time.time()
 edits.begin_sensor_drag()
@@ -71,7 +72,7 @@ spin(lambda: dragged)
 marks["first_drag_s"] = dragged[0] - moved
 print(json.dumps(marks))
 edits.end_sensor_drag()
-window.context.document.undo_stack.clear()
+models_of(window).document.undo_stack.clear()
 window.close()
 """
 
@@ -105,7 +106,7 @@ def play(window, qtbot, every_tick=lambda: None):
     heatmaps = [view for view in window.findChildren(HeatmapView) if view.isVisible()]
     views = [window.findChild(VideoView), *heatmaps]
     counter = PaintCounter([*views, *window.findChildren(ImageBackend)])
-    context = window.context
+    context = models_of(window)
     shown = {"pictures": 0, "maps": 0}
     context.video.frame_changed.connect(lambda: shown.update(pictures=shown["pictures"] + 1))
     context.synthetic.changed.connect(lambda: shown.update(maps=shown["maps"] + 1))
@@ -134,7 +135,7 @@ def test_playing_the_sample(benchmark, sample_window, qtbot):
 
 def test_dragging_the_sensor_while_playing(benchmark, sample_window, qtbot):
     """Target: 20 whole-clip heatmaps a second; the hand moves at 125 Hz."""
-    edits = sample_window.context.edits
+    edits = models_of(sample_window).edits
     edits.begin_sensor_drag()
     began = time.perf_counter()
 

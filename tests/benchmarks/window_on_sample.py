@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from window_models import models_of
+
 from sd2core.files.resources import resource_path
 
 
@@ -23,10 +25,10 @@ def window_on_sample(qtbot: Any, *more: Any) -> Iterator[Any]:
     window.open_paths([resource_path("swipes.sd2")])
     settle(window, qtbot)
     yield window
-    window.context.document.undo_stack.clear()
+    models_of(window).document.undo_stack.clear()
     window.close()
 
 
 def settle(window: Any, qtbot: Any) -> None:
     """Wait until nothing is under way and the map is exact."""
-    qtbot.waitUntil(lambda: window.settled and window.context.synthesis.complete, timeout=60_000)
+    qtbot.waitUntil(lambda: window.settled and models_of(window).synthesis.complete, timeout=60_000)

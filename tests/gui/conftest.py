@@ -12,6 +12,7 @@ from fake_classifiers import FakeClassifiers
 from fake_denoisers import FakeDenoisers
 from fake_ladder import FakeLadder
 from PySide6.QtCore import QCoreApplication, QEvent
+from window_models import models_of
 
 from sd2core.io.mesh import save_mesh
 from sd2core.io.radar.infineon import write_capture
@@ -114,14 +115,12 @@ def fake_classes() -> FakeClassifiers:
 def empty_window(qtbot, compiled_kernels, fake, fake_models, fake_classes):
     """The window without a recording, all views in place."""
     from sd2app.settings import Settings
+    from sd2app.shell.parts import Parts
     from sd2app.shell.window import MainWindow
 
     window = MainWindow(
         Settings.forgetful(),
-        fake.ladder,
-        None,
-        fake_models.library,
-        classifiers=fake_classes.library,
+        Parts(ladder=fake.ladder, denoisers=fake_models.library, classifiers=fake_classes.library),
     )
     window.resize(1280, 800)
     window.show()
@@ -131,7 +130,7 @@ def empty_window(qtbot, compiled_kernels, fake, fake_models, fake_classes):
     fake.gate.set()
     fake_classes.gate.set()
     if window.ready:
-        window.context.document.undo_stack.clear()
+        models_of(window).document.undo_stack.clear()
     window.close()
     # Styling the next window would style all that are still there.
     window.deleteLater()
@@ -140,10 +139,10 @@ def empty_window(qtbot, compiled_kernels, fake, fake_models, fake_classes):
 
 def opened(window, qtbot, recording):
     """The window on a recording, everything computed."""
-    with qtbot.waitSignal(window.context.document.opened, timeout=120_000):
+    with qtbot.waitSignal(models_of(window).document.opened, timeout=120_000):
         window.open_paths([recording])
     qtbot.waitUntil(lambda: window.settled, timeout=120_000)
-    qtbot.waitUntil(lambda: window.context.synthesis.complete, timeout=120_000)
+    qtbot.waitUntil(lambda: models_of(window).synthesis.complete, timeout=120_000)
     return window
 
 

@@ -6,6 +6,7 @@ from typing import Any
 
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
+from window_models import models_of
 
 from sd2app.labels.timeline import LabelTimeline
 from sd2app.maps.heatmap import HeatmapView
@@ -18,17 +19,17 @@ LEFT = Qt.MouseButton.LeftButton
 
 def spans(window: Any, track: str | None = None) -> list[tuple[str, int, int]]:
     """What is labelled, in frames; all of it, or on one track."""
-    base = window.context.playback.timebase
+    base = models_of(window).playback.timebase
     return [
         (span.label, *base.frames_between(span.start_s, span.end_s))
-        for span in window.context.labels.labels.spans
+        for span in models_of(window).labels.labels.spans
         if track in (None, span.track)
     ]
 
 
 def chosen(window: Any) -> list[str]:
     """The labels of what is selected."""
-    return [span.label for span in window.context.labels.selected]
+    return [span.label for span in models_of(window).labels.selected]
 
 
 def key(window: Any, name: str, modifier: Qt.KeyboardModifier = NONE) -> None:

@@ -50,10 +50,10 @@ def learning(application: QApplication) -> None:
 def training(application: QApplication, campaign: Path) -> None:
     """The Train panel while a denoiser learns from a small simulated campaign."""
     window = opened(application, [resource_path("swipes.sd2")], campaign.with_name("runs"))
-    window.context.playback.seek(1.9)
+    window.session.playback.seek(1.9)
     window.resize(1280, 960)
-    window.show_training("denoisers")
-    model = window.context.training
+    window.bring_up("Train", "Denoiser")
+    model = window.features.training.model
     model.setup.add_store(campaign)
     model.setup.set_value("epochs", 40)
     wait_for(application, lambda: not model.setup.problem)
@@ -69,8 +69,8 @@ def classifier(application: QApplication, sample: Path, campaign: Path) -> None:
     """A classifier that learnt from the campaign, on the sample; then a quick comparison."""
     window = opened(application, [sample])
     window.resize(1280, 960)
-    window.show_training("classifiers")
-    model, classify = window.context.class_training, window.context.classify
+    window.bring_up("Train", "Classifier")
+    model, classify = window.features.classify.training, window.features.classify.model
     model.setup.add(campaign)
     model.setup.set_map("denoised", True)
     wait_for(application, lambda: not model.setup.problem)
@@ -78,7 +78,7 @@ def classifier(application: QApplication, sample: Path, campaign: Path) -> None:
     _wait_for_end(application, window)
     model.use_model()
     wait_for(application, lambda: classify.track.complete and not classify.busy)
-    window.context.playback.seek(3.7)
+    window.session.playback.seek(3.7)
     wait_until_settled(application, window, LIMIT_S)
     window.messages.hide()
     application.processEvents()
@@ -87,7 +87,7 @@ def classifier(application: QApplication, sample: Path, campaign: Path) -> None:
     model.select(None)
     model.compare()
     _wait_for_end(application, window)
-    window.class_dialogs.show_result()
+    window.features.classify.dialogs.show_result()
     result = window.findChild(ClassResultDialog)
     application.processEvents()
     save(result, "class-result.png")
@@ -98,8 +98,8 @@ def classifier(application: QApplication, sample: Path, campaign: Path) -> None:
 def export(application: QApplication, sample: Path) -> None:
     """A data set of the sample, as it is written, with its preview sheet."""
     window = opened(application, [sample])
-    window.dialogs.export_dataset()
-    dialog, model = window.findChild(ExportDialog), window.context.export
+    window.action("export_dataset").trigger()
+    dialog, model = window.findChild(ExportDialog), window.features.dataset_export.model
     wait_for(application, lambda: model.ready)
     model.start(sample.with_name("gestures.zarr"))
     wait_for(application, lambda: not model.exporting)
@@ -112,11 +112,11 @@ def export(application: QApplication, sample: Path) -> None:
 def batch(application: QApplication, sample: Path) -> None:
     """The batch window after a batch of the sample, seen from nine places."""
     window = opened(application, [sample])
-    model = window.context.batch
+    model = window.features.batch.model
     grid = PlacementGrid((1.5, 2.2, 3.0), (-30.0, 0.0, 30.0))
     model.setup.add([sample])
     model.setup.set_placements(grid, "grid.json")
-    window.batch_dialogs.show()
+    window.features.batch.dialogs.show()
     wait_for(application, lambda: not model.why_not_start)
     model.start()
     wait_for(application, lambda: model.batch is not None and model.batch.phase == "finished")
@@ -128,6 +128,6 @@ def batch(application: QApplication, sample: Path) -> None:
 
 def _wait_for_end(application: QApplication, window: MainWindow) -> None:
     """Until a training or a comparison of classifiers is over."""
-    model = window.context.class_training
+    model = window.features.classify.training
     wait_for(application, lambda: model.run is not None and not model.under_way, _LONG_S)
     wait_until_settled(application, window, LIMIT_S)

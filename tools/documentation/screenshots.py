@@ -31,49 +31,48 @@ from tools.documentation.windows import LIMIT_S, opened, save, wait_for
 
 def sample(window: MainWindow) -> None:
     """The sample in the middle of a swipe."""
-    window.context.playback.seek(1.9)
+    window.session.playback.seek(1.9)
 
 
 def far_in_the_dark(window: MainWindow) -> None:
     """The sensor moved aside to 6 m, range colours, dark theme."""
-    context = window.context
-    window.set_dark(True)
-    context.playback.seek(2.0)
+    window.features.program.set_dark(True)
+    window.session.playback.seek(2.0)
     sensor = VirtualSensor(position_m=(2.6, -0.6, -2.8))
-    context.edits.place_sensor(aimed_at(sensor, context.synthesis.torso_m))
-    window.set_scene_view("overview")
-    context.display.set_mesh_colour("range")
+    window.session.edits.place_sensor(aimed_at(sensor, window.features.maps.synthesis.torso_m))
+    window.features.scene.view.set_view("overview")
+    window.session.display.set_mesh_colour("range")
 
 
 def trade(window: MainWindow) -> None:
     """The Trade panel on the sample, measured, for a tolerance of 2 %."""
     window.resize(1280, 960)
-    window.context.playback.seek(1.9)
-    window.context.trade.set_tolerance(0.02)
-    window.measure_scene()
+    window.session.playback.seek(1.9)
+    window.features.accuracy.model.set_tolerance(0.02)
+    window.features.accuracy.measure()
 
 
 def labels(window: MainWindow) -> None:
     """The spans of the sample as a table beside the maps, one of them selected."""
     window.resize(1280, 960)
-    window.show_labels()
-    span = window.context.labels.labels.spans[2]
-    window.context.label_edits.go_to(span)
+    window.bring_up("Labels", "Spans")
+    span = window.features.labels.model.labels.spans[2]
+    window.features.labels.edits.go_to(span)
 
 
 def placements(window: MainWindow) -> None:
     """A cloud of sensors planned around the sample's body."""
     window.resize(1280, 960)
-    window.context.playback.seek(1.9)
-    window.show_placements()
-    window.context.edits.plan_placements(
+    window.session.playback.seek(1.9)
+    window.bring_up("Sensor", "Placements")
+    window.session.edits.plan_placements(
         PlacementCloud(120, (1.0, 4.0), (-80.0, 80.0), (-10.0, 50.0), seed=2)
     )
 
 
 def real(window: MainWindow) -> None:
     """A real person with the mesh fitted to the video."""
-    window.context.playback.seek(1.9)
+    window.session.playback.seek(1.9)
 
 
 def strip() -> None:
@@ -95,7 +94,7 @@ def fitting(application: QApplication) -> None:
     with tempfile.TemporaryDirectory() as folder:
         video = Path(shutil.copy(SHARED / "video" / "walk.mkv", folder))
         window = opened(application, [video])
-        fit = window.context.fit
+        fit = window.features.fit.model
         fit.start(FitRequest(video, video.with_suffix(".sd2")))
 
         def far_enough() -> bool:
@@ -124,8 +123,8 @@ def comparison(application: QApplication) -> None:
             print("comparison.png is left as it is: the fit failed", file=sys.stderr)
             return
         window = opened(application, [sample_folder])
-        window.context.playback.seek(2.1)
-        window.compare_with_mesh(fitted)
+        window.session.playback.seek(2.1)
+        window.features.mesh_comparison.compare(fitted)
         compared = window.findChild(ComparisonWindow)
         wait_for(application, lambda: compared._model.comparison is not None)
         wait_until_settled(application, window, LIMIT_S)
@@ -146,7 +145,7 @@ def take(
         window.messages.hide()
         application.processEvents()
     save(window, name)
-    window.context.document.undo_stack.setClean()
+    window.session.document.undo_stack.setClean()
     window.close()
     application.processEvents()
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from sd2app.agreement.model import AgreementModel
 from sd2app.agreement.text import facts, label_facts, verdict, where
 from sd2app.session.playback import PlaybackModel
-from sd2app.shell.menus import ActionSet
 from sd2app.widgets.inputs import action_button
 from sd2app.widgets.panel import ElidedLabel, FactRows, rule, sentence, title
 
@@ -26,7 +28,7 @@ class AgreementPanel(QWidget):
         self,
         model: AgreementModel,
         playback: PlaybackModel,
-        actions: ActionSet,
+        action: Callable[[str], QAction],
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
@@ -38,12 +40,12 @@ class AgreementPanel(QWidget):
         self._facts = FactRows(_MOST_FACTS, at_the_edge=True, parent=self)
         self._labels = FactRows(_MOST_LABELS, at_the_edge=True, parent=self)
         self._nothing = sentence(_NOTHING)
-        self._result = self._lay_out_result(actions)
+        self._result = self._lay_out_result(action)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(8, 6, 8, 6)
         layout.setSpacing(8)
         layout.addLayout(
-            _row(self._name, actions, ("compare_labels", "File…"), ("end_comparison", "End"))
+            _row(self._name, action, ("compare_labels", "File…"), ("end_comparison", "End"))
         )
         layout.addWidget(self._nothing)
         layout.addWidget(self._result)
@@ -52,7 +54,7 @@ class AgreementPanel(QWidget):
         playback.frame_changed.connect(self._follow_cursor)
         self._refresh()
 
-    def _lay_out_result(self, actions: ActionSet) -> QWidget:
+    def _lay_out_result(self, action: Callable[[str], QAction]) -> QWidget:
         result = QWidget(self)
         layout = QVBoxLayout(result)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -61,7 +63,7 @@ class AgreementPanel(QWidget):
         layout.addWidget(self._verdict)
         layout.addWidget(sentence(_MEANING))
         layout.addWidget(rule())
-        layout.addLayout(_row(title("Disagreements"), actions, *buttons))
+        layout.addLayout(_row(title("Disagreements"), action, *buttons))
         layout.addWidget(self._where)
         layout.addWidget(rule())
         layout.addWidget(self._facts)
@@ -87,12 +89,14 @@ class AgreementPanel(QWidget):
             self._where.setText(where(self._model))
 
 
-def _row(heading: QWidget, actions: ActionSet, *buttons: tuple[str, str]) -> QHBoxLayout:
+def _row(
+    heading: QWidget, action: Callable[[str], QAction], *buttons: tuple[str, str]
+) -> QHBoxLayout:
     row = QHBoxLayout()
     row.setSpacing(6)
     row.addWidget(heading, 1)
     for name, text in buttons:
-        button = action_button(actions[name], text)
+        button = action_button(action(name), text)
         button.setObjectName("outlined")
         button.setAccessibleName(text)
         row.addWidget(button)

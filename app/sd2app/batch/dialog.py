@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QTimer, QUrl
 from PySide6.QtGui import QDesktopServices, QHideEvent, QShowEvent
@@ -22,6 +21,9 @@ from sd2app.batch.model import BatchModel
 from sd2app.batch.results import Result
 from sd2app.batch.run_view import BatchRunView
 from sd2app.batch.setup_view import BatchSetupView
+from sd2app.feature import Shell
+from sd2app.sensor.placements import PlacementsModel
+from sd2app.session.session import Session
 from sd2app.widgets.panel import outlined, sentence, title
 from sd2app.widgets.text import counted
 from sd2core.batch.plan_file import write_plan
@@ -30,9 +32,6 @@ from sd2core.files.paths import plain_path
 from sd2core.io.kinds import VIDEO_SUFFIXES
 from sd2core.placements.placements import Placements, read_placements
 from sd2core.recording.recording import is_recording, open_recording
-
-if TYPE_CHECKING:
-    from sd2app.shell.wiring import Context
 
 _FILES = (
     "Recordings, videos, meshes (*.mp4 *.mkv *.mov *.avi *.webm *.npz *.zip *.obj *.ply *.glb"
@@ -44,39 +43,30 @@ _OWN, _PLANNED, _FILE = range(3)
 
 
 class BatchDialogs:
-    """Asks, then calls the models; a failure is handed to ``report`` as a sentence.
-
-    Parameters
-    ----------
-    parent : QWidget
-    context : Context
-    report : callable
-    open_paths : callable
-        Opens files in the window; False where the user wants to keep what is open.
-    """
+    """Asks, then calls the models; ``installed`` names the denoisers that are there."""
 
     def __init__(
         self,
-        parent: QWidget,
-        context: Context,
-        report: Callable[[str], None],
-        open_paths: Callable[[list[Path]], bool],
+        batch: BatchModel,
+        session: Session,
+        shell: Shell,
+        placements: PlacementsModel,
+        installed: Callable[[], Sequence[str]],
     ) -> None:
-        self._parent, self._context = parent, context
-        self._batch = context.batch
-        self._report, self._open_paths = report, open_paths
+        self._batch, self._session, self._shell = batch, session, shell
+        self._placements, self._installed = placements, installed
         self._window: BatchWindow | None = None
         self._opening: tuple[Result, set[Path]] | None = None
-        context.placements.changed.connect(self._follow_plan)
-        context.document.opened.connect(self._place_sensor)
-        context.document.failed.connect(lambda _: self._forget_result())
+        placements.changed.connect(self._follow_plan)
+        session.document.opened.connect(self._place_sensor)
+        session.document.failed.connect(lambda _: self._forget_result())
 
     # --- the window -----------------------------------------------------------------------
 
     def show(self) -> None:
         """Bring up the batch in view, or set up another."""
         if self._window is None:
-            self._window = BatchWindow(self._batch, self, self._parent)
+            self._window = BatchWindow(self._batch, self, self._shell.dialog_parent)
         if self._batch.batch is None and not self._batch.setup.entries:
             self._add_what_is_open()
         self._window.show()
@@ -85,7 +75,7 @@ class BatchDialogs:
 
     def show_with_placements(self) -> None:
         """The same, with the places that are planned in the recording that is open."""
-        placements = self._context.placements.plan
+        placements = self._placements.plan
         if placements is not None and self._batch.batch is None:
             self._batch.setup.set_placements(placements, _PLAN_HERE)
         self.show()
@@ -96,7 +86,7 @@ class BatchDialogs:
             self._window.close()
 
     def _add_what_is_open(self) -> None:
-        content = self._context.document.content
+        content = self._session.document.content
         if content is not None and content.saved:
             self._batch.setup.add([content.recording.folder])
 
@@ -115,7 +105,7 @@ class BatchDialogs:
 
     def placement_choices(self) -> Sequence[str]:
         """Where sensors may be put, in words."""
-        placements, setup = self._context.placements.plan, self._batch.setup
+        placements, setup = self._placements.plan, self._batch.setup
         here = "As planned in the open recording"
         if placements is not None:
             here += f" ({_count_text(placements)})"
@@ -137,7 +127,7 @@ class BatchDialogs:
         if index == _OWN:
             setup.set_placements(None)
         elif index == _PLANNED:
-            placements = self._context.placements.plan
+            placements = self._placements.plan
             if placements is None:
                 self._say("The open recording plans no placements: Edit → Placements… does.")
             setup.set_placements(placements, _PLAN_HERE)
@@ -155,7 +145,7 @@ class BatchDialogs:
 
     def _follow_plan(self) -> None:
         """What is planned in the open recording is what was chosen, as long as it is open."""
-        setup, placements = self._batch.setup, self._context.placements.plan
+        setup, placements = self._batch.setup, self._placements.plan
         if setup.placements is None or setup.placed != _PLAN_HERE:
             return
         if placements is None:
@@ -165,7 +155,7 @@ class BatchDialogs:
 
     def model_names(self) -> Sequence[str]:
         """Models that are installed."""
-        return self._context.denoise.installed()
+        return self._installed()
 
     def choose_out(self) -> None:
         """Let the user choose the folder of the results."""
@@ -210,18 +200,19 @@ class BatchDialogs:
         result = self._batch.results.rows[row]
         found: list[list[Path]] = []
         self._attempt(lambda: found.append(paths_of(result)))
-        if found and self._open_paths(found[0]):
+        if found and self._shell.may_discard():
+            self._shell.open_paths(found[0])
             self._opening = (result, set(map(plain_path, found[0])))
 
     def _place_sensor(self) -> None:
-        recording, opening = self._context.document.recording, self._opening
+        recording, opening = self._session.document.recording, self._opening
         self._opening = None
         if recording is None or opening is None:
             return
         result, paths = opening
         # Something else may have been opened meanwhile.
         if paths & {recording.folder, recording.video, recording.mesh}:
-            self._context.edits.place_sensor(result.sensor, "Sensor to placement")
+            self._session.edits.place_sensor(result.sensor, "Sensor to placement")
 
     def _forget_result(self) -> None:
         self._opening = None
@@ -229,7 +220,7 @@ class BatchDialogs:
     @property
     def _over(self) -> QWidget:
         """What choosers are put over."""
-        return self._window or self._parent
+        return self._window or self._shell.dialog_parent
 
     def _attempt(self, work: Callable[[], object]) -> None:
         self._say("")
@@ -243,7 +234,7 @@ class BatchDialogs:
         if self._window is not None and self._window.isVisible():
             self._window.warn(text)
         elif text:
-            self._report(text)
+            self._shell.warn(text)
 
 
 _PLAN_HERE = "the open recording"

@@ -4,21 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from PySide6.QtWidgets import QApplication, QFileDialog, QWidget
 
-from sd2app.classify.result import read_result
-from sd2app.classify.result_dialog import ClassResultDialog
+from sd2app.classify.model import ClassifyModel
 from sd2app.classify.text import classifier_page
+from sd2app.classify.training import ClassTraining
 from sd2app.session.content import UNTITLED
+from sd2app.session.session import Session
 from sd2app.widgets.dialogs import may_delete
 from sd2app.widgets.model_card_dialog import ModelCardDialog
 from sd2core.errors import Sd2Error
-
-if TYPE_CHECKING:
-    from sd2app.classify.training import ClassTraining
-    from sd2app.shell.wiring import Context
 
 _FILES = "Classifiers (*.safetensors)"
 _DATA = "Data sets and labelled radar files (*.h5 *.hdf5 *.npz)"
@@ -28,32 +24,38 @@ _RESULTS = "Results (*.json)"
 class ClassifyDialogs:
     """Asks, then calls the models; a failure is handed to ``report`` as a sentence."""
 
-    def __init__(self, parent: QWidget, context: Context, report: Callable[[str], None]) -> None:
-        self._parent = parent
-        self._context = context
-        self._report = report
+    def __init__(
+        self,
+        parent: QWidget,
+        classify: ClassifyModel,
+        training: ClassTraining,
+        session: Session,
+        report: Callable[[str], None],
+    ) -> None:
+        self._parent, self._report = parent, report
+        self._classify, self._training, self._session = classify, training, session
 
     def open_classifier(self) -> None:
         """Choose a file, and use it."""
-        start = str(self._context.classify.path or "")
+        start = str(self._classify.path or "")
         name, _ = QFileDialog.getOpenFileName(self._parent, "Open classifier file", start, _FILES)
         if name:
             self.use(Path(name))
 
     def use(self, path: Path | None) -> None:
         """Classify with a file, or not at all."""
-        self._attempt(lambda: self._context.classify.use(path))
+        self._attempt(lambda: self._classify.use(path))
 
     def show_card(self) -> None:
         """What the classifier in use says about itself."""
-        card = self._context.classify.card
+        card = self._classify.card
         if card is not None:
             ModelCardDialog(classifier_page(card), self._parent).exec()
 
     def take_dropped(self, path: Path) -> bool:
         """Use a file that was dropped; False where it is no classifier."""
         try:
-            self._context.classify.describe(path)
+            self._classify.describe(path)
         except Sd2Error:
             return False
         self.use(path)
@@ -79,13 +81,13 @@ class ClassifyDialogs:
 
     def add_this(self) -> None:
         """Learn from the recording that is open."""
-        recording = self._context.document.recording
+        recording = self._session.document.recording
         if recording is not None and self.has_this():
             self._training.setup.add(recording.folder)
 
     def has_this(self) -> bool:
         """Whether it can be learnt from: it is on disk."""
-        content = self._context.document.content
+        content = self._session.document.content
         return content is not None and content.recording.folder != UNTITLED
 
     def train(self) -> None:
@@ -133,12 +135,12 @@ class ClassifyDialogs:
             self._training.delete()
 
     def _show(self, path: Path) -> None:
-        display = self._context.display
-        self._attempt(lambda: ClassResultDialog(read_result(path), display, self._parent).show())
+        # Imported here because a result needs what loads torch.
+        from sd2app.classify.result import read_result
+        from sd2app.classify.result_dialog import ClassResultDialog
 
-    @property
-    def _training(self) -> ClassTraining:
-        return self._context.class_training
+        display = self._session.display
+        self._attempt(lambda: ClassResultDialog(read_result(path), display, self._parent).show())
 
     def _attempt(self, work: Callable[[], object]) -> None:
         try:

@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QTimer
-from PySide6.QtWidgets import QDialog, QFileDialog, QMessageBox, QWidget
+from PySide6.QtWidgets import QDialog, QFileDialog, QMessageBox
 
+from sd2app.feature import Shell
 from sd2app.labels.cut_out_dialog import CutOutDialog
-from sd2app.labels.cut_out_model import groups
+from sd2app.labels.cut_out_model import CutOutModel, groups
+from sd2app.labels.edits import LabelEdits
 from sd2app.labels.export_dialog import LabelExportDialog
 from sd2app.labels.export_model import LabelExportModel
 from sd2app.labels.import_dialog import LabelImportDialog
-from sd2app.labels.import_model import LABEL_SUFFIXES, LabelImportModel, is_label_file
+from sd2app.labels.import_model import LABEL_FILES, LabelImportModel, is_label_file
+from sd2app.labels.model import LabelsModel
+from sd2app.session.session import Session
 from sd2core.labels.import_labels import take_in
-
-if TYPE_CHECKING:
-    from sd2app.shell.wiring import Context
-    from sd2app.widgets.message_bar import MessageBar
-
-_PATTERNS = " ".join(f"*{suffix}" for suffix in LABEL_SUFFIXES)
-LABEL_FILES = f"Labels ({_PATTERNS});;All files (*)"
 
 
 class LabelFileDialogs:
@@ -30,16 +25,15 @@ class LabelFileDialogs:
 
     def __init__(
         self,
-        parent: QWidget,
-        context: Context,
-        messages: MessageBar,
-        show_agreement: Callable[[], object],
+        shell: Shell,
+        session: Session,
+        labels: LabelsModel,
+        edits: LabelEdits,
+        cut_out: CutOutModel,
     ) -> None:
-        self._parent, self._context, self._messages = parent, context, messages
-        self._show_agreement = show_agreement
-        context.cut_out.asked.connect(self.decide_on_others)
-        context.cut_out.noted.connect(messages.note)
-        context.cut_out.failed.connect(messages.warn)
+        self._shell, self._session = shell, session
+        self._labels, self._edits, self._cut_out = labels, edits, cut_out
+        cut_out.asked.connect(self.decide_on_others)
 
     def take_dropped(self, path: Path) -> bool:
         """Import a file of labels once the drop is over; False where it is none."""
@@ -51,74 +45,71 @@ class LabelFileDialogs:
 
     def import_labels(self, path: Path | None = None) -> None:
         """Ask for a file unless there is one, show what it holds, and take it."""
-        c = self._context
-        if c.label_edits.refusal:
-            self._messages.warn(c.label_edits.refusal)
+        if self._edits.refusal:
+            self._shell.warn(self._edits.refusal)
             return
         if path is None:
-            name, _ = QFileDialog.getOpenFileName(self._parent, "Import labels", "", LABEL_FILES)
+            name, _ = QFileDialog.getOpenFileName(
+                self._shell.dialog_parent, "Import labels", "", LABEL_FILES
+            )
             if not name:
                 return
             path = Path(name)
-        model = LabelImportModel(path, c.labels.labels, c.playback.timebase, self._parent)
-        dialog = LabelImportDialog(model, self._parent)
+        model = LabelImportModel(
+            path, self._labels.labels, self._session.playback.timebase, self._shell.dialog_parent
+        )
+        dialog = LabelImportDialog(model, self._shell.dialog_parent)
         accepted = dialog.exec() == QDialog.DialogCode.Accepted
         incoming, way = model.incoming, model.way
         model.close()
         for done in (dialog, model):
             done.deleteLater()
         if accepted and incoming is not None:
-            c.label_edits.apply(lambda labels, _: take_in(labels, incoming, way, path.stem))
+            self._edits.apply(lambda labels, _: take_in(labels, incoming, way, path.stem))
 
     def export_labels(self) -> None:
         """Show what a format can hold, ask for a file, and write it."""
-        c = self._context
-        content = c.document.content
+        content = self._session.document.content
         if content is None:
             return
         model = LabelExportModel(
-            c.labels.labels, c.playback.timebase, content.recording.video, self._parent
+            self._labels.labels,
+            self._session.playback.timebase,
+            content.recording.video,
+            self._shell.dialog_parent,
         )
-        model.written.connect(lambda written: self._messages.note(str(written)))
-        dialog = LabelExportDialog(model, c.document.title, self._parent)
+        model.written.connect(lambda written: self._shell.note(str(written)))
+        dialog = LabelExportDialog(model, self._session.document.title, self._shell.dialog_parent)
         dialog.exec()
         model.close()
         for done in (dialog, model):
             done.deleteLater()
 
-    def compare_labels(self) -> None:
-        """Ask for the file of another person, and show how far the two agree."""
-        name, _ = QFileDialog.getOpenFileName(
-            self._parent, "Compare with another's labels", "", LABEL_FILES
-        )
-        if name:
-            self._context.agreement.open(Path(name))
-            self._show_agreement()
-
     def cut_out(self) -> None:
         """Ask which spans, what of them and where to, and cut them out in the background."""
-        c = self._context
-        source = c.cut_out.source()
-        offered = groups(c.labels.labels, c.labels.selected)
+        source = self._cut_out.source()
+        offered = groups(self._labels.labels, self._labels.selected)
         if source is None:
             return
         if not offered[-1][1]:
-            self._messages.warn("There is nothing to cut out: accept the suggestions first.")
+            self._shell.warn("There is nothing to cut out: accept the suggestions first.")
             return
-        dialog = CutOutDialog(offered, source, self._parent)
+        dialog = CutOutDialog(offered, source, self._shell.dialog_parent)
         accepted = dialog.exec() == QDialog.DialogCode.Accepted
         spans, parts = dialog.spans, dialog.parts
         dialog.deleteLater()
         if not accepted:
             return
-        folder = QFileDialog.getExistingDirectory(self._parent, "Folder for the cut-outs")
+        folder = QFileDialog.getExistingDirectory(
+            self._shell.dialog_parent, "Folder for the cut-outs"
+        )
         if folder:
-            c.cut_out.start(spans, parts, Path(folder))
+            self._cut_out.start(spans, parts, Path(folder))
 
     def decide_on_others(self, count: int, example: str) -> None:
         """Folders hold something else: ask what becomes of them."""
         buttons = QMessageBox.StandardButton
-        box = QMessageBox(self._parent)
+        box = QMessageBox(self._shell.dialog_parent)
         box.setWindowTitle("Replace cut-outs?")
         box.setText(
             f"{count} folder{'s' * (count != 1)} of the same name hold something else, such as"
@@ -130,7 +121,7 @@ class LabelFileDialogs:
         box.setDefaultButton(keep)
         box.exec()
         if box.clickedButton() in (replace, keep):
-            self._context.cut_out.go_on(replace_others=box.clickedButton() is replace)
+            self._cut_out.go_on(replace_others=box.clickedButton() is replace)
         else:
-            self._context.cut_out.give_up()
+            self._cut_out.give_up()
         box.deleteLater()

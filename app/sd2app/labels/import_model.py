@@ -16,6 +16,8 @@ from sd2core.timebase import Timebase
 _MOST_NAMED = 6
 
 LABEL_SUFFIXES = tuple(dict.fromkeys(suffix for one in FORMATS for suffix in one.suffixes))
+LABEL_FILES = f"Labels ({' '.join(f'*{suffix}' for suffix in LABEL_SUFFIXES)});;All files (*)"
+"""Filter of file choosers."""
 
 
 def is_label_file(path: Path) -> bool:

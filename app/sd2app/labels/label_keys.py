@@ -2,39 +2,39 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from PySide6.QtGui import QAction, QKeySequence
-from PySide6.QtWidgets import QMenu
+from PySide6.QtWidgets import QMenu, QWidget
 
+from sd2app.labels.model import LabelsModel
 from sd2app.widgets.icons import swatch_icon
 from sd2app.widgets.key_text import canonical, native
-
-if TYPE_CHECKING:
-    from sd2app.shell.window import MainWindow
-    from sd2core.labels.label_set import Label, LabelSet
+from sd2core.labels.label_set import Label, LabelSet
 
 
 class LabelActions:
     """A key marks; paused and with nothing begun, it gives what is selected another label."""
 
-    def __init__(self, window: MainWindow, menu: QMenu) -> None:
-        self._window, self._menu = window, menu
+    def __init__(
+        self, labels: LabelsModel, use: Callable[[str], None], menu: QMenu, window: QWidget
+    ) -> None:
+        self._labels, self._use, self._menu, self._window = labels, use, menu, window
         self._first = menu.addSeparator()
         self._actions: list[QAction] = []
         self._shown: LabelSet | None = None
-        window.context.labels.changed.connect(self._follow)
+        labels.changed.connect(self._follow)
         self._follow()
 
     def refresh(self, refusal: str) -> None:
-        """Follow whether labels can be edited; ``refusal`` says why not."""
+        """Disable the actions where ``refusal`` says why labels cannot be edited."""
         labels = self._shown.labels if self._shown is not None else ()
         for action, label in zip(self._actions, labels, strict=True):
             action.setEnabled(not refusal)
             action.setToolTip(refusal or _tip(label))
 
     def _follow(self) -> None:
-        offered = self._window.context.labels.labels.label_set
+        offered = self._labels.labels.label_set
         if offered == self._shown:
             return
         self._shown = offered
@@ -52,16 +52,6 @@ class LabelActions:
         action.setAutoRepeat(False)
         action.triggered.connect(lambda _=False: self._use(label.name))
         return action
-
-    def _use(self, label: str) -> None:
-        context = self._window.context
-        chosen = context.labels.selected
-        if not chosen or context.playback.playing or context.labels.marks:
-            context.label_marking.mark(label)
-        elif any(span.origin == "suggestion" for span in chosen):
-            context.suggestions.accept(label)
-        else:
-            context.label_edits.relabel(label)
 
 
 def _tip(label: Label) -> str:

@@ -10,9 +10,9 @@ from typing import Any
 from PySide6.QtCore import QObject, Qt
 from PySide6.QtGui import QIcon
 
+from sd2app.feature import Keys
 from sd2app.labels.columns import Change
 from sd2app.labels.model import LabelsModel
-from sd2app.shell.keys.bindings import KeyBindings
 from sd2app.widgets.icons import swatch_icon
 from sd2app.widgets.key_text import canonical, native
 from sd2app.widgets.record_table import Heading, Index, RecordTableModel
@@ -51,7 +51,7 @@ class LabelSetModel(RecordTableModel[Label]):
     def __init__(
         self,
         labels: LabelsModel,
-        keys: KeyBindings,
+        keys: Keys,
         apply: Callable[[Change], bool],
         parent: QObject | None = None,
     ) -> None:

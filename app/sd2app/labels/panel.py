@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
+from sd2app.feature import Keys
+from sd2app.labels.edits import LabelEdits
 from sd2app.labels.label_set_model import LabelSetModel
 from sd2app.labels.label_set_page import Asks, LabelSetPage
+from sd2app.labels.model import LabelsModel
 from sd2app.labels.span_page import SpanPage
 from sd2app.labels.statistics import StatisticsTableModel
 from sd2app.labels.statistics_page import StatisticsPage
 from sd2app.labels.table import SpanTable
 from sd2app.labels.table_model import SpanTableModel
+from sd2app.session.session import Session
 from sd2app.widgets.pages import InnerPage, InnerPages
 from sd2app.widgets.panel import ElidedLabel
-
-if TYPE_CHECKING:
-    from sd2app.shell.menus import ActionSet
-    from sd2app.shell.wiring import Context
 
 _PAGES = (
     ("Spans", "All spans, to be found, sorted and edited"),
@@ -35,20 +36,23 @@ class LabelsPanel(QWidget):
 
     def __init__(
         self,
-        context: Context,
-        actions: ActionSet,
+        session: Session,
+        labels: LabelsModel,
+        edits: LabelEdits,
+        keys: Keys,
+        action: Callable[[str], QAction],
         asks: Asks,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
         self.setObjectName("page")
-        c = context
-        self.model = model = SpanTableModel(c.labels, c.playback, c.label_edits.apply, self)
-        table = SpanTable(model, c.labels, c.label_edits, c.playback, c.span, c.settings, self)
-        table.set_menu([actions[name] for name in _MENU])
-        self.spans = SpanPage(model, c.labels, table, self)
-        statistics = StatisticsPage(StatisticsTableModel(c.labels, c.playback, self), self)
-        set_model = LabelSetModel(c.labels, c.keys, c.label_edits.apply, self)
+        s = session
+        self.model = model = SpanTableModel(labels, s.playback, edits.apply, self)
+        table = SpanTable(model, labels, edits, s.playback, s.span, s.settings, self)
+        table.set_menu([action(name) for name in _MENU])
+        self.spans = SpanPage(model, labels, table, self)
+        statistics = StatisticsPage(StatisticsTableModel(labels, s.playback, self), self)
+        set_model = LabelSetModel(labels, keys, edits.apply, self)
         self._label_set = LabelSetPage(set_model, asks, self)
         self._count = ElidedLabel(self)
         self._count.setObjectName("muted")
@@ -65,26 +69,21 @@ class LabelsPanel(QWidget):
         for signal in (
             model.rowsInserted,
             model.rowsRemoved,
-            c.labels.changed,
+            labels.changed,
             self._pages.turned,
         ):
             signal.connect(self._show_count)
         self._show_count()
 
-    def show_spans(self) -> None:
-        """Show the spans, with the keyboard in their table."""
-        self._pages.turn_to(0)
-        self.spans.table.setFocus(Qt.FocusReason.ShortcutFocusReason)
-
-    def find(self) -> None:
-        """Show the spans, with the keyboard in the search."""
-        self._pages.turn_to(0)
-        self.spans.find()
-
-    def show_label_set(self) -> None:
-        """Show the label set, with the keyboard in its table."""
-        self._pages.turn_to(2)
-        self._label_set.table.setFocus(Qt.FocusReason.ShortcutFocusReason)
+    def turn_to(self, page: str) -> None:
+        """Show a page, or the search in the spans, with the keyboard there."""
+        if page == "Search":
+            self._pages.turn_to(0)
+            self.spans.find()
+            return
+        tables = {"Spans": self.spans.table, "Label set": self._label_set.table}
+        self._pages.turn_to([name for name, _ in _PAGES].index(page))
+        tables[page].setFocus(Qt.FocusReason.ShortcutFocusReason)
 
     def _show_count(self) -> None:
         self._count.setText(self.model.words if self._pages.shown == 0 else "")

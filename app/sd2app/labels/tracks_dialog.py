@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from PySide6.QtWidgets import (
     QCheckBox,
     QDialog,
@@ -14,12 +12,11 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from sd2app.labels.reaction import LONGEST_MS
-
-if TYPE_CHECKING:
-    from sd2app.shell.wiring import Context
-    from sd2app.widgets.message_bar import MessageBar
-    from sd2core.labels.spans import Overlap
+from sd2app.feature import Shell
+from sd2app.labels.model import LabelsModel
+from sd2app.labels.reaction import LONGEST_MS, ReactionModel
+from sd2app.labels.track_edits import LabelTracks
+from sd2core.labels.spans import Overlap
 
 
 class TrackDialog(QDialog):
@@ -59,37 +56,39 @@ class TrackDialog(QDialog):
 class TrackDialogs:
     """Asks, then calls the edits."""
 
-    def __init__(self, parent: QWidget, context: Context, messages: MessageBar) -> None:
-        self._parent, self._context, self._messages = parent, context, messages
+    def __init__(
+        self, shell: Shell, labels: LabelsModel, tracks: LabelTracks, reaction: ReactionModel
+    ) -> None:
+        self._shell, self._labels, self._tracks, self._reaction = shell, labels, tracks, reaction
 
     def add(self) -> None:
         """Ask for a name, and add a track."""
-        dialog = TrackDialog(self._context.label_tracks.new_name, self._parent)
+        dialog = TrackDialog(self._tracks.new_name, self._shell.dialog_parent)
         if dialog.exec() == QDialog.DialogCode.Accepted:
-            self._context.label_tracks.add(dialog.name, dialog.overlap)
+            self._tracks.add(dialog.name, dialog.overlap)
         dialog.deleteLater()
 
     def rename(self) -> None:
         """Ask for another name of the track on which new spans come."""
         name, accepted = QInputDialog.getText(
-            self._parent, "Rename track", "Name", text=self._context.labels.track
+            self._shell.dialog_parent, "Rename track", "Name", text=self._labels.track
         )
         if accepted:
-            self._context.label_tracks.rename(name.strip())
+            self._tracks.rename(name.strip())
 
     def remove(self) -> None:
         """Remove the track on which new spans come, and say what went with it."""
-        labels = self._context.labels
+        labels = self._labels
         track, count = labels.track, len(labels.labels.of_track(labels.track))
-        if self._context.label_tracks.remove() and count:
+        if self._tracks.remove() and count:
             spans = "1 span" if count == 1 else f"{count} spans"
-            self._messages.note(f"Removed {track!r} with {spans}; undo brings them back.")
+            self._shell.note(f"Removed {track!r} with {spans}; undo brings them back.")
 
     def reaction(self) -> None:
         """Ask for a reaction time that the menu does not offer."""
-        reaction = self._context.reaction
+        reaction = self._reaction
         chosen_ms, accepted = QInputDialog.getInt(
-            self._parent,
+            self._shell.dialog_parent,
             "Reaction time",
             "Marks made while it plays begin and end earlier by so many milliseconds.",
             reaction.reaction_ms,

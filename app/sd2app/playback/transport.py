@@ -2,15 +2,33 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QSignalBlocker, Qt
+from collections.abc import Callable
+from typing import Protocol
+
+from PySide6.QtCore import QSignalBlocker, Qt, SignalInstance
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSlider, QToolButton, QWidget
 
-from sd2app.labels.loop import SpanLoop
 from sd2app.session.playback import PlaybackModel
-from sd2app.shell.menus import ActionSet
 from sd2app.widgets.time_axis import clock_text
+from sd2core.labels.spans import Span
 
 _BUTTONS = ("first_frame", "previous_frame", "play", "next_frame", "last_frame", "loop")
+
+
+class Looped(Protocol):
+    """Span that is played in a loop."""
+
+    @property
+    def changed(self) -> SignalInstance:
+        """Emitted when a loop begins or ends."""
+
+    @property
+    def span(self) -> Span | None:
+        """The span, or None."""
+
+    def end(self) -> None:
+        """Play on beyond it."""
 
 
 class TransportBar(QWidget):
@@ -19,8 +37,8 @@ class TransportBar(QWidget):
     def __init__(
         self,
         playback: PlaybackModel,
-        looped: SpanLoop,
-        actions: ActionSet,
+        looped: Looped,
+        action: Callable[[str], QAction],
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
@@ -30,7 +48,7 @@ class TransportBar(QWidget):
         layout.setSpacing(4)
         for name in _BUTTONS:
             button = QToolButton(self)
-            button.setDefaultAction(actions[name])
+            button.setDefaultAction(action(name))
             button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
             layout.addWidget(button)
         self._stretch = QToolButton(self)
@@ -51,8 +69,8 @@ class TransportBar(QWidget):
         self._slider.setAccessibleName("Frame")
         self._slider.valueChanged.connect(playback.seek_frame)
         slower, faster = QToolButton(self), QToolButton(self)
-        slower.setDefaultAction(actions["slower"])
-        faster.setDefaultAction(actions["faster"])
+        slower.setDefaultAction(action("slower"))
+        faster.setDefaultAction(action("faster"))
         self._speed = QLabel(self)
         self._speed.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._speed.setMinimumWidth(self._speed.fontMetrics().horizontalAdvance("0.25×") + 8)

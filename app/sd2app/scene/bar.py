@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from PySide6.QtCore import QSignalBlocker, Qt
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QToolButton, QWidget
 
 from sd2app.session.display import DisplayModel
-from sd2app.shell.menus import ActionSet
 from sd2app.widgets.inputs import Choice, action_button
 from sd2app.widgets.panel import title
 
@@ -25,7 +27,7 @@ class SceneBar(QWidget):
     def __init__(
         self,
         display: DisplayModel,
-        actions: ActionSet,
+        action: Callable[[str], QAction],
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
@@ -43,9 +45,9 @@ class SceneBar(QWidget):
         layout.addSpacing(8)
         layout.addWidget(QLabel("colour", self))
         layout.addWidget(self._colour)
-        layout.addWidget(action_button(actions["dots"], "Dots"))
+        layout.addWidget(action_button(action("dots"), "Dots"))
         layout.addStretch(1)
-        layout.addWidget(_view_menu(actions))
+        layout.addWidget(_view_menu(action))
         display.mesh_changed.connect(self._refresh)
         self._refresh()
 
@@ -54,7 +56,7 @@ class SceneBar(QWidget):
             self._colour.setCurrentIndex(self._colour.findData(self._display.mesh_colour))
 
 
-def _view_menu(actions: ActionSet) -> QToolButton:
+def _view_menu(action: Callable[[str], QAction]) -> QToolButton:
     button = QToolButton()
     button.setText("Look from")
     button.setToolTip("Where to look at the scene from")
@@ -62,6 +64,6 @@ def _view_menu(actions: ActionSet) -> QToolButton:
     button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
     menu = QMenu(button)
     for name in _VIEWS:
-        menu.addAction(actions[name])
+        menu.addAction(action(name))
     button.setMenu(menu)
     return button

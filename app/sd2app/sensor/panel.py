@@ -302,10 +302,6 @@ class SensorPages(QWidget):
         layout.setContentsMargins(0, 6, 0, 0)
         layout.addWidget(self._pages)
 
-    def show_sensor(self) -> None:
-        """Show the sensor."""
-        self._pages.turn_to(0)
-
-    def show_placements(self) -> None:
-        """Show the placements."""
-        self._pages.turn_to(1)
+    def turn_to(self, page: str) -> None:
+        """Show a page by its name."""
+        self._pages.turn_to({"Sensor": 0, "Placements": 1}[page])

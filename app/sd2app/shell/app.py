@@ -33,6 +33,7 @@ def run(paths: Sequence[Path] = (), *, screenshot: Path | None = None) -> int:
     from PySide6.QtWidgets import QApplication
 
     from sd2app.settings import Settings
+    from sd2app.shell.parts import Parts
     from sd2app.shell.window import MainWindow, is_dark
     from sd2app.widgets.theme import apply_theme
 
@@ -44,14 +45,14 @@ def run(paths: Sequence[Path] = (), *, screenshot: Path | None = None) -> int:
     apply_theme(application, is_dark(settings))
     # A picture neither keeps anybody from editing labels nor says that somebody does.
     aside = None if screenshot is None else TemporaryDirectory()
-    window = MainWindow(settings, recovery=None if aside is None else Path(aside.name))
+    window = MainWindow(settings, Parts(recovery=None if aside is None else Path(aside.name)))
 
     def fill() -> None:
         window.populate()
         if paths:
             window.open_paths(list(paths))
         else:
-            window.context.label_session.look_around()
+            window.features.labels.autosave.look_around()
 
     # Queued, so that the skeleton reaches the screen before the imports begin.
     window.first_painted.connect(lambda: QTimer.singleShot(0, fill))

@@ -1,125 +1,176 @@
-"""The table of actions as Qt actions of one window, with its menus."""
+"""Actions of all features as Qt actions of one window, with its menus."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable, Mapping
 
 from PySide6.QtGui import QAction, QKeySequence
-from PySide6.QtWidgets import QMenu
+from PySide6.QtWidgets import QMainWindow, QMenu
 
-from sd2app.labels.label_keys import LabelActions
-from sd2app.labels.menus import ReactionMenu, TrackMenu
-from sd2app.shell.actions import ACTIONS, Action
+from sd2app.feature import Action
+from sd2app.session.session import Session
+from sd2app.shell.keys.bindings import KeyBindings
 from sd2app.widgets.icons import transport_icon
 from sd2app.widgets.key_text import native
 
-if TYPE_CHECKING:
-    from sd2app.shell.window import MainWindow
+_LINE = "-"
+_FILLED, _SUBMENU = "@", ">"
 
-_SUBMENUS = {"Tracks": "Labels"}
-_MENUS = ("File", "Edit", "View", "Play", "Labels", "Model", "Help")
+LAYOUT: Mapping[str, tuple[str, ...]] = {
+    "File": (
+        "new_from_video", "open", "open_folder", "@recent", "add", "add_folder", "compare",
+        "relink", "-", "save", "save_as", "export_map", "export_denoised", "export_maps",
+        "export_strip", "export_dataset", "-", "batch", "-", "recover_labels", "-", "quit",
+    ),
+    "Edit": ("undo", "redo", "-", "sensor_to_camera", "aim_sensor", "placements"),
+    "View": (
+        "colour_velocity", "colour_range", "colour_visibility", "colour_plain", "dots", "overlay",
+        "overlay_dots", "draw_placements", "-", "view_three_quarter", "view_camera", "view_sensor",
+        "view_side", "view_top", "-", "zoom_in", "zoom_out", "zoom_fit", "reset_reference",
+        "uncertain", "-", "show_sensor", "show_trade", "show_train", "show_labels", "show_agree",
+        "measure", "-", "dark",
+    ),
+    "Play": (
+        "play", "previous_frame", "next_frame", "back_second", "on_second", "first_frame",
+        "last_frame", "-", "slower", "faster", "loop",
+    ),
+    "Labels": (
+        "@label keys", "-", "end_marks", "carve_marks", "@reaction", "leave", "-",
+        "span_starts_here", "span_ends_here", "nudge_back", "nudge_on", "split_span",
+        "merge_spans", "delete_spans", "duplicate_spans", "meet_spans", "fill_gaps", "-",
+        "loop_span", "select_all", "-", "next_span", "previous_span", ">Tracks", "-", "suggest",
+        "accept_suggestion", "reject_suggestion", "accept_suggestions", "reject_suggestions",
+        "find_gestures", "-", "import_labels", "export_labels", "cut_out", "-", "restore_labels",
+        "edit_labels_here", "find_spans", "label_set", "-", "compare_labels", "next_disagreement",
+        "previous_disagreement", "end_comparison",
+    ),
+    "Tracks": (
+        "@tracks", "-", "previous_track", "next_track", "spans_up", "spans_down", "-", "add_track",
+        "rename_track", "overlap", "track_up", "track_down", "remove_track",
+    ),
+    "Model": (
+        "@denoisers", "-", "open_model", "model_card", "-", "difference", "compare_models", "live",
+        "-", "@classifiers", "open_classifier", "classifier_card", "show_classes",
+        "train_classifier",
+    ),
+    "Help": ("sample", "keys", "about"),
+}  # fmt: skip
+"""Order of the menus: ids of actions, ``-`` lines, ``@`` places that a feature fills, ``>`` menus
+within a menu."""
+
+_INNER = tuple(
+    entry[1:] for entries in LAYOUT.values() for entry in entries if entry.startswith(_SUBMENU)
+)
 
 
-class ActionSet:
-    """Makes the actions, keeps them enabled and checked as the models say."""
+def in_order(actions: Iterable[Action]) -> tuple[Action, ...]:
+    """Actions in the order of the menus.
 
-    def __init__(self, window: MainWindow) -> None:
-        self._window = window
-        self._context = window.context
+    Raises
+    ------
+    ValueError
+        Where an action stands in no menu or in another one than it says, or a place of the
+        menus has no action.
+    """
+    known = {action.id: action for action in actions}
+    places = [
+        (menu, entry)
+        for menu, entries in LAYOUT.items()
+        for entry in entries
+        if entry[0] not in (_LINE, _FILLED, _SUBMENU)
+    ]
+    wanted, given = set(places), {(action.menu, action.id) for action in known.values()}
+    if wanted != given:
+        raise ValueError(f"Menus and actions differ: {sorted(wanted ^ given)}")
+    return tuple(known[entry] for _, entry in places)
+
+
+class Menus:
+    """Makes the Qt actions, keeps them enabled and checked as the features say."""
+
+    def __init__(
+        self,
+        window: QMainWindow,
+        session: Session,
+        actions: Iterable[Action],
+        keys: KeyBindings,
+    ) -> None:
+        self._window, self._session, self._keys = window, session, keys
+        self._rows = {row.id: row for row in actions}
         self._actions: dict[str, QAction] = {}
-        for row in ACTIONS:
+        for row in self._rows.values():
             action = QAction(row.text, window)
             action.setCheckable(row.checked is not None)
-            action.triggered.connect(lambda _=False, run=row.run: run(window))
+            action.triggered.connect(lambda _=False, run=row.run: run())
             self._actions[row.id] = action
-        self._context.keys.changed.connect(self._follow_keys)
+        keys.changed.connect(self._follow_keys)
         self._follow_keys()
 
     def __getitem__(self, name: str) -> QAction:
         return self._actions[name]
 
-    def fill_menu_bar(self, models: QMenu, classifiers: QMenu) -> QMenu:
-        """Make the menus; returns the one for recent files, which the window fills.
-
-        ``models`` and ``classifiers`` are put into the menu of models.
-        """
+    def fill_menu_bar(self, fillers: Mapping[str, Callable[[QMenu], object]]) -> None:
+        """Make the menus; ``fillers`` fill the places that are a feature's own."""
         bar = self._window.menuBar()
-        menus = {name: bar.addMenu(f"&{name}") for name in _MENUS}
-        for menu in menus.values():
-            menu.setToolTipsVisible(True)
-        self.labels = LabelActions(self._window, menus["Labels"])
-        recent = QMenu("Open recent", menus["File"])
-        menus["Model"].addMenu(models)
-        for row in ACTIONS:
-            if row.menu not in menus:
-                menus[row.menu] = self._submenu(row.menu, menus[_SUBMENUS[row.menu]])
-            if row.separator_before:
-                menus[row.menu].addSeparator()
-            if row.id == "open_classifier":
-                menus["Model"].addSeparator()
-                menus["Model"].addMenu(classifiers)
-            menus[row.menu].addAction(self._actions[row.id])
-            if row.id == "open_folder":
-                menus["File"].addMenu(recent)
-            if row.id == "carve_marks":
-                ask = self._window.track_dialogs.reaction
-                self.reaction = ReactionMenu(self._context.reaction, ask, menus["Labels"])
-                menus["Labels"].addMenu(self.reaction)
-        return recent
+        for name in LAYOUT:
+            if name not in _INNER:
+                self._fill(bar.addMenu(f"&{name}"), name, fillers)
 
-    def _submenu(self, name: str, above: QMenu) -> QMenu:
-        made = above.addMenu(name)
-        made.setToolTipsVisible(True)
-        self.tracks = TrackMenu(made, self._context.labels)
-        return made
+    def _fill(
+        self, menu: QMenu, name: str, fillers: Mapping[str, Callable[[QMenu], object]]
+    ) -> None:
+        menu.setToolTipsVisible(True)
+        for entry in LAYOUT[name]:
+            if entry == _LINE:
+                menu.addSeparator()
+            elif entry.startswith(_FILLED):
+                fillers[entry[1:]](menu)
+            elif entry.startswith(_SUBMENU):
+                self._fill(menu.addMenu(entry[1:]), entry[1:], fillers)
+            else:
+                menu.addAction(self._actions[entry])
 
     def refresh(self) -> None:
         """Follow the models."""
-        refusal = self._context.label_edits.refusal
-        self.labels.refresh(refusal)
-        for row in ACTIONS:
+        for row in self._rows.values():
             action = self._actions[row.id]
-            refused = refusal if row.edits_labels else ""
-            action.setEnabled(row.enabled(self._context) and not refused)
-            if row.edits_labels or row.why_not is not None:
-                why_not = row.why_not(self._context) if row.why_not is not None else ""
-                action.setToolTip(refused or why_not or self._tip(row))
+            action.setEnabled(row.enabled())
+            if row.why_not is not None:
+                action.setToolTip(row.why_not() or self._tip(row))
             if row.checked is not None:
-                action.setChecked(row.checked(self._context))
-        stack = self._context.document.undo_stack
+                action.setChecked(row.checked())
+        stack = self._session.document.undo_stack
         self._actions["undo"].setText(f"Undo {stack.undoText().lower()}".rstrip())
         self._actions["redo"].setText(f"Redo {stack.redoText().lower()}".rstrip())
-        playing = self._context.playback.playing
+        playing = self._session.playback.playing
         if playing != (self._actions["play"].text() == "Pause"):
             self._actions["play"].setText("Pause" if playing else "Play")
             self._set_icon("play", "pause" if playing else "play")
 
     def refresh_one(self, name: str) -> None:
         """Follow the models with one action, which changes with every frame."""
-        row = next(row for row in ACTIONS if row.id == name)
-        self._actions[name].setEnabled(row.enabled(self._context))
+        self._actions[name].setEnabled(self._rows[name].enabled())
 
     def restyle(self) -> None:
         """Draw the icons in the colour of the theme."""
-        for row in ACTIONS:
+        for row in self._rows.values():
             if row.icon:
                 self._set_icon(row.id, row.icon)
-        if self._context.playback.playing:
+        if self._session.playback.playing:
             self._set_icon("play", "pause")
 
     def _set_icon(self, name: str, icon: str) -> None:
-        self._actions[name].setIcon(transport_icon(icon, self._context.display.palette.text))
+        self._actions[name].setIcon(transport_icon(icon, self._session.display.palette.text))
 
     def _follow_keys(self) -> None:
-        keys = self._context.keys
-        # Keys that change hands are nobody's in between.
+        # A key that changes hands has no owner in between.
         for action in self._actions.values():
             action.setShortcuts([])
         for name, action in self._actions.items():
-            action.setShortcuts([QKeySequence(key) for key in keys.keys_of(name)])
-        for row in ACTIONS:
+            action.setShortcuts([QKeySequence(key) for key in self._keys.keys_of(name)])
+        for row in self._rows.values():
             self._actions[row.id].setToolTip(self._tip(row))
 
     def _tip(self, row: Action) -> str:
-        keys = ", ".join(map(native, self._context.keys.keys_of(row.id)))
+        keys = ", ".join(map(native, self._keys.keys_of(row.id)))
         return f"{row.tip} ({keys})" if keys else row.tip

@@ -2,8 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Protocol, runtime_checkable
+
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QScrollArea, QTabWidget, QWidget
+
+
+@runtime_checkable
+class Paged(Protocol):
+    """Panel of several pages."""
+
+    def turn_to(self, page: str) -> None:
+        """Show a page by its name."""
 
 
 class SidePanel(QTabWidget):
@@ -15,6 +25,7 @@ class SidePanel(QTabWidget):
         self.tabBar().setDrawBase(False)
         self.tabBar().setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self._names = list(pages)
+        self._pages = dict(pages)
         for name, page in pages.items():
             self.addTab(_scrolled(page), name)
 
@@ -30,9 +41,13 @@ class SidePanel(QTabWidget):
         if text != self.tabText(index):
             self.setTabText(index, text)
 
-    def bring_up(self, name: str) -> None:
-        """Show a panel."""
+    def bring_up(self, name: str, page: str = "") -> None:
+        """Show a panel, and a page of one that has several."""
         self.setCurrentIndex(self._names.index(name))
+        if page:
+            shown = self._pages[name]
+            assert isinstance(shown, Paged)
+            shown.turn_to(page)
 
 
 def _scrolled(widget: QWidget) -> QScrollArea:

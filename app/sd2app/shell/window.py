@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, TypeVar
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import (
+    QAction,
     QCloseEvent,
     QDragEnterEvent,
     QDropEvent,
@@ -23,71 +24,42 @@ from PySide6.QtWidgets import (
 
 from sd2app.background.latest import LatestRunner
 from sd2app.settings import Settings
+from sd2app.shell.parts import Parts
 from sd2app.widgets.panel import fill, panel, splitter
 from sd2app.widgets.theme import apply_theme
 
 if TYPE_CHECKING:
-    from sd2app.accuracy.ladder import Ladder
-    from sd2app.batch.dialog import BatchDialogs
-    from sd2app.classify.dialogs import ClassifyDialogs
-    from sd2app.classify.library import ClassifierLibrary
-    from sd2app.denoise.library import DenoiserLibrary
-    from sd2app.labels.files_dialogs import LabelFileDialogs
-    from sd2app.labels.panel import LabelsPanel
-    from sd2app.labels.tracks_dialog import TrackDialogs
-    from sd2app.scene import SceneView
-    from sd2app.sensor.panel import SensorPages
-    from sd2app.shell.file_dialogs import Dialogs
+    from sd2app.maps.stack import MapStack
+    from sd2app.session.session import Session
+    from sd2app.shell.keys.bindings import KeyBindings
     from sd2app.shell.side_panel import SidePanel
-    from sd2app.shell.wiring import Context
-    from sd2app.training.dialogs import TrainingDialogs
-    from sd2app.training.page import TrainPage
+    from sd2app.shell.wiring import Features
 
-_SHARED_KEYS = ("play", "previous_frame", "next_frame", "back_second", "on_second", "zoom_fit")
-"""Actions that work in the window of a comparison too."""
+T = TypeVar("T")
+
 _LABELS_PX = 560
 """Room for the usual columns of the table of spans."""
 _PANELS = ("video", "scene", "sensor", "tracks", "spectrum")
 
 
 class MainWindow(QMainWindow):
-    """One recording: frame-wise views on top, time-wise tracks below."""
+    """One recording: frame-wise views on top, time-wise tracks below.
+
+    It is also the :class:`sd2app.feature.Shell` of its features.
+    """
 
     first_painted = Signal()
 
-    context: Context
-    dialogs: Dialogs
-    label_files: LabelFileDialogs
-    track_dialogs: TrackDialogs
-    train_dialogs: TrainingDialogs
-    class_dialogs: ClassifyDialogs
+    session: Session
+    features: Features
+    keys: KeyBindings
     side: SidePanel
-    train_page: TrainPage
-    labels_panel: LabelsPanel
-    sensor_pages: SensorPages
-    batch_dialogs: BatchDialogs
+    maps: MapStack
 
-    def __init__(
-        self,
-        settings: Settings,
-        ladder: Ladder | None = None,
-        fit_command: Sequence[str] | None = None,
-        denoisers: DenoiserLibrary | None = None,
-        train_command: Sequence[str] | None = None,
-        recovery: Path | None = None,
-        batch_command: Sequence[str] | None = None,
-        classifiers: ClassifierLibrary | None = None,
-    ) -> None:
+    def __init__(self, settings: Settings, parts: Parts | None = None) -> None:
         super().__init__()
         self._settings = settings
-        self._ladder = ladder
-        self._fit_command = fit_command
-        self._denoisers = denoisers
-        self._train_command = train_command
-        self._recovery = recovery
-        self._batch_command = batch_command
-        self._classifiers = classifiers
-        self._scene: SceneView | None = None
+        self._parts = parts or Parts()
         self._ready = False
         self._painted = False
         self.setWindowTitle("SD² Studio")
@@ -101,21 +73,14 @@ class MainWindow(QMainWindow):
 
     @property
     def ready(self) -> bool:
-        """Whether the views stand and a recording can be shown."""
+        """True once the views stand and a recording can be shown."""
         return self._ready
 
     @property
     def settled(self) -> bool:
-        """Whether nothing is being read, computed or decoded."""
-        return (
-            self._scene is not None
-            and not self.context.jobs.jobs
-            and not self.context.synthesis.busy
-            and not self.context.placements.busy
-            and not self.context.denoise.busy
-            and not self.context.classify.busy
-            and not self.context.video.busy
-        )
+        """True while nothing is being read, computed or decoded."""
+        busy = any(feature.busy for feature in self.features)
+        return not self.session.jobs.jobs and not busy
 
     # --- building -------------------------------------------------------------------------
 
@@ -143,60 +108,33 @@ class MainWindow(QMainWindow):
         """Load what takes time to import, and fill the skeleton."""
         # Imported here so that the skeleton is on screen before NumPy, PyAV,
         # numba and VTK are loaded.
-        from sd2app.batch.dialog import BatchDialogs
-        from sd2app.classify.chooser import ClassifierChooser
-        from sd2app.classify.dialogs import ClassifyDialogs
-        from sd2app.denoise.chooser import DenoiserChooser
-        from sd2app.labels.files_dialogs import LabelFileDialogs
-        from sd2app.labels.tracks_dialog import TrackDialogs
         from sd2app.playback.transport import TransportBar
-        from sd2app.shell.file_dialogs import Dialogs
-        from sd2app.shell.menus import ActionSet
-        from sd2app.shell.panes import fit_bar, label_bar
+        from sd2app.session.session import build_session
+        from sd2app.shell.keys.bindings import KeyBindings
+        from sd2app.shell.menus import Menus, in_order
         from sd2app.shell.status_bar import StatusLine
-        from sd2app.shell.wiring import build_context
+        from sd2app.shell.wiring import build_features
         from sd2app.widgets.message_bar import MessageBar
-        from sd2app.widgets.model_menu import ModelMenu
 
-        self.context = build_context(
-            self,
-            self._settings,
-            self._ladder,
-            self._fit_command,
-            self._denoisers,
-            self._train_command,
-            self._recovery,
-            self._batch_command,
-            self._classifiers,
-        )
-        context = self.context
-        context.display.set_dark(is_dark(self._settings))
         self.messages = MessageBar(self)
-        self.dialogs = Dialogs(self, context, self.messages.warn)
-        self.label_files = LabelFileDialogs(
-            self, context, self.messages, lambda: self.side.bring_up("Agree")
+        self.session = s = build_session(self, self._settings)
+        s.display.set_dark(is_dark(self._settings))
+        self.features = build_features(s, self, self._parts, self)
+        actions = in_order(action for feature in self.features for action in feature.actions())
+        self.keys = KeyBindings(actions, self.features.labels.model, self._settings, self)
+        self._menus = Menus(self, s, actions, self.keys)
+        self._menus.fill_menu_bar(
+            {name: fill for feature in self.features for name, fill in feature.menus().items()}
         )
-        self.batch_dialogs = BatchDialogs(self, context, self.messages.warn, self.open_others)
-        self.track_dialogs = TrackDialogs(self, context, self.messages)
-        self._actions = ActionSet(self)
-        below = [self._actions[name] for name in ("open_model", "model_card")]
-        choosers = DenoiserChooser(context.denoise), ClassifierChooser(context.classify)
-        self._models = ModelMenu(choosers[0], self.dialogs.use_model, below, self)
-        self.class_dialogs = ClassifyDialogs(self, context, self.messages.warn)
-        below = [self._actions[name] for name in ("open_classifier", "classifier_card")]
-        self._classes = ModelMenu(choosers[1], self.class_dialogs.use, below, self)
-        self._recent_menu = self._actions.fill_menu_bar(self._models, self._classes)
-        self._recent_menu.aboutToShow.connect(self._list_recent)
         self._fill_panels()
-        self._column.insertWidget(0, self.messages)
-        self._column.insertWidget(1, label_bar(context, self.dialogs))
-        self._column.insertWidget(2, fit_bar(context, self.dialogs))
+        bars = [*self.features.labels.bars(), *self.features.fit.bars()]
+        for place, bar in enumerate((self.messages, *bars)):
+            self._column.insertWidget(place, bar)
         self._column.addWidget(
-            TransportBar(context.playback, context.span_loop, self._actions, self)
+            TransportBar(s.playback, self.features.labels.loop, self.action, self)
         )
-        self._column.addWidget(
-            StatusLine(context.pointer, context.jobs, context.trade, context.synthesis, self)
-        )
+        accuracy, synthesis = self.features.accuracy.model, self.features.maps.synthesis
+        self._column.addWidget(StatusLine(s.pointer, s.jobs, accuracy, synthesis, self))
         self._connect()
         self._restyle()
         self._refresh()
@@ -204,85 +142,66 @@ class MainWindow(QMainWindow):
             if (state := self._settings.layout(name)) is not None:
                 getattr(self, f"_{name}").restoreState(state)
         self._ready = True
-        context.fit.look_for_unfinished()
-        context.training.look_for_runs()
-        context.batch.look_for_batch()
-        context.class_training.look_for_runs()
-        context.export.look_for_export()
+        for feature in self.features:
+            feature.look_for_unfinished()
         # VTK last, imported in a thread: everything else is usable while it loads.
         self._importer = LatestRunner("import", self)
         self._importer.finished.connect(self._add_scene)
-        self._importer.submit(lambda emit: import_module("sd2app.scene"))
+        self._importer.submit(lambda emit: import_module("sd2app.scene.view"))
 
     def _fill_panels(self) -> None:
         from sd2app.shell.page_widths import PageWidths
-        from sd2app.shell.panes import spectrum_pane, video_pane
-        from sd2app.shell.side_pages import side_pages
-        from sd2app.shell.track_stack import Tracks
+        from sd2app.shell.side_panel import SidePanel
+        from sd2app.shell.wiring import side_pages, track_stack
 
-        c, actions = self.context, self._actions
-        fill(self._panels["video"], video_pane(c, actions))
-        self.side, self.sensor_pages, self.train_page, self.labels_panel, self.train_dialogs = (
-            side_pages(self, actions)
-        )
+        views = {name: view for feature in self.features for name, view in feature.panels().items()}
+        for name in ("video", "spectrum"):
+            fill(self._panels[name], views[name])
+        self.side = SidePanel(side_pages(self.features, views))
         fill(self._panels["sensor"], self.side)
         self._widths = PageWidths(self._top, self.side, {"Labels": _LABELS_PX}, self._settings)
-        self._tracks = Tracks(c, self._models, self._classes, actions)
-        fill(self._panels["tracks"], self._tracks)
-        fill(self._panels["spectrum"], spectrum_pane(c, actions))
+        stack, self.maps = track_stack(self.session, self.features, views)
+        fill(self._panels["tracks"], stack)
 
     def _add_scene(self) -> None:
-        if not self._ready:
-            return
-        from sd2app.scene import SceneView
-        from sd2app.scene.bar import SceneBar
-
-        c = self.context
-        self._scene = SceneView(
-            c.document,
-            c.playback,
-            c.sensor,
-            c.display,
-            c.synthesis,
-            c.placements,
-            begin_drag=c.edits.begin_sensor_drag,
-            drag=c.edits.drag_sensor,
-            end_drag=c.edits.end_sensor_drag,
-        )
-        layout = QVBoxLayout()
-        layout.addWidget(SceneBar(c.display, self._actions))
-        layout.addWidget(self._scene, 1)
-        fill(self._panels["scene"], layout)
+        if self._ready:
+            fill(self._panels["scene"], self.features.scene.make_view())
 
     def _connect(self) -> None:
-        from sd2app.shell.window_signals import connect_sentences, signals_of_actions
-
-        c = self.context
-        connect_sentences(c, self.messages)
-        self.labels_panel.model.noted.connect(self.messages.note)
-        c.document.opened.connect(self._show_document)
-        for training in (c.training, c.class_training):
-            training.changed.connect(self._mark_training)
+        s, features = self.session, self.features
+        for feature in features:
+            for signal in feature.warnings():
+                signal.connect(self.messages.warn)
+            for signal in feature.notes():
+                signal.connect(self.messages.note)
+            for signal in feature.changes():
+                signal.connect(self._refresh)
+        self.keys.changed.connect(self._refresh)
+        s.document.opened.connect(self._show_document)
+        for runs in (features.training.model, features.classify.training):
+            runs.changed.connect(self._mark_training)
         # Without a person in the frame there is nothing to aim at.
-        c.synthesis.target_changed.connect(lambda: self._actions.refresh_one("aim_sensor"))
-        c.display.theme_changed.connect(self._restyle)
-        for signal in signals_of_actions(c):
-            signal.connect(self._refresh)
+        features.maps.synthesis.target_changed.connect(
+            lambda: self._menus.refresh_one("aim_sensor")
+        )
+        s.display.theme_changed.connect(self._restyle)
 
     def _mark_training(self) -> None:
-        c = self.context
-        self.side.set_mark("Train", c.training.mark or c.class_training.mark)
+        training, classify = self.features.training.model, self.features.classify.training
+        self.side.set_mark("Train", training.mark or classify.mark)
 
     # --- following the models -------------------------------------------------------------
 
     def _show_document(self) -> None:
         self.messages.hide()
-        self._tracks.show_document()
+        self.maps.refresh()
         self._refresh()
 
     def _refresh(self) -> None:
-        document = self.context.document
-        self._actions.refresh()
+        document = self.session.document
+        self._menus.refresh()
+        for feature in self.features:
+            feature.refresh_menus()
         mark = " *" if document.modified else ""
         kind = " (simulated)" if document.simulated else ""
         name = f"{document.title}{mark}{kind} – " if document.title else ""
@@ -291,95 +210,60 @@ class MainWindow(QMainWindow):
     def _restyle(self) -> None:
         application = QApplication.instance()
         assert isinstance(application, QApplication)
-        apply_theme(application, self.context.display.dark)
-        self._actions.restyle()
+        apply_theme(application, self.session.display.dark)
+        self._menus.restyle()
 
-    # --- what actions call ----------------------------------------------------------------
+    # --- what features use ----------------------------------------------------------------
 
-    def open_paths(self, paths: list[Path]) -> None:
-        """Open what was named on the command line, dropped, or chosen from the list."""
-        if len(paths) == 1 and self.context.fit.take_up(paths[0]):
+    @property
+    def dialog_parent(self) -> QWidget:
+        """Parent of dialogs."""
+        return self
+
+    def action(self, name: str) -> QAction:
+        """Action by its id, of any feature."""
+        return self._menus[name]
+
+    def note(self, text: str) -> None:
+        """Tell the user about something that was done."""
+        self.messages.note(text)
+
+    def warn(self, text: str) -> None:
+        """Tell the user about something that went wrong."""
+        self.messages.warn(text)
+
+    def attempt(self, work: Callable[[], T]) -> T | None:
+        """Result of ``work``; an error is told to the user, and None returned."""
+        from sd2core.errors import Sd2Error
+
+        try:
+            return work()
+        except (Sd2Error, OSError) as error:
+            self.warn(str(error))
+            return None
+
+    def bring_up(self, panel: str, page: str = "") -> None:
+        """Show a panel at the side, and a page of it."""
+        self.side.bring_up(panel, page)
+
+    def save(self) -> bool:
+        """Save the recording, asking where if need be; False where the user cancels."""
+        return self.features.files.save()
+
+    def may_discard(self) -> bool:
+        """True once unsaved edits are saved or given up by the user's decision."""
+        return self.features.files.may_discard()
+
+    def open_paths(self, paths: Sequence[Path]) -> None:
+        """Open files in place of what is open."""
+        paths, fit = list(paths), self.features.fit.model
+        if len(paths) == 1 and fit.take_up(paths[0]):
             # No recording yet: a folder in which a fit was stopped.
-            request = self.context.fit.request
-            assert request is not None
-            paths = [request.video]
-        self.context.document.open(paths)
+            assert fit.request is not None
+            paths = [fit.request.video]
+        self.session.document.open(paths)
         if len(paths) == 1:
             self._settings.add_recent(paths[0].resolve())
-
-    def open_others(self, paths: list[Path]) -> bool:
-        """Open in place of what is open; False where the user wants to keep that."""
-        if not self.dialogs.may_discard():
-            return False
-        self.open_paths(paths)
-        return True
-
-    def open_sample(self) -> None:
-        """Open the recording that comes with the program."""
-        from sd2core.files.resources import resource_path
-
-        if self.dialogs.may_discard():
-            self.open_paths([resource_path("swipes.sd2")])
-
-    def set_dark(self, dark: bool) -> None:
-        """Choose the theme and remember it."""
-        self._settings.dark = dark
-        self.context.display.set_dark(dark)
-
-    def set_scene_view(self, name: str) -> None:
-        """Look at the scene from somewhere else."""
-        if self._scene is not None:
-            self._scene.set_view(name)
-
-    def compare_with_mesh(self, path: Path | None = None) -> None:
-        """Ask for another mesh, and show both."""
-        keys = [self._actions[name] for name in _SHARED_KEYS]
-        self.dialogs.compare_with_mesh(keys, path)
-
-    def show_sensor(self) -> None:
-        """Bring up the one sensor."""
-        self.side.bring_up("Sensor")
-        self.sensor_pages.show_sensor()
-
-    def show_placements(self) -> None:
-        """Bring up the places where sensors are planned."""
-        self.side.bring_up("Sensor")
-        self.sensor_pages.show_placements()
-
-    def measure_scene(self) -> None:
-        """Measure every plan, where one can watch it."""
-        self.side.bring_up("Accuracy")
-        self.context.trade.measured.measure()
-
-    def show_labels(self, page: Literal["spans", "search", "label set"] = "spans") -> None:
-        """Bring up the table of spans, the search in it, or the label set, with the keyboard."""
-        self.side.bring_up("Labels")
-        panel = self.labels_panel
-        pages = {"spans": panel.show_spans, "search": panel.find, "label set": panel.show_label_set}
-        pages[page]()
-
-    def show_training(self, page: Literal["denoisers", "classifiers"]) -> None:
-        """Bring up the training of denoisers, or that of classifiers."""
-        self.side.bring_up("Train")
-        train = self.train_page
-        {"denoisers": train.show_denoisers, "classifiers": train.show_classifiers}[page]()
-
-    def close_window(self) -> None:
-        """Close, after asking when edits would be lost."""
-        self.close()
-
-    def _list_recent(self) -> None:
-        self._recent_menu.clear()
-        for path in self._settings.recent:
-            action = self._recent_menu.addAction(str(path))
-            action.triggered.connect(lambda _=False, path=path: self._open_recent(path))
-        self._recent_menu.setEnabled(True)
-        if self._recent_menu.isEmpty():
-            self._recent_menu.addAction("Nothing yet").setEnabled(False)
-
-    def _open_recent(self, path: Path) -> None:
-        if self.dialogs.may_discard():
-            self.open_paths([path])
 
     # --- Qt events ------------------------------------------------------------------------
 
@@ -401,14 +285,11 @@ class MainWindow(QMainWindow):
         if not paths:
             return
         event.acceptProposedAction()
-        if len(paths) == 1 and paths[0].suffix == ".safetensors":
-            if not self.class_dialogs.take_dropped(paths[0]):
-                self.dialogs.use_model(paths[0])
-        elif len(paths) == 1 and self.label_files.take_dropped(paths[0]):
-            pass
-        elif event.modifiers() & Qt.KeyboardModifier.ShiftModifier:
-            self.context.document.add(paths)
-        elif self.dialogs.may_discard():
+        if len(paths) == 1 and any(feature.take_dropped(paths[0]) for feature in self.features):
+            return
+        if event.modifiers() & Qt.KeyboardModifier.ShiftModifier:
+            self.session.document.add(paths)
+        elif self.may_discard():
             self.open_paths(paths)
 
     def closeEvent(self, event: QCloseEvent) -> None:
@@ -416,8 +297,10 @@ class MainWindow(QMainWindow):
         if not self._ready:
             event.accept()
             return
-        asked = (self.dialogs.may_discard, self.dialogs.may_stop_fit, self.train_dialogs.may_leave)
-        if not all(may_close() for may_close in asked):
+        features = self.features
+        if not all(
+            asked.may_close() for asked in (features.files, features.fit, features.training)
+        ):
             event.ignore()
             return
         self._settings.set_layout("window", self.saveGeometry())
@@ -425,12 +308,9 @@ class MainWindow(QMainWindow):
         for name in ("top", "bottom", "rows"):
             self._settings.set_layout(name, getattr(self, f"_{name}").saveState())
         self._ready = False
-        self.dialogs.close_comparison()
-        self.batch_dialogs.close()
         self._importer.close()
-        self.context.close()
-        if self._scene is not None:
-            self._scene.close()
+        self.session.playback.pause()
+        features.close()
         event.accept()
 
 

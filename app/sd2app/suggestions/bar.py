@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from PySide6.QtCore import QSignalBlocker, Qt
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QWidget
 
-from sd2app.shell.menus import ActionSet
 from sd2app.suggestions.model import SuggestionsModel
 from sd2app.widgets.inputs import Choice, NumberBox, action_button
 from sd2app.widgets.panel import ElidedLabel
@@ -22,7 +24,10 @@ class SuggestionBar(QWidget):
     """View of :class:`SuggestionsModel`; hidden until suggestions are asked for."""
 
     def __init__(
-        self, model: SuggestionsModel, actions: ActionSet, parent: QWidget | None = None
+        self,
+        model: SuggestionsModel,
+        action: Callable[[str], QAction],
+        parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
         self._model = model
@@ -43,7 +48,7 @@ class SuggestionBar(QWidget):
         layout.addWidget(self._text, 1)
         layout.addWidget(self._as)
         for name, text in _BUTTONS:
-            layout.addWidget(_outlined(action_button(actions[name], text)))
+            layout.addWidget(_outlined(action_button(action(name), text)))
         layout.addSpacing(8)
         layout.addWidget(self._by)
         layout.addWidget(self._source)

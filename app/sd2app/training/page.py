@@ -26,10 +26,6 @@ class TrainPage(QWidget):
         layout.setContentsMargins(0, 6, 0, 0)
         layout.addWidget(self._pages)
 
-    def show_denoisers(self) -> None:
-        """Show the training of denoisers."""
-        self._pages.turn_to(0)
-
-    def show_classifiers(self) -> None:
-        """Show the training of classifiers."""
-        self._pages.turn_to(1)
+    def turn_to(self, page: str) -> None:
+        """Show a page by its name."""
+        self._pages.turn_to({"Denoiser": 0, "Classifier": 1}[page])

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from PySide6.QtCore import QSignalBlocker, Qt
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QHBoxLayout, QSlider, QWidget
 
-from sd2app.shell.menus import ActionSet
 from sd2app.video.overlay_settings import OverlayModel
 from sd2app.widgets.inputs import action_button
 from sd2app.widgets.panel import title
@@ -17,11 +19,11 @@ class VideoBar(QWidget):
     """Mesh on or off, as dots or surface, and how much of the person it hides."""
 
     def __init__(
-        self, overlay: OverlayModel, actions: ActionSet, parent: QWidget | None = None
+        self, overlay: OverlayModel, action: Callable[[str], QAction], parent: QWidget | None = None
     ) -> None:
         super().__init__(parent)
         self._overlay = overlay
-        self._mesh = actions["overlay"]
+        self._mesh = action("overlay")
         self._slider = QSlider(Qt.Orientation.Horizontal, self)
         self._slider.setRange(1, _STEPS)
         self._slider.setFixedWidth(80)
@@ -35,7 +37,7 @@ class VideoBar(QWidget):
         layout.addStretch(1)
         layout.addWidget(action_button(self._mesh, "Mesh"))
         layout.addWidget(self._slider)
-        layout.addWidget(action_button(actions["overlay_dots"], "Dots"))
+        layout.addWidget(action_button(action("overlay_dots"), "Dots"))
         overlay.changed.connect(self._refresh)
         self._mesh.changed.connect(self._refresh)
         self._refresh()

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtCore import QRectF, QSize, Qt, SignalInstance
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
 from PySide6.QtWidgets import QWidget
 
-from sd2app.fit.clock import FitFollower
-from sd2app.fit.model import FitModel
 from sd2app.session.display import DisplayModel
 from sd2app.session.document import DocumentModel
 from sd2app.session.playback import PlaybackModel
@@ -17,6 +17,17 @@ from sd2app.session.video import VideoModel
 from sd2app.video.landmark_overlay import draw_landmarks
 from sd2app.video.overlay_settings import OverlayModel
 from sd2app.widgets.mesh_painting import draw_mesh
+
+
+class Landmarks(Protocol):
+    """Landmarks of the person in the picture, while they are being found."""
+
+    @property
+    def landmarks_changed(self) -> tuple[SignalInstance, ...]:
+        """Signals after which there are others."""
+
+    def landmarks_at(self, frame: int) -> NDArray[np.float32] | None:
+        """Landmarks of a frame, or None where none are to be shown."""
 
 
 class VideoView(QWidget):
@@ -29,8 +40,7 @@ class VideoView(QWidget):
         playback: PlaybackModel,
         display: DisplayModel,
         overlay: OverlayModel,
-        fit: FitModel,
-        follower: FitFollower,
+        landmarks: Landmarks,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
@@ -39,13 +49,12 @@ class VideoView(QWidget):
         self._playback = playback
         self._display = display
         self._overlay = overlay
-        self._fit = fit
-        self._follower = follower
+        self._found = landmarks
         self.setMinimumSize(200, 150)
         video.frame_changed.connect(self.update)
         overlay.changed.connect(self.update)
-        fit.advanced.connect(self.update)
-        fit.changed.connect(self.update)
+        for signal in landmarks.landmarks_changed:
+            signal.connect(self.update)
         display.theme_changed.connect(self.update)
         document.changed.connect(self.update)
 
@@ -89,12 +98,10 @@ class VideoView(QWidget):
         return "The video cannot be shown"
 
     def _landmarks(self) -> NDArray[np.float32] | None:
-        """Landmarks that the fit found in this frame, until there is a mesh."""
-        if self._fit.state == "idle" or not self._follower.on_screen:
-            return None
+        """Landmarks of this frame, until the mesh takes their place."""
         if self._document.mesh is not None:
             return None
-        return self._fit.landmarks_at(self._video.shown_frame)
+        return self._found.landmarks_at(self._video.shown_frame)
 
     def _paint_mesh(self, painter: QPainter, box: QRectF) -> None:
         mesh, reader = self._document.mesh, self._video.reader

@@ -12,10 +12,11 @@ import trimesh
 from fake_denoisers import FakeDenoisers, card_of, fading
 from fake_ladder import FakeLadder
 from PySide6.QtCore import QObject
+from window_models import build_models
 
 from sd2app.denoise import map as denoised_map
 from sd2app.settings import Settings
-from sd2app.shell.wiring import build_context
+from sd2app.shell.parts import Parts
 from sd2core.errors import Sd2Error
 from sd2core.io.mesh import save_mesh
 from sd2core.maps import DopplerMap
@@ -67,7 +68,11 @@ def make(qapp, compiled_kernels):
         made.append(
             (
                 parent,
-                build_context(parent, Settings.forgetful(), ladder.ladder, None, models.library),
+                build_models(
+                    parent,
+                    Settings.forgetful(),
+                    Parts(ladder=ladder.ladder, denoisers=models.library),
+                ),
             )
         )
         return made[-1][1]
@@ -424,7 +429,7 @@ def test_a_real_model_gives_the_map_that_the_library_gives(
     card = replace(card_of(tmp_path), options={"channels": 8}, path=None)
     save_model(tmp_path / "own.safetensors", TrainedDenoiser(network, card))
     parent = QObject()
-    context = build_context(parent, Settings.forgetful(), FakeLadder().ladder)
+    context = build_models(parent, Settings.forgetful(), Parts(ladder=FakeLadder().ladder))
     open_it(context, qtbot, ball)
     context.denoise.use(tmp_path / "own.safetensors")
     qtbot.waitUntil(lambda: not context.denoise.busy, timeout=120_000)

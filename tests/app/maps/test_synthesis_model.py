@@ -9,11 +9,12 @@ import pytest
 import trimesh
 from fake_denoisers import FakeDenoisers
 from fake_ladder import COUNTING, EXACT, FACING, FakeLadder
+from window_models import build_models
 
 from sd2app.maps import warm_up as map_warm_up
 from sd2app.maps.partial_map import FINAL, ROUGH
 from sd2app.settings import Settings
-from sd2app.shell.wiring import build_context
+from sd2app.shell.parts import Parts
 from sd2core.accuracy.plans import AccuracyPlan
 from sd2core.accuracy.trial import synthesizer_for
 from sd2core.doppler.synthesizer import Synthesizer
@@ -43,8 +44,10 @@ def context(qapp, compiled_kernels, fake):
     from PySide6.QtCore import QObject
 
     parent = QObject()
-    context = build_context(
-        parent, Settings.forgetful(), fake.ladder, None, FakeDenoisers().library
+    context = build_models(
+        parent,
+        Settings.forgetful(),
+        Parts(ladder=fake.ladder, denoisers=FakeDenoisers().library),
     )
     yield context
     fake.gate.set()
@@ -343,7 +346,7 @@ def test_the_library_chooses_for_a_small_scene(qapp, qtbot, ball, compiled_kerne
     from PySide6.QtCore import QObject
 
     parent = QObject()
-    context = build_context(parent, Settings.forgetful(), denoisers=FakeDenoisers().library)
+    context = build_models(parent, Settings.forgetful(), Parts(denoisers=FakeDenoisers().library))
     try:
         open_ball(context, qtbot, ball)
         qtbot.waitUntil(lambda: context.trade.in_use is not None, timeout=60_000)

@@ -11,17 +11,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from PySide6.QtTest import QAbstractItemModelTester
+from window_models import all_actions
 
 from sd2app.labels.model import LabelsModel
 from sd2app.settings import Settings
-from sd2app.shell.actions import ACTIONS, MOUSE
 from sd2app.shell.keys.bindings import KeyBindings
 from sd2app.shell.keys.model import KEYS, KeyListModel
+from sd2app.shell.program import MOUSE
 from sd2app.widgets.key_text import canonical
 from sd2core.errors import Sd2Error
 from sd2core.labels.label_set import Label, LabelSet
 from sd2core.labels.spans import Labels
 from sd2core.timebase import Timebase
+
+ACTIONS = all_actions()
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ import pytest
 from fake_ladder import COUNTING, EXACT, FACING, WAVES, measurement_of, result_of, stale
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QLabel, QTabBar, QToolButton, QToolTip
+from window_models import models_of
 
 from sd2app.accuracy.panel import AccuracyPanel, ReasonList, ToleranceRow
 from sd2app.accuracy.plot import AccuracyPlot
@@ -30,7 +31,7 @@ def panel(window, fake, qtbot):
 @pytest.fixture
 def plot(panel, window, qtbot):
     """The plot with its points."""
-    measured = window.context.trade.measured
+    measured = models_of(window).trade.measured
     measured.measure()
     qtbot.waitUntil(lambda: measured.job is None, timeout=5_000)
     plot = panel.findChild(AccuracyPlot)
@@ -53,7 +54,7 @@ def at(plot, result):
 
 
 def done(window):
-    c = window.context
+    c = models_of(window)
     return c.synthesis.complete and not c.synthesis.busy and not c.jobs.jobs
 
 
@@ -85,7 +86,7 @@ def test_the_panel_says_what_the_tolerance_means_and_what_the_plan_costs(panel):
 
 
 def test_a_preset_and_the_number_box_set_the_tolerance(panel, window, fake, qtbot):
-    trade = window.context.trade
+    trade = models_of(window).trade
     fake.plans = {0.1: FACING, 0.02: STRIDE}
     qtbot.mouseClick(button(panel, "10 %"), Qt.MouseButton.LeftButton)
     assert trade.tolerance == 0.1
@@ -100,8 +101,8 @@ def test_a_preset_and_the_number_box_set_the_tolerance(panel, window, fake, qtbo
     assert trade.tolerance == pytest.approx(0.02)
     qtbot.waitUntil(lambda: trade.in_use.plan == STRIDE, timeout=5_000)
     assert not box.hasFocus()
-    assert window.context.settings.tolerance == pytest.approx(0.02)
-    assert window.context.document.undo_stack.count() == 0
+    assert models_of(window).settings.tolerance == pytest.approx(0.02)
+    assert models_of(window).document.undo_stack.count() == 0
 
 
 def test_a_tolerance_that_no_plan_holds_is_said(panel, window, fake, qtbot):
@@ -120,7 +121,7 @@ def test_reasons_are_listed_with_what_is_modelled_first(panel):
 
 
 def test_measuring_shows_progress_and_then_the_points(panel, window, fake, qtbot):
-    measured = window.context.trade.measured
+    measured = models_of(window).trade.measured
     fake.gate.clear()
     qtbot.mouseClick(button(panel, "Measure this scene"), Qt.MouseButton.LeftButton)
     assert measured.job is not None
@@ -166,12 +167,12 @@ def test_hovering_says_what_a_point_is(plot, qtbot):
 
 
 def test_a_click_uses_a_point_until_the_tolerance_rules_again(plot, panel, window, qtbot):
-    trade = window.context.trade
+    trade = models_of(window).trade
     qtbot.mouseClick(plot, Qt.MouseButton.LeftButton, pos=at(plot, COUNTING[0]))
     assert trade.in_use.plan == FACING
     assert "You clicked this point" in texts(panel)
     qtbot.waitUntil(lambda: done(window), timeout=10_000)
-    assert window.context.synthetic.status == "visibility facing, ±13 %"
+    assert models_of(window).synthetic.status == "visibility facing, ±13 %"
     qtbot.mouseClick(button(panel, "Choose by tolerance"), Qt.MouseButton.LeftButton)
     assert trade.in_use.plan == EXACT
     assert "You clicked" not in texts(panel)
@@ -181,7 +182,7 @@ def test_a_click_uses_a_point_until_the_tolerance_rules_again(plot, panel, windo
 
 
 def test_keys_go_from_point_to_point_and_use_one(plot, window, qtbot):
-    trade, playback = window.context.trade, window.context.playback
+    trade, playback = models_of(window).trade, models_of(window).playback
     frame = playback.frame
     plot.setFocus(Qt.FocusReason.TabFocusReason)
     assert plot.pointed.plan == EXACT
@@ -204,7 +205,7 @@ def test_keys_go_from_point_to_point_and_use_one(plot, window, qtbot):
 
 
 def test_fmcw_plans_are_shown_and_said_how_to_run(panel, plot, window, qtbot):
-    trade = window.context.trade
+    trade = models_of(window).trade
     family = panel.findChild(ChoiceBox)
     family.setFocus()
     qtbot.keyClick(family, Qt.Key.Key_Down)
@@ -221,13 +222,13 @@ def test_fmcw_plans_are_shown_and_said_how_to_run(panel, plot, window, qtbot):
 def test_what_was_measured_elsewhere_is_said_to_be(panel, window, fake, qtbot):
     there = VirtualSensor(position_m=(0.5, 0.0, 0.0))
     fake.known["histogram", there] = stale(measurement_of(*COUNTING))
-    window.context.edits.place_sensor(there)
+    models_of(window).edits.place_sensor(there)
     qtbot.waitUntil(lambda: "Measured for another placement" in texts(panel), timeout=10_000)
 
 
 def test_many_points_are_painted_in_both_themes(panel, window, fake, qtbot):
     """Every state of the plot is painted without a word from Qt."""
-    here = window.context.sensor.sensor
+    here = models_of(window).sensor.sensor
     many = [
         result_of(
             AccuracyPlan(mask_stride=stride, vertices_kept=kept), 0.1 * kept / stride, kept / stride
@@ -236,13 +237,13 @@ def test_many_points_are_painted_in_both_themes(panel, window, fake, qtbot):
         for kept in (1.0, 0.5, 0.25, 0.1)
     ]
     fake.known["histogram", here] = measurement_of(*many)
-    window.context.trade.measured._place = None
-    window.context.trade.rest_at(here)
-    qtbot.waitUntil(lambda: window.context.trade.measured.measurement is not None)
+    models_of(window).trade.measured._place = None
+    models_of(window).trade.rest_at(here)
+    qtbot.waitUntil(lambda: models_of(window).trade.measured.measurement is not None)
     plot = panel.findChild(AccuracyPlot)
     pictures = set()
     for dark in (False, True):
-        window.set_dark(dark)
+        window.features.program.set_dark(dark)
         plot.setFocus(Qt.FocusReason.TabFocusReason)
         qtbot.keyClick(plot, Qt.Key.Key_Right)
         picture = plot.grab().toImage()
@@ -254,7 +255,7 @@ def test_the_status_line_names_the_plan_in_use(window, qtbot):
     def shown():
         return [label.text() for label in window.findChildren(ElidedLabel)][-1]
 
-    c = window.context
+    c = models_of(window)
     assert shown() == f"Plan: {EXACT} · ±0 % · 0.6 ms/frame"
     c.edits.begin_sensor_drag()
     assert shown().startswith("Plan:")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QFileDialog, QToolButton
+from window_models import models_of
 
 from sd2app.agreement.panel import AgreementPanel
 from sd2app.agreement.timeline import OtherTimeline
@@ -20,16 +21,16 @@ def compared(window, qtbot, monkeypatch, tmp_path):
     """Mine: "there" 0.2 to 0.8 s, "back" 1 to 2 s. Ben's: "there" the same, "back" from 1.5 s."""
     spans = (Span(1, "Ben", 0.2, 0.8, "there"), Span(2, "Ben", 1.5, 2.0, "back"))
     path = tmp_path / "ben.eaf"
-    write_labels(path, Labels((LabelTrack("Ben"),), spans), window.context.playback.timebase)
+    write_labels(path, Labels((LabelTrack("Ben"),), spans), models_of(window).playback.timebase)
     monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(path), ""))
     qtbot.keyClick(window, Qt.Key.Key_K, CONTROL)
-    model = window.context.agreement
+    model = models_of(window).agreement
     qtbot.waitUntil(lambda: model.found is not None, timeout=10_000)
     return window
 
 
 def test_side_by_side_and_from_one_difference_to_the_next(compared, qtbot) -> None:
-    c = compared.context
+    c = models_of(compared)
     below, panel = compared.findChild(OtherTimeline), compared.findChild(AgreementPanel)
     assert below.isVisible()
     assert compared.side.shown == "Agree"
@@ -45,7 +46,7 @@ def test_side_by_side_and_from_one_difference_to_the_next(compared, qtbot) -> No
 
 
 def test_editing_is_followed_and_nothing_of_theirs_is_changed(compared, qtbot) -> None:
-    c, below = compared.context, compared.findChild(OtherTimeline)
+    c, below = models_of(compared), compared.findChild(OtherTimeline)
     qtbot.mouseClick(below, LEFT, pos=QPoint(round(below.scale.x_of(1.5)), below.height() - 8))
     assert c.playback.frame == 45
     assert not c.labels.selected
@@ -62,10 +63,10 @@ def test_the_end_takes_them_away(compared, qtbot) -> None:
     end = next(one for one in panel.findChildren(QToolButton) if one.text() == "End")
     qtbot.mouseClick(end, LEFT)
     assert not compared.findChild(OtherTimeline).isVisible()
-    assert not compared.context.agreement.active
+    assert not models_of(compared).agreement.active
 
 
 def test_another_recording_is_not_compared(compared, qtbot, recording_copy) -> None:
     compared.open_paths([recording_copy])
     qtbot.waitUntil(lambda: compared.settled, timeout=20_000)
-    assert not compared.context.agreement.active
+    assert not models_of(compared).agreement.active

@@ -12,12 +12,14 @@ import pytest
 from PySide6.QtCore import QCoreApplication, QEvent, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QCheckBox, QFileDialog, QLabel, QListWidget, QTableView, QToolButton
+from window_models import models_of
 
 from sd2app.background import run_monitor
 from sd2app.batch import dialog as batch_dialogs
 from sd2app.batch.dialog import BatchWindow
 from sd2app.batch.model import BatchModel
 from sd2app.settings import Settings
+from sd2app.shell.parts import Parts
 from sd2app.shell.window import MainWindow
 from sd2core.batch.plan_file import read_plan
 from sd2core.placements.placements import PlacementGrid, write_placements
@@ -42,7 +44,8 @@ def opened(qtbot, compiled_kernels, fake, fake_models, recording_copy):
     def make(*options: object) -> MainWindow:
         command = [sys.executable, "-u", str(FAKE), *map(str, options)]
         window = MainWindow(
-            Settings.forgetful(), fake.ladder, None, fake_models.library, batch_command=command
+            Settings.forgetful(),
+            Parts(ladder=fake.ladder, denoisers=fake_models.library, batch_command=command),
         )
         windows.append(window)
         window.show()
@@ -50,23 +53,23 @@ def opened(qtbot, compiled_kernels, fake, fake_models, recording_copy):
         qtbot.waitUntil(lambda: window.settled, timeout=20_000)
         window.open_paths([recording_copy])
         qtbot.waitUntil(
-            lambda: window.settled and window.context.synthesis.complete, timeout=20_000
+            lambda: window.settled and models_of(window).synthesis.complete, timeout=20_000
         )
         return window
 
     yield make
     for window in windows:
-        run = window.context.batch.batch
+        run = models_of(window).batch.batch
         if run is not None and run.folder.live:
             os.kill(run.folder.status().pid, signal.SIGKILL)
-        window.context.document.undo_stack.clear()
+        models_of(window).document.undo_stack.clear()
         window.close()
         window.deleteLater()
     QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 
 def begin(window: MainWindow) -> BatchWindow:
-    window._actions["batch"].trigger()
+    window.action("batch").trigger()
     return window.findChild(BatchWindow)
 
 
@@ -97,7 +100,7 @@ def test_a_batch_is_set_up_started_and_its_results_opened(
     opened, qtbot, recording_copy, tmp_path, monkeypatch
 ):
     window = opened("--fail", 0)
-    batch = window.context.batch
+    batch = models_of(window).batch
     dialog = begin(window)
     # What is open is taken along.
     assert batch.setup.entries[0].path == recording_copy
@@ -132,11 +135,11 @@ def test_a_batch_is_set_up_started_and_its_results_opened(
     click(dialog, "Results")
     table = dialog.findChild(QTableView)
     table.selectRow(3)
-    with qtbot.waitSignal(window.context.document.opened, timeout=20_000):
+    with qtbot.waitSignal(models_of(window).document.opened, timeout=20_000):
         click(dialog, "Open in the window")
     qtbot.waitUntil(lambda: window.settled, timeout=20_000)
-    assert window.context.document.recording.folder == another
-    assert window.context.sensor.sensor.position_m == (1.0, 0.0, 0.25)
+    assert models_of(window).document.recording.folder == another
+    assert models_of(window).sensor.sensor.position_m == (1.0, 0.0, 0.25)
     assert open_recording(another).sensor.position_m != (1.0, 0.0, 0.25)
     click(dialog, "New batch")
     assert button(dialog, "Start")
@@ -145,7 +148,7 @@ def test_a_batch_is_set_up_started_and_its_results_opened(
 def test_delete_takes_a_recording_from_the_list_and_says_what_is_missing(opened, qtbot):
     window = opened()
     dialog = begin(window)
-    ready(qtbot, window.context.batch)
+    ready(qtbot, models_of(window).batch)
     paths = dialog.findChild(QListWidget)
     paths.setCurrentRow(0)
     paths.item(0).setSelected(True)
@@ -157,7 +160,7 @@ def test_delete_takes_a_recording_from_the_list_and_says_what_is_missing(opened,
 
 def test_failures_and_their_reasons_are_shown_and_a_batch_is_stopped(opened, qtbot, recording_copy):
     window = opened("--fail", 1, "--step-s", 30)
-    batch = window.context.batch
+    batch = models_of(window).batch
     dialog = begin(window)
     ready(qtbot, batch)
     assert "1 recording: about 30 min on" in words(dialog)
@@ -177,11 +180,11 @@ def test_failures_and_their_reasons_are_shown_and_a_batch_is_stopped(opened, qtb
 
 def test_placements_of_the_recording_or_of_a_file_are_taken(opened, qtbot, tmp_path, monkeypatch):
     window = opened()
-    context = window.context
+    context = models_of(window)
     setup = context.batch.setup
     context.edits.plan_placements(PlacementGrid((1.0, 2.0, 3.0)))
-    window.show_placements()
-    window.batch_dialogs.show_with_placements()
+    window.bring_up("Sensor", "Placements")
+    window.features.batch.dialogs.show_with_placements()
     dialog = window.findChild(BatchWindow)
     qtbot.waitUntil(lambda: not setup.problem, timeout=20_000)
     assert setup.plan().placement_count == 3
@@ -218,13 +221,13 @@ def test_placements_of_the_recording_or_of_a_file_are_taken(opened, qtbot, tmp_p
 
 def test_the_window_closes_and_the_batch_goes_on(opened, qtbot):
     window = opened("--step-s", 20)
-    batch = window.context.batch
+    batch = models_of(window).batch
     dialog = begin(window)
     ready(qtbot, batch)
     click(dialog, "Start")
     qtbot.waitUntil(lambda: batch.batch is not None and batch.batch.status is not None)
     folder = batch.batch.folder
-    window.context.document.undo_stack.clear()
+    models_of(window).document.undo_stack.clear()
     window.close()
     assert not dialog.isVisible()
     assert folder.live

@@ -18,6 +18,7 @@ from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
 from PySide6.QtGui import QDropEvent
 from PySide6.QtWidgets import QFileDialog, QLabel, QToolButton
 from small_pairs import write_pairs
+from window_models import models_of
 
 from sd2app.classify.confusion_view import ConfusionView
 from sd2app.classify.curve import ClassCurve
@@ -42,9 +43,9 @@ def fake_classes(fake_classes, tmp_path):
 @pytest.fixture
 def classified(window, fake_classes, qtbot):
     """The window on the ball, which approaches and recedes once a second; nothing is marked."""
-    c = window.context
+    c = models_of(window)
     (path,) = fake_classes.cards
-    window.class_dialogs.use(path)
+    window.features.classify.dialogs.use(path)
     qtbot.waitUntil(lambda: c.classify.track.complete and not c.classify.busy, timeout=10_000)
     for _ in range(2):
         key(window, "N")
@@ -54,16 +55,16 @@ def classified(window, fake_classes, qtbot):
 
 
 def truth(window):
-    return expected(window.context.synthetic.map.values.T)
+    return expected(models_of(window).synthetic.map.values.T)
 
 
 def labels(window):
-    return [(span.label, span.origin) for span in window.context.labels.labels.spans]
+    return [(span.label, span.origin) for span in models_of(window).labels.labels.spans]
 
 
 def found(window, qtbot):
     key(window, "G", SHIFT)
-    qtbot.waitUntil(lambda: not window.context.suggestions.busy, timeout=10_000)
+    qtbot.waitUntil(lambda: not models_of(window).suggestions.busy, timeout=10_000)
 
 
 def press(view, text, qtbot):
@@ -81,24 +82,27 @@ def test_a_file_is_chosen_and_the_strip_appears(window, fake_classes, qtbot, mon
     assert not strip.isVisible()
     (path,) = fake_classes.cards
     monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(path), ""))
-    window._actions["open_classifier"].trigger()
-    qtbot.waitUntil(lambda: window.context.classify.track.complete, timeout=10_000)
+    window.action("open_classifier").trigger()
+    qtbot.waitUntil(lambda: models_of(window).classify.track.complete, timeout=10_000)
     assert strip.isVisible()
     key(window, "I", SHIFT)
     assert not strip.isVisible()
     key(window, "I", SHIFT)
     assert strip.isVisible()
-    window._classes.fill()
-    entries = {action.text().split("\t")[0]: action for action in window._classes.actions()}
+    window.features.classify._classifiers().fill()
+    entries = {
+        action.text().split("\t")[0]: action
+        for action in window.features.classify._classifiers().actions()
+    }
     assert entries["waves"].isChecked()
     entries["No model"].trigger()
     assert not strip.isVisible()
-    assert window.context.classify.reading is None
+    assert models_of(window).classify.reading is None
 
 
 def test_the_readout_follows_keys_and_clicks(classified, qtbot):
     readout, plot = classified.findChild(ClassReadout), classified.findChild(ClassPlot)
-    c, shares = classified.context, truth(classified)
+    c, shares = models_of(classified), truth(classified)
     for _ in range(8):
         key(classified, "Right")
     for frame in (8, 40):
@@ -112,7 +116,7 @@ def test_the_readout_follows_keys_and_clicks(classified, qtbot):
 
 
 def test_what_belongs_to_another_sensor_is_not_shown_as_current(classified, fake_classes, qtbot):
-    c, readout = classified.context, classified.findChild(ClassReadout)
+    c, readout = models_of(classified), classified.findChild(ClassReadout)
     before = readout.text
     assert before
     fake_classes.gate.clear()
@@ -135,7 +139,7 @@ def test_what_belongs_to_another_sensor_is_not_shown_as_current(classified, fake
 
 
 def test_another_map_is_looked_at(classified, qtbot):
-    c, strip = classified.context, classified.findChild(ClassStrip)
+    c, strip = models_of(classified), classified.findChild(ClassStrip)
     choice = strip.findChild(Choice)
     assert [choice.itemText(at) for at in range(choice.count())] == [
         "on synthetic", "on radar (simulated)",
@@ -165,7 +169,7 @@ def test_the_strip_stacks_what_is_probable():
 
 
 def test_found_by_a_key_decided_on_and_undone(classified, qtbot):
-    c, bar = classified.context, classified.findChild(SuggestionBar)
+    c, bar = models_of(classified), classified.findChild(SuggestionBar)
     found(classified, qtbot)
     assert bar.isVisible()
     names = [label for label, _ in labels(classified)]
@@ -193,7 +197,7 @@ def test_found_by_a_key_decided_on_and_undone(classified, qtbot):
 
 
 def test_an_edge_is_dragged_before_it_is_accepted(classified, qtbot):
-    c = classified.context
+    c = models_of(classified)
     found(classified, qtbot)
     span = c.labels.selected[0]
     view = classified.findChild(LabelTimeline)
@@ -211,7 +215,7 @@ def test_an_edge_is_dragged_before_it_is_accepted(classified, qtbot):
 
 
 def test_how_sure_it_must_be_is_typed(classified, qtbot):
-    c, bar = classified.context, classified.findChild(SuggestionBar)
+    c, bar = models_of(classified), classified.findChild(SuggestionBar)
     found(classified, qtbot)
     many = len(c.suggestions.pending)
     sure = sorted(span.confidence for span in c.suggestions.pending)
@@ -228,7 +232,7 @@ def test_how_sure_it_must_be_is_typed(classified, qtbot):
 
 
 def test_without_a_classifier_the_key_says_what_to_do(window, qtbot):
-    action = window._actions["find_gestures"]
+    action = window.action("find_gestures")
     assert not action.isEnabled()
     assert "Choose a classifier" in action.toolTip()
 
@@ -244,7 +248,7 @@ def test_the_card_calls_simulated_what_is(classified, qtbot):
         dialog.reject()
 
     once_asked(ModelCardDialog, read)
-    classified._actions["classifier_card"].trigger()
+    classified.action("classifier_card").trigger()
     assert {"waves", "simulated data only", "background, horizontal, vertical"} <= set(texts)
 
 
@@ -254,15 +258,15 @@ def test_a_classifier_that_is_dropped_is_used(window, fake_classes, qtbot):
     data.setUrls([QUrl.fromLocalFile(str(path))])
     none = Qt.KeyboardModifier.NoModifier
     window.dropEvent(QDropEvent(QPointF(50, 50), Qt.DropAction.CopyAction, data, LEFT, none))
-    qtbot.waitUntil(lambda: window.context.classify.track.complete, timeout=10_000)
-    assert window.context.classify.path == path
-    assert window.context.denoise.path is None
+    qtbot.waitUntil(lambda: models_of(window).classify.track.complete, timeout=10_000)
+    assert models_of(window).classify.path == path
+    assert models_of(window).denoise.path is None
 
 
 def test_what_is_no_classifier_is_said(window, tmp_path):
-    window.class_dialogs.use(tmp_path / "other.safetensors")
+    window.features.classify.dialogs.use(tmp_path / "other.safetensors")
     assert "other.safetensors is no classifier" in window.messages.text
-    assert window.context.classify.path is None
+    assert models_of(window).classify.path is None
 
 
 # --- training and comparing -------------------------------------------------------------------
@@ -271,7 +275,7 @@ def test_what_is_no_classifier_is_said(window, tmp_path):
 @pytest.fixture
 def trainable(window, tmp_path, qtbot):
     """The page of classifiers with data, and a command that learns nothing."""
-    training = window.context.class_training
+    training = models_of(window).class_training
     training._command = (sys.executable, "-u", fake_class_command.__file__)
     key(window, "C", SHIFT)
     panel = window.findChild(ClassPanel)
@@ -285,7 +289,7 @@ def trainable(window, tmp_path, qtbot):
 
 
 def test_trained_by_clicks_watched_and_used(trainable, fake_classes, qtbot):
-    training, panel = trainable.context.class_training, trainable.findChild(ClassPanel)
+    training, panel = models_of(trainable).class_training, trainable.findChild(ClassPanel)
     training.select(None)
     press(panel, "Start training", qtbot)
     qtbot.waitUntil(lambda: training.run is not None and not training.run.under_way, timeout=20_000)
@@ -299,7 +303,7 @@ def test_trained_by_clicks_watched_and_used(trainable, fake_classes, qtbot):
     kept = training._folder / f"{training.run.folder.path.name}.safetensors"
     fake_classes.add(kept)
     press(panel, "Use this model", qtbot)
-    assert trainable.context.classify.path == kept
+    assert models_of(trainable).classify.path == kept
     assert kept.is_file()
     answer(qtbot, "Discard")
     press(panel, "Delete…", qtbot)
@@ -307,7 +311,7 @@ def test_trained_by_clicks_watched_and_used(trainable, fake_classes, qtbot):
 
 
 def test_a_person_is_typed_and_who_does_what_is_said(trainable, tmp_path, qtbot):
-    training, panel = trainable.context.class_training, trainable.findChild(ClassPanel)
+    training, panel = models_of(trainable).class_training, trainable.findChild(ClassPanel)
     setup = training.setup
     shutil.copytree(resource_path("swipes.sd2"), copy := tmp_path / "copy.sd2")
     # A step takes as long as this says: importing torch under load takes longer than a test may.
@@ -345,7 +349,7 @@ def test_a_person_is_typed_and_who_does_what_is_said(trainable, tmp_path, qtbot)
 
 
 def test_stopped_by_a_click(trainable, qtbot):
-    training, panel = trainable.context.class_training, trainable.findChild(ClassPanel)
+    training, panel = models_of(trainable).class_training, trainable.findChild(ClassPanel)
     training._command = (*training._command, "--step-s", "0.5")
     press(panel, "Start training", qtbot)
     qtbot.waitUntil(lambda: training.run.history.done >= 1, timeout=20_000)
@@ -363,7 +367,7 @@ def test_a_result_is_opened_and_looked_at(window, tmp_path, qtbot, monkeypatch):
     path = tmp_path / "table.json"
     path.write_text(json.dumps(finite(as_json(a_table()))))
     monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(path), ""))
-    window.class_dialogs.open_result()
+    window.features.classify.dialogs.open_result()
     dialog = window.findChild(ClassResultDialog)
     left, right = dialog.findChildren(ConfusionView)
     assert left.matrix.title == "radar only"
@@ -376,5 +380,5 @@ def test_a_result_is_opened_and_looked_at(window, tmp_path, qtbot, monkeypatch):
     dialog.grab()
     dialog.close()
     path.write_text("{}")
-    window.class_dialogs.open_result()
+    window.features.classify.dialogs.open_result()
     assert "is no such result" in window.messages.text

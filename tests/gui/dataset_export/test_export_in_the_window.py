@@ -17,6 +17,7 @@ from PySide6.QtWidgets import (
     QProgressBar,
     QToolButton,
 )
+from window_models import models_of
 
 from sd2app.dataset_export.dialog import ExportDialog
 from sd2app.widgets.inputs import NumberBox
@@ -34,9 +35,9 @@ def dialog(window, qtbot):
                    | Qt.KeyboardModifier.ShiftModifier)  # fmt: skip
     found = QApplication.activeModalWidget()
     assert isinstance(found, ExportDialog)
-    qtbot.waitUntil(lambda: not window.context.export.counting, timeout=20_000)
+    qtbot.waitUntil(lambda: not models_of(window).export.counting, timeout=20_000)
     yield found
-    model = window.context.export
+    model = models_of(window).export
     if model.exporting:
         model.stop()
         qtbot.waitUntil(lambda: not model.exporting, timeout=20_000)
@@ -66,7 +67,7 @@ def words(dialog: ExportDialog) -> list[str]:
 def test_counts_follow_and_the_data_set_is_written(
     window, dialog, qtbot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    model = window.context.export
+    model = models_of(window).export
     # The recording has 60 frames: none of 72 on end.
     assert "No recording has 72 frames on end with a person." in words(dialog)
     assert not button(dialog, "Export…").isEnabled()
@@ -106,7 +107,7 @@ def test_counts_follow_and_the_data_set_is_written(
 def test_it_goes_on_when_the_dialog_is_closed_and_can_be_stopped(
     window, dialog, qtbot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    model = window.context.export
+    model = models_of(window).export
     monkeypatch.setattr(model, "_command", (sys.executable, str(FAKE), "slow"))
     type_frames(dialog, "Frames of a segment", "20", qtbot)
     qtbot.waitUntil(lambda: model.ready, timeout=20_000)
@@ -117,12 +118,12 @@ def test_it_goes_on_when_the_dialog_is_closed_and_can_be_stopped(
     qtbot.keyClick(dialog, Qt.Key.Key_Escape)
     qtbot.waitUntil(lambda: QApplication.activeModalWidget() is None)
     assert model.exporting
-    assert [job.title for job in window.context.jobs.jobs] == ["Exporting s.zarr"]
-    window._actions["export_dataset"].trigger()
+    assert [job.title for job in models_of(window).jobs.jobs] == ["Exporting s.zarr"]
+    window.action("export_dataset").trigger()
     again = QApplication.activeModalWidget()
     assert isinstance(again, ExportDialog)
     qtbot.mouseClick(button(again, "Stop"), LEFT)
     qtbot.waitUntil(lambda: not model.exporting, timeout=20_000)
     assert button(again, "Export…").isEnabled()
-    assert not window.context.jobs.jobs
+    assert not models_of(window).jobs.jobs
     again.close()

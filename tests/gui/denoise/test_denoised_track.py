@@ -9,6 +9,7 @@ from fake_denoisers import fading
 from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QTimer, QUrl
 from PySide6.QtGui import QColor, QDropEvent
 from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QPushButton
+from window_models import models_of
 
 from sd2app.figures.map_dialog import MapFigureDialog
 from sd2app.maps.spectrum import SpectrumView
@@ -28,7 +29,7 @@ def fake_models(fake_models, tmp_path):
 
 
 def wait(window, qtbot):
-    qtbot.waitUntil(lambda: window.settled and window.context.synthesis.complete, timeout=20_000)
+    qtbot.waitUntil(lambda: window.settled and models_of(window).synthesis.complete, timeout=20_000)
 
 
 def choose(window, qtbot, button, words):
@@ -68,7 +69,7 @@ def denoised(window, fake_models, qtbot):
 
 
 def test_a_click_chooses_a_model_and_the_track_appears(window, qtbot):
-    c, tracks = window.context, window._tracks
+    c, tracks = models_of(window), window.maps
     assert not tracks.denoised.isVisible()
     assert shown_button(window).text() == "No denoiser"
     choose(window, qtbot, shown_button(window), "kitchen")
@@ -95,15 +96,15 @@ def test_a_model_file_that_is_dropped_is_used(window, fake_models, qtbot, tmp_pa
     none = Qt.KeyboardModifier.NoModifier
     window.dropEvent(QDropEvent(QPointF(50, 50), actions, data, button, none))
     wait(window, qtbot)
-    assert is_of(window.context, 3.0)
+    assert is_of(models_of(window), 3.0)
     data.setUrls([QUrl.fromLocalFile(str(tmp_path / "other.safetensors"))])
     window.dropEvent(QDropEvent(QPointF(50, 50), actions, data, button, none))
     assert "no model file" in window.messages.text
-    assert is_of(window.context, 3.0)
+    assert is_of(models_of(window), 3.0)
 
 
 def test_the_difference_has_a_sign_and_says_what_it_is(denoised, qtbot):
-    c, view = denoised.context, denoised._tracks.difference
+    c, view = models_of(denoised), denoised.maps.difference
     assert not view.isVisible()
     qtbot.keyClick(denoised, Qt.Key.Key_X)
     assert view.isVisible()
@@ -141,15 +142,15 @@ def test_the_difference_has_a_sign_and_says_what_it_is(denoised, qtbot):
 
 
 def test_without_a_model_the_difference_says_why_it_cannot_be(window, qtbot):
-    action = window._actions["difference"]
+    action = window.action("difference")
     assert not action.isEnabled()
     assert "no denoised map" in action.toolTip()
     qtbot.keyClick(window, Qt.Key.Key_X)
-    assert not window._tracks.difference.isVisible()
+    assert not window.maps.difference.isVisible()
 
 
 def test_playing_live_shows_frames_as_the_clock_reaches_them(denoised, fake_models, qtbot):
-    c = denoised.context
+    c = models_of(denoised)
     whole = c.denoised.map.values.copy()
     qtbot.keyClick(denoised, Qt.Key.Key_V)
     assert c.live.wanted
@@ -180,8 +181,8 @@ def test_playing_live_shows_frames_as_the_clock_reaches_them(denoised, fake_mode
 
 
 def test_the_model_before_stands_below_this_one(denoised, qtbot):
-    c, tracks = denoised.context, denoised._tracks
-    assert not denoised._actions["compare_models"].isEnabled()
+    c, tracks = models_of(denoised), denoised.maps
+    assert not denoised.action("compare_models").isEnabled()
     choose(denoised, qtbot, shown_button(denoised), "hall")
     qtbot.keyClick(denoised, Qt.Key.Key_B)
     wait(denoised, qtbot)
@@ -199,7 +200,7 @@ def test_the_model_before_stands_below_this_one(denoised, qtbot):
 
 
 def test_the_spectrum_has_a_curve_of_it(denoised, qtbot):
-    view, c = denoised.findChild(SpectrumView), denoised.context
+    view, c = denoised.findChild(SpectrumView), models_of(denoised)
 
     def pixels(name):
         image = view.grab().toImage()
@@ -223,7 +224,7 @@ def test_the_card_says_what_the_model_is(denoised, qtbot):
         dialog.reject()
 
     once_asked(ModelCardDialog, read)
-    denoised._actions["model_card"].trigger()
+    denoised.action("model_card").trigger()
     assert "kitchen" in texts
     assert "simulated data only" in texts
     assert "Knows kitchens only" in texts
@@ -231,10 +232,10 @@ def test_the_card_says_what_the_model_is(denoised, qtbot):
 
 
 def test_map_and_figure_are_exported(denoised, qtbot, tmp_path, monkeypatch):
-    c = denoised.context
+    c = models_of(denoised)
     name = tmp_path / "out.npz"
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(name), ""))
-    denoised._actions["export_denoised"].trigger()
+    denoised.action("export_denoised").trigger()
     made = DopplerMap.load(name)
     assert made.kind == "denoised"
     np.testing.assert_allclose(made.values, c.denoised.map.values, rtol=1e-5, atol=1e-9)
@@ -246,7 +247,7 @@ def test_map_and_figure_are_exported(denoised, qtbot, tmp_path, monkeypatch):
         qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
 
     once_asked(MapFigureDialog, export)
-    denoised._actions["export_maps"].trigger()
+    denoised.action("export_maps").trigger()
     text = name.read_text(encoding="utf-8")
     for words in (
         "Synthetic",

@@ -10,6 +10,7 @@ from answering import once_asked
 from PIL import Image
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QCheckBox, QFileDialog, QPushButton
+from window_models import models_of
 
 from sd2app.figures.strip import StripModel
 from sd2app.figures.strip_dialog import StripDialog
@@ -17,8 +18,8 @@ from sd2app.figures.strip_dialog import StripDialog
 
 @pytest.fixture
 def model(window, qtbot):
-    window.context.playback.seek_frame(30)
-    model = StripModel(window.context.document.content, window.context.playback.time_s)
+    models_of(window).playback.seek_frame(30)
+    model = StripModel(models_of(window).document.content, models_of(window).playback.time_s)
     yield model
     model.close()
 
@@ -58,9 +59,9 @@ def test_the_preview_follows_what_is_chosen(model, qtbot):
 
 
 def test_what_is_not_there_is_not_offered(empty_window, small_recording, qtbot):
-    with qtbot.waitSignal(empty_window.context.document.opened, timeout=20_000):
+    with qtbot.waitSignal(models_of(empty_window).document.opened, timeout=20_000):
         empty_window.open_paths([small_recording / "video.mp4"])
-    model = StripModel(empty_window.context.document.content, 0.0)
+    model = StripModel(models_of(empty_window).document.content, 0.0)
     assert model.available == ("video",)
     assert model.options.rows == ("video",)
     settle(model, qtbot)
@@ -96,4 +97,4 @@ def test_exported_by_hand(window, qtbot, tmp_path, monkeypatch):
     said = json.loads(Image.open(path).text["Description"])
     assert said["frames"] == [4, 8]
     assert said["simulated"] is True
-    assert said["source"] == str(window.context.document.recording.folder)
+    assert said["source"] == str(models_of(window).document.recording.folder)

@@ -18,12 +18,14 @@ from PySide6.QtWidgets import (
     QPushButton,
     QToolButton,
 )
+from window_models import models_of
 
 from sd2app.fit.bar import FitBar
 from sd2app.fit.dialog import NewFromVideoDialog
 from sd2app.fit.request import FitRequest, Person
 from sd2app.fit.setup import FitSetupModel
 from sd2app.settings import Settings
+from sd2app.shell.parts import Parts
 from sd2app.shell.window import MainWindow
 from sd2app.video.landmark_overlay import bones
 from sd2app.video.view import VideoView
@@ -48,7 +50,8 @@ def made(qtbot, compiled_kernels, fake):
     def make(*options: object, settings: Settings | None = None) -> MainWindow:
         command = [sys.executable, "-u", str(FAKE), *map(str, options)]
         window = MainWindow(
-            settings or Settings.forgetful(), fake.ladder, command, FakeDenoisers().library
+            settings or Settings.forgetful(),
+            Parts(ladder=fake.ladder, fit_command=command, denoisers=FakeDenoisers().library),
         )
         windows.append(window)
         window.resize(1280, 800)
@@ -60,16 +63,16 @@ def made(qtbot, compiled_kernels, fake):
     yield make
     for window in windows:
         if window.ready:
-            window.context.fit.close()
-            window.context.fit._state = "idle"
-            window.context.document.undo_stack.clear()
+            models_of(window).fit.close()
+            models_of(window).fit._state = "idle"
+            models_of(window).document.undo_stack.clear()
         window.close()
         window.deleteLater()
     QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 
 def show(window, qtbot, path: Path) -> None:
-    with qtbot.waitSignal(window.context.document.opened, timeout=20_000):
+    with qtbot.waitSignal(models_of(window).document.opened, timeout=20_000):
         window.open_paths([path])
     qtbot.waitUntil(lambda: window.settled, timeout=20_000)
 
@@ -108,19 +111,19 @@ def test_from_the_offer_to_the_recording(made, qtbot, video) -> None:
 
     once_asked(NewFromVideoDialog, fill)
     click(window, qtbot, "Fit a body…")
-    fit = window.context.fit
+    fit = models_of(window).fit
     person = asked[0].person
     assert isinstance(person, Person)
     assert (person.x, person.y) == pytest.approx((40, 20), abs=1)
     assert (person.width, person.height) == pytest.approx((80, 80), abs=1)
     assert asked[0].stature_m == DEFAULT_STATURE_M
     assert fit.request == asked[0]
-    with qtbot.waitSignal(window.context.document.opened, timeout=30_000):
+    with qtbot.waitSignal(models_of(window).document.opened, timeout=30_000):
         pass
     made_of = open_recording(video.with_name("walk.sd2"))
     assert made_of.video == video
-    assert window.context.document.recording.folder == made_of.folder
-    assert window.context.document.mesh.frame_count == 60
+    assert models_of(window).document.recording.folder == made_of.folder
+    assert models_of(window).document.mesh.frame_count == 60
     qtbot.waitUntil(lambda: window.messages.text == "This was no fit.")
     assert fit.state == "idle"
     assert not bar.isVisible()
@@ -129,7 +132,7 @@ def test_from_the_offer_to_the_recording(made, qtbot, video) -> None:
 def test_landmarks_are_drawn_and_the_clock_goes_along_until_it_is_moved(made, qtbot, video) -> None:
     window = made("--pause-s", 0.01, "--stop-at", 30)
     show(window, qtbot, video)
-    c = window.context
+    c = models_of(window)
     c.fit.start(FitRequest(video, video.with_name("walk.sd2")))
     qtbot.waitUntil(lambda: c.video.shown_frame == 30 == c.playback.frame, timeout=20_000)
     view = window.findChild(VideoView)
@@ -166,8 +169,8 @@ def image_format():
 def test_a_failure_is_shown_and_put_away(made, qtbot, video) -> None:
     window = made("--refuse", "There is nobody in walk.mp4. Film a person.")
     show(window, qtbot, video)
-    window.context.fit.start(FitRequest(video, video.with_name("walk.sd2")))
-    qtbot.waitUntil(lambda: window.context.fit.state == "failed", timeout=20_000)
+    models_of(window).fit.start(FitRequest(video, video.with_name("walk.sd2")))
+    qtbot.waitUntil(lambda: models_of(window).fit.state == "failed", timeout=20_000)
     bar = window.findChild(FitBar)
     assert bar._reason.text() == "There is nobody in walk.mp4. Film a person."
     assert bar._reason.isVisible()
@@ -181,28 +184,28 @@ def test_a_failure_is_shown_and_put_away(made, qtbot, video) -> None:
     click(window, qtbot, "Change…")
     assert asked == [video]
     click(window, qtbot, "✕")
-    assert window.context.fit.state == "idle"
+    assert models_of(window).fit.state == "idle"
 
 
 def test_closing_asks_and_the_next_start_continues(made, qtbot, video) -> None:
     settings = Settings.forgetful()
     window = made("--stop-at", 10, settings=settings)
     show(window, qtbot, video)
-    window.context.fit.start(FitRequest(video, video.with_name("walk.sd2")))
-    qtbot.waitUntil(lambda: window.context.fit.landmarks_at(10) is not None, timeout=20_000)
+    models_of(window).fit.start(FitRequest(video, video.with_name("walk.sd2")))
+    qtbot.waitUntil(lambda: models_of(window).fit.landmarks_at(10) is not None, timeout=20_000)
     once_asked(QMessageBox, lambda box: box.button(QMessageBox.StandardButton.Cancel).click())
     window.close()
     assert window.isVisible()
-    assert window.context.fit.state == "running"
+    assert models_of(window).fit.state == "running"
     once_asked(QMessageBox, lambda box: box.button(QMessageBox.StandardButton.Ok).click())
     window.close()
     assert not window.isVisible()
     again = made("--body", settings=settings)
-    assert again.context.fit.state == "stopped"
+    assert models_of(again).fit.state == "stopped"
     click(again, qtbot, "Resume")
     # Nothing else is open: the video is shown, and then the recording.
     made_of = video.with_name("walk.sd2")
-    document = again.context.document
+    document = models_of(again).document
     qtbot.waitUntil(
         lambda: document.content and document.recording.folder == made_of, timeout=30_000
     )
@@ -213,14 +216,14 @@ def test_a_folder_in_which_a_fit_was_stopped_can_be_opened(made, qtbot, video) -
     request.save()
     window = made()
     show(window, qtbot, request.folder)
-    assert window.context.document.recording.video == video
-    assert window.context.fit.state == "stopped"
+    assert models_of(window).document.recording.video == video
+    assert models_of(window).fit.state == "stopped"
 
 
 def test_what_is_open_meanwhile_stays_open(made, qtbot, video, small_recording) -> None:
     window = made("--body", "--pause-s", 0.02)
     show(window, qtbot, small_recording)
-    c = window.context
+    c = models_of(window)
     c.fit.start(FitRequest(video, video.with_name("walk.sd2")))
     qtbot.waitUntil(lambda: c.fit.state == "finished", timeout=30_000)
     assert c.document.recording.folder == small_recording
@@ -233,7 +236,7 @@ def test_a_recording_that_is_open_keeps_its_edits_and_gets_the_mesh(made, qtbot,
     saved = Recording.create(video.with_name("mine.sd2"), video=video, title="Mine")
     window = made("--body", "--pause-s", 0.02)
     show(window, qtbot, saved.folder)
-    c = window.context
+    c = models_of(window)
     setup = FitSetupModel()
     setup.choose_video(c.fit_offer.video, c.document.recording)
     qtbot.waitUntil(lambda: setup.ready, timeout=10_000)
@@ -244,7 +247,7 @@ def test_a_recording_that_is_open_keeps_its_edits_and_gets_the_mesh(made, qtbot,
     c.edits.place_sensor(sensor)
     # There is an edit that is not saved: nothing is opened over it.
     qtbot.waitUntil(lambda: c.fit.state == "finished", timeout=30_000)
-    assert window.dialogs.save()
+    assert window.save()
     kept = open_recording(saved.folder)
     assert kept.mesh == saved.folder / "mesh.zarr"
     assert (kept.sensor, kept.title) == (sensor, "Mine")
@@ -259,7 +262,7 @@ def test_the_key_asks_for_a_video(made, qtbot, monkeypatch) -> None:
     monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *a, **k: asked.append(a) or ("", ""))
     qtbot.keyClick(window, Qt.Key.Key_N, Qt.KeyboardModifier.ControlModifier)
     assert len(asked) == 1
-    assert not window.context.fit.busy
+    assert not models_of(window).fit.busy
 
 
 def test_no_offer_where_there_is_a_mesh_or_it_was_declined(made, qtbot, video, small_recording):

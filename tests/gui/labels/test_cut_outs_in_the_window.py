@@ -9,6 +9,7 @@ import pytest
 from answering import answer, once_asked
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QCheckBox, QComboBox, QFileDialog, QPushButton
+from window_models import models_of
 
 from sd2app.labels.cut_out_dialog import CutOutDialog
 from sd2core.io.video import open_video
@@ -34,9 +35,9 @@ def cut(window, qtbot, which: str, *left_out: str) -> None:
 
     window.messages.hide()
     once_asked(CutOutDialog, work)
-    window._actions["cut_out"].trigger()
+    window.action("cut_out").trigger()
     qtbot.waitUntil(lambda: bool(window.messages.text), timeout=30_000)
-    assert not window.context.jobs.jobs
+    assert not models_of(window).jobs.jobs
 
 
 def listed(folder: Path) -> list[tuple[str, list[int], list[str]]]:
@@ -71,7 +72,7 @@ def test_one_label_and_some_parts_then_something_else(window, qtbot, cuts) -> No
 
 
 def test_cancelled_it_leaves_whole_folders_only(window, qtbot, cuts) -> None:
-    c = window.context
+    c = models_of(window)
     c.cut_out.start(c.labels.labels.spans, ("video", "mesh", "maps"), cuts)
     (job,) = c.jobs.jobs
     assert job.title == "Cutting out 2 spans"

@@ -17,6 +17,7 @@ import pytest
 from label_hands import key, spans
 from numbered_videos import number_in, write_video
 from PySide6.QtCore import Qt, QTimer
+from window_models import models_of
 
 from sd2app.session import playback as playback_module
 from sd2core.files.resources import resource_path
@@ -61,13 +62,13 @@ def open_video(window, qtbot, folder: Path, rate: str) -> np.ndarray:
         path = write_video(folder / "v.mkv", FRAMES, times_ms=UNEVEN_MS.tolist())
         times_s = UNEVEN_MS / 1000
     window.open_paths([path])
-    qtbot.waitUntil(lambda: window.context.document.content is not None, timeout=20_000)
+    qtbot.waitUntil(lambda: models_of(window).document.content is not None, timeout=20_000)
     return times_s
 
 
 def turn_to(window, qtbot, time_s: float) -> None:
     """Let the clock of the window come to a time, while it plays."""
-    playback = window.context.playback
+    playback = models_of(window).playback
     HandClock.now_ns += round((time_s - playback.time_s) * 1e9) + 1
     qtbot.waitUntil(lambda: playback.time_s >= time_s, timeout=5000)
 
@@ -76,7 +77,7 @@ def turn_to(window, qtbot, time_s: float) -> None:
 def test_a_mark_has_the_time_of_the_frame_that_is_shown(
     empty_window, qtbot, tmp_path, rate: str
 ) -> None:
-    times_s, c = open_video(empty_window, qtbot, tmp_path, rate), empty_window.context
+    times_s, c = open_video(empty_window, qtbot, tmp_path, rate), models_of(empty_window)
 
     def shown() -> int:
         return -1 if c.video.picture is None else number_in(c.video.picture)
@@ -95,7 +96,7 @@ def test_a_mark_has_the_time_of_the_frame_that_is_shown(
 def test_a_key_while_it_plays_marks_the_frame_on_screen(
     empty_window, qtbot, tmp_path, rate: str
 ) -> None:
-    times_s, c = open_video(empty_window, qtbot, tmp_path, rate), empty_window.context
+    times_s, c = open_video(empty_window, qtbot, tmp_path, rate), models_of(empty_window)
     rng = random.Random(1)
     pressed = sorted(rng.sample(range(1, FRAMES - 1), 20))
     c.playback.play()
@@ -116,7 +117,7 @@ def test_a_key_while_it_plays_marks_the_frame_on_screen(
 @pytest.fixture
 def unlabelled_sample(empty_window, qtbot):
     """The sample without its labels."""
-    c = empty_window.context
+    c = models_of(empty_window)
     empty_window.open_paths([SAMPLE])
     qtbot.waitUntil(lambda: c.document.content is not None and empty_window.settled, timeout=60_000)
     key(empty_window, "A", Qt.KeyboardModifier.ControlModifier)
@@ -150,7 +151,7 @@ def check_marked(
 
 def check_formats(labels: Labels, window, folder: Path) -> None:
     """Every format gives back what it can hold of them."""
-    base = window.context.playback.timebase
+    base = models_of(window).playback.timebase
     for one in FORMATS:
         path = folder / f"gestures-{one.name}{one.suffixes[0]}"
         write_labels(path, labels, base, one.name)
@@ -173,7 +174,7 @@ def check_formats(labels: Labels, window, folder: Path) -> None:
 
 @pytest.mark.usefixtures("by_hand")
 def test_the_eight_gestures_of_the_sample(unlabelled_sample, qtbot, tmp_path) -> None:
-    c, script = unlabelled_sample.context, presses()
+    c, script = models_of(unlabelled_sample), presses()
     c.playback.play()
     on_screen_s = []
     for at_s, name in script:
@@ -192,7 +193,7 @@ def test_the_eight_gestures_of_the_sample(unlabelled_sample, qtbot, tmp_path) ->
 
 @pytest.mark.slow
 def test_the_same_at_1x_by_the_clock_on_the_wall(unlabelled_sample, qtbot, tmp_path) -> None:
-    c, script = unlabelled_sample.context, presses()
+    c, script = models_of(unlabelled_sample), presses()
     # When the hand has pressed by a clock of its own, and what it saw then.
     pressed: list[tuple[float, str]] = []
     on_screen_s: list[float] = []

@@ -9,6 +9,7 @@ from answering import once_asked
 from PySide6.QtCore import QMimeData, QPointF, Qt, QUrl
 from PySide6.QtGui import QDropEvent
 from PySide6.QtWidgets import QComboBox, QFileDialog, QPushButton
+from window_models import models_of
 
 from sd2app.labels.export_dialog import LabelExportDialog
 from sd2app.labels.import_dialog import LabelImportDialog
@@ -24,7 +25,7 @@ def theirs(window, tmp_path) -> Path:
     """Ben's file: one span within, one that ends after the recording (2 s)."""
     spans = (Span(1, "Ben", 0.5, 1.0, "wave"), Span(2, "Ben", 1.5, 2.5, "up-to-down"))
     path = tmp_path / "ben.eaf"
-    write_labels(path, Labels((LabelTrack("Ben"),), spans), window.context.playback.timebase)
+    write_labels(path, Labels((LabelTrack("Ben"),), spans), models_of(window).playback.timebase)
     return path
 
 
@@ -57,7 +58,7 @@ def press(qtbot, text: str, way: str = ""):
 
 
 def test_an_import_is_one_step(window, theirs, qtbot, monkeypatch) -> None:
-    c = window.context
+    c = models_of(window)
     before = c.labels.labels
     choose(monkeypatch, "getOpenFileName", theirs)
     press(qtbot, "Import")
@@ -75,7 +76,7 @@ def test_an_import_is_one_step(window, theirs, qtbot, monkeypatch) -> None:
 
 
 def test_a_dropped_file_is_imported(window, theirs, qtbot) -> None:
-    c = window.context
+    c = models_of(window)
     data = QMimeData()
     data.setUrls([QUrl.fromLocalFile(str(theirs))])
     press(qtbot, "Import", "instead of all labels of this recording")
@@ -89,16 +90,16 @@ def test_cancelled_is_cancelled(window, theirs, qtbot, monkeypatch) -> None:
     choose(monkeypatch, "getOpenFileName", theirs)
     press(qtbot, "Cancel")
     key(window, qtbot, "I", CONTROL)
-    assert window.context.document.undo_stack.count() == 0
+    assert models_of(window).document.undo_stack.count() == 0
 
 
 def test_without_a_recording_it_says_what_to_do(empty_window, tmp_path) -> None:
-    empty_window.label_files.import_labels(tmp_path / "ben.eaf")
+    empty_window.features.labels.files.import_labels(tmp_path / "ben.eaf")
     assert "Nothing is open" in empty_window.messages.text
 
 
 def test_export_to_every_format_and_back(window, qtbot, monkeypatch, tmp_path) -> None:
-    c = window.context
+    c = models_of(window)
     spans = [(span.start_s, span.end_s, span.label) for span in c.labels.labels.spans]
     for one in FORMATS:
         path = tmp_path / f"mine{one.suffixes[0]}"

@@ -15,6 +15,7 @@ from answering import answer, once_asked
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QToolButton
+from window_models import models_of
 
 from sd2app.labels.recovery_bar import LabelBar
 from sd2app.labels.recovery_dialog import RecoverLabelsDialog
@@ -32,7 +33,7 @@ def on(empty_window, qtbot):
     """Opens something in the window."""
 
     def open_path(path):
-        with qtbot.waitSignal(empty_window.context.document.opened, timeout=20_000):
+        with qtbot.waitSignal(models_of(empty_window).document.opened, timeout=20_000):
             empty_window.open_paths([path])
         return empty_window
 
@@ -61,16 +62,16 @@ def elsewhere(recording_copy):
 
 
 def spans(window) -> list[tuple[str, int, int]]:
-    base = window.context.playback.timebase
+    base = models_of(window).playback.timebase
     return [
         (span.label, *base.frames_between(span.start_s, span.end_s))
-        for span in window.context.labels.labels.spans
+        for span in models_of(window).labels.labels.spans
     ]
 
 
 def mark(window, qtbot, first: int, stop: int) -> None:
     for frame in (first, stop):
-        window.context.playback.seek_frame(frame)
+        models_of(window).playback.seek_frame(frame)
         qtbot.keyClick(window, Qt.Key.Key_1)
 
 
@@ -99,24 +100,24 @@ class TestAfterACrash:
         press(window, qtbot, "Restore")
         assert spans(window) == [THERE, LOST, BACK]
         assert bar(window).text == ""
-        assert window._actions["undo"].text() == "Undo restore labels"
+        assert window.action("undo").text() == "Undo restore labels"
         qtbot.keyClick(window, Qt.Key.Key_Z, CONTROL)
         assert spans(window) == [THERE, BACK]
         qtbot.keyClick(window, Qt.Key.Key_Z, CONTROL | Qt.KeyboardModifier.ShiftModifier)
         qtbot.keyClick(window, Qt.Key.Key_S, CONTROL)
         assert len(json.loads((crashed / "labels.json").read_text("utf-8"))["spans"]) == 3
-        assert on(crashed).context.label_session.offer is None
+        assert models_of(on(crashed)).label_session.offer is None
         assert spans(window) == [THERE, LOST, BACK]
 
     def test_from_the_menu_too(self, on, crashed) -> None:
         window = on(crashed)
-        window._actions["restore_labels"].trigger()
+        window.action("restore_labels").trigger()
         assert spans(window) == [THERE, LOST, BACK]
-        assert not window._actions["restore_labels"].isEnabled()
+        assert not window.action("restore_labels").isEnabled()
 
     def test_what_it_changes_follows_what_is_there(self, on, qtbot, crashed) -> None:
         window = on(crashed)
-        window.context.label_edits.step(1)
+        models_of(window).label_edits.step(1)
         qtbot.keyClick(window, Qt.Key.Key_Backspace)
         assert spans(window) == [BACK]
         assert "against what is open: 2 spans added." in bar(window).text
@@ -148,7 +149,7 @@ class TestAfterACrash:
         self, empty_window, qtbot, crashed
     ) -> None:
         window = empty_window
-        window.context.label_session.look_around()
+        models_of(window).label_session.look_around()
         assert bar(window).text.endswith("before labels were saved: ball.sd2.")
 
         def choose(dialog: RecoverLabelsDialog) -> None:
@@ -158,7 +159,7 @@ class TestAfterACrash:
             qtbot.keyClick(dialog._list, Qt.Key.Key_Return)
 
         once_asked(RecoverLabelsDialog, choose)
-        with qtbot.waitSignal(window.context.document.opened, timeout=20_000):
+        with qtbot.waitSignal(models_of(window).document.opened, timeout=20_000):
             press(window, qtbot, "Recover labels…")
         press(window, qtbot, "Restore")
         assert spans(window) == [THERE, LOST, BACK]
@@ -185,7 +186,7 @@ class TestAfterACrash:
             dialog.reject()
 
         once_asked(RecoverLabelsDialog, rescue)
-        empty_window._actions["recover_labels"].trigger()
+        empty_window.action("recover_labels").trigger()
         assert len(json.loads(out.read_text("utf-8"))["spans"]) == 3
         assert not list(recovery_folder().rglob("0*"))
 
@@ -232,7 +233,7 @@ class TestAFullDisk:
 class TestReadOnly:
     def test_says_who_edits_and_refuses(self, on, qtbot, elsewhere, recording_copy) -> None:
         window = on(recording_copy)
-        refusal = window.context.label_session.refusal
+        refusal = models_of(window).label_session.refusal
         assert bar(window).text == f"Labels are read-only: {refusal}."
         assert f"(process {os.getpid()}) since " in refusal
         mark(window, qtbot, 24, 28)
@@ -246,30 +247,30 @@ class TestReadOnly:
         QTest.mouseRelease(timeline, button, NONE, aside)
         assert window.messages.text == refusal
         assert spans(window) == [THERE, BACK]
-        assert not window.context.labels.marks
+        assert not models_of(window).labels.marks
         # Looking is allowed.
         QTest.mouseClick(timeline, button, NONE, middle)
-        assert len(window.context.labels.selected) == 1
+        assert len(models_of(window).labels.selected) == 1
         qtbot.keyClick(window, Qt.Key.Key_Backspace)
         assert spans(window) == [THERE, BACK]
 
     def test_actions_say_why(self, on, elsewhere, recording_copy) -> None:
         window = on(recording_copy)
-        refusal = window.context.label_session.refusal
-        window.context.label_edits.step(1)
+        refusal = models_of(window).label_session.refusal
+        models_of(window).label_edits.step(1)
         for name in ("delete_spans", "span_starts_here", "nudge_on", "split_span", "end_marks"):
-            assert not window._actions[name].isEnabled()
-            assert window._actions[name].toolTip() == refusal
-        assert window._actions["next_span"].isEnabled()
-        labels = window._actions.labels._actions
+            assert not window.action(name).isEnabled()
+            assert window.action(name).toolTip() == refusal
+        assert window.action("next_span").isEnabled()
+        labels = window.features.labels._keys._actions
         assert all(not one.isEnabled() and one.toolTip() == refusal for one in labels)
         elsewhere.release()
-        window._actions["edit_labels_here"].trigger()
-        window.context.label_edits.step(1)
-        assert window._actions["delete_spans"].isEnabled()
-        assert "Undo brings them back" in window._actions["delete_spans"].toolTip()
+        window.action("edit_labels_here").trigger()
+        models_of(window).label_edits.step(1)
+        assert window.action("delete_spans").isEnabled()
+        assert "Undo brings them back" in window.action("delete_spans").toolTip()
         assert all(one.isEnabled() and one.toolTip() != refusal for one in labels)
-        assert not window._actions["edit_labels_here"].isEnabled()
+        assert not window.action("edit_labels_here").isEnabled()
 
     def test_the_sensor_is_saved_and_their_labels_stay(
         self, on, qtbot, elsewhere, recording_copy
@@ -278,12 +279,12 @@ class TestReadOnly:
         theirs = open_recording(recording_copy)
         theirs.labels = theirs.labelled.with_spans(without=[1])
         theirs.save()
-        window.context.edits.sensor_to_camera()
+        models_of(window).edits.sensor_to_camera()
         qtbot.keyClick(window, Qt.Key.Key_S, CONTROL)
-        assert not window.context.document.modified
+        assert not models_of(window).document.modified
         assert open_recording(recording_copy).labels == theirs.labels
         press(window, qtbot, "Try again")
-        assert window.messages.text == window.context.label_session.refusal
+        assert window.messages.text == models_of(window).label_session.refusal
         elsewhere.release()
         press(window, qtbot, "Try again")
         assert bar(window).text == ""
@@ -330,16 +331,16 @@ class TestLabelsOfARadarFile:
             file["DS1"] = values
             file["LABEL"] = np.isin(np.arange(10), (2, 3)).astype(np.uint16)[:, None]
         window = on(small_recording / "video.mp4")
-        with qtbot.waitSignal(window.context.document.opened, timeout=20_000):
-            window.context.document.add([tmp_path / "swing.h5"])
-        labels, edits = window.context.labels, window.context.edits
+        with qtbot.waitSignal(models_of(window).document.opened, timeout=20_000):
+            models_of(window).document.add([tmp_path / "swing.h5"])
+        labels, edits = models_of(window).labels, models_of(window).edits
         (before,) = labels.labels.spans
         edits.set_radar_offset(0.5)
         (after,) = labels.labels.spans
         assert after.start_s == pytest.approx(before.start_s + 0.5)
-        window.context.document.undo_stack.undo()
+        models_of(window).document.undo_stack.undo()
         assert labels.labels.spans == (before,)
-        window.context.label_edits.step(1)
+        models_of(window).label_edits.step(1)
         qtbot.keyClick(window, Qt.Key.Key_Backspace)
         assert labels.labels.spans == ()
         edits.set_radar_offset(0.5)

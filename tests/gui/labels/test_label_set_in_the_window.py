@@ -6,6 +6,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QLineEdit, QToolButton
+from window_models import models_of
 
 from sd2app.labels.label_set_model import COLOUR, KEY, NAME
 from sd2app.labels.label_set_page import LabelSetPage
@@ -37,7 +38,7 @@ def button(page, text: str) -> QToolButton:
 
 
 def names(window) -> list[str]:
-    return [label.name for label in window.context.labels.labels.label_set.labels]
+    return [label.name for label in models_of(window).labels.labels.label_set.labels]
 
 
 def go(page, row: int, column: int) -> None:
@@ -46,7 +47,7 @@ def go(page, row: int, column: int) -> None:
 
 
 def test_a_label_is_added_named_and_used_at_once(window, page, qtbot) -> None:
-    c = window.context
+    c = models_of(window)
     QTest.mouseClick(button(page, "Add"), LEFT)
     line = QApplication.focusWidget()
     assert isinstance(line, QLineEdit)
@@ -67,7 +68,7 @@ def test_a_label_is_added_named_and_used_at_once(window, page, qtbot) -> None:
 
 
 def test_a_label_is_removed_by_key_and_no_span_is(window, page) -> None:
-    c = window.context
+    c = models_of(window)
     c.labels.select([span.id for span in c.labels.labels.spans])
     go(page, 1, NAME)
     press(Qt.Key.Key_Delete)
@@ -76,7 +77,7 @@ def test_a_label_is_removed_by_key_and_no_span_is(window, page) -> None:
 
 
 def test_spans_of_a_removed_label_keep_it_or_get_another(window, page) -> None:
-    c = window.context
+    c = models_of(window)
     ids = [span.id for span in c.labels.labels.spans]
     c.labels.select(ids)
     c.label_edits.relabel("up-to-down")
@@ -102,7 +103,7 @@ def test_a_colour_is_chosen_from_a_list_and_likeness_is_said(window, page) -> No
     assert isinstance(editor, ListedEditor)
     press(Qt.Key.Key_Down)
     press(Qt.Key.Key_Return)
-    label = window.context.labels.labels.label_set.labels[0]
+    label = models_of(window).labels.labels.label_set.labels[0]
     assert label.colour == "#56b4e9"
     warning = page.findChild(QLabel, "warning")
     assert warning.text() == "left-to-right and right-to-left look alike."
@@ -115,7 +116,7 @@ def test_any_other_colour_is_asked_for(window, page, qtbot, monkeypatch) -> None
     press(Qt.Key.Key_Return)
     press(Qt.Key.Key_End)
     press(Qt.Key.Key_Return)
-    labels = window.context.labels
+    labels = models_of(window).labels
     qtbot.waitUntil(lambda: labels.labels.label_set.labels[0].colour == "#123456", timeout=5000)
 
 
@@ -125,7 +126,7 @@ def test_a_key_of_an_action_is_refused_in_the_cell(window, page) -> None:
     QTest.keyClicks(QApplication.focusWidget(), "n")
     press(Qt.Key.Key_Return)
     assert "N belongs to “Next span” in the menu Labels" in window.messages.text
-    assert window.context.labels.labels.label_set == GESTURES
+    assert models_of(window).labels.labels.label_set == GESTURES
 
 
 def test_order_and_name_of_the_set(window, page) -> None:
@@ -138,11 +139,11 @@ def test_order_and_name_of_the_set(window, page) -> None:
     press(Qt.Key.Key_A, CONTROL)
     QTest.keyClicks(page._name, "Mine")
     press(Qt.Key.Key_Return)
-    assert window.context.labels.labels.label_set.name == "Mine"
+    assert models_of(window).labels.labels.label_set.name == "Mine"
 
 
 def test_a_set_is_shared_as_a_file(window, page, tmp_path, monkeypatch) -> None:
-    c = window.context
+    c = models_of(window)
     path = tmp_path / "set.json"
     files = {one.text(): one for one in button(page, "File").menu().actions()}
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(path), ""))

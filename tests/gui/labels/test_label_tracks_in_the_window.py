@@ -21,6 +21,7 @@ from label_hands import (
 from PySide6.QtCore import QPoint
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QCheckBox, QInputDialog, QLineEdit
+from window_models import menu_of, models_of
 
 from sd2app.labels.timeline_area import LabelArea
 from sd2app.labels.tracks_dialog import TrackDialog
@@ -31,22 +32,22 @@ THERE, BACK = ("there", 6, 24), ("back", 30, 60)
 @pytest.fixture
 def two_tracks(labelled):
     """The same with a track on which spans may overlap."""
-    assert labelled.context.label_tracks.add("Hands", "free")
+    assert models_of(labelled).label_tracks.add("Hands", "free")
     return labelled
 
 
 def tracks(window) -> list[tuple[str, str]]:
-    return [(track.name, track.overlap) for track in window.context.labels.labels.tracks]
+    return [(track.name, track.overlap) for track in models_of(window).labels.labels.tracks]
 
 
 def run(window, name: str) -> None:
-    action = window._actions[name]
+    action = window.action(name)
     assert action.isEnabled()
     action.trigger()
 
 
 def test_tracks_are_added_renamed_freed_moved_and_removed_step_by_step(labelled, qtbot) -> None:
-    c = labelled.context
+    c = models_of(labelled)
 
     def fill_in(dialog: TrackDialog) -> None:
         dialog.findChild(QLineEdit).setText("Hands")
@@ -94,7 +95,7 @@ def test_tracks_are_added_renamed_freed_moved_and_removed_step_by_step(labelled,
 
 
 def test_what_a_track_may_not_be_is_said(two_tracks) -> None:
-    c = two_tracks.context
+    c = models_of(two_tracks)
     assert not c.label_tracks.add("Hands", "free")
     assert "a name of its own" in two_tracks.messages.text
     hand = timeline(two_tracks)
@@ -107,7 +108,7 @@ def test_what_a_track_may_not_be_is_said(two_tracks) -> None:
 
 
 def test_several_are_marked_at_once_on_a_free_track(two_tracks) -> None:
-    c = two_tracks.context
+    c = models_of(two_tracks)
     for frame, name in ((2, "1"), (5, "3"), (9, "1"), (12, "4"), (15, "3"), (20, "4")):
         c.playback.seek_frame(frame)
         key(two_tracks, name)
@@ -129,7 +130,7 @@ def test_several_are_marked_at_once_on_a_free_track(two_tracks) -> None:
 
 
 def test_marks_on_two_tracks_at_once(two_tracks) -> None:
-    c = two_tracks.context
+    c = models_of(two_tracks)
     c.playback.seek_frame(24)
     key(two_tracks, "1")
     key(two_tracks, "Up", SHIFT)
@@ -145,7 +146,7 @@ def test_marks_on_two_tracks_at_once(two_tracks) -> None:
 
 
 def test_what_is_marked_goes_with_its_track(two_tracks) -> None:
-    c = two_tracks.context
+    c = models_of(two_tracks)
     key(two_tracks, "1")
     assert c.labels.marks
     run(two_tracks, "remove_track")
@@ -154,7 +155,7 @@ def test_what_is_marked_goes_with_its_track(two_tracks) -> None:
 
 
 def test_a_name_chooses_the_track_and_spans_change_theirs(two_tracks) -> None:
-    c = two_tracks.context
+    c = models_of(two_tracks)
     row = timeline(two_tracks).rows.tracks[0]
     QTest.mouseClick(timeline(two_tracks), LEFT, NONE, QPoint(20, round(row.top_px + 10)))
     assert c.labels.track == "Gestures"
@@ -168,7 +169,7 @@ def test_a_name_chooses_the_track_and_spans_change_theirs(two_tracks) -> None:
 
 
 def test_many_tracks_are_scrolled_and_the_chosen_one_is_in_view(labelled, qtbot) -> None:
-    c, view = labelled.context, timeline(labelled)
+    c, view = models_of(labelled), timeline(labelled)
     width_px = view.width()
     for number in range(20):
         c.label_tracks.add(f"Track {number}", "exclusive")
@@ -187,8 +188,8 @@ def test_many_tracks_are_scrolled_and_the_chosen_one_is_in_view(labelled, qtbot)
 
 
 def test_the_menu_shows_the_tracks_and_the_one_that_is_chosen(two_tracks) -> None:
-    c = two_tracks.context
-    entries = two_tracks._actions.tracks._group.actions()
+    c = models_of(two_tracks)
+    entries = [one for one in menu_of(two_tracks, "Tracks").actions() if one.actionGroup()]
     assert [(one.text(), one.isChecked()) for one in entries] == [
         ("Gestures", False),
         ("Hands", True),
@@ -196,4 +197,5 @@ def test_the_menu_shows_the_tracks_and_the_one_that_is_chosen(two_tracks) -> Non
     entries[0].trigger()
     assert c.labels.track == "Gestures"
     c.document.undo_stack.undo()
-    assert [one.text() for one in two_tracks._actions.tracks._group.actions()] == ["Gestures"]
+    entries = [one for one in menu_of(two_tracks, "Tracks").actions() if one.actionGroup()]
+    assert [one.text() for one in entries] == ["Gestures"]

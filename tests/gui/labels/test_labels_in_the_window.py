@@ -7,6 +7,7 @@ import json
 import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
+from window_models import models_of
 
 from sd2app.labels.rows import ROW_PX
 from sd2app.labels.timeline import LabelTimeline
@@ -17,10 +18,10 @@ NONE = Qt.KeyboardModifier.NoModifier
 
 def spans(window) -> list[tuple[str, int, int]]:
     """What is labelled, in frames."""
-    base = window.context.playback.timebase
+    base = models_of(window).playback.timebase
     return [
         (span.label, *base.frames_between(span.start_s, span.end_s))
-        for span in window.context.labels.labels.spans
+        for span in models_of(window).labels.labels.spans
     ]
 
 
@@ -47,26 +48,26 @@ THERE, BACK = ("there", 6, 24), ("back", 30, 60)
 
 
 def test_a_key_marks_from_the_frame_on_screen_to_the_frame_on_screen(labelled, qtbot) -> None:
-    playback = labelled.context.playback
+    playback = models_of(labelled).playback
     assert spans(labelled) == [THERE, BACK]
     playback.seek_frame(24)
     key(labelled, qtbot, "1")
-    assert [(mark.label, mark.start_s) for mark in labelled.context.labels.marks] == [
+    assert [(mark.label, mark.start_s) for mark in models_of(labelled).labels.marks] == [
         ("left-to-right", playback.timebase.time_of(24))
     ]
     playback.seek_frame(28)
     key(labelled, qtbot, "1")
     assert spans(labelled) == [THERE, ("left-to-right", 24, 28), BACK]
-    assert not labelled.context.labels.marks
-    stack = labelled.context.document.undo_stack
+    assert not models_of(labelled).labels.marks
+    stack = models_of(labelled).document.undo_stack
     assert stack.undoText() == "Create span"
     key(labelled, qtbot, "Z", Qt.KeyboardModifier.ControlModifier)
     assert spans(labelled) == [THERE, BACK]
-    assert not labelled.context.document.modified
+    assert not models_of(labelled).document.modified
 
 
 def test_keys_while_it_plays(labelled, qtbot) -> None:
-    c = labelled.context
+    c = models_of(labelled)
     c.label_edits.step(1)
     key(labelled, qtbot, "Backspace")
     c.label_edits.step(1)
@@ -86,7 +87,7 @@ def test_keys_while_it_plays(labelled, qtbot) -> None:
 
 
 def test_a_hand_draws_moves_and_shortens(labelled, qtbot) -> None:
-    c, alt = labelled.context, Qt.KeyboardModifier.AltModifier
+    c, alt = models_of(labelled), Qt.KeyboardModifier.AltModifier
     labels = c.labels
     labels.set_label("down-to-up")
     drag(labelled, 0.84, 0.95, alt)
@@ -118,7 +119,7 @@ def test_escape_takes_back_what_the_hand_does(labelled, qtbot) -> None:
     assert spans(labelled)[0] != THERE
     qtbot.keyClick(labelled.findChild(LabelTimeline), Qt.Key.Key_Escape)
     assert spans(labelled) == [THERE, BACK]
-    assert labelled.context.document.undo_stack.count() == 0
+    assert models_of(labelled).document.undo_stack.count() == 0
 
 
 def test_nothing_is_undone_under_the_hand(labelled, qtbot) -> None:
@@ -135,7 +136,7 @@ def test_nothing_is_undone_under_the_hand(labelled, qtbot) -> None:
 
 
 def test_a_click_selects_and_goes_there(labelled, qtbot) -> None:
-    c, timeline = labelled.context, labelled.findChild(LabelTimeline)
+    c, timeline = models_of(labelled), labelled.findChild(LabelTimeline)
     button = Qt.MouseButton.LeftButton
     QTest.mouseClick(timeline, button, NONE, at(labelled, 1.5))
     assert ([span.label for span in c.labels.selected], c.playback.frame) == (["back"], 30)
@@ -159,7 +160,7 @@ def test_a_click_selects_and_goes_there(labelled, qtbot) -> None:
 
 
 def test_labels_are_saved_and_read_back(labelled, qtbot, recording_copy) -> None:
-    c = labelled.context
+    c = models_of(labelled)
     c.playback.seek_frame(24)
     key(labelled, qtbot, "1")
     c.playback.seek_frame(28)
@@ -177,7 +178,7 @@ def test_labels_are_saved_and_read_back(labelled, qtbot, recording_copy) -> None
 
 
 def test_what_cannot_be_done_is_said(labelled, qtbot) -> None:
-    c = labelled.context
+    c = models_of(labelled)
     c.playback.seek_frame(10)
     key(labelled, qtbot, "1")
     c.playback.seek_frame(12)

@@ -7,8 +7,10 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit, QToolButton
+from window_models import models_of
 
 from sd2app.labels.columns import COLUMNS
+from sd2app.labels.panel import LabelsPanel
 from sd2app.labels.table import SpanTable
 from sd2app.labels.timeline import ROW_PX, LabelTimeline
 from sd2app.widgets.table import ListedEditor
@@ -38,10 +40,10 @@ def press(window, name: str, modifier=NONE) -> None:
 
 
 def spans(window) -> list[tuple[str, int, int]]:
-    base = window.context.playback.timebase
+    base = models_of(window).playback.timebase
     return [
         (span.label, *base.frames_between(span.start_s, span.end_s))
-        for span in window.context.labels.labels.spans
+        for span in models_of(window).labels.labels.spans
     ]
 
 
@@ -73,7 +75,7 @@ def test_the_key_of_the_panel_puts_the_keyboard_into_the_table(labelled) -> None
 
 
 def test_one_selection_in_table_and_timeline(labelled) -> None:
-    c, timeline = labelled.context, labelled.findChild(LabelTimeline)
+    c, timeline = models_of(labelled), labelled.findChild(LabelTimeline)
     click(labelled, 1, "start")
     assert [span.label for span in c.labels.selected] == ["back"]
     assert c.playback.frame == 30
@@ -93,15 +95,15 @@ def test_one_selection_in_table_and_timeline(labelled) -> None:
 
 def test_what_was_selected_before_the_table_was_seen_is_selected_in_it(labelled) -> None:
     labelled.side.bring_up("Sensor")
-    back = labelled.context.labels.labels.spans[1]
-    labelled.context.labels.select([back.id])
+    back = models_of(labelled).labels.labels.spans[1]
+    models_of(labelled).labels.select([back.id])
     labelled.side.bring_up("Labels")
     rows = [index.row() for index in table(labelled).selectionModel().selectedRows()]
     assert rows == [1]
 
 
 def test_up_and_down_go_from_span_to_span(labelled) -> None:
-    c = labelled.context
+    c = models_of(labelled)
     press(labelled, "Down")
     assert [span.label for span in c.labels.selected] == ["back"]
     press(labelled, "Up")
@@ -111,7 +113,7 @@ def test_up_and_down_go_from_span_to_span(labelled) -> None:
 
 
 def test_keys_of_the_window_work_beside_the_table_and_not_in_its_cells(labelled) -> None:
-    c = labelled.context
+    c = models_of(labelled)
     sensor = c.sensor.sensor
     click(labelled, 1, "label")
     press(labelled, "Right")
@@ -134,7 +136,7 @@ def test_keys_of_the_window_work_beside_the_table_and_not_in_its_cells(labelled)
 
 
 def test_times_are_typed_tab_goes_on_and_the_window_follows(labelled) -> None:
-    c = labelled.context
+    c = models_of(labelled)
     QTest.keyClicks(edit(labelled, 0, "start"), "f3")
     press(labelled, "Tab")
     assert c.document.undo_stack.undoText() == "Move start of span"
@@ -159,7 +161,7 @@ def test_what_cannot_be_is_said_and_the_cell_stays(labelled) -> None:
     press(labelled, "Return")
     assert "'soon' was typed as a time" in labelled.messages.text
     assert spans(labelled) == [THERE, BACK]
-    assert labelled.context.document.undo_stack.count() == 0
+    assert models_of(labelled).document.undo_stack.count() == 0
     editor = edit(labelled, 0, "end")
     QTest.keyClicks(editor, "7")
     press(labelled, "Escape")
@@ -176,10 +178,10 @@ def test_a_label_is_chosen_from_a_list_for_all_selected_rows(labelled) -> None:
     # A letter that is a key of the window chooses from the list instead.
     press(labelled, "D")
     assert editor.currentText() == "down-to-up"
-    assert not labelled.context.display.as_dots
+    assert not models_of(labelled).display.as_dots
     press(labelled, "Return")
     assert [label for label, *_ in spans(labelled)] == ["down-to-up", "down-to-up"]
-    assert labelled.context.document.undo_stack.count() == 1
+    assert models_of(labelled).document.undo_stack.count() == 1
 
 
 def test_letters_choose_in_an_open_list_too(labelled) -> None:
@@ -187,7 +189,7 @@ def test_letters_choose_in_an_open_list_too(labelled) -> None:
     press(labelled, "Down", Qt.KeyboardModifier.AltModifier)
     assert editor.view().isVisible()
     QTest.keyClick(editor.view(), Qt.Key.Key_D)
-    assert not labelled.context.display.as_dots
+    assert not models_of(labelled).display.as_dots
     QTest.keyClick(editor.view(), Qt.Key.Key_Return)
     QApplication.processEvents()
     assert spans(labelled)[0][0] == "down-to-up"
@@ -207,7 +209,7 @@ def test_search_filters_and_escape_leaves(labelled) -> None:
 
 
 def test_statistics_are_counted_and_copied(labelled) -> None:
-    buttons = {one.text(): one for one in labelled.labels_panel.findChildren(QToolButton)}
+    buttons = {one.text(): one for one in labelled.findChild(LabelsPanel).findChildren(QToolButton)}
     QTest.mouseClick(buttons["Statistics"], LEFT)
     QTest.mouseClick(buttons["Copy CSV"], LEFT)
     copied = QGuiApplication.clipboard().mimeData()
@@ -239,4 +241,4 @@ def test_columns_are_chosen_and_remembered(labelled) -> None:
     menu = table(labelled).columns_menu
     next(one for one in menu.actions() if one.text() == "Author").trigger()
     assert not table(labelled).isColumnHidden(AT["author"])
-    assert "author" not in labelled.context.settings.stored("span_table/hidden", "")
+    assert "author" not in models_of(labelled).settings.stored("span_table/hidden", "")

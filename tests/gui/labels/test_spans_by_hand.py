@@ -24,6 +24,7 @@ from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QToolButton
+from window_models import menu_of, models_of
 
 from sd2app.playback.timeline import TimeRuler
 
@@ -37,7 +38,7 @@ def looping(window) -> str:
 
 
 def steps(window) -> list[str]:
-    stack = window.context.document.undo_stack
+    stack = models_of(window).document.undo_stack
     return [stack.text(step) for step in range(stack.count())]
 
 
@@ -45,7 +46,7 @@ def steps(window) -> list[str]:
 
 
 def test_a_double_click_plays_the_span_again_and_again(labelled, qtbot) -> None:
-    playback = labelled.context.playback
+    playback = models_of(labelled).playback
     playback.set_speed(4.0)
     frames = []
     playback.frame_changed.connect(frames.append)
@@ -66,7 +67,7 @@ def _times_back(frames: list[int]) -> int:
 
 
 def test_going_elsewhere_ends_the_loop_and_staying_does_not(labelled) -> None:
-    playback = labelled.context.playback
+    playback = models_of(labelled).playback
     click(labelled, 1.5)
     key(labelled, "O")
     playback.pause()
@@ -80,7 +81,7 @@ def test_going_elsewhere_ends_the_loop_and_staying_does_not(labelled) -> None:
 
 
 def test_the_loop_follows_the_span_and_ends_with_it(labelled) -> None:
-    playback = labelled.context.playback
+    playback = models_of(labelled).playback
     click(labelled, 0.5)
     key(labelled, "O")
     playback.pause()
@@ -98,7 +99,7 @@ def test_the_loop_follows_the_span_and_ends_with_it(labelled) -> None:
 
 
 def test_shift_click_and_select_all(labelled) -> None:
-    c = labelled.context
+    c = models_of(labelled)
     click(labelled, 0.5)
     click(labelled, 1.5, SHIFT)
     assert chosen(labelled) == ["there", "back"]
@@ -126,7 +127,7 @@ def test_what_is_selected_is_dragged_together_and_stops_together(labelled) -> No
 
 
 def test_copies_come_to_the_frame_on_screen_or_behind(labelled) -> None:
-    c = labelled.context
+    c = models_of(labelled)
     click(labelled, 1.5)
     key(labelled, "Backspace")
     click(labelled, 0.5)
@@ -139,7 +140,7 @@ def test_copies_come_to_the_frame_on_screen_or_behind(labelled) -> None:
 
 
 def test_two_spans_meet_and_gaps_are_filled(labelled) -> None:
-    c = labelled.context
+    c = models_of(labelled)
     key(labelled, "A", CONTROL)
     c.playback.seek_frame(27)
     key(labelled, "J")
@@ -150,14 +151,14 @@ def test_two_spans_meet_and_gaps_are_filled(labelled) -> None:
 
 
 def test_a_span_that_is_drawn_with_shift_cuts_the_others(labelled) -> None:
-    labelled.context.labels.set_label("up-to-down")
+    models_of(labelled).labels.set_label("up-to-down")
     pull(timeline(labelled), at(labelled, 0.4), at(labelled, 1.2), SHIFT)
     assert spans(labelled) == [("there", 6, 12), ("up-to-down", 12, 36), ("back", 36, 60)]
     assert steps(labelled) == ["Create span over others"]
 
 
 def test_a_mark_that_cuts_the_others(labelled) -> None:
-    c = labelled.context
+    c = models_of(labelled)
     c.playback.seek_frame(12)
     key(labelled, "3")
     c.playback.seek_frame(36)
@@ -166,7 +167,7 @@ def test_a_mark_that_cuts_the_others(labelled) -> None:
 
 
 def test_an_edit_ends_the_drag_and_escape_cancels_it(labelled) -> None:
-    c, hand = labelled.context, timeline(labelled)
+    c, hand = models_of(labelled), timeline(labelled)
     pull(hand, at(labelled, 0.5), at(labelled, 0.4), ALT, release=False)
     assert c.label_dragging.dragging
     key(labelled, "Escape")
@@ -174,17 +175,19 @@ def test_an_edit_ends_the_drag_and_escape_cancels_it(labelled) -> None:
     QTest.mouseMove(hand, at(labelled, 0.3))
     QTest.mouseRelease(hand, LEFT, NONE, at(labelled, 0.3))
     assert spans(labelled) == [THERE, BACK]
-    assert labelled._actions["undo"].isEnabled() is False
+    assert labelled.action("undo").isEnabled() is False
 
 
 # --- reaction time ----------------------------------------------------------------------------
 
 
 def test_marks_go_back_by_the_reaction_time_while_it_plays(labelled, qtbot) -> None:
-    c = labelled.context
+    c = models_of(labelled)
     key(labelled, "A", CONTROL)
     key(labelled, "Backspace")
-    entry = next(one for one in labelled._actions.reaction.actions() if one.text() == "200 ms")
+    entry = next(
+        one for one in menu_of(labelled, "Reaction time").actions() if one.text() == "200 ms"
+    )
     entry.trigger()
     assert c.reaction.reaction_ms == 200
     assert entry.isChecked()
@@ -209,7 +212,7 @@ def test_marks_go_back_by_the_reaction_time_while_it_plays(labelled, qtbot) -> N
 
 
 def test_a_region_is_selected_looped_and_its_edges_dragged(labelled) -> None:
-    c, view = labelled.context, labelled._tracks.synthetic
+    c, view = models_of(labelled), labelled.maps.synthetic
     QTest.mouseClick(view, LEFT, NONE, on_map(view, 1.5))
     assert (chosen(labelled), c.playback.frame) == (["back"], 45)
     QTest.mouseClick(view, LEFT, NONE, on_map(view, 0.915))
@@ -229,7 +232,7 @@ def test_a_region_is_selected_looped_and_its_edges_dragged(labelled) -> None:
 
 
 def test_selecting_goes_there_with_video_mesh_and_maps(labelled, qtbot) -> None:
-    c = labelled.context
+    c = models_of(labelled)
     shown = []
     c.video.frame_changed.connect(lambda: shown.append(c.playback.frame))
     click(labelled, 1.5)
@@ -238,7 +241,7 @@ def test_selecting_goes_there_with_video_mesh_and_maps(labelled, qtbot) -> None:
 
 
 def test_the_wheel_over_the_labels_zooms_as_over_the_maps(labelled) -> None:
-    span, view = labelled.context.span, timeline(labelled)
+    span, view = models_of(labelled).span, timeline(labelled)
     place = at(labelled, 0.5)
     event = QWheelEvent(
         QPointF(place),
@@ -256,7 +259,7 @@ def test_the_wheel_over_the_labels_zooms_as_over_the_maps(labelled) -> None:
 
 
 def test_undo_moves_the_view_only_to_show_the_change(labelled) -> None:
-    span, undo = labelled.context.span, labelled.context.document.undo_stack.undo
+    span, undo = models_of(labelled).span, models_of(labelled).document.undo_stack.undo
     click(labelled, 0.5)
     key(labelled, "Backspace")
     assert spans(labelled) == [BACK]
@@ -265,5 +268,5 @@ def test_undo_moves_the_view_only_to_show_the_change(labelled) -> None:
     assert spans(labelled) == [THERE, BACK]
     assert (span.start_s, span.end_s) == (0.7, 1.4), "0.2 to 0.8 s can be seen in part"
     span.set_span(1.2, 1.6)
-    labelled.context.document.undo_stack.redo()
+    models_of(labelled).document.undo_stack.redo()
     assert span.start_s == pytest.approx(0.2)

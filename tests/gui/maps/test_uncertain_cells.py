@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QLabel, QToolButton
+from window_models import models_of
 
 from sd2app.maps.heatmap import HeatmapView
 from sd2app.maps.level_bar import LevelBar
@@ -30,14 +31,14 @@ def fitted(empty_window, recording_copy, qtbot):
         np.full((frames, 1), 0.001),
     )
     save_mesh(replace(ball, uncertainty=known), recording_copy / "mesh.npz")
-    with qtbot.waitSignal(empty_window.context.document.opened, timeout=20_000):
+    with qtbot.waitSignal(models_of(empty_window).document.opened, timeout=20_000):
         empty_window.open_paths([recording_copy])
     wait(empty_window, qtbot)
     return empty_window
 
 
 def wait(window, qtbot):
-    c = window.context
+    c = models_of(window)
     qtbot.waitUntil(
         lambda: window.settled and c.synthesis.complete and not c.uncertainty.busy, timeout=20_000
     )
@@ -51,7 +52,7 @@ def colour_of(view):
 
 
 def test_a_key_takes_the_colour_from_what_is_not_known(fitted, qtbot, tmp_path):
-    c, view = fitted.context, fitted.findChildren(HeatmapView)[0]
+    c, view = models_of(fitted), fitted.findChildren(HeatmapView)[0]
     assert c.synthetic.uncertainty is None
     assert colour_of(view) > 60
     qtbot.keyClick(fitted, Qt.Key.Key_U)
@@ -81,7 +82,7 @@ def test_a_key_takes_the_colour_from_what_is_not_known(fitted, qtbot, tmp_path):
 
 
 def test_it_follows_the_sensor_and_is_remembered(fitted, qtbot):
-    c, view = fitted.context, fitted.findChildren(HeatmapView)[0]
+    c, view = models_of(fitted), fitted.findChildren(HeatmapView)[0]
     button = next(
         b for b in fitted.findChild(LevelBar).findChildren(QToolButton) if b.text() == "Uncertain"
     )
@@ -104,7 +105,7 @@ def test_it_follows_the_sensor_and_is_remembered(fitted, qtbot):
 
 
 def test_without_knowledge_the_action_says_why(window, qtbot):
-    action = window._actions["uncertain"]
+    action = window.action("uncertain")
     assert not action.isEnabled()
     assert "does not say how well its velocities are known" in action.toolTip()
     button = next(
@@ -113,12 +114,12 @@ def test_without_knowledge_the_action_says_why(window, qtbot):
     assert not button.isEnabled()
     assert button.toolTip() == action.toolTip()
     qtbot.keyClick(window, Qt.Key.Key_U)
-    assert not window.context.uncertainty.shown
-    assert window.context.synthetic.uncertainty is None
+    assert not models_of(window).uncertainty.shown
+    assert models_of(window).synthetic.uncertainty is None
 
 
 def test_closing_while_it_is_found_is_safe(fitted, qtbot):
     qtbot.keyClick(fitted, Qt.Key.Key_U)
-    assert fitted.context.uncertainty.busy
-    fitted.context.document.undo_stack.clear()
+    assert models_of(fitted).uncertainty.busy
+    models_of(fitted).document.undo_stack.clear()
     fitted.close()

@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QComboBox, QFileDialog, QToolButton
+from window_models import models_of
 
 from sd2app.mesh_comparison.curves import JointCurves, joint_words
+from sd2app.mesh_comparison.feature import mesh_of
 from sd2app.mesh_comparison.model import name_of
 from sd2app.mesh_comparison.pictures import ComparedPicture
 from sd2app.mesh_comparison.table import JointTable
 from sd2app.mesh_comparison.window import ComparisonWindow
-from sd2app.shell.file_dialogs import mesh_of
 from sd2core.body.model import Body
 from sd2core.body.rotations import about
 from sd2core.io.mesh import save_mesh
@@ -54,10 +55,10 @@ def meshes(waving, tmp_path) -> tuple[Path, Path]:
 def compared(empty_window, meshes, qtbot):
     """The window of the comparison, everything worked out."""
     own, other = meshes
-    with qtbot.waitSignal(empty_window.context.document.opened, timeout=20_000):
+    with qtbot.waitSignal(models_of(empty_window).document.opened, timeout=20_000):
         empty_window.open_paths([own])
     qtbot.waitUntil(lambda: empty_window.settled, timeout=20_000)
-    empty_window.compare_with_mesh(other)
+    empty_window.features.mesh_comparison.compare(other)
     window = empty_window.findChild(ComparisonWindow)
     qtbot.waitUntil(lambda: window._model.comparison is not None, timeout=30_000)
     return window
@@ -118,7 +119,7 @@ def test_the_other_one_can_be_the_reference(compared, qtbot):
 
 def test_it_follows_the_sensor(compared, empty_window, qtbot):
     sensor = VirtualSensor(position_m=(1.5, 0.0, 1.0))
-    empty_window.context.edits.place_sensor(sensor)
+    models_of(empty_window).edits.place_sensor(sensor)
     qtbot.waitUntil(lambda: compared._model.comparison.sensor == sensor, timeout=20_000)
 
 
@@ -151,14 +152,16 @@ def test_the_figure_is_written(compared, qtbot, tmp_path, monkeypatch):
 def test_another_recording_closes_it(compared, empty_window, meshes, qtbot):
     with qtbot.waitSignal(compared.closed, timeout=20_000):
         empty_window.open_paths([meshes[1]])
-    assert empty_window.dialogs._comparison is None
+    assert empty_window.features.mesh_comparison._window is None
 
 
 def test_what_cannot_be_compared_is_explained(empty_window, small_recording, meshes, qtbot):
-    with qtbot.waitSignal(empty_window.context.document.opened, timeout=20_000):
+    with qtbot.waitSignal(models_of(empty_window).document.opened, timeout=20_000):
         empty_window.open_paths([small_recording])
     qtbot.waitUntil(lambda: empty_window.settled, timeout=20_000)
-    empty_window.compare_with_mesh(small_recording / "mesh.npz")  # a ball has no joints
+    empty_window.features.mesh_comparison.compare(
+        small_recording / "mesh.npz"
+    )  # a ball has no joints
     window = empty_window.findChild(ComparisonWindow)
     qtbot.waitUntil(lambda: bool(window._model.problem), timeout=20_000)
     assert "joints" in window._notes.text()
@@ -178,10 +181,10 @@ def test_names(tmp_path):
 
 def test_the_mesh_of_another_recording(empty_window, meshes, tmp_path, qtbot):
     other = Recording.create(tmp_path / "other.sd2", mesh=meshes[1])
-    with qtbot.waitSignal(empty_window.context.document.opened, timeout=20_000):
+    with qtbot.waitSignal(models_of(empty_window).document.opened, timeout=20_000):
         empty_window.open_paths([meshes[0]])
     qtbot.waitUntil(lambda: empty_window.settled, timeout=20_000)
-    empty_window.compare_with_mesh(other.folder)
+    empty_window.features.mesh_comparison.compare(other.folder)
     model = empty_window.findChild(ComparisonWindow)._model
     qtbot.waitUntil(lambda: model.comparison is not None, timeout=20_000)
     assert model.labels == ("own.npz", "other.sd2")

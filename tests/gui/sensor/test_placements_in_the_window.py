@@ -6,6 +6,7 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QCheckBox, QFileDialog, QLabel, QToolButton
+from window_models import models_of
 
 from sd2app.sensor.placements_page import PlacementsPage
 from sd2app.widgets.inputs import Choice, TypedLine
@@ -23,7 +24,7 @@ GRID = PlacementGrid((1.0, 2.0), (-30.0, 0.0, 30.0))
 @pytest.fixture
 def page(window, qtbot) -> PlacementsPage:
     """The page on the small recording, with the keyboard in the window."""
-    window.show_placements()
+    window.bring_up("Sensor", "Placements")
     return window.findChild(PlacementsPage)
 
 
@@ -52,15 +53,15 @@ def write(field: TypedLine, text: str) -> None:
 
 
 def settle(qtbot, window) -> None:
-    places = window.context.placements
+    places = models_of(window).placements
     qtbot.waitUntil(lambda: places.planned.coverage is not None and not places.busy, timeout=10_000)
 
 
 def test_a_grid_is_typed_counted_as_it_is_typed_and_is_one_step_back(window, page, qtbot):
-    stack = window.context.document.undo_stack
+    stack = models_of(window).document.undo_stack
     assert "A map from every place" in words(page)
     choose(page, "Grid")
-    assert window.context.document.recording.placements is not None
+    assert models_of(window).document.recording.placements is not None
     settle(qtbot, window)
     assert "20 placements" in words(page)
     count = stack.count()
@@ -76,41 +77,41 @@ def test_a_grid_is_typed_counted_as_it_is_typed_and_is_one_step_back(window, pag
     QTest.keyClick(field, Qt.Key.Key_Return)
     assert not field.hasFocus()
     assert stack.count() == count + 1
-    assert window.context.document.modified
-    window._actions["undo"].trigger()
+    assert models_of(window).document.modified
+    window.action("undo").trigger()
     assert field.text() == "1:4:1"
-    window._actions["undo"].trigger()
-    assert window.context.document.recording.placements is None
+    window.action("undo").trigger()
+    assert models_of(window).document.recording.placements is None
     assert "A map from every place" in words(page)
 
 
 def test_escape_takes_back_what_was_typed(window, page, qtbot):
-    window.context.edits.plan_placements(GRID)
-    stack = window.context.document.undo_stack
+    models_of(window).edits.plan_placements(GRID)
+    stack = models_of(window).document.undo_stack
     count = stack.count()
     field = line(page, "Azimuths, °")
     write(field, "0:90:45")
-    assert window.context.placements.plan.azimuths_deg == (0.0, 45.0, 90.0)
+    assert models_of(window).placements.plan.azimuths_deg == (0.0, 45.0, 90.0)
     QTest.keyClick(field, Qt.Key.Key_Escape)
-    assert window.context.placements.plan == GRID
+    assert models_of(window).placements.plan == GRID
     assert stack.count() == count
 
 
 def test_typing_that_ends_in_another_recording_is_no_step_there(
     window, page, qtbot, recording_copy
 ):
-    window.context.edits.plan_placements(GRID)
+    models_of(window).edits.plan_placements(GRID)
     field = line(page, "Ranges, m")
     write(field, "5")
-    with qtbot.waitSignal(window.context.document.opened, timeout=20_000):
+    with qtbot.waitSignal(models_of(window).document.opened, timeout=20_000):
         window.open_paths([recording_copy])
     field.clearFocus()
-    assert window.context.placements.plan is None
-    assert window.context.document.undo_stack.count() == 0
+    assert models_of(window).placements.plan is None
+    assert models_of(window).document.undo_stack.count() == 0
 
 
 def test_limits_and_cost_are_said(window, page, qtbot):
-    window.context.edits.plan_placements(PlacementGrid((0.2, 2.0, 20.0)))
+    models_of(window).edits.plan_placements(PlacementGrid((0.2, 2.0, 20.0)))
     settle(qtbot, window)
     said = words(page)
     # The fake ladder says 0.6 ms per frame; 60 frames.
@@ -120,10 +121,10 @@ def test_limits_and_cost_are_said(window, page, qtbot):
 
 
 def test_a_click_in_the_scene_puts_the_sensor_there_and_undo_takes_it_back(window, page, qtbot):
-    context = window.context
+    context = models_of(window)
     context.edits.plan_placements(GRID)
     settle(qtbot, window)
-    view = window._scene
+    view = window.features.scene.view
     view.grab()
     places = view.scene.markers.positions_m
     size = (view.width(), view.height())
@@ -136,12 +137,12 @@ def test_a_click_in_the_scene_puts_the_sensor_there_and_undo_takes_it_back(windo
     QTest.mouseClick(widget, Qt.MouseButton.LeftButton, pos=place)
     assert context.sensor.sensor.position_m == context.placements.planned.sensors[number].position_m
     assert f"{number + 1} of 6" in words(page)
-    window._actions["undo"].trigger()
+    window.action("undo").trigger()
     assert context.sensor.sensor == before
 
 
 def test_buttons_go_from_place_to_place_and_the_box_hides_them(window, page, qtbot):
-    context = window.context
+    context = models_of(window)
     context.edits.plan_placements(GRID)
     settle(qtbot, window)
     for _ in range(2):
@@ -152,10 +153,10 @@ def test_buttons_go_from_place_to_place_and_the_box_hides_them(window, page, qtb
     box = page.findChild(QCheckBox)
     QTest.mouseClick(box, Qt.MouseButton.LeftButton, pos=QPoint(8, box.height() // 2))
     assert not context.placements.shown
-    assert not len(window._scene.scene.markers.positions_m)
-    window._actions["draw_placements"].trigger()
+    assert not len(window.features.scene.view.scene.markers.positions_m)
+    window.action("draw_placements").trigger()
     assert box.isChecked()
-    assert len(window._scene.scene.markers.positions_m) == 6
+    assert len(window.features.scene.view.scene.markers.positions_m) == 6
 
 
 def test_a_plan_is_saved_exported_and_taken_from_a_file(
@@ -163,8 +164,8 @@ def test_a_plan_is_saved_exported_and_taken_from_a_file(
 ):
     window.open_paths([recording_copy])
     qtbot.waitUntil(lambda: window.settled, timeout=20_000)
-    window.context.edits.plan_placements(GRID)
-    window._actions["save"].trigger()
+    models_of(window).edits.plan_placements(GRID)
+    window.action("save").trigger()
     assert open_recording(recording_copy).placements == GRID
     # An ending is put where it was forgotten.
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(tmp_path / "a"), ""))
@@ -174,9 +175,9 @@ def test_a_plan_is_saved_exported_and_taken_from_a_file(
     write_placements(tmp_path / "b.json", cloud)
     monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(tmp_path / "b.json"), ""))
     QTest.mouseClick(button(page, "Import…"), Qt.MouseButton.LeftButton)
-    assert window.context.placements.plan == cloud
+    assert models_of(window).placements.plan == cloud
     assert line(page, "Count").text() == "5"
     (tmp_path / "b.json").write_text("{}")
     QTest.mouseClick(button(page, "Import…"), Qt.MouseButton.LeftButton)
     assert "b.json" in window.messages.text
-    assert window.context.placements.plan == cloud
+    assert models_of(window).placements.plan == cloud

@@ -6,11 +6,12 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QPushButton, QToolButton
+from window_models import models_of
 
-from sd2app.shell.actions import MOUSE
 from sd2app.shell.keys.capture import KeyCapture
 from sd2app.shell.keys.dialog import KeysDialog, KeyTable
 from sd2app.shell.keys.model import KeyListModel
+from sd2app.shell.program import MOUSE
 from sd2app.widgets.inputs import NumberBox
 
 CONTROL, SHIFT = Qt.KeyboardModifier.ControlModifier, Qt.KeyboardModifier.ShiftModifier
@@ -19,7 +20,7 @@ NONE, LEFT = Qt.KeyboardModifier.NoModifier, Qt.MouseButton.LeftButton
 
 @pytest.fixture
 def dialog(window, qtbot):
-    c = window.context
+    c = models_of(window)
     shown = KeysDialog(KeyListModel(c.keys, c.labels, MOUSE, c.label_edits.apply), c.keys, window)
     qtbot.addWidget(shown)
     shown.show()
@@ -61,12 +62,12 @@ def capture(dialog) -> None:
 
 
 def test_another_key_does_it_at_once_and_the_usual_one_nothing(window, dialog, qtbot) -> None:
-    c = window.context
+    c = models_of(window)
     search(dialog, "next span")
     capture(dialog)
     press(Qt.Key.Key_H)
     assert c.keys.keys_of("next_span") == ("H",)
-    action = window._actions["next_span"]
+    action = window.action("next_span")
     assert [one.toString() for one in action.shortcuts()] == ["H"]
     assert action.toolTip().endswith("(H)")
     dialog.close()
@@ -97,25 +98,25 @@ def test_a_key_that_is_taken_is_refused_by_name(window, dialog) -> None:
         capture(dialog)
         press(key, modifier)
         assert words in said(dialog)
-        assert window.context.keys.keys_of("next_span") == ("N",)
+        assert models_of(window).keys.keys_of("next_span") == ("N",)
     capture(dialog)
     press(Qt.Key.Key_Escape)
     assert dialog.isVisible()
-    assert window.context.keys.keys_of("next_span") == ("N",)
+    assert models_of(window).keys.keys_of("next_span") == ("N",)
 
 
 def test_a_shifted_sign_is_the_sign(window, dialog) -> None:
     search(dialog, "next span")
     capture(dialog)
     QTest.keyClick(QApplication.focusWidget(), Qt.Key.Key_Exclam, SHIFT)
-    assert window.context.keys.keys_of("next_span") == ("!",)
+    assert models_of(window).keys.keys_of("next_span") == ("!",)
     capture(dialog)
     press(Qt.Key.Key_H, SHIFT)
-    assert window.context.keys.keys_of("next_span") == ("Shift+H",)
+    assert models_of(window).keys.keys_of("next_span") == ("Shift+H",)
 
 
 def test_keys_are_added_taken_away_and_given_back(window, dialog) -> None:
-    keys = window.context.keys
+    keys = models_of(window).keys
     search(dialog, "split span")
     assert not button(dialog, "Reset").isEnabled()
     click(dialog, "Add")
@@ -134,12 +135,12 @@ def test_a_labels_key_is_changed_as_one_step(window, dialog) -> None:
     search(dialog, "left-to-right")
     capture(dialog)
     press(Qt.Key.Key_H)
-    labels = window.context.labels
+    labels = models_of(window).labels
     assert labels.labels.label_set.find("left-to-right").key == "h"
-    assert window.context.document.undo_stack.undoText() == "Change key of label"
-    window.context.document.undo_stack.undo()
+    assert models_of(window).document.undo_stack.undoText() == "Change key of label"
+    models_of(window).document.undo_stack.undo()
     assert labels.labels.label_set.find("left-to-right").key == "1"
-    assert window.context.keys.owner("H") == ""
+    assert models_of(window).keys.owner("H") == ""
 
 
 def test_what_the_mouse_does_is_listed_and_not_changed(dialog) -> None:
@@ -150,7 +151,7 @@ def test_what_the_mouse_does_is_listed_and_not_changed(dialog) -> None:
 
 def test_typing_in_a_number_box_fires_no_action(window, qtbot) -> None:
     """Whatever keys are chosen: letters, signs and arrows belong to the field."""
-    c = window.context
+    c = models_of(window)
     c.keys.bind("dots", ["Up"])
     c.keys.bind("show_trade", ["End"])
     window.activateWindow()

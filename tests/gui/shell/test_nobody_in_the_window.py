@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPoint
 from PySide6.QtWidgets import QLabel
+from window_models import models_of
 
 from sd2app.maps.heatmap import HeatmapView
 from sd2app.maps.overview import Overview
@@ -26,15 +27,15 @@ def window(empty_window, recording_copy, qtbot):
     present = np.ones(ball.frame_count, bool)
     present[slice(*GONE)] = False
     save_mesh(replace(ball, present=present), recording_copy / "mesh.npz")
-    with qtbot.waitSignal(empty_window.context.document.opened, timeout=20_000):
+    with qtbot.waitSignal(models_of(empty_window).document.opened, timeout=20_000):
         empty_window.open_paths([recording_copy])
     qtbot.waitUntil(lambda: empty_window.settled, timeout=20_000)
-    qtbot.waitUntil(lambda: empty_window.context.synthesis.complete, timeout=20_000)
+    qtbot.waitUntil(lambda: models_of(empty_window).synthesis.complete, timeout=20_000)
     return empty_window
 
 
 def show(window, qtbot, frame):
-    window.context.playback.seek_frame(frame)
+    models_of(window).playback.seek_frame(frame)
     qtbot.waitUntil(lambda: window.settled, timeout=20_000)
 
 
@@ -47,8 +48,8 @@ def colours(widget, area=None):
 
 
 def test_the_map_is_empty_there_and_says_so_under_the_pointer(window, qtbot):
-    view, real = window._tracks.synthetic, window._tracks.real
-    c = window.context
+    view, real = window.maps.synthetic, window.maps.real
+    c = models_of(window)
     assert not c.synthetic.map.values[:, slice(*GONE)].any()
     assert c.synthetic.map.values[:, : GONE[0]].any()
     middle = QPoint(round(view.scale.x_of(32 / 30)), round(view.y_of(1.0)))
@@ -65,7 +66,7 @@ def test_the_map_is_empty_there_and_says_so_under_the_pointer(window, qtbot):
 def test_what_is_unknown_does_not_have_the_colour_of_nothing(window):
     view = window.findChildren(HeatmapView)[0]
     for dark in (False, True):
-        window.set_dark(dark)
+        window.features.program.set_dark(dark)
         assert_hatched(window, view)
 
 
@@ -81,35 +82,35 @@ def assert_hatched(window, view):
 def lines_drawn(window):
     """Pixels of the synthetic curve in the spectrum of the frame."""
     view = window.findChild(SpectrumView)
-    blue, image = window.context.display.palette.synthetic, view.grab().toImage()
+    blue, image = models_of(window).display.palette.synthetic, view.grab().toImage()
     rows = range(56, image.height() - 44)  # between legend and axis
     return sum(image.pixelColor(x, y).name() == blue for y in rows for x in range(48, view.width()))
 
 
 def test_nothing_shows_the_pose_that_was_held(window, qtbot):
-    video, c = window.findChild(VideoView), window.context
+    video, c = window.findChild(VideoView), models_of(window)
     c.overlay.set_style(opacity=1.0)
     show(window, qtbot, 20)
     assert lines_drawn(window) > 10
-    assert window._actions["aim_sensor"].isEnabled()
+    assert window.action("aim_sensor").isEnabled()
     assert len(colours(video)) > 20  # a shaded ball
-    assert window._scene.overlay.message == ""
+    assert window.features.scene.view.overlay.message == ""
     show(window, qtbot, 30)
     assert lines_drawn(window) == 0
     assert len(colours(video)) < 10  # a grey picture
-    window._scene._prepare((400.0, 300.0), 1.0)
-    assert window._scene.overlay.message == "No person at this time"
+    window.features.scene.view._prepare((400.0, 300.0), 1.0)
+    assert window.features.scene.view.overlay.message == "No person at this time"
     assert c.synthesis.readout() is None
-    assert not window._actions["aim_sensor"].isEnabled()
+    assert not window.action("aim_sensor").isEnabled()
 
 
 def test_another_place_has_the_same_gap(window, qtbot):
-    before = window.context.synthetic.map
-    window.context.sensor.set_sensor(
-        replace(window.context.sensor.sensor, position_m=(0.3, 0.0, 0.0))
+    before = models_of(window).synthetic.map
+    models_of(window).sensor.set_sensor(
+        replace(models_of(window).sensor.sensor, position_m=(0.3, 0.0, 0.0))
     )
-    qtbot.waitUntil(lambda: window.context.synthesis.complete, timeout=20_000)
-    after = window.context.synthetic.map
+    qtbot.waitUntil(lambda: models_of(window).synthesis.complete, timeout=20_000)
+    after = models_of(window).synthetic.map
     assert after is not before
     assert not after.values[:, slice(*GONE)].any()
     assert after.present is not None

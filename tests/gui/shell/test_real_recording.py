@@ -4,24 +4,25 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from window_models import models_of
 
 from sd2core.figures.surface import shade_mesh
 
 
 @pytest.fixture
 def walk(empty_window, shared_data, qtbot):
-    document = empty_window.context.document
+    document = models_of(empty_window).document
     with qtbot.waitSignal(document.opened, timeout=30_000):
         empty_window.open_paths(
             [shared_data / "video" / "walk.mkv", shared_data / "mesh" / "walk.npz"]
         )
     qtbot.waitUntil(lambda: empty_window.settled, timeout=60_000)
-    qtbot.waitUntil(lambda: empty_window.context.synthesis.complete, timeout=60_000)
+    qtbot.waitUntil(lambda: models_of(empty_window).synthesis.complete, timeout=60_000)
     return empty_window
 
 
 def test_the_mesh_lies_on_the_person(walk, qtbot):
-    c = walk.context
+    c = models_of(walk)
     for frame in (20, 44, 70):
         c.playback.seek_frame(frame)
         qtbot.waitUntil(lambda frame=frame: c.video.shown_frame == frame, timeout=10_000)
@@ -35,7 +36,7 @@ def test_the_mesh_lies_on_the_person(walk, qtbot):
 
 
 def test_the_sensor_drag_is_followed(walk, qtbot):
-    c = walk.context
+    c = models_of(walk)
     before = c.synthetic.map.values.copy()
     c.edits.begin_sensor_drag()
     for step in range(10):
@@ -49,7 +50,7 @@ def test_the_sensor_drag_is_followed(walk, qtbot):
 
 
 def test_a_real_capture_shows_a_person_receding(empty_window, shared_data, qtbot):
-    c = empty_window.context
+    c = models_of(empty_window)
     with qtbot.waitSignal(c.document.opened, timeout=30_000):
         empty_window.open_paths([shared_data / "radar" / "infineon_people"])
     assert c.real.title == "Real"

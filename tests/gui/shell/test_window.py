@@ -7,10 +7,10 @@ import pytest
 from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QTimer, QUrl
 from PySide6.QtGui import QDragEnterEvent, QDropEvent, QWheelEvent
 from PySide6.QtWidgets import QApplication, QMessageBox
+from window_models import all_actions, models_of
 
 from sd2app.maps.overview import Overview
 from sd2app.playback.timeline import TimeRuler
-from sd2app.shell.actions import ACTIONS
 from sd2app.shell.keys.dialog import KeysDialog
 from sd2app.video.view import VideoView
 from sd2core.accuracy.plans import AccuracyPlan
@@ -19,7 +19,7 @@ from sd2core.sensor import VirtualSensor
 
 
 def heatmaps(window):
-    synthetic, real = window._tracks.synthetic, window._tracks.real
+    synthetic, real = window.maps.synthetic, window.maps.real
     return synthetic, real
 
 
@@ -28,7 +28,7 @@ def at(view, time_s, velocity_mps):
 
 
 def test_opening_shows_every_part(window):
-    c = window.context
+    c = models_of(window)
     assert window.windowTitle().startswith("ball (simulated)")
     assert c.video.picture.shape == (120, 160, 3)
     assert c.synthetic.map.values.max() > 0
@@ -41,7 +41,7 @@ def test_opening_shows_every_part(window):
 
 def test_the_ball_is_where_it_should_be_in_the_map(window):
     # d/dt of 2 + 0.2 sin(2πt): fastest away at t = 0 and 1 s, fastest towards at 0.5 and 1.5 s.
-    c = window.context
+    c = models_of(window)
     mean = c.synthetic.map.mean_velocity_mps()
     peak = 0.2 * 2 * np.pi
     for time_s, sign in ((0.5, 1), (1.0, -1), (1.5, 1)):
@@ -50,7 +50,7 @@ def test_the_ball_is_where_it_should_be_in_the_map(window):
 
 
 def test_keys_play_step_and_change_speed(window, qtbot):
-    playback = window.context.playback
+    playback = models_of(window).playback
     qtbot.keyClick(window, Qt.Key.Key_Right)
     assert playback.frame == 1
     qtbot.keyClick(window, Qt.Key.Key_Right, Qt.KeyboardModifier.ShiftModifier)
@@ -73,7 +73,7 @@ def test_keys_play_step_and_change_speed(window, qtbot):
 
 
 def test_the_picture_follows_the_clock(window, qtbot):
-    c = window.context
+    c = models_of(window)
     for frame in (10, 50, 3):
         c.playback.seek_frame(frame)
         qtbot.waitUntil(lambda frame=frame: c.video.shown_frame == frame)
@@ -82,7 +82,7 @@ def test_the_picture_follows_the_clock(window, qtbot):
 
 def test_a_click_in_a_heatmap_seeks_and_a_drag_scrubs(window, qtbot):
     synthetic, _ = heatmaps(window)
-    playback = window.context.playback
+    playback = models_of(window).playback
     qtbot.mouseClick(synthetic, Qt.MouseButton.LeftButton, pos=at(synthetic, 1.25, 0.5))
     assert playback.time_s == pytest.approx(1.25, abs=1 / 30)
     qtbot.mousePress(synthetic, Qt.MouseButton.LeftButton, pos=at(synthetic, 0.5, 0.5))
@@ -93,12 +93,12 @@ def test_a_click_in_a_heatmap_seeks_and_a_drag_scrubs(window, qtbot):
 
 def test_hovering_reads_time_velocity_and_level(window, qtbot):
     synthetic, _ = heatmaps(window)
-    pointer = window.context.pointer
+    pointer = models_of(window).pointer
     qtbot.mouseMove(synthetic, at(synthetic, 0.5, 1.2))
     reading = pointer.reading
     assert reading.frame == 15
     assert reading.velocity_mps == pytest.approx(1.1875)
-    assert reading.value == window.context.synthetic.map.values[25, 15]
+    assert reading.value == models_of(window).synthetic.map.values[25, 15]
     qtbot.mouseMove(synthetic, at(synthetic, 0.5, 0.0))
     assert pointer.reading.note == "nulled bin"
 
@@ -119,7 +119,7 @@ def wheel(view, position, notches, modifiers=Qt.KeyboardModifier.NoModifier):
 
 def test_the_wheel_zooms_about_the_pointer_and_pans_with_shift(window, qtbot):
     synthetic, real = heatmaps(window)
-    span = window.context.span
+    span = models_of(window).span
     where = at(synthetic, 0.5, 1.0)
     wheel(synthetic, where, 3)
     assert span.duration_s == pytest.approx(2.0 * 0.8**3)
@@ -135,7 +135,7 @@ def test_the_wheel_zooms_about_the_pointer_and_pans_with_shift(window, qtbot):
 
 def test_the_overview_pans_and_zooms(window, qtbot):
     overview = window.findChild(Overview)
-    span = window.context.span
+    span = models_of(window).span
     span.set_span(0.5, 1.0)
     y = overview.height() // 2
 
@@ -154,12 +154,12 @@ def test_the_overview_pans_and_zooms(window, qtbot):
 def test_the_ruler_seeks(window, qtbot):
     ruler = window.findChild(TimeRuler)
     qtbot.mouseClick(ruler, Qt.MouseButton.LeftButton, pos=QPoint(round(ruler.scale.x_of(1.5)), 12))
-    assert window.context.playback.time_s == pytest.approx(1.5, abs=1 / 30)
+    assert models_of(window).playback.time_s == pytest.approx(1.5, abs=1 / 30)
 
 
 def test_dragging_the_title_of_the_radar_aligns_it_in_one_step(window, qtbot):
     _, real = heatmaps(window)
-    recording = window.context.document.recording
+    recording = models_of(window).document.recording
     start = QPoint(400, 10)
     shift_px = round(0.25 / real.scale.seconds_per_px)
     qtbot.mousePress(real, Qt.MouseButton.LeftButton, pos=start)
@@ -167,17 +167,17 @@ def test_dragging_the_title_of_the_radar_aligns_it_in_one_step(window, qtbot):
         qtbot.mouseMove(real, start + QPoint(round(step * shift_px), 0))
     qtbot.mouseRelease(real, Qt.MouseButton.LeftButton, pos=start + QPoint(shift_px, 0))
     assert recording.radar_offset_s == pytest.approx(0.25, abs=0.005)
-    assert window.context.real.offset_s == recording.radar_offset_s
+    assert models_of(window).real.offset_s == recording.radar_offset_s
     qtbot.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
     assert recording.radar_offset_s == 0.0
-    assert window.context.real.offset_s == 0.0
+    assert models_of(window).real.offset_s == 0.0
     keys = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier
     qtbot.keyClick(window, Qt.Key.Key_Z, keys)
     assert recording.radar_offset_s == pytest.approx(0.25, abs=0.005)
 
 
 def test_moving_the_sensor_changes_the_map_and_undo_restores_it(window, qtbot):
-    c = window.context
+    c = models_of(window)
     before = c.synthetic.map.values.copy()
     c.edits.place_sensor(VirtualSensor(position_m=(2.0, 0.0, 2.0)))
     qtbot.waitUntil(lambda: c.synthesis.complete, timeout=10_000)
@@ -193,7 +193,7 @@ def test_moving_the_sensor_changes_the_map_and_undo_restores_it(window, qtbot):
 def test_typing_a_range_moves_the_sensor_along_its_direction(window, qtbot):
     from sd2app.sensor.panel import SensorPanel
 
-    c = window.context
+    c = models_of(window)
     panel = window.findChild(SensorPanel)
     box = panel._spherical[0]
     box.setFocus()
@@ -223,7 +223,7 @@ def type_into(box, text, qtbot):
 
 
 def test_typing_is_not_disturbed_by_playing(window, qtbot):
-    c = window.context
+    c = models_of(window)
     box = number_boxes(window)[1][0]
     c.playback.set_loop(True)
     c.playback.play()
@@ -242,7 +242,7 @@ def test_typing_is_not_disturbed_by_playing(window, qtbot):
 
 
 def test_a_number_box_gives_the_keyboard_back(window, qtbot):
-    c = window.context
+    c = models_of(window)
     x = number_boxes(window)[0][0]
     type_into(x, "0.5", qtbot)
     qtbot.keyClick(x, Qt.Key.Key_Return)
@@ -264,7 +264,7 @@ def test_a_number_box_gives_the_keyboard_back(window, qtbot):
 def test_the_wheel_over_a_box_changes_nothing(window, qtbot):
     from sd2app.widgets.inputs import Choice, NumberBox
 
-    c = window.context
+    c = models_of(window)
     before = (c.sensor.sensor, c.display.levels, c.document.clutter)
     for widget in [*window.findChildren(NumberBox), *window.findChildren(Choice)]:
         wheel(widget, QPoint(5, 5), 1)
@@ -274,7 +274,7 @@ def test_the_wheel_over_a_box_changes_nothing(window, qtbot):
 def test_levels_push_each_other_along(window, qtbot):
     from sd2app.maps.level_bar import LevelBar
 
-    bar, levels = window.findChild(LevelBar), lambda: window.context.display.levels
+    bar, levels = window.findChild(LevelBar), lambda: models_of(window).display.levels
     type_into(bar._low, "15", qtbot)
     qtbot.keyClick(bar._low, Qt.Key.Key_Return)
     assert (levels().low_db, levels().high_db) == (15, 16)
@@ -285,7 +285,7 @@ def test_levels_push_each_other_along(window, qtbot):
 
 
 def test_clutter_removal_can_be_undone(window, qtbot):
-    c = window.context
+    c = models_of(window)
     before, reference = c.real.map.values.copy(), c.real.reference
     c.edits.set_clutter("none")
     qtbot.waitUntil(lambda: not np.array_equal(c.real.map.values, before), timeout=10_000)
@@ -299,11 +299,11 @@ def test_the_bundled_sample_is_never_written_to(empty_window, qtbot, monkeypatch
 
     from sd2core.files.resources import resource_path
 
-    c = empty_window.context
+    c = models_of(empty_window)
     file = resource_path("swipes.sd2") / "recording.json"
     before = file.read_bytes()
     with qtbot.waitSignal(c.document.opened, timeout=20_000):
-        empty_window.open_sample()
+        empty_window.features.files.open_sample()
     c.edits.place_sensor(VirtualSensor(position_m=(0.5, 0.0, 0.0)))
     asked = []
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (asked.append(1), ("", ""))[1])
@@ -319,7 +319,7 @@ def test_a_mesh_longer_than_its_video_is_played_to_its_end(
 
     with np.load(small_recording / "mesh.npz") as data:
         vertices, faces = data["vertices"], data["faces"]
-    c = empty_window.context
+    c = models_of(empty_window)
     for count, end_s in ((90, 3.0), (30, 2.0)):
         mesh = tmp_path / f"{count}.npz"
         frames = np.arange(count) % len(vertices)
@@ -340,7 +340,7 @@ def test_a_mesh_longer_than_its_video_is_played_to_its_end(
 
 
 def test_a_drag_shows_a_preview_and_becomes_exact(window, qtbot):
-    c = window.context
+    c = models_of(window)
     seen = []
     c.synthetic.status_changed.connect(lambda: seen.append(c.synthetic.status))
     c.edits.begin_sensor_drag()
@@ -357,7 +357,7 @@ def test_dragging_the_sensor_in_3d_follows_the_mouse_in_one_step(window, qtbot):
     from sd2app.scene import SceneView
     from sd2app.scene.offscreen_backend import ImageBackend
 
-    c = window.context
+    c = models_of(window)
     view = window.findChild(SceneView)
     canvas = window.findChild(ImageBackend)
     view.grab()
@@ -386,7 +386,7 @@ def test_dragging_the_sensor_in_3d_follows_the_mouse_in_one_step(window, qtbot):
 
 
 def test_a_farther_sensor_shows_weaker_levels(window, qtbot):
-    c = window.context
+    c = models_of(window)
     strongest, reference = float(c.synthetic.map.values.max()), c.synthetic.reference
     c.edits.place_sensor(VirtualSensor(position_m=(0.0, 0.0, -2.0)))
     qtbot.waitUntil(lambda: c.synthesis.complete, timeout=10_000)
@@ -399,7 +399,7 @@ def test_a_farther_sensor_shows_weaker_levels(window, qtbot):
 
 
 def test_dropped_files_are_opened_and_added(empty_window, small_recording, qtbot):
-    document = empty_window.context.document
+    document = models_of(empty_window).document
 
     def drop(path, modifiers=Qt.KeyboardModifier.NoModifier):
         mime = QMimeData()
@@ -426,7 +426,7 @@ def test_a_point_cloud_counts_every_point(empty_window, fake, tmp_path, qtbot):
     points = np.repeat(rng.normal(size=(1, 25, 3)), 20, axis=0)
     points[:, :, 2] += 3.0 - np.arange(20)[:, None] / 30.0  # approaches at 1 m/s
     np.savez(tmp_path / "cloud.npz", vertices=points, times_s=np.arange(20) / 30.0)
-    c = empty_window.context
+    c = models_of(empty_window)
     with qtbot.waitSignal(c.document.opened, timeout=10_000):
         empty_window.open_paths([tmp_path / "cloud.npz"])
     qtbot.waitUntil(lambda: c.synthesis.complete, timeout=10_000)
@@ -449,7 +449,7 @@ def test_what_cannot_be_opened_is_a_sentence(window, qtbot, tmp_path, name, cont
     if content is not None:
         path.write_bytes(content)
     title = window.windowTitle()
-    with qtbot.waitSignal(window.context.document.failed, timeout=10_000):
+    with qtbot.waitSignal(models_of(window).document.failed, timeout=10_000):
         window.open_paths([path])
     assert words in window.messages.text
     assert "Traceback" not in window.messages.text
@@ -461,7 +461,7 @@ def test_a_recording_with_a_missing_file_shows_the_rest_and_finds_it_again(
 ):
     (tmp_path / "elsewhere").mkdir()
     (recording_copy / "mesh.npz").rename(tmp_path / "elsewhere" / "mesh.npz")
-    document = empty_window.context.document
+    document = models_of(empty_window).document
     with qtbot.waitSignal(document.failed, timeout=10_000):
         empty_window.open_paths([recording_copy])
     assert document.video is not None
@@ -473,7 +473,7 @@ def test_a_recording_with_a_missing_file_shows_the_rest_and_finds_it_again(
 
 
 def test_saving_keeps_sensor_and_offset(empty_window, recording_copy, qtbot):
-    c = empty_window.context
+    c = models_of(empty_window)
     with qtbot.waitSignal(c.document.opened, timeout=10_000):
         empty_window.open_paths([recording_copy])
     c.edits.place_sensor(VirtualSensor(position_m=(0.5, -0.25, 0.125)))
@@ -488,7 +488,7 @@ def test_saving_keeps_sensor_and_offset(empty_window, recording_copy, qtbot):
 
 
 def test_unsaved_edits_are_asked_about(window, monkeypatch):
-    window.context.edits.set_radar_offset(0.5)
+    models_of(window).edits.set_radar_offset(0.5)
     monkeypatch.setattr(QMessageBox, "question", lambda *_: QMessageBox.StandardButton.Cancel)
     window.close()
     assert window.isVisible()
@@ -507,7 +507,7 @@ def test_closing_during_work_is_safe(empty_window, small_recording, qtbot):
 def test_opening_can_be_cancelled(window, small_recording, qtbot):
     title = window.windowTitle()
     window.open_paths([small_recording / "mesh.npz"])
-    jobs = window.context.jobs
+    jobs = models_of(window).jobs
     jobs.cancel(jobs.jobs[0])
     assert jobs.jobs == ()
     qtbot.wait(300)
@@ -516,14 +516,14 @@ def test_opening_can_be_cancelled(window, small_recording, qtbot):
 
 def test_the_exported_map_is_the_one_on_screen(window, tmp_path):
     path = tmp_path / "map.npz"
-    window.context.synthesis.export(path)
+    models_of(window).synthesis.export(path)
     exported = DopplerMap.load(path)
-    np.testing.assert_allclose(exported.values, window.context.synthetic.map.values, atol=1e-7)
+    np.testing.assert_allclose(exported.values, models_of(window).synthetic.map.values, atol=1e-7)
     assert exported.meta["sensor"]["position_m"] == [0.0, 0.0, 0.0]
 
 
 def test_every_key_is_used_once(window):
-    keys = [key for action in ACTIONS for key in action.keys]
+    keys = [key for action in all_actions() for key in action.keys]
     assert len(keys) == len(set(keys))
 
 
@@ -542,7 +542,7 @@ def test_the_question_mark_shows_all_keys(window, qtbot):
 
 def test_both_themes_repaint_everything(window, qtbot):
     light = window.grab().toImage()
-    window.set_dark(True)
+    window.features.program.set_dark(True)
     qtbot.wait(50)
     dark = window.grab().toImage()
 

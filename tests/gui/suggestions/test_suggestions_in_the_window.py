@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QToolButton
+from window_models import models_of
 
 from sd2app.suggestions.bar import SuggestionBar
 from sd2core.maps import DopplerMap
@@ -17,7 +18,7 @@ NONE = Qt.KeyboardModifier.NoModifier
 @pytest.fixture
 def moving(window, qtbot):
     """Something moves from frame 5 to 15 and from 40 to 50; nothing is marked."""
-    c = window.context
+    c = models_of(window)
     values = np.ones((32, 60), np.float32)
     values[:, 5:15] = values[:, 40:50] = 100.0
     c.synthetic.set_map(DopplerMap(values, VelocityAxis(), c.playback.timebase, "synthetic"))
@@ -34,15 +35,15 @@ def key(window, qtbot, name: str, modifier=NONE) -> None:
 
 def asked(window, qtbot) -> None:
     key(window, qtbot, "F")
-    qtbot.waitUntil(lambda: not window.context.suggestions.busy, timeout=10_000)
+    qtbot.waitUntil(lambda: not models_of(window).suggestions.busy, timeout=10_000)
 
 
 def decided(window) -> list[tuple[str, str]]:
-    return [(span.label, span.origin) for span in window.context.labels.labels.spans]
+    return [(span.label, span.origin) for span in models_of(window).labels.labels.spans]
 
 
 def test_found_by_a_key_and_decided_on_by_one_key_each(moving, qtbot) -> None:
-    bar, c = moving.findChild(SuggestionBar), moving.context
+    bar, c = moving.findChild(SuggestionBar), models_of(moving)
     assert not bar.isVisible()
     asked(moving, qtbot)
     assert bar.isVisible()
@@ -77,7 +78,7 @@ def test_suggestions_are_saved_with_the_labels(moving, qtbot, tmp_path) -> None:
     from sd2core.recording.recording import open_recording
 
     asked(moving, qtbot)
-    moving.context.document.save_as(tmp_path / "saved.sd2")
+    models_of(moving).document.save_as(tmp_path / "saved.sd2")
     assert [span.origin for span in open_recording(tmp_path / "saved.sd2").labelled.spans] == [
         "suggestion"
     ] * 2
@@ -85,7 +86,7 @@ def test_suggestions_are_saved_with_the_labels(moving, qtbot, tmp_path) -> None:
 
 def test_while_it_plays_a_label_key_marks_also_with_a_suggestion_selected(moving, qtbot) -> None:
     asked(moving, qtbot)
-    c = moving.context
+    c = models_of(moving)
     assert [span.origin for span in c.labels.selected] == ["suggestion"]
     c.playback.toggle()
     key(moving, qtbot, "3")

@@ -12,9 +12,11 @@ from answering import answer
 from PySide6.QtCore import QCoreApplication, QEvent, Qt
 from PySide6.QtWidgets import QTabBar, QToolButton
 from training_pairs import write_pairs
+from window_models import models_of
 
 from sd2app.background import run_monitor
 from sd2app.settings import Settings
+from sd2app.shell.parts import Parts
 from sd2app.shell.window import MainWindow
 from sd2app.training.pair_maker import PairMaker
 from sd2app.training.panel import TrainingPanel
@@ -32,7 +34,10 @@ def made(qtbot, compiled_kernels, fake, fake_models, monkeypatch):
 
     def make(*options: object, settings: Settings) -> MainWindow:
         command = [sys.executable, "-u", str(FAKE), *map(str, options)]
-        window = MainWindow(settings, fake.ladder, None, fake_models.library, command)
+        window = MainWindow(
+            settings,
+            Parts(ladder=fake.ladder, denoisers=fake_models.library, train_command=command),
+        )
         windows.append(window)
         window.resize(1280, 800)
         window.show()
@@ -42,12 +47,12 @@ def made(qtbot, compiled_kernels, fake, fake_models, monkeypatch):
 
     yield make
     for window in windows:
-        run = window.context.training.run
+        run = models_of(window).training.run
         if run is not None and run.under_way and run.folder.exists:
             os.kill(run.folder.status().pid, signal.SIGKILL)
         if window.ready:
-            window.context.training.set_closing("keep")
-            window.context.document.undo_stack.clear()
+            models_of(window).training.set_closing("keep")
+            models_of(window).document.undo_stack.clear()
         window.close()
         window.deleteLater()
     QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
@@ -66,7 +71,7 @@ def test_a_run_outlives_its_window_and_is_found_by_the_next(made, qtbot, tmp_pat
     tabs = window.side.findChild(QTabBar)
     qtbot.keyClick(window, Qt.Key.Key_T, Qt.KeyboardModifier.ShiftModifier)
     assert window.side.shown == "Train"
-    training = window.context.training
+    training = models_of(window).training
     training.setup.add_store(write_pairs(tmp_path / "campaign.zarr"))
     training.setup.set_value("epochs", 4)
     qtbot.waitUntil(lambda: not training.setup.problem)
@@ -85,7 +90,7 @@ def test_a_run_outlives_its_window_and_is_found_by_the_next(made, qtbot, tmp_pat
     assert not window.isVisible()
     assert TrainingFolder(path).live
     again = made(settings=settings)
-    training = again.context.training
+    training = models_of(again).training
     qtbot.waitUntil(lambda: training.run is not None and training.run.phase == "running")
     assert training.run.folder.path == path
     assert again.messages.text == f"{path.name} is being trained. The Train panel shows it."
@@ -99,7 +104,7 @@ def test_a_trained_model_denoises_the_recording(
     made, qtbot, tmp_path, small_recording, fake_models, own_data
 ) -> None:
     window = made("--rest-at", 1, settings=Settings.forgetful())
-    c = window.context
+    c = models_of(window)
     window.open_paths([small_recording])
     qtbot.waitUntil(lambda: window.settled and c.synthesis.complete, timeout=20_000)
     c.training.setup.add_store(write_pairs(tmp_path / "campaign.zarr"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QSlider, QToolButton
+from window_models import models_of
 
 from sd2app.video.bar import VideoBar
 
@@ -15,7 +16,7 @@ def buttons(window):
 
 def test_mesh_dots_and_opacity(window, qtbot):
     slider, mesh, dots = buttons(window)
-    overlay = window.context.overlay
+    overlay = models_of(window).overlay
     qtbot.mouseClick(mesh, Qt.MouseButton.LeftButton)
     assert not overlay.style.shown
     assert not slider.isEnabled()
@@ -37,14 +38,14 @@ def test_the_video_shows_the_mesh_as_strongly_as_asked(window, qtbot):
     from sd2app.video.view import VideoView
 
     view = window.findChild(VideoView)
-    window.context.playback.seek_frame(0)
-    qtbot.waitUntil(lambda: window.context.video.shown_frame == 0)
+    models_of(window).playback.seek_frame(0)
+    qtbot.waitUntil(lambda: models_of(window).video.shown_frame == 0)
 
     def middle():
         colour = view.grab().toImage().pixelColor(view.width() // 2, view.height() // 2)
         return colour.red(), colour.green(), colour.blue()
 
-    overlay = window.context.overlay
+    overlay = models_of(window).overlay
     overlay.set_style(shown=False)
     red, green, blue = middle()
     assert abs(red - 40) < 8

@@ -1,0 +1,65 @@
+"""The trade of speed for accuracy in the window."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from PySide6.QtCore import QObject, SignalInstance
+from PySide6.QtWidgets import QWidget
+
+from sd2app.accuracy.ladder import CORE, Ladder
+from sd2app.accuracy.model import AccuracyModel
+from sd2app.accuracy.panel import AccuracyPanel
+from sd2app.feature import Action, Feature, Shell
+from sd2app.session.session import Session
+
+
+class AccuracyFeature(Feature):
+    """Choice and measurement of accuracy plans."""
+
+    def __init__(
+        self, session: Session, shell: Shell, ladder: Ladder | None, parent: QObject
+    ) -> None:
+        self._session, self._shell = session, shell
+        self.model = AccuracyModel(session.jobs, session.settings, ladder or CORE, parent)
+
+    def actions(self) -> Sequence[Action]:
+        """Panel and measurement."""
+        return (
+            Action(
+                "show_trade", "View", "Accuracy panel", ("T",),
+                "How exact the synthetic map is to be, and what that costs",
+                lambda: self._shell.bring_up("Accuracy"),
+            ),
+            Action(
+                "measure", "View", "Measure this scene", ("Ctrl+M",),
+                "Measure error and cost of every plan with the sensor where it is; takes a while",
+                self.measure, lambda: self.model.measured.can_measure,
+            ),
+        )  # fmt: skip
+
+    def measure(self) -> None:
+        """Measure every plan, with the panel in view."""
+        self._shell.bring_up("Accuracy")
+        self.model.measured.measure()
+
+    def panels(self) -> Mapping[str, QWidget]:
+        """The panel at the side."""
+        measure = self._shell.action("measure")
+        return {"Accuracy": AccuracyPanel(self.model, self._session.display, measure)}
+
+    def warnings(self) -> Sequence[SignalInstance]:
+        """Failures of choosing and measuring."""
+        return (self.model.failed,)
+
+    def notes(self) -> Sequence[SignalInstance]:
+        """What was chosen."""
+        return (self.model.noted,)
+
+    def changes(self) -> Sequence[SignalInstance]:
+        """Plans and measurements."""
+        return self.model.plan_changed, self.model.measured.changed
+
+    def close(self) -> None:
+        """Stop choosing and measuring."""
+        self.model.close()

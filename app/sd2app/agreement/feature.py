@@ -1,0 +1,86 @@
+"""Agreement of two annotators."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from PySide6.QtCore import QObject, SignalInstance
+from PySide6.QtWidgets import QFileDialog, QWidget
+
+from sd2app.agreement.model import AgreementModel
+from sd2app.agreement.panel import AgreementPanel
+from sd2app.agreement.timeline import OtherTimeline
+from sd2app.feature import Action, Feature, Shell
+from sd2app.labels.import_model import LABEL_FILES
+from sd2app.labels.model import LabelsModel
+from sd2app.session.session import Session
+
+
+class AgreementFeature(Feature):
+    """Another person's labels below these, and how far the two agree."""
+
+    def __init__(
+        self, session: Session, shell: Shell, labels: LabelsModel, parent: QObject
+    ) -> None:
+        self._session, self._shell = session, shell
+        self.model = AgreementModel(labels, session.playback, session.span, parent)
+
+    def actions(self) -> Sequence[Action]:
+        """Comparison of labels."""
+        model = self.model
+        return (
+            Action(
+                "show_agree", "View", "Agree panel", ("Shift+A",),
+                "How far another person's labels agree with these",
+                lambda: self._shell.bring_up("Agree"),
+            ),
+            Action(
+                "compare_labels", "Labels", "Compare with another's labels…", ("Ctrl+K",),
+                "Show how far another person's labels agree with these, and where they do not",
+                self._compare, lambda: self._session.has_content,
+            ),
+            Action(
+                "next_disagreement", "Labels", "Next disagreement", ("Shift+N",),
+                "Go to where the labels differ next", lambda: model.step(1), self._disagree,
+            ),
+            Action(
+                "previous_disagreement", "Labels", "Previous disagreement", ("Shift+P",),
+                "Go to where the labels differ before", lambda: model.step(-1), self._disagree,
+            ),
+            Action(
+                "end_comparison", "Labels", "End the comparison of labels", (),
+                "Take the other's labels away", model.clear, lambda: model.active,
+            ),
+        )  # fmt: skip
+
+    def _disagree(self) -> bool:
+        return bool(self.model.disagreements)
+
+    def _compare(self) -> None:
+        name, _ = QFileDialog.getOpenFileName(
+            self._shell.dialog_parent, "Compare with another's labels", "", LABEL_FILES
+        )
+        if name:
+            self.model.open(Path(name))
+            self._shell.bring_up("Agree")
+
+    def panels(self) -> Mapping[str, QWidget]:
+        """The panel at the side, and the other person's labels below these."""
+        s = self._session
+        return {
+            "Agree": AgreementPanel(self.model, s.playback, self._shell.action),
+            "other labels": OtherTimeline(self.model, s.span, s.playback, s.display),
+        }
+
+    def changes(self) -> Sequence[SignalInstance]:
+        """The comparison."""
+        return (self.model.changed,)
+
+    def take_over(self) -> None:
+        """Forget the comparison of the recording before."""
+        self.model.clear()
+
+    def close(self) -> None:
+        """Stop reading labels."""
+        self.model.close()

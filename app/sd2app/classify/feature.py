@@ -1,0 +1,151 @@
+"""Gesture classifiers in the window: use, training, comparison."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from PySide6.QtCore import QObject, SignalInstance
+from PySide6.QtWidgets import QMenu, QWidget
+
+from sd2app.background.step_times import StepTimes
+from sd2app.classify.chooser import ClassifierChooser
+from sd2app.classify.dialogs import ClassifyDialogs
+from sd2app.classify.finder import GestureFinder
+from sd2app.classify.library import ClassifierLibrary
+from sd2app.classify.model import ClassifyModel
+from sd2app.classify.panel import ClassPanel
+from sd2app.classify.strip import ClassStrip
+from sd2app.classify.training import ClassTraining
+from sd2app.denoise.validity import MapValidity
+from sd2app.feature import Action, Feature, Shell
+from sd2app.labels.actions import editing
+from sd2app.labels.edits import LabelEdits
+from sd2app.labels.model import LabelsModel
+from sd2app.session.session import Session
+from sd2app.widgets.model_menu import ModelButton, ModelMenu
+
+
+class ClassifyFeature(Feature):
+    """Probabilities of gestures below the maps, and runs that train classifiers.
+
+    ``suggest`` suggests what a finder finds.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        shell: Shell,
+        standing: MapValidity,
+        labels: LabelsModel,
+        edits: LabelEdits,
+        library: ClassifierLibrary,
+        step_times: StepTimes,
+        suggest: Callable[[GestureFinder], object],
+        parent: QObject,
+    ) -> None:
+        self._session, self._shell, self._suggest = session, shell, suggest
+        self._labels, self._edits = labels, edits
+        maps = (session.maps.synthetic, session.maps.denoised, session.maps.real)
+        self.model = ClassifyModel(
+            maps, session.playback, standing, labels, session.settings, library, parent
+        )
+        self.gestures = GestureFinder(self.model)
+        self.training = ClassTraining(
+            session.settings, self.model.use, parent, step_times=step_times
+        )
+        self.dialogs = ClassifyDialogs(
+            shell.dialog_parent, self.model, self.training, session, shell.warn
+        )
+        self._menu: ModelMenu | None = None
+
+    @property
+    def busy(self) -> bool:
+        """True while a map is being classified."""
+        return self.model.busy
+
+    def actions(self) -> Sequence[Action]:
+        """Classifier, its probabilities, gestures as suggestions, training."""
+        model, gestures = self.model, self.gestures
+        return (
+            *editing(
+                self._edits,
+                Action(
+                    "find_gestures", "Labels", "Find gestures", ("Shift+G",),
+                    "Suggest what the classifier takes for gestures; each is then accepted or"
+                    " rejected",
+                    lambda: self._suggest(gestures), lambda: not gestures.why_not,
+                    why_not=lambda: gestures.why_not,
+                ),
+            ),
+            Action(
+                "open_classifier", "Model", "Open classifier file…", (),
+                "Say which gesture each frame shows, with a classifier of your own (.safetensors)",
+                self.dialogs.open_classifier,
+            ),
+            Action(
+                "classifier_card", "Model", "About this classifier…", (),
+                "What it is shown, what it learned from, and how well it did",
+                self.dialogs.show_card, lambda: model.card is not None,
+            ),
+            Action(
+                "show_classes", "Model", "Probabilities of gestures", ("Shift+I",),
+                "Show under the maps how probable each gesture is, and which one is on screen",
+                lambda: model.set_shown(not model.shown),
+                lambda: model.path is not None,
+                lambda: model.shown and model.path is not None,
+                why_not=lambda: "" if model.path is not None else "No classifier is in use",
+            ),
+            Action(
+                "train_classifier", "Model", "Train a classifier…", ("Shift+C",),
+                "Learn gestures from labelled maps, beside the window",
+                lambda: self._shell.bring_up("Train", "Classifier"),
+            ),
+        )  # fmt: skip
+
+    def menus(self) -> Mapping[str, Callable[[QMenu], object]]:
+        """The classifiers to choose from."""
+        return {"classifiers": lambda menu: menu.addMenu(self._classifiers())}
+
+    def _classifiers(self) -> ModelMenu:
+        if self._menu is None:
+            below = [self._shell.action(name) for name in ("open_classifier", "classifier_card")]
+            chooser = ClassifierChooser(self.model)
+            self._menu = ModelMenu(chooser, self.dialogs.use, below, self._shell.dialog_parent)
+        return self._menu
+
+    def panels(self) -> Mapping[str, QWidget]:
+        """Probabilities below the maps."""
+        s = self._session
+        button = ModelButton(ClassifierChooser(self.model), self._classifiers())
+        strip = ClassStrip(self.model, self._labels, s.span, s.playback, s.display, button)
+        return {"classes": strip}
+
+    def panel(self) -> QWidget:
+        """Page of the Train panel."""
+        return ClassPanel(self.training, self._session.display, self.dialogs)
+
+    def take_dropped(self, path: Path) -> bool:
+        """Use a classifier that was dropped."""
+        return path.suffix == ".safetensors" and self.dialogs.take_dropped(path)
+
+    def warnings(self) -> Sequence[SignalInstance]:
+        """Classifiers that cannot be used, failures of runs."""
+        return self.model.failed, self.training.failed
+
+    def notes(self) -> Sequence[SignalInstance]:
+        """Ends of runs."""
+        return (self.training.noted,)
+
+    def changes(self) -> Sequence[SignalInstance]:
+        """The classifier."""
+        return (self.model.changed,)
+
+    def look_for_unfinished(self) -> None:
+        """Find runs under way and ended."""
+        self.training.look_for_runs()
+
+    def close(self) -> None:
+        """Stop classifying; runs go on."""
+        self.training.close()
+        self.model.close()

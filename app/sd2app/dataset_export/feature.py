@@ -1,0 +1,75 @@
+"""Export of data sets in a background process."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import QObject, Qt, SignalInstance
+from PySide6.QtWidgets import QMessageBox
+
+from sd2app.dataset_export.dialog import ExportDialog
+from sd2app.dataset_export.model import ExportModel
+from sd2app.feature import Action, Feature, Shell
+from sd2app.session.session import Session
+
+
+class DatasetExportFeature(Feature):
+    """Segments with labels to learn from, of the open recording or a folder."""
+
+    def __init__(self, session: Session, shell: Shell, parent: QObject) -> None:
+        self._session, self._shell = session, shell
+        self.model = ExportModel(session.jobs, parent)
+
+    def actions(self) -> Sequence[Action]:
+        """The dialog."""
+        return (
+            Action(
+                "export_dataset", "File", "Export data set…", ("Ctrl+Shift+D",),
+                "Write segments with labels to learn from (Zarr, HDF5, NPZ), of this recording or"
+                " a folder",
+                self._export,
+            ),
+        )  # fmt: skip
+
+    def _export(self) -> None:
+        """Choose what a data set holds and have it written; the window can be used meanwhile."""
+        document = self._session.document
+        recording = document.recording
+        if recording is not None and (document.modified or not recording.folder.exists()):
+            if not self._may_save("A data set is made of what is saved."):
+                return
+            recording = document.recording
+        opened = None if recording is None else recording.folder
+        if not self.model.exporting:
+            self.model.begin(opened)
+        dialog = ExportDialog(self.model, opened, self._shell.dialog_parent)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.open()
+
+    def _may_save(self, why: str) -> bool:
+        buttons = QMessageBox.StandardButton
+        words = f"{self._session.document.title} has changes that are not saved. {why}"
+        answer = QMessageBox.question(
+            self._shell.dialog_parent,
+            "Save changes?",
+            words,
+            buttons.Save | buttons.Cancel,
+            buttons.Save,
+        )
+        return answer == buttons.Save and self._shell.save()
+
+    def warnings(self) -> Sequence[SignalInstance]:
+        """Failures of an export."""
+        return (self.model.failed,)
+
+    def notes(self) -> Sequence[SignalInstance]:
+        """Ends of exports."""
+        return (self.model.noted,)
+
+    def look_for_unfinished(self) -> None:
+        """Find an export that outlived its window."""
+        self.model.look_for_export()
+
+    def close(self) -> None:
+        """Let go of the export, which goes on."""
+        self.model.close()

@@ -1,0 +1,157 @@
+"""Denoised maps, and the choice of the denoiser."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from PySide6.QtCore import QObject, SignalInstance
+from PySide6.QtWidgets import QFileDialog, QMenu
+
+from sd2app.denoise.chooser import DenoiserChooser
+from sd2app.denoise.library import DenoiserLibrary
+from sd2app.denoise.live import LiveDenoiseModel
+from sd2app.denoise.model import DenoiseModel
+from sd2app.denoise.text import denoiser_page
+from sd2app.feature import Action, Feature, Shell
+from sd2app.maps.model import SynthesisModel
+from sd2app.maps.stack import MapStack
+from sd2app.session.session import Session
+from sd2app.widgets.model_card_dialog import ModelCardDialog
+from sd2app.widgets.model_menu import ModelButton, ModelMenu
+
+_MODELS = "Model (*.safetensors);;All files (*)"
+
+
+class DenoiseFeature(Feature):
+    """The synthetic map denoised by a model of the user's choice."""
+
+    def __init__(
+        self,
+        session: Session,
+        shell: Shell,
+        synthesis: SynthesisModel,
+        library: DenoiserLibrary,
+        parent: QObject,
+    ) -> None:
+        self._shell, s = shell, session
+        self._session = session
+        maps = s.maps
+        self.model = DenoiseModel(
+            s.document,
+            synthesis,
+            s.span,
+            maps.synthetic,
+            maps.denoised,
+            maps.before,
+            s.jobs,
+            library,
+            s.edits.choose_denoiser,
+            parent,
+        )
+        self.live = LiveDenoiseModel(s.playback, maps.synthetic, self.model, s.settings, parent)
+        self._menu: ModelMenu | None = None
+
+    @property
+    def busy(self) -> bool:
+        """True while a map is being denoised."""
+        return self.model.busy
+
+    def actions(self) -> Sequence[Action]:
+        """Models and what is done with them."""
+        model, live = self.model, self.live
+        return (
+            Action(
+                "export_denoised", "File", "Export denoised map…", (),
+                "Write the denoised Doppler map with its provenance (.npz)",
+                self._export, lambda: model.can_export,
+            ),
+            Action(
+                "open_model", "Model", "Open model file…", (),
+                "Denoise this recording with a model of your own (.safetensors)",
+                self._open, lambda: self._session.has_content,
+            ),
+            Action(
+                "model_card", "Model", "About this model…", (),
+                "What it learned from, what was measured of it, and its limits",
+                self._show_card, lambda: model.card is not None,
+            ),
+            Action(
+                "compare_models", "Model", "Compare with the model before", ("B",),
+                "Show the map of the model that was in use before below that of this one",
+                lambda: model.set_comparing(not model.comparing),
+                lambda: model.before is not None, lambda: model.comparing,
+                why_not=lambda: (
+                    "" if model.before is not None else "No other model has been in use here yet"
+                ),
+            ),
+            Action(
+                "live", "Model", "Denoise live while playing", ("V",),
+                "Frame by frame as the clock reaches them, knowing the past only, as beside a"
+                " radar",
+                lambda: live.set_wanted(not live.wanted), checked=lambda: live.wanted,
+            ),
+        )  # fmt: skip
+
+    def menus(self) -> Mapping[str, Callable[[QMenu], object]]:
+        """The models to choose from."""
+        return {"denoisers": lambda menu: menu.addMenu(self._models())}
+
+    def _models(self) -> ModelMenu:
+        if self._menu is None:
+            below = [self._shell.action(name) for name in ("open_model", "model_card")]
+            chooser = DenoiserChooser(self.model)
+            self._menu = ModelMenu(chooser, self.use, below, self._shell.dialog_parent)
+        return self._menu
+
+    def put_buttons(self, stack: MapStack) -> None:
+        """Offer the models on the maps too."""
+        chooser, menu = DenoiserChooser(self.model), self._models()
+        stack.set_denoiser_buttons(ModelButton(chooser, menu), ModelButton(chooser, menu))
+
+    def use(self, path: Path | None) -> None:
+        """Denoise with a model file, or with none."""
+        self._shell.attempt(lambda: self.model.use(path))
+
+    def take_dropped(self, path: Path) -> bool:
+        """Use a model file that was dropped."""
+        if path.suffix != ".safetensors":
+            return False
+        self.use(path)
+        return True
+
+    def _open(self) -> None:
+        start = str(self.model.path or "")
+        name, _ = QFileDialog.getOpenFileName(
+            self._shell.dialog_parent, "Open model file", start, _MODELS
+        )
+        if name:
+            self.use(Path(name))
+
+    def _show_card(self) -> None:
+        if self.model.card is not None:
+            ModelCardDialog(denoiser_page(self.model.card), self._shell.dialog_parent).exec()
+
+    def _export(self) -> None:
+        name, _ = QFileDialog.getSaveFileName(
+            self._shell.dialog_parent, "Export denoised map", "denoised.npz", "Doppler map (*.npz)"
+        )
+        if name:
+            self._shell.attempt(lambda: self.model.export(Path(name)))
+
+    def warnings(self) -> Sequence[SignalInstance]:
+        """Models that cannot be used."""
+        return (self.model.failed,)
+
+    def notes(self) -> Sequence[SignalInstance]:
+        """Remarks on the model in use."""
+        return (self.model.noted,)
+
+    def changes(self) -> Sequence[SignalInstance]:
+        """Model and live denoising."""
+        return self.model.changed, self.live.changed
+
+    def close(self) -> None:
+        """Stop denoising."""
+        self.live.close()
+        self.model.close()

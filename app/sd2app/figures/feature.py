@@ -1,0 +1,88 @@
+"""Figures for papers: the maps, and strips of frames."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from sd2app.feature import Action, Feature, Shell
+from sd2app.figures.map_dialog import MapFigureDialog
+from sd2app.figures.map_figure import FigureModel
+from sd2app.figures.strip import StripModel
+from sd2app.figures.strip_dialog import StripDialog
+from sd2app.maps.difference import DifferenceModel
+from sd2app.session.session import Session
+from sd2core.labels.spans import Labels
+
+
+class FiguresFeature(Feature):
+    """Dialogs that draw what is on screen into a file.
+
+    ``labels`` gives the labels that are drawn, ``denoiser`` the denoiser in words.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        shell: Shell,
+        difference: DifferenceModel,
+        labels: Callable[[], Labels],
+        denoiser: Callable[[], str],
+    ) -> None:
+        self._session, self._shell, self._difference = session, shell, difference
+        self._labels, self._denoiser = labels, denoiser
+
+    def actions(self) -> Sequence[Action]:
+        """Figure of the maps, strip of frames."""
+        s = self._session
+        return (
+            Action(
+                "export_maps", "File", "Export figure of the maps…", (),
+                "Write the Doppler maps one above the other, as they are shown (.png, .svg, .pdf)",
+                self._export_maps, lambda: any(track.map is not None for track in s.maps.all),
+            ),
+            Action(
+                "export_strip", "File", "Export strip of frames…", ("Ctrl+Shift+E",),
+                "Write frames side by side, the video above its mesh (.png, .svg, .pdf)",
+                self._export_strip, lambda: s.document.video is not None or s.has_mesh,
+            ),
+        )  # fmt: skip
+
+    def _export_maps(self) -> None:
+        s, window = self._session, self._shell.dialog_parent
+        titles = {s.maps.denoised: self._denoiser(), s.maps.before: s.maps.before.status}
+        about = {
+            "recording": s.document.title,
+            "simulated": s.document.simulated,
+            "sensor_position_m": list(s.sensor.sensor.position_m),
+            "denoiser": self._denoiser(),
+            "synthetic": s.maps.synthetic.status,
+        }
+        clock = s.playback.timebase
+        model = FigureModel(
+            [(track, titles.get(track, "")) for track in s.maps.all],
+            self._difference,
+            s.display.levels,
+            self._labels(),
+            (s.span.start_s, s.span.end_s),
+            (clock.start_s, clock.end_s),
+            about,
+            window,
+        )
+        dialog = MapFigureDialog(model, s.display.palette, "doppler-maps", window)
+        dialog.exec()
+        model.close()
+        model.deleteLater()
+        dialog.deleteLater()
+
+    def _export_strip(self) -> None:
+        s, content = self._session, self._session.document.content
+        if content is None:
+            return
+        model = StripModel(content, s.playback.time_s, self._shell.dialog_parent)
+        dialog = StripDialog(
+            model, s.display.palette, content.recording.title, self._shell.dialog_parent
+        )
+        dialog.exec()
+        model.close()
+        model.deleteLater()
+        dialog.deleteLater()

@@ -1,0 +1,149 @@
+"""Fitting a body to a video: dialogs, progress bar, result."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QObject, SignalInstance
+from PySide6.QtWidgets import QDialog, QFileDialog, QMessageBox, QWidget
+
+from sd2app.feature import Action, Feature, Shell
+from sd2app.fit.bar import FitBar
+from sd2app.fit.clock import FitFollower
+from sd2app.fit.dialog import VIDEOS, NewFromVideoDialog
+from sd2app.fit.importer import FitTaker
+from sd2app.fit.model import COMMAND, FitModel
+from sd2app.fit.offer import FitOffer
+from sd2app.fit.request import FitRequest
+from sd2app.fit.setup import FitSetupModel
+from sd2app.session.session import Session
+
+
+class FitFeature(Feature):
+    """A fit in a background process, from the question for its video to its recording."""
+
+    def __init__(
+        self, session: Session, shell: Shell, command: Sequence[str] | None, parent: QObject
+    ) -> None:
+        self._session, self._shell = session, shell
+        document = session.document
+        self.model = FitModel(session.settings, parent, command or COMMAND)
+        self.clock = FitFollower(self.model, document, session.playback, parent)
+        self.offer = FitOffer(document, self.model, parent)
+        self.taker = FitTaker(self.model, self.clock, document, session.settings, parent)
+
+    @property
+    def landmarks_changed(self) -> tuple[SignalInstance, ...]:
+        """Signals after which there are other landmarks."""
+        return self.model.advanced, self.model.changed
+
+    def landmarks_at(self, frame: int) -> NDArray[np.float32] | None:
+        """Landmarks that the fit has found in a frame of the video on screen."""
+        if self.model.state == "idle" or not self.clock.on_screen:
+            return None
+        return self.model.landmarks_at(frame)
+
+    def actions(self) -> Sequence[Action]:
+        """A new recording from a video."""
+        return (
+            Action(
+                "new_from_video", "File", "New from video…", ("Ctrl+N",),
+                "Fit a body to the person in a video and make a recording of both",
+                self.new_from_video, lambda: not self.model.busy,
+            ),
+        )  # fmt: skip
+
+    def bars(self) -> Sequence[QWidget]:
+        """Progress of the fit, and what can be done with it."""
+        return (
+            FitBar(
+                self.model,
+                self.clock,
+                self.offer,
+                begin=self.new_from_video,
+                open_result=self._open_result,
+                resume=self._resume,
+            ),
+        )
+
+    def notes(self) -> Sequence[SignalInstance]:
+        """Results that were taken over."""
+        return (self.taker.noted,)
+
+    def changes(self) -> Sequence[SignalInstance]:
+        """State of the fit."""
+        return (self.model.state_changed,)
+
+    def take_over(self) -> None:
+        """Follow the fit again: staying elsewhere was a wish about the recording before."""
+        self.clock.set_following(True)
+
+    def look_for_unfinished(self) -> None:
+        """Find a fit that was stopped."""
+        self.model.look_for_unfinished()
+
+    def new_from_video(self, video: Path | None = None) -> None:
+        """Ask for the settings of a fit, begin it, and show its video.
+
+        The video is that of a fit that was stopped or failed, or the one that is open where
+        it has no mesh; else it is asked for.
+        """
+        window, model = self._shell.dialog_parent, self.model
+        video = video or self.offer.video
+        if model.state in ("stopped", "failed") and model.request is not None:
+            video = model.request.video
+        if video is None:
+            name, _ = QFileDialog.getOpenFileName(window, "Video of a person", "", VIDEOS)
+            if not name:
+                return
+            video = Path(name)
+        setup = FitSetupModel(window)
+        setup.choose_video(video, self._session.document.recording)
+        dialog = NewFromVideoDialog(setup, self._session.display.palette, window)
+        accepted = dialog.exec() == QDialog.DialogCode.Accepted
+        request = setup.request() if accepted and setup.ready else None
+        setup.close()
+        setup.deleteLater()
+        dialog.deleteLater()
+        if request is not None:
+            self._begin(request)
+
+    def _begin(self, request: FitRequest) -> None:
+        if self._shell.attempt(lambda: (self.model.start(request), True)) is None:
+            return
+        if not self.clock.on_screen and self._shell.may_discard():
+            self._session.document.open([request.video])
+
+    def _resume(self) -> None:
+        """Continue a stopped fit; where nothing else is open, its video is."""
+        if self._shell.attempt(lambda: (self.model.resume(), True)) is None:
+            return
+        if not self._session.has_content and self.model.busy and self.model.request:
+            self._session.document.open([self.model.request.video])
+
+    def _open_result(self) -> None:
+        if self._shell.may_discard():
+            self.taker.open_result()
+
+    def may_close(self) -> bool:
+        """Ask whether a fit under way may stop with the window."""
+        request = self.model.request
+        if not self.model.busy or request is None:
+            return True
+        buttons = QMessageBox.StandardButton
+        answer = QMessageBox.question(
+            self._shell.dialog_parent,
+            "Stop the fit?",
+            f"A body is being fitted to {request.video.name}. It stops with the window and can"
+            " be continued when the program is started again.",
+            buttons.Ok | buttons.Cancel,
+            buttons.Ok,
+        )
+        return answer == buttons.Ok
+
+    def close(self) -> None:
+        """Stop the fit; it can be continued."""
+        self.model.close()

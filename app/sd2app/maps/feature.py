@@ -1,0 +1,128 @@
+"""Doppler maps on screen: synthesis, difference, uncertainty, spectrum."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from PySide6.QtCore import QObject, SignalInstance
+from PySide6.QtWidgets import QFileDialog, QVBoxLayout, QWidget
+
+from sd2app.accuracy.model import AccuracyModel
+from sd2app.feature import Action, Feature, Shell
+from sd2app.maps.difference import DifferenceModel
+from sd2app.maps.heatmap import HeatmapView
+from sd2app.maps.level_bar import LevelBar
+from sd2app.maps.model import SynthesisModel
+from sd2app.maps.spectrum import Curve, SpectrumView
+from sd2app.maps.stack import MapStack
+from sd2app.maps.uncertainty import UncertaintyModel
+from sd2app.session.session import Session
+from sd2app.session.tracks import MapModel
+from sd2app.widgets.time_plot import Overlay
+
+_COLOURS = ("synthetic", "denoised", "before", "real")
+
+
+class MapsFeature(Feature):
+    """The synthetic map follows sensor and accuracy; all maps share time axis and levels."""
+
+    def __init__(
+        self, session: Session, shell: Shell, accuracy: AccuracyModel, parent: QObject
+    ) -> None:
+        self._session, self._shell = s, _ = session, shell
+        maps = s.maps
+        self.synthesis = SynthesisModel(
+            s.document, s.sensor, s.playback, s.span, maps.synthetic, s.jobs, accuracy, parent
+        )
+        self.uncertainty = UncertaintyModel(
+            s.document, self.synthesis, accuracy, maps.synthetic, s.jobs, s.settings, parent
+        )
+        self.difference = DifferenceModel(maps.denoised, maps.real, s.display, s.settings, parent)
+        s.document.changed.connect(s.follow_capture)
+
+    @property
+    def busy(self) -> bool:
+        """True while a map is being computed."""
+        return self.synthesis.busy
+
+    def actions(self) -> Sequence[Action]:
+        """Export, levels, uncertainty, difference."""
+        uncertainty, difference = self.uncertainty, self.difference
+        return (
+            Action(
+                "export_map", "File", "Export synthetic map…", ("Ctrl+E",),
+                "Write the synthetic Doppler map with its provenance (.npz)",
+                self._export, lambda: self.synthesis.complete,
+            ),
+            Action(
+                "reset_reference", "View", "Set 0 dB to what is shown", ("R",),
+                "Make the strongest bin of each map 0 dB",
+                self._session.maps.reset_references, lambda: self._session.has_content,
+            ),
+            Action(
+                "uncertain", "View", "Show uncertain cells", ("U",),
+                "Take the colour from cells of the synthetic map that are known to worse than half"
+                " of their value; the pointer reads value ± deviation",
+                lambda: uncertainty.set_shown(not uncertainty.shown),
+                lambda: not uncertainty.why_not,
+                lambda: uncertainty.shown and not uncertainty.why_not,
+                why_not=lambda: uncertainty.why_not,
+            ),
+            Action(
+                "difference", "Model", "Difference to the radar", ("X",),
+                "Show denoised minus real, in signed colours, below the maps",
+                lambda: difference.set_wanted(not difference.wanted),
+                lambda: not difference.why_not,
+                lambda: difference.shown,
+                why_not=lambda: difference.why_not,
+            ),
+        )  # fmt: skip
+
+    def _export(self) -> None:
+        name, _ = QFileDialog.getSaveFileName(
+            self._shell.dialog_parent,
+            "Export synthetic map",
+            "synthetic.npz",
+            "Doppler map (*.npz)",
+        )
+        if name:
+            self._shell.attempt(lambda: self.synthesis.export(Path(name)))
+
+    def stack(self, over_maps: Sequence[Overlay], over_all: Sequence[Overlay]) -> MapStack:
+        """Maps one above the other, with what other features draw over them and the overview."""
+        return MapStack(self._session, self.difference, over_maps, over_all)
+
+    def view_of(self, track: MapModel, overlays: Sequence[Overlay]) -> HeatmapView:
+        """View of one more map on the shared time axis."""
+        s = self._session
+        return HeatmapView(track, s.span, s.playback, s.display, s.pointer, overlays)
+
+    def panels(self) -> Mapping[str, QWidget]:
+        """The spectra of this frame over the levels of all maps."""
+        s, maps, pane = self._session, self._session.maps.all, QWidget()
+        curves = tuple(Curve(track, colour) for track, colour in zip(maps, _COLOURS, strict=True))
+        layout = QVBoxLayout(pane)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(0)
+        layout.addWidget(SpectrumView(curves, s.playback, s.display, s.pointer), 1)
+        layout.addWidget(LevelBar(s.display, maps, self._shell.action("uncertain")))
+        return {"spectrum": pane}
+
+    def warnings(self) -> Sequence[SignalInstance]:
+        """Failures of synthesis."""
+        return self.synthesis.failed, self.uncertainty.failed
+
+    def changes(self) -> Sequence[SignalInstance]:
+        """Maps that are complete, and what is shown of them."""
+        return self.synthesis.completed, self.uncertainty.changed, self.difference.state_changed
+
+    def take_over(self) -> None:
+        """Compute the map of the recording that was opened."""
+        self._session.follow_capture(new=True)
+        self.synthesis.take_over()
+
+    def close(self) -> None:
+        """Stop computing."""
+        self.uncertainty.close()
+        self.synthesis.close()

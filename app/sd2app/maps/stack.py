@@ -1,0 +1,97 @@
+"""The Doppler maps one above the other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+
+from sd2app.maps.difference import DifferenceModel
+from sd2app.maps.difference_view import DifferenceView
+from sd2app.maps.heatmap import HeatmapView
+from sd2app.maps.overview import Overview
+from sd2app.session.session import Session
+from sd2app.widgets.time_plot import Overlay
+
+_LOWEST_PX = {1: 96, 2: 96, 3: 72, 4: 54}
+"""Least height of a map, by the number of maps."""
+
+
+class MapStack(QWidget):
+    """Maps that there are, each in a view of its own; a map with nothing to show is hidden."""
+
+    def __init__(
+        self,
+        session: Session,
+        difference: DifferenceModel,
+        over_maps: Sequence[Overlay],
+        over_all: Sequence[Overlay],
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._session, self._difference = s, _ = session, difference
+        maps, common = s.maps, (s.span, s.playback, s.display, s.pointer, over_maps)
+        self.synthetic = HeatmapView(maps.synthetic, *common)
+        self.denoised = HeatmapView(maps.denoised, *common)
+        self.before = HeatmapView(maps.before, *common)
+        self.real = HeatmapView(maps.real, *common, alignable=True)
+        self.difference = DifferenceView(difference, *common)
+        self.real.setToolTip("Drag the title to align the capture in time")
+        self.real.offset_grabbed.connect(s.edits.begin_offset_drag)
+        self.real.offset_dragged.connect(s.edits.drag_offset)
+        self.real.offset_released.connect(s.edits.end_offset_drag)
+        self.overview = Overview(maps.synthetic, s.span, s.playback, s.display, over_all)
+        self._offer: QWidget | None = None
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        for view in self.views:
+            column.addWidget(view, 1)
+        self._shown: object = None
+        for track in maps.all:
+            track.changed.connect(self.refresh)
+        difference.state_changed.connect(self.refresh)
+        self.refresh()
+
+    @property
+    def views(self) -> tuple[HeatmapView, ...]:
+        """All views from top to bottom, hidden ones included."""
+        return (self.synthetic, self.denoised, self.before, self.real, self.difference)
+
+    def set_denoiser_buttons(self, offer: QWidget, chosen: QWidget) -> None:
+        """Put the choice of the denoiser beside the map it makes, or the one it could use."""
+        self._offer = offer
+        self.synthetic.set_button(offer)
+        self.denoised.set_button(chosen)
+        self._shown = None
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Show the views that have something to show."""
+        document, maps = self._session.document, self._session.maps
+        has_any = maps.synthetic.map is not None or maps.real.map is not None
+        shown = {
+            self.synthetic: maps.synthetic.map is not None or not has_any,
+            self.denoised: maps.denoised.map is not None,
+            self.before: maps.before.map is not None,
+            self.real: maps.real.map is not None,
+            self.difference: self._difference.shown,
+        }
+        state = *shown.values(), maps.synthetic.map is None, document.content is None
+        if state == self._shown:
+            return  # maps change many times a second
+        self._shown = state
+        lowest_px = _LOWEST_PX.get(sum(shown.values()), 44)
+        for view, there in shown.items():
+            view.setMinimumHeight(lowest_px)
+            view.setVisible(there)
+        if self._offer is not None:
+            self._offer.setVisible(maps.synthetic.map is not None and maps.denoised.map is None)
+        self.overview.set_track(maps.synthetic if maps.synthetic.map is not None else maps.real)
+        self.synthetic.set_hint(
+            "Add a mesh to see its synthetic Doppler: File → Add to this recording…\n\n"
+            "From a video alone: File → New from video… fits a body to the person in it."
+            if document.content is not None
+            else "Drop a recording, video, mesh or radar capture here, or choose File → Open….\n\n"
+            "Help → Open the sample recording shows what it looks like."
+        )

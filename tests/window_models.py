@@ -1,0 +1,114 @@
+"""All models of a window under short names, for tests that look at many of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+from PySide6.QtCore import QObject
+from PySide6.QtWidgets import QMenu
+
+from sd2app.feature import Action
+from sd2app.session.session import Session, build_session
+from sd2app.settings import Settings
+from sd2app.shell.menus import in_order
+from sd2app.shell.parts import Parts
+from sd2app.shell.window import MainWindow
+from sd2app.shell.wiring import Features, build_features
+
+
+def models_of(window: MainWindow) -> SimpleNamespace:
+    """Models of a window that stands."""
+    return _named(window.session, window.features, keys=window.keys)
+
+
+def build_models(parent: QObject, settings: Settings, parts: Parts | None = None) -> Any:
+    """Models without a window."""
+    session = build_session(parent, settings)
+    features = build_features(session, NoShell(), parts or Parts(), parent)
+    return _named(session, features)
+
+
+def all_actions() -> tuple[Action, ...]:
+    """Actions of all features in the order of the menus; they belong to nothing that is open."""
+    parent = QObject()
+    session = build_session(parent, Settings.forgetful())
+    features = build_features(session, NoShell(), Parts(), parent)
+    return in_order(action for feature in features for action in feature.actions())
+
+
+def menu_of(window: MainWindow, title: str) -> QMenu:
+    """Menu of a window by its title."""
+    return next(one for one in window.menuBar().findChildren(QMenu) if one.title() == title)
+
+
+class NoShell:
+    """Stands in for the window where nothing asks the user."""
+
+    dialog_parent = None
+
+    def warn(self, text: str) -> None:
+        raise AssertionError(text)
+
+    def open_paths(self, paths: list[Path]) -> None:
+        raise AssertionError(paths)
+
+
+def _named(session: Session, features: Features, **others: object) -> SimpleNamespace:
+    s, f = session, features
+
+    def close() -> None:
+        s.playback.pause()
+        f.close()
+
+    return SimpleNamespace(
+        settings=s.settings,
+        jobs=s.jobs,
+        document=s.document,
+        playback=s.playback,
+        video=s.video,
+        sensor=s.sensor,
+        display=s.display,
+        span=s.span,
+        pointer=s.pointer,
+        tracks=s.maps.all,
+        synthetic=s.maps.synthetic,
+        denoised=s.maps.denoised,
+        before=s.maps.before,
+        real=s.maps.real,
+        reset_references=s.maps.reset_references,
+        edits=s.edits,
+        overlay=f.video.overlay,
+        trade=f.accuracy.model,
+        synthesis=f.maps.synthesis,
+        uncertainty=f.maps.uncertainty,
+        difference=f.maps.difference,
+        placements=f.sensor.placements,
+        denoise=f.denoise.model,
+        live=f.denoise.live,
+        classify=f.classify.model,
+        gestures=f.classify.gestures,
+        class_training=f.classify.training,
+        labels=f.labels.model,
+        label_session=f.labels.autosave,
+        label_edits=f.labels.edits,
+        label_dragging=f.labels.dragging,
+        label_marking=f.labels.marking,
+        label_tracks=f.labels.tracks,
+        reaction=f.labels.reaction,
+        span_loop=f.labels.loop,
+        cut_out=f.labels.cut_out,
+        suggestions=f.suggestions.model,
+        agreement=f.agreement.model,
+        fit=f.fit.model,
+        fit_follower=f.fit.clock,
+        fit_offer=f.fit.offer,
+        fit_taker=f.fit.taker,
+        batch=f.batch.model,
+        training=f.training.model,
+        training_use=f.training.adoption,
+        export=f.dataset_export.model,
+        close=close,
+        **others,
+    )
