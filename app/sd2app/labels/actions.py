@@ -1,4 +1,4 @@
-"""Actions of labels: marking, spans, tracks."""
+"""Actions of labels: marking, spans, tracks, keys of labels, and their menus."""
 
 from __future__ import annotations
 
@@ -6,14 +6,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Protocol
 
+from PySide6.QtGui import QAction, QActionGroup, QKeySequence
+from PySide6.QtWidgets import QMenu, QWidget
+
 from sd2app.feature import Action
 from sd2app.labels.dragging import LabelDragging
-from sd2app.labels.edits import LabelEdits
+from sd2app.labels.edits import LabelEdits, LabelTracks
 from sd2app.labels.loop import SpanLoop
-from sd2app.labels.marking import LabelMarking
+from sd2app.labels.marking import OFFERED_MS, LabelMarking, ReactionModel
 from sd2app.labels.model import LabelsModel
-from sd2app.labels.track_edits import LabelTracks
 from sd2app.labels.tracks_dialog import TrackDialogs
+from sd2app.widgets.icons import swatch_icon
+from sd2app.widgets.key_text import canonical, native
+from sd2core.labels.label_set import Label, LabelSet
+from sd2core.labels.spans import LabelTrack
 
 
 class Refusing(Protocol):
@@ -235,3 +241,120 @@ def track_actions(
             ),
         ),
     )  # fmt: skip
+
+
+class LabelActions:
+    """Action per label: its key marks, or relabels selected spans while paused without marks."""
+
+    def __init__(
+        self, labels: LabelsModel, use: Callable[[str], None], menu: QMenu, window: QWidget
+    ) -> None:
+        self._labels, self._use, self._menu, self._window = labels, use, menu, window
+        self._first = menu.addSeparator()
+        self._actions: list[QAction] = []
+        self._shown: LabelSet | None = None
+        labels.changed.connect(self._follow)
+        self._follow()
+
+    def refresh(self, refusal: str) -> None:
+        """Disable the actions where ``refusal`` says why labels cannot be edited."""
+        labels = self._shown.labels if self._shown is not None else ()
+        for action, label in zip(self._actions, labels, strict=True):
+            action.setEnabled(not refusal)
+            action.setToolTip(refusal or _tip(label))
+
+    def _follow(self) -> None:
+        offered = self._labels.labels.label_set
+        if offered == self._shown:
+            return
+        self._shown = offered
+        for action in self._actions:
+            self._menu.removeAction(action)
+            action.deleteLater()
+        self._actions = [self._made(label) for label in offered.labels]
+        self._menu.insertActions(self._first, self._actions)
+
+    def _made(self, label: Label) -> QAction:
+        action = QAction(swatch_icon(label.colour), label.name, self._window)
+        if label.key:
+            action.setShortcut(QKeySequence(canonical(label.key)))
+        action.setToolTip(_tip(label))
+        action.setAutoRepeat(False)
+        action.triggered.connect(lambda _=False: self._use(label.name))
+        return action
+
+
+def _tip(label: Label) -> str:
+    keys = f" ({native(canonical(label.key))})" if label.key else ""
+    return (
+        "Begin a span with this frame, or end the one that has begun; with a span selected,"
+        f" give it this label{keys}"
+    )
+
+
+class TrackMenu:
+    """Menu of tracks, the first entries of which choose the one for new spans."""
+
+    def __init__(self, menu: QMenu, labels: LabelsModel) -> None:
+        self._menu, self._labels = menu, labels
+        self._group = QActionGroup(menu)
+        self._first = menu.addSeparator()
+        self._shown: tuple[LabelTrack, ...] = ()
+        labels.changed.connect(self._follow)
+        labels.selection_changed.connect(self._check)
+        self._follow()
+
+    def _follow(self) -> None:
+        tracks = self._labels.labels.tracks
+        if tracks != self._shown:
+            self._shown = tracks
+            for action in self._group.actions():
+                self._group.removeAction(action)
+                self._menu.removeAction(action)
+                action.deleteLater()
+            self._menu.insertActions(self._first, [self._made(track) for track in tracks])
+        self._check()
+
+    def _made(self, track: LabelTrack) -> QAction:
+        # An ampersand would underline what comes after it.
+        action = QAction(track.name.replace("&", "&&"), self._menu)
+        action.setCheckable(True)
+        action.setToolTip("Spans may overlap" if track.overlap == "free" else "One span at a time")
+        action.triggered.connect(lambda _=False: self._labels.set_track(track.name))
+        self._group.addAction(action)
+        return action
+
+    def _check(self) -> None:
+        for action, track in zip(self._group.actions(), self._shown, strict=True):
+            action.setChecked(track.name == self._labels.track)
+
+
+class ReactionMenu(QMenu):
+    """Menu of the reaction time."""
+
+    def __init__(self, reaction: ReactionModel, ask: Callable[[], None], parent: QMenu) -> None:
+        super().__init__("Reaction time", parent)
+        self.setToolTipsVisible(True)
+        self._reaction = reaction
+        group = QActionGroup(self)
+        self._offered = {offered_ms: self._made(offered_ms, group) for offered_ms in OFFERED_MS}
+        self._other = self.addAction("Other…")
+        self._other.setCheckable(True)
+        group.addAction(self._other)
+        self._other.triggered.connect(lambda _=False: (ask(), self._follow()))
+        reaction.changed.connect(self._follow)
+        self._follow()
+
+    def _made(self, offered_ms: int, group: QActionGroup) -> QAction:
+        action = self.addAction(f"{offered_ms} ms" if offered_ms else "None")
+        action.setCheckable(True)
+        action.setToolTip("Marks made while it plays begin and end earlier by so much")
+        group.addAction(action)
+        action.triggered.connect(lambda _=False: self._reaction.set_reaction_ms(offered_ms))
+        return action
+
+    def _follow(self) -> None:
+        chosen_ms = self._reaction.reaction_ms
+        other = chosen_ms not in self._offered
+        self._other.setText(f"Other: {chosen_ms} ms…" if other else "Other…")
+        (self._other if other else self._offered[chosen_ms]).setChecked(True)

@@ -9,27 +9,30 @@ from PySide6.QtCore import QObject, SignalInstance
 from PySide6.QtWidgets import QMenu, QWidget
 
 from sd2app.feature import Action, Feature, Shell
-from sd2app.labels.actions import editing, marking_actions, span_actions, track_actions
+from sd2app.labels.actions import (
+    LabelActions,
+    ReactionMenu,
+    TrackMenu,
+    editing,
+    marking_actions,
+    span_actions,
+    track_actions,
+)
 from sd2app.labels.autosave import LabelSession
 from sd2app.labels.cut_out_model import CutOutModel
 from sd2app.labels.dragging import LabelDragging
-from sd2app.labels.edits import LabelEdits
+from sd2app.labels.edits import LabelEdits, LabelTracks
 from sd2app.labels.files_dialogs import LabelFileDialogs
-from sd2app.labels.label_keys import LabelActions
 from sd2app.labels.label_set_dialog import LabelSetDialogs
 from sd2app.labels.loop import SpanLoop
 from sd2app.labels.map_dragging import SpanDragger
-from sd2app.labels.marking import LabelMarking
-from sd2app.labels.menus import ReactionMenu, TrackMenu
+from sd2app.labels.marking import LabelMarking, ReactionModel
 from sd2app.labels.model import LabelsModel
 from sd2app.labels.painting import map_overlay, strip_overlay
 from sd2app.labels.panel import LabelsPanel
-from sd2app.labels.reaction import ReactionModel
 from sd2app.labels.recovery_bar import LabelBar
 from sd2app.labels.recovery_dialog import choose_recovery
-from sd2app.labels.timeline import LabelTimeline
-from sd2app.labels.timeline_area import LabelArea
-from sd2app.labels.track_edits import LabelTracks
+from sd2app.labels.timeline import LabelArea, LabelTimeline
 from sd2app.labels.tracks_dialog import TrackDialogs
 from sd2app.session.session import Session
 from sd2app.widgets.time_plot import Overlay, TimePlot

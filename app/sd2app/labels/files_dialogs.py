@@ -1,4 +1,4 @@
-"""What the menu of labels asks about files."""
+"""Dialogs to import and export labels and cut-outs."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from sd2core.labels.import_labels import take_in
 
 
 class LabelFileDialogs:
-    """Asks, then calls models and edits; what came of it is said over the window."""
+    """Asks, then calls models and edits; results are reported over the window."""
 
     def __init__(
         self,
@@ -36,7 +36,7 @@ class LabelFileDialogs:
         cut_out.asked.connect(self.decide_on_others)
 
     def take_dropped(self, path: Path) -> bool:
-        """Import a file of labels once the drop is over; False where it is none."""
+        """Import a dropped file of labels; False where it is none."""
         if not is_label_file(path):
             return False
         # A dialog during the drop would keep the program waiting that it came from.
@@ -44,7 +44,7 @@ class LabelFileDialogs:
         return True
 
     def import_labels(self, path: Path | None = None) -> None:
-        """Ask for a file unless there is one, show what it holds, and take it."""
+        """Ask for a file unless there is one, preview it, and import it."""
         if self._edits.refusal:
             self._shell.warn(self._edits.refusal)
             return
@@ -68,7 +68,7 @@ class LabelFileDialogs:
             self._edits.apply(lambda labels, _: take_in(labels, incoming, way, path.stem))
 
     def export_labels(self) -> None:
-        """Show what a format can hold, ask for a file, and write it."""
+        """Ask for format and file, show the losses, and write it."""
         content = self._session.document.content
         if content is None:
             return
@@ -86,7 +86,7 @@ class LabelFileDialogs:
             done.deleteLater()
 
     def cut_out(self) -> None:
-        """Ask which spans, what of them and where to, and cut them out in the background."""
+        """Ask for spans, parts and folder, and export the cut-outs in the background."""
         source = self._cut_out.source()
         offered = groups(self._labels.labels, self._labels.selected)
         if source is None:
@@ -107,7 +107,7 @@ class LabelFileDialogs:
             self._cut_out.start(spans, parts, Path(folder))
 
     def decide_on_others(self, count: int, example: str) -> None:
-        """Folders hold something else: ask what becomes of them."""
+        """Ask what to do with folders that hold something else."""
         buttons = QMessageBox.StandardButton
         box = QMessageBox(self._shell.dialog_parent)
         box.setWindowTitle("Replace cut-outs?")

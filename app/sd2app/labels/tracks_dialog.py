@@ -1,4 +1,4 @@
-"""What is asked about the tracks of labels, and about the reaction time."""
+"""Dialogs on the tracks of labels, and on the reaction time."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from PySide6.QtWidgets import (
 )
 
 from sd2app.feature import Shell
+from sd2app.labels.edits import LabelTracks
+from sd2app.labels.marking import LONGEST_MS, ReactionModel
 from sd2app.labels.model import LabelsModel
-from sd2app.labels.reaction import LONGEST_MS, ReactionModel
-from sd2app.labels.track_edits import LabelTracks
 from sd2core.labels.spans import Overlap
 
 
 class TrackDialog(QDialog):
-    """Name of a new track, and whether its spans may overlap."""
+    """Name of a new track, and a choice if its spans may overlap."""
 
     def __init__(self, name: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -44,12 +44,12 @@ class TrackDialog(QDialog):
 
     @property
     def name(self) -> str:
-        """What it is to be called."""
+        """Name typed."""
         return self._name.text().strip()
 
     @property
     def overlap(self) -> Overlap:
-        """Whether its spans may overlap."""
+        """Overlap chosen."""
         return "free" if self._free.isChecked() else "exclusive"
 
 
@@ -69,7 +69,7 @@ class TrackDialogs:
         dialog.deleteLater()
 
     def rename(self) -> None:
-        """Ask for another name of the track on which new spans come."""
+        """Ask for another name of the track for new spans."""
         name, accepted = QInputDialog.getText(
             self._shell.dialog_parent, "Rename track", "Name", text=self._labels.track
         )
@@ -77,7 +77,7 @@ class TrackDialogs:
             self._tracks.rename(name.strip())
 
     def remove(self) -> None:
-        """Remove the track on which new spans come, and say what went with it."""
+        """Remove the track for new spans, and report the spans removed with it."""
         labels = self._labels
         track, count = labels.track, len(labels.labels.of_track(labels.track))
         if self._tracks.remove() and count:

@@ -14,9 +14,8 @@ from labelled import even, imported, random_edit
 from sd2app.labels.autosave import LabelSession
 from sd2app.labels.dragging import LabelDragging
 from sd2app.labels.edits import LabelEdits
-from sd2app.labels.marking import LabelMarking
+from sd2app.labels.marking import LabelMarking, ReactionModel
 from sd2app.labels.model import LabelsModel
-from sd2app.labels.reaction import ReactionModel
 from sd2app.session.document import DocumentModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.tasks import TaskList

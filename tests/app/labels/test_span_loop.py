@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from sd2app.labels.loop import SpanLoop
+from sd2app.labels.marking import LONGEST_MS, ReactionModel
 from sd2app.labels.model import LabelsModel
-from sd2app.labels.reaction import LONGEST_MS, ReactionModel
 from sd2app.session import playback as playback_module
 from sd2app.session.playback import PlaybackModel
 from sd2app.settings import Settings

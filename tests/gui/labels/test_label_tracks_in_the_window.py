@@ -23,7 +23,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QCheckBox, QInputDialog, QLineEdit
 from window_models import menu_of, models_of
 
-from sd2app.labels.timeline_area import LabelArea
+from sd2app.labels.timeline import LabelArea
 from sd2app.labels.tracks_dialog import TrackDialog
 
 THERE, BACK = ("there", 6, 24), ("back", 30, 60)
