@@ -11,9 +11,9 @@ import pytest
 from PySide6.QtCore import QLockFile
 
 from sd2app.command_line import main
+from sd2app.fit.importer import make_recording
 from sd2app.fit.model import FitModel
 from sd2app.fit.request import LOCK_NAME, FitRequest, Person, read_request, settled
-from sd2app.fit.result import make_recording
 from sd2app.settings import Settings
 from sd2core.cli import build_parser
 from sd2core.errors import Sd2Error

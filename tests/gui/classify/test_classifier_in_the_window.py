@@ -20,10 +20,9 @@ from PySide6.QtWidgets import QFileDialog, QLabel, QToolButton
 from small_pairs import write_pairs
 from window_models import models_of
 
-from sd2app.classify.confusion_view import ConfusionView
 from sd2app.classify.curve import ClassCurve
 from sd2app.classify.panel import ClassPanel
-from sd2app.classify.result_dialog import ClassResultDialog
+from sd2app.classify.result_dialog import ClassResultDialog, ConfusionView
 from sd2app.classify.strip import ClassPlot, ClassReadout, ClassStrip, stacked_image
 from sd2app.labels.timeline import LabelTimeline
 from sd2app.suggestions.bar import SuggestionBar
