@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal, Protocol
 
 import torch
 
+from sd2core.denoise.model import Denoiser
 from sd2core.denoise.scaling import Scaling
 from sd2core.errors import Sd2Error
 from sd2core.runs.control import Control, Word
@@ -23,10 +24,18 @@ from sd2core.train.folder import TrainingFolder
 from sd2core.train.optimiser import rate_factor
 from sd2core.train.validate import Exam, Validation, validate
 
-if TYPE_CHECKING:
-    from sd2core.train.learner import Learner
-
 Outcome = Literal["finished", "stopped", "cancelled", "failed"]
+
+
+class Learner(Protocol):
+    """The part of :class:`sd2core.train.learner.Learner` that callbacks use."""
+
+    network: Denoiser
+    device: torch.device
+    trainer: Any
+
+    def checkpoint_tensors(self) -> tuple[dict[str, torch.Tensor], dict[int, Any]]:
+        """Weights, and moments of the optimiser."""
 
 
 class Course:

@@ -236,17 +236,14 @@ def main() -> int:
     if words[:1] == ["--folder"]:
         folder, words = CommandFolder(Path(words[1])), words[2:]
     sys.argv[1:] = words  # files say how they were made
-    if folder is None:
-        from sd2app.command_line import main as run
-
-        return run()
 
     def command() -> int:
-        from sd2app.command_line import main as run
+        # The library's commands: none of those that open the window is run in the background.
+        from sd2core.cli import build_parser, run
 
-        return run(words)
+        return run(build_parser()[0], words)
 
-    return run_in_folder(folder, command)
+    return command() if folder is None else run_in_folder(folder, command)
 
 
 def run_in_folder(folder: CommandFolder, command: Callable[[], int]) -> int:
