@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict, deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -190,7 +190,9 @@ class Driver:
         if ending.worker is not None:
             self._freed = ending.worker
             self._remember_home(ending.tasks[0].group, ending.worker)
-        outcomes = ending.outcomes or [self._lost(task, ending) for task in ending.tasks]
+        outcomes: Sequence[Outcome | None] = ending.outcomes or [
+            self._lost(task, ending) for task in ending.tasks
+        ]
         for task, outcome in zip(ending.tasks, outcomes, strict=True):
             alike = self.running.pop(task.key)
             for _ in range(outcome.deaths if outcome else 0):

@@ -5,18 +5,30 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Protocol
 
-from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt
+from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, SignalInstance
 from PySide6.QtGui import QColor, QFocusEvent, QHelpEvent, QKeyEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
 
-from sd2app.session.display import DisplayModel
+from sd2app.palette import Palette
 
 _STEPS = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
 
 Tick = tuple[float, str]
 """A pixel along an axis, and what is written there."""
+
+
+class Themed(Protocol):
+    """Colours of the window, which the user may change."""
+
+    @property
+    def palette(self) -> Palette:
+        """Colours in use."""
+
+    @property
+    def theme_changed(self) -> SignalInstance:
+        """Emitted when there are others."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +89,7 @@ class PointPlot(QWidget):
 
     Parameters
     ----------
-    display : DisplayModel
+    display : Themed
     name : str
         What a screen reader calls it.
     """
@@ -89,7 +101,7 @@ class PointPlot(QWidget):
     KEYS: ClassVar[frozenset[Qt.Key]]
     """Those that belong to the plot while it has the keyboard."""
 
-    def __init__(self, display: DisplayModel, name: str, parent: QWidget | None = None) -> None:
+    def __init__(self, display: Themed, name: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._display = display
         self._pointed: Any = None

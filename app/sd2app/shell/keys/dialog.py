@@ -58,8 +58,7 @@ class KeysDialog(QDialog):
         every = self._button("Reset all", "Give everything its usual keys", bindings.reset_all)
         close = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, self)
         close.rejected.connect(self.reject)
-        for button in close.buttons():
-            button.setAutoDefault(False)
+        close.button(QDialogButtonBox.StandardButton.Close).setAutoDefault(False)
         row = QHBoxLayout()
         for button in (self._change, self._add, self._clear, self._reset):
             row.addWidget(button)
