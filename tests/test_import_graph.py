@@ -1,4 +1,4 @@
-"""The import graph: no circle of files, models without widgets, features without each other's views.
+"""The import graph: no circle of files, models without widgets, views that are their feature's own.
 
 Imports in functions and under ``TYPE_CHECKING`` count like any other.
 """

@@ -60,7 +60,7 @@ def digitise(
     Returns
     -------
     dict
-        Gain and noise of the converter, for provenance.
+        Improvement and noise of the converter, for provenance.
     """
     middle = 2 ** (config.adc_bits - 1)
     gain = options.peak_share * middle / peak if peak > 0 else 1.0

@@ -38,7 +38,7 @@ class Learner(Protocol):
         """Weights, and moments of the optimiser."""
 
 
-class Course:
+class TrainingCallbacks:
     """A run between its steps.
 
     Parameters

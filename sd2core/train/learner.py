@@ -15,7 +15,7 @@ import torch
 from lightning.pytorch import LightningModule
 
 from sd2core.denoise.model import Denoiser
-from sd2core.train.callbacks import Course
+from sd2core.train.callbacks import TrainingCallbacks
 from sd2core.train.checkpoint import Checkpoint, moments_of, set_moments
 from sd2core.train.data import Order, Windows
 from sd2core.train.optimiser import optimiser_of, set_rate
@@ -83,7 +83,7 @@ class Learner(LightningModule):
     network : Denoiser
     windows : Windows
         Of energies; the course's scaling compresses them.
-    course : Course
+    course : TrainingCallbacks
     checkpoint : Checkpoint, optional
         To go on from.
     """
@@ -92,7 +92,7 @@ class Learner(LightningModule):
         self,
         network: Denoiser,
         windows: Windows,
-        course: Course,
+        course: TrainingCallbacks,
         checkpoint: Checkpoint | None = None,
     ) -> None:
         super().__init__()

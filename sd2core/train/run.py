@@ -23,7 +23,7 @@ from sd2core.errors import Sd2Error
 from sd2core.processes import lower_priority
 from sd2core.runs.control import Control, signals_kept
 from sd2core.runs.progress import ProgressWriter
-from sd2core.train.callbacks import Course, Outcome
+from sd2core.train.callbacks import Outcome, TrainingCallbacks
 from sd2core.train.checkpoint import Checkpoint, Position, read_checkpoint
 from sd2core.train.config import TrainConfig
 from sd2core.train.data import Order, TrainingData, prepare, read_mixed
@@ -86,7 +86,7 @@ def carry_out(
             data.pairs.null_bins,
         )
         about = _About(config, data, scaling, command, machine_words(device, precision, threads))
-        course = Course(
+        course = TrainingCallbacks(
             config,
             folder,
             writer,
@@ -174,7 +174,7 @@ def _counted(data: TrainingData) -> tuple[int, ...]:
 
 def _say_start(
     writer: ProgressWriter,
-    course: Course,
+    course: TrainingCallbacks,
     data: TrainingData,
     network: Denoiser,
     device: str,

@@ -17,7 +17,7 @@ from PySide6.QtCore import Qt, QTimer
 from window_models import models_of
 from window_on_sample import settle, window_on_sample
 
-from sd2app.background.model_worker.client import DenoiseProcess
+from sd2app.background.model_worker.client import ModelProcess
 from sd2core.denoise.card import ModelCard
 from sd2core.denoise.scaling import Compression, Scaling
 from sd2core.maps import DopplerMap
@@ -30,7 +30,7 @@ TICK = """
 import json, sys, threading, time
 import numpy as np
 from PySide6.QtCore import QCoreApplication, Qt, QTimer
-from sd2app.background.model_worker.client import DenoiseProcess
+from sd2app.background.model_worker.client import ModelProcess
 
 how, model = sys.argv[1:]
 application = QCoreApplication([])
@@ -39,7 +39,7 @@ timer.setTimerType(Qt.TimerType.PreciseTimer)
 timer.setInterval(5)
 timer.timeout.connect(lambda: ticks.append(time.perf_counter()))
 timer.start()
-process = DenoiseProcess()
+process = ModelProcess()
 
 def work():
     if how == "thread":
@@ -122,7 +122,7 @@ def test_what_the_way_to_the_process_costs(benchmark, model):
     """450 frames and one frame, asked from here and in the window's way."""
     from sd2core.denoise.files import load_model
 
-    process, given = DenoiseProcess(), a_map()
+    process, given = ModelProcess(), a_map()
     both = {"here": load_model(model), "process": process.load(model)}
     frame = np.ascontiguousarray(given.values[:, 0])
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 from PySide6.QtCore import SignalInstance
 
 from sd2app.classify.model import ClassifyModel
-from sd2app.session.tracks import MapModel
+from sd2app.session.maps import MapModel
 from sd2app.suggestions.finders import Found, Threshold
 from sd2core.classify.spans import SpanOptions, predicted_spans
 

@@ -14,7 +14,7 @@ from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
 
 if TYPE_CHECKING:
-    from sd2app.background.model_worker.client import DenoiseProcess
+    from sd2app.background.model_worker.client import ModelProcess
     from sd2core.classify.card import ClassifierCard
 
 
@@ -64,7 +64,7 @@ def user_classifiers_folder() -> Path:
     return user_models_folder().parent / "classifiers"
 
 
-def core_classifiers(process: DenoiseProcess) -> ClassifierLibrary:
+def core_classifiers(process: ModelProcess) -> ClassifierLibrary:
     """The library's own: cards are read here, classifiers work where the denoisers do."""
     from sd2core.classify.files import describe_classifier
 

@@ -13,8 +13,8 @@ from sd2app.classify.library import Classifier, ClassifierLibrary
 from sd2app.classify.track import ClassReading, ClassTrack
 from sd2app.denoise.validity import MapValidity
 from sd2app.labels.model import LabelsModel
+from sd2app.session.maps import MapModel
 from sd2app.session.playback import PlaybackModel
-from sd2app.session.tracks import MapModel
 from sd2app.settings import Settings
 
 if TYPE_CHECKING:

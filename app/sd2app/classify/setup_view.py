@@ -20,8 +20,8 @@ from sd2app.classify.questions import ClassAsks
 from sd2app.classify.setup import FEATURES, MAPS, MODELS
 from sd2app.classify.text import FEATURE_WORDS, MODEL_WORDS
 from sd2app.classify.training import ClassTraining
-from sd2app.training.estimate import EstimateLines
 from sd2app.training.text import division_text, steps_text
+from sd2app.widgets.estimate import EstimateLines
 from sd2app.widgets.inputs import Choice, NumberBox, TypedLine
 from sd2app.widgets.panel import data_row, outlined, rule, sentence, side_by_side, title
 from sd2core.classify.defaults import LONGEST_DELAY_S

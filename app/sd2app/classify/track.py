@@ -13,7 +13,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from sd2app.background.latest import Emit, LatestRunner
 from sd2app.classify.library import Classifier, LiveClasses
 from sd2app.denoise.map import AT_ONCE, cut_out, known_frames
-from sd2app.session.tracks import MapModel
+from sd2app.session.maps import MapModel
 from sd2core.denoise.resample_to_model import check_bins, is_regular, stretches
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sd2core.maps import DopplerMap
 
 if TYPE_CHECKING:
-    from sd2app.background.model_worker.client import DenoiseProcess
+    from sd2app.background.model_worker.client import ModelProcess
     from sd2core.denoise.card import ModelCard
 
 
@@ -78,7 +78,7 @@ class DenoiserLibrary:
         return next((card for card in self.available() if card.name == name), None)
 
 
-def core_library(process: DenoiseProcess) -> DenoiserLibrary:
+def core_library(process: ModelProcess) -> DenoiserLibrary:
     """The library's own: cards are read here, models work in another process."""
 
     def available() -> Sequence[ModelCard]:

@@ -12,8 +12,8 @@ from PySide6.QtCore import QObject, Signal
 from sd2app.background.latest import LatestRunner
 from sd2app.denoise.library import Denoiser, LiveSession
 from sd2app.denoise.model import DenoiseModel
+from sd2app.session.maps import MapModel
 from sd2app.session.playback import PlaybackModel
-from sd2app.session.tracks import MapModel
 from sd2app.settings import Settings
 from sd2core.denoise.resample_to_model import is_regular
 

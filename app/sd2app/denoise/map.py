@@ -17,8 +17,8 @@ from sd2app.denoise.library import Denoiser, LiveSession
 from sd2app.maps.partial_map import View
 from sd2app.maps.quality import Companion
 from sd2app.session.content import reference_of
+from sd2app.session.maps import MapModel
 from sd2app.session.tasks import Job, TaskList
-from sd2app.session.tracks import MapModel
 from sd2core.denoise.resample_to_model import is_regular
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap

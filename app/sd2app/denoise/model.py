@@ -18,9 +18,9 @@ from sd2app.maps.partial_map import Part, View
 from sd2app.maps.quality import Companion
 from sd2app.session.denoiser_choice import NO_MODEL, UNSAID, DenoiserChoice
 from sd2app.session.document import DocumentModel
+from sd2app.session.maps import MapModel
 from sd2app.session.tasks import TaskList
 from sd2app.session.time_window import TimeWindow
-from sd2app.session.tracks import MapModel
 from sd2core.denoise.files import DEFAULT_NAME
 from sd2core.errors import Sd2Error
 

@@ -6,8 +6,8 @@ from PySide6.QtCore import QObject, Signal
 
 from sd2app.denoise.model import DenoiseModel
 from sd2app.maps.model import SynthesisModel
+from sd2app.session.maps import MapModel
 from sd2app.session.sensor import SensorModel
-from sd2app.session.tracks import MapModel
 
 
 class MapValidity(QObject):

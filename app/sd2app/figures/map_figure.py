@@ -12,7 +12,7 @@ from PySide6.QtCore import QObject
 from sd2app.figures.preview import DrawnFigure
 from sd2app.maps.difference import DifferenceModel
 from sd2app.session.display import HeatmapLevels
-from sd2app.session.tracks import MapModel
+from sd2app.session.maps import MapModel
 from sd2core.errors import Sd2Error
 from sd2core.figures.maps import Levels, MapRow, draw_maps, save_maps
 from sd2core.files.figure_files import check_figure

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QProgressBar, QToolButton, QWidget
 
-from sd2app.fit.clock import FitFollower
+from sd2app.fit.clock import FitPlayback
 from sd2app.fit.model import FitModel
 from sd2app.fit.offer import FitOffer
 from sd2app.fit.progress import left_in_words
@@ -34,7 +34,7 @@ class FitBar(QFrame):
     def __init__(
         self,
         fit: FitModel,
-        follower: FitFollower,
+        follower: FitPlayback,
         offer: FitOffer,
         begin: Callable[[], None],
         open_result: Callable[[], None],

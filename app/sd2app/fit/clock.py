@@ -10,7 +10,7 @@ from sd2app.session.playback import PlaybackModel
 from sd2core.files.paths import plain_path
 
 
-class FitFollower(QObject):
+class FitPlayback(QObject):
     """Shows the frame that the fit is at, where the window is on its video."""
 
     changed = Signal()

@@ -12,9 +12,9 @@ from PySide6.QtWidgets import QDialog, QFileDialog, QMessageBox, QWidget
 
 from sd2app.feature import Action, Feature, Shell
 from sd2app.fit.bar import FitBar
-from sd2app.fit.clock import FitFollower
+from sd2app.fit.clock import FitPlayback
 from sd2app.fit.dialog import VIDEOS, NewFromVideoDialog
-from sd2app.fit.importer import FitTaker
+from sd2app.fit.importer import FitResultImporter
 from sd2app.fit.model import COMMAND, FitModel
 from sd2app.fit.offer import FitOffer
 from sd2app.fit.request import FitRequest
@@ -31,9 +31,9 @@ class FitFeature(Feature):
         self._session, self._shell = session, shell
         document = session.document
         self.model = FitModel(session.settings, parent, command or COMMAND)
-        self.clock = FitFollower(self.model, document, session.playback, parent)
+        self.clock = FitPlayback(self.model, document, session.playback, parent)
         self.offer = FitOffer(document, self.model, parent)
-        self.taker = FitTaker(self.model, self.clock, document, session.settings, parent)
+        self.taker = FitResultImporter(self.model, self.clock, document, session.settings, parent)
 
     @property
     def landmarks_changed(self) -> tuple[SignalInstance, ...]:

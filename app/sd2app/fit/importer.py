@@ -7,7 +7,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from sd2app.fit.clock import FitFollower
+from sd2app.fit.clock import FitPlayback
 from sd2app.fit.model import FitModel
 from sd2app.fit.request import FitRequest
 from sd2app.session.document import DocumentModel
@@ -19,7 +19,7 @@ from sd2core.io.fitted import fitted_camera
 from sd2core.recording.recording import FILE_NAME, Recording, open_recording
 
 
-class FitTaker(QObject):
+class FitResultImporter(QObject):
     """Makes the recording as soon as its mesh is there.
 
     Signals
@@ -33,7 +33,7 @@ class FitTaker(QObject):
     def __init__(
         self,
         fit: FitModel,
-        follower: FitFollower,
+        follower: FitPlayback,
         document: DocumentModel,
         settings: Settings,
         parent: QObject | None = None,

@@ -21,7 +21,7 @@ from sd2core.recording.recording import Recording
 _NOTHING_OPEN = "Nothing is open: labels belong to a recording"
 
 
-class LabelSession(QObject):
+class LabelAutosave(QObject):
     """Labels of one recording in this window, from opening to closing.
 
     One window edits; another is read-only and says why. A journal begins with the first edit.

@@ -10,8 +10,8 @@ from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import Emit, LatestRunner
 from sd2app.session.document import DocumentModel
+from sd2app.session.maps import MapModel
 from sd2app.session.tasks import Job, TaskList
-from sd2app.session.tracks import MapModel
 from sd2core.cutouts.cutting import Cut, cut_out, plan_cuts
 from sd2core.cutouts.source import CutSource, Part
 from sd2core.labels.spans import Labels, Span

@@ -8,7 +8,7 @@ from typing import Literal
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QUndoCommand
 
-from sd2app.labels.autosave import LabelSession
+from sd2app.labels.autosave import LabelAutosave
 from sd2app.labels.model import LabelsModel
 from sd2app.session.document import DocumentModel
 from sd2app.session.playback import PlaybackModel
@@ -47,7 +47,7 @@ class LabelEdits(QObject):
 
     Mouse drags (:class:`sd2app.labels.dragging.LabelDragging`) and marking during playback
     (:class:`sd2app.labels.marking.LabelMarking`) also end here. Each edit is on disk when it is
-    made (see :class:`sd2app.labels.autosave.LabelSession`). Times are frames of the playback clock.
+    made (see :class:`sd2app.labels.autosave.LabelAutosave`). Times are frames of the clock.
     An impossible edit changes nothing, and ``failed`` says why. ``applying`` is emitted before an
     edit, so that a drag in progress ends first; ``done_at`` after an edit, an undo or a redo, with
     the earliest start and latest end of changed spans.
@@ -62,7 +62,7 @@ class LabelEdits(QObject):
         document: DocumentModel,
         labels: LabelsModel,
         playback: PlaybackModel,
-        session: LabelSession,
+        session: LabelAutosave,
         parent: QObject | None = None,
     ) -> None:
         super().__init__(parent)

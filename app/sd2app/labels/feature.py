@@ -18,7 +18,7 @@ from sd2app.labels.actions import (
     span_actions,
     track_actions,
 )
-from sd2app.labels.autosave import LabelSession
+from sd2app.labels.autosave import LabelAutosave
 from sd2app.labels.cut_out_model import CutOutModel
 from sd2app.labels.dragging import LabelDragging
 from sd2app.labels.edits import LabelEdits, LabelTracks
@@ -55,7 +55,7 @@ class LabelsFeature(Feature):
     ) -> None:
         self._session, self._shell, self._accept = s, _, _ = session, shell, accept
         self.model = labels = LabelsModel(parent)
-        self.autosave = LabelSession(s.document, labels, recovery, parent)
+        self.autosave = LabelAutosave(s.document, labels, recovery, parent)
         self.edits = LabelEdits(s.document, labels, s.playback, self.autosave, parent)
         self.reaction = ReactionModel(s.settings, parent)
         self.dragging = LabelDragging(labels, s.playback, self.edits, parent)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QSizePolicy, QToolButton, QWidget
 
-from sd2app.labels.autosave import LabelSession
+from sd2app.labels.autosave import LabelAutosave
 from sd2app.labels.recovery_dialog import offer_text, waiting_text
 from sd2app.session.document import DocumentModel
 from sd2app.widgets.panel import outlined, sentence, title
@@ -22,7 +22,7 @@ class LabelBar(QFrame):
 
     def __init__(
         self,
-        session: LabelSession,
+        session: LabelAutosave,
         document: DocumentModel,
         restore: Callable[[], None],
         recover: Callable[[], None],

@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from sd2app.labels.autosave import LabelSession
+from sd2app.labels.autosave import LabelAutosave
 from sd2app.widgets.panel import sentence
 from sd2app.widgets.text import clock_text
 from sd2core.errors import Sd2Error
@@ -35,7 +35,7 @@ _ROW_PX, _MARGIN_PX = 24, 16
 _HEADINGS = ("Recording", "Edits that were not saved", "Holds", "")
 
 
-def choose_recovery(session: LabelSession, parent: QWidget) -> Offer | None:
+def choose_recovery(session: LabelAutosave, parent: QWidget) -> Offer | None:
     """Show the dialog; return the offer whose recording is to be opened."""
     dialog = RecoverLabelsDialog(session, parent)
     accepted = dialog.exec() == QDialog.DialogCode.Accepted
@@ -46,7 +46,7 @@ def choose_recovery(session: LabelSession, parent: QWidget) -> Offer | None:
 class RecoverLabelsDialog(QDialog):
     """A row for each session with unsaved edits."""
 
-    def __init__(self, session: LabelSession, parent: QWidget | None = None) -> None:
+    def __init__(self, session: LabelAutosave, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._session = session
         self.chosen: Offer | None = None

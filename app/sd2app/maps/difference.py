@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.session.display import DisplayModel, HeatmapLevels
-from sd2app.session.tracks import MapModel, Reading
+from sd2app.session.maps import MapModel, Reading
 from sd2app.settings import Settings
 
 _SHOWN = "difference"

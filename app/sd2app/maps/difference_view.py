@@ -13,9 +13,9 @@ from sd2app.maps.difference import DifferenceModel
 from sd2app.maps.heatmap import HeatmapView
 from sd2app.maps.heatmap_image import difference_image
 from sd2app.session.display import DisplayModel
+from sd2app.session.maps import PointerModel, Reading
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.time_window import TimeWindow
-from sd2app.session.tracks import PointerModel, Reading
 from sd2app.widgets.colour_maps import signed_table
 from sd2app.widgets.time_plot import Overlay
 

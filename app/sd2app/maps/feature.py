@@ -17,8 +17,8 @@ from sd2app.maps.model import SynthesisModel
 from sd2app.maps.spectrum import Curve, SpectrumView
 from sd2app.maps.stack import MapStack
 from sd2app.maps.uncertainty import UncertaintyModel
+from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
-from sd2app.session.tracks import MapModel
 from sd2app.widgets.time_plot import Overlay
 
 _COLOURS = ("synthetic", "denoised", "before", "real")

@@ -19,9 +19,9 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from sd2app.maps.map_widget import MapWidget
 from sd2app.session.display import DisplayModel
+from sd2app.session.maps import UNCERTAIN_SHARE, MapModel, PointerModel, Reading
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.time_window import TimeWindow
-from sd2app.session.tracks import UNCERTAIN_SHARE, MapModel, PointerModel, Reading
 from sd2app.widgets.cached_paint import CachedPaint
 from sd2app.widgets.colour_maps import lookup_table
 from sd2app.widgets.time_axis import (

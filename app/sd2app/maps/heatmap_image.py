@@ -11,7 +11,7 @@ from PySide6.QtGui import QImage
 
 from sd2app.maps.difference import DifferenceModel
 from sd2app.session.display import HeatmapLevels
-from sd2app.session.tracks import MapModel
+from sd2app.session.maps import MapModel
 from sd2app.widgets.colour_maps import lookup_table, uncertain_table
 
 

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import (
 )
 
 from sd2app.session.display import COLOUR_MAPS, DisplayModel
-from sd2app.session.tracks import MapModel
+from sd2app.session.maps import MapModel
 from sd2app.widgets.colour_maps import lookup_table, uncertain_table
 from sd2app.widgets.inputs import Choice, NumberBox, action_button
 from sd2app.widgets.panel import ElidedLabel

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QWidget
 
 from sd2app.maps.heatmap_image import heatmap_image
 from sd2app.session.display import DisplayModel
-from sd2app.session.tracks import MapModel
+from sd2app.session.maps import MapModel
 from sd2app.widgets.time_axis import TimeScale
 from sd2app.widgets.time_plot import TimePlot
 

@@ -28,11 +28,11 @@ from sd2app.maps.readout import FrameReader, Readout
 from sd2app.maps.synthesizers import SynthesizerCache
 from sd2app.maps.warm_up import CompilerModel, MaskPrefetcher
 from sd2app.session.document import DocumentModel
+from sd2app.session.maps import MapModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.sensor import SensorModel
 from sd2app.session.tasks import Job, TaskList
 from sd2app.session.time_window import TimeWindow
-from sd2app.session.tracks import MapModel
 from sd2core.doppler.options import PRESETS
 from sd2core.doppler.synthesizer import FrameScattering, Synthesizer
 from sd2core.errors import Sd2Error

@@ -10,9 +10,9 @@ from PySide6.QtWidgets import QWidget
 
 from sd2app.maps.map_widget import MapWidget
 from sd2app.session.display import DisplayModel
+from sd2app.session.maps import MapModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.time_window import TimeWindow
-from sd2app.session.tracks import MapModel
 from sd2app.widgets.time_axis import (
     GUTTER_PX,
     MARGIN_PX,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2app.session.content import reference_of
-from sd2app.session.tracks import MapModel
+from sd2app.session.maps import MapModel
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.doppler.synthesizer import Stretch
 from sd2core.maps import DopplerMap

@@ -10,8 +10,8 @@ from PySide6.QtGui import QBrush, QColor, QFontMetrics, QPainter, QPaintEvent, Q
 from PySide6.QtWidgets import QWidget
 
 from sd2app.session.display import DisplayModel
+from sd2app.session.maps import MapModel, PointerModel
 from sd2app.session.playback import PlaybackModel
-from sd2app.session.tracks import MapModel, PointerModel
 from sd2app.widgets.time_axis import signed_text, ticks
 from sd2core.maps import DopplerMap
 

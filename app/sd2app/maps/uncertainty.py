@@ -10,8 +10,8 @@ from sd2app.accuracy.model import AccuracyModel
 from sd2app.background.latest import LatestRunner
 from sd2app.maps.model import SynthesisModel
 from sd2app.session.document import DocumentModel
+from sd2app.session.maps import MapModel
 from sd2app.session.tasks import Job, TaskList
-from sd2app.session.tracks import MapModel
 from sd2app.settings import Settings
 from sd2core.maps import CellUncertainty, DopplerMap
 from sd2core.progress import Cancelled

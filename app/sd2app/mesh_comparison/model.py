@@ -13,9 +13,9 @@ from PySide6.QtCore import QObject, Signal
 from sd2app.background.latest import Emit, LatestRunner
 from sd2app.session.content import UNTITLED, reference_of
 from sd2app.session.document import DocumentModel
+from sd2app.session.maps import MapModel
 from sd2app.session.sensor import SensorModel
 from sd2app.session.tasks import Job, TaskList
-from sd2app.session.tracks import MapModel
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.recording.recording import MeshReading, Recording, is_recording, open_recording
 

@@ -23,9 +23,9 @@ from sd2app.mesh_comparison.pictures import ComparedPicture
 from sd2app.mesh_comparison.table import JointTable
 from sd2app.session.display import DisplayModel
 from sd2app.session.document import DocumentModel
+from sd2app.session.maps import MapModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.time_window import TimeWindow
-from sd2app.session.tracks import MapModel
 from sd2app.session.video import VideoModel
 from sd2app.video.overlay_settings import OverlayModel
 from sd2app.widgets.dialogs import FIGURES

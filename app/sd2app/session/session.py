@@ -9,11 +9,11 @@ from PySide6.QtCore import QObject
 from sd2app.session.content import reference_of
 from sd2app.session.display import DisplayModel
 from sd2app.session.document import DocumentModel
+from sd2app.session.maps import MapModel, PointerModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.sensor import SensorModel
 from sd2app.session.tasks import TaskList
 from sd2app.session.time_window import TimeWindow
-from sd2app.session.tracks import MapModel, PointerModel
 from sd2app.session.undo import Edits
 from sd2app.session.video import VideoModel
 from sd2app.settings import Settings

@@ -7,8 +7,8 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QToolButton, QW
 
 from sd2app.accuracy.model import AccuracyModel
 from sd2app.maps.model import SynthesisModel
+from sd2app.session.maps import PointerModel, Reading
 from sd2app.session.tasks import TaskList
-from sd2app.session.tracks import PointerModel, Reading
 from sd2app.widgets.panel import ElidedLabel
 from sd2app.widgets.time_axis import clock_text
 

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from sd2app.accuracy.feature import AccuracyFeature
 from sd2app.agreement.feature import AgreementFeature
-from sd2app.background.model_worker.client import DenoiseProcess
+from sd2app.background.model_worker.client import ModelProcess
 from sd2app.batch.feature import BatchFeature
 from sd2app.classify.feature import ClassifyFeature
 from sd2app.classify.library import core_classifiers
@@ -76,7 +76,7 @@ class Features:
 
 def build_features(session: Session, shell: Shell, parts: Parts, parent: QObject) -> Features:
     """Make all features and let them follow the document."""
-    process = DenoiseProcess()
+    process = ModelProcess()
     accuracy = AccuracyFeature(session, shell, parts.ladder, parent)
     maps = MapsFeature(session, shell, accuracy.model, parent)
     denoisers = parts.denoisers or core_library(process)

@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from PySide6.QtCore import SignalInstance
 
-from sd2app.session.tracks import MapModel
+from sd2app.session.maps import MapModel
 from sd2core.labels.spans import Span
 from sd2core.labels.suggest import SuggestOptions, motion_energy_db, suggest_spans
 

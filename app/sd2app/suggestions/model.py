@@ -9,8 +9,8 @@ from PySide6.QtGui import QUndoStack
 
 from sd2app.background.latest import LatestRunner
 from sd2app.labels.model import LabelsModel
+from sd2app.session.maps import MapModel
 from sd2app.session.playback import PlaybackModel
-from sd2app.session.tracks import MapModel
 from sd2app.suggestions.finders import Found, SpanFinder, Threshold
 from sd2core.labels.edits import Edit
 from sd2core.labels.field_edits import offer, pending, reject, take

@@ -8,7 +8,7 @@ from pathlib import Path
 from PySide6.QtWidgets import QApplication, QCheckBox, QFileDialog, QMessageBox, QWidget
 
 from sd2app.training.model import TrainingModel
-from sd2app.training.result import TrainingUse
+from sd2app.training.result import ModelAdoption
 from sd2app.widgets.dialogs import may_delete
 from sd2core.errors import Sd2Error
 
@@ -20,7 +20,7 @@ class TrainingDialogs:
         self,
         parent: QWidget,
         training: TrainingModel,
-        use: TrainingUse,
+        use: ModelAdoption,
         report: Callable[[str], None],
     ) -> None:
         self._parent = parent

@@ -12,7 +12,7 @@ from sd2app.session.session import Session
 from sd2app.training.dialogs import TrainingDialogs
 from sd2app.training.model import COMMAND, TrainingModel
 from sd2app.training.panel import TrainingPanel
-from sd2app.training.result import Denoising, TrainingUse
+from sd2app.training.result import Denoising, ModelAdoption
 from sd2core.denoise.files import user_models_folder
 
 
@@ -29,7 +29,7 @@ class TrainingFeature(Feature):
     ) -> None:
         self._session, self._shell, maps = session, shell, session.maps
         self.model = TrainingModel(session.settings, parent, command or COMMAND)
-        self.adoption = TrainingUse(
+        self.adoption = ModelAdoption(
             self.model,
             denoise,
             maps.synthetic,

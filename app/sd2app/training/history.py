@@ -211,3 +211,19 @@ _READERS = {
     "resumed": TrainingHistory._go_on,
     "end": TrainingHistory._ended,
 }
+
+
+@dataclass(frozen=True)
+class Improvement:
+    """Mean error of the peak velocity per frame, against the radar's map of the recording.
+
+    ``plain_mps`` is that of the synthetic map, ``before_mps`` of the model that was in use before,
+    if there was one; ``frames`` is the number of frames with both maps.
+    """
+
+    plain_mps: float
+    before_mps: float | None
+    now_mps: float
+    before_title: str
+    frames: int
+    simulated: bool

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QVBoxLayout, QWidget
 
 from sd2app.session.display import DisplayModel
 from sd2app.training.model import TrainingModel
-from sd2app.training.result import TrainingUse
+from sd2app.training.result import ModelAdoption
 from sd2app.training.run_view import TrainingRunView
 from sd2app.training.setup_view import TrainingSetupView
 from sd2app.training.text import gain_rows, gain_summary
@@ -46,9 +46,9 @@ class Asks(Protocol):
 
 
 class TrainingGainView(QWidget):
-    """A view of :class:`TrainingUse`."""
+    """A view of :class:`ModelAdoption`."""
 
-    def __init__(self, use: TrainingUse, parent: QWidget | None = None) -> None:
+    def __init__(self, use: ModelAdoption, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._use = use
         layout = QVBoxLayout(self)
@@ -86,7 +86,7 @@ class TrainingPanel(RunPanel):
     def __init__(
         self,
         training: TrainingModel,
-        use: TrainingUse,
+        use: ModelAdoption,
         display: DisplayModel,
         asks: Asks,
         parent: QWidget | None = None,

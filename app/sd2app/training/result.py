@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
@@ -11,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, QTimer, Signal, SignalInstance
 
-from sd2app.session.tracks import MapModel
+from sd2app.session.maps import MapModel
+from sd2app.training.history import Improvement
 from sd2app.training.model import TrainingModel
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
@@ -44,33 +44,7 @@ class Denoising(Protocol):
         """Show the map of the model before as well, or not."""
 
 
-@dataclass(frozen=True)
-class Gain:
-    """Mean error of the peak velocity per frame, against the radar's map of the recording.
-
-    Parameters
-    ----------
-    plain_mps : float
-        Of the synthetic map as it is.
-    before_mps : float or None
-        Of the model that was in use before; None where there was none.
-    now_mps : float
-    before_title : str
-    frames : int
-        That could be judged.
-    simulated : bool
-        Whether the radar's map is simulated.
-    """
-
-    plain_mps: float
-    before_mps: float | None
-    now_mps: float
-    before_title: str
-    frames: int
-    simulated: bool
-
-
-class TrainingUse(QObject):
+class ModelAdoption(QObject):
     """Keeps the best model of a run among the user's models, and denoises with it.
 
     Parameters
@@ -114,7 +88,7 @@ class TrainingUse(QObject):
         self._kept: Path | None = None
         self._run: Path | None = None
         self._previous: Path | None = None
-        self._gain: Gain | None = None
+        self._gain: Improvement | None = None
         self._before_mps: float | None = None
         # Maps change many times while one is denoised piece by piece.
         self._calm = QTimer(self)
@@ -132,7 +106,7 @@ class TrainingUse(QObject):
         return self._run if self._kept is not None and self._denoise.path == self._kept else None
 
     @property
-    def gain(self) -> Gain | None:
+    def gain(self) -> Improvement | None:
         """Improvement over the earlier model; None while unknown or without a radar."""
         return self._gain if self.run is not None else None
 
@@ -219,7 +193,7 @@ class TrainingUse(QObject):
                 self._before_mps = _peak_error(before, *target)[0]
             plain_mps, frames = _peak_error(plain, *target)
             now_mps, _ = _peak_error(now, *target)
-            gain = Gain(
+            gain = Improvement(
                 plain_mps,
                 self._before_mps,
                 now_mps,

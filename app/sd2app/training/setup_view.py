@@ -17,7 +17,6 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from sd2app.training.estimate import EstimateLines
 from sd2app.training.model import TrainingModel
 from sd2app.training.setup import MODELS, Store
 from sd2app.training.text import (
@@ -26,6 +25,7 @@ from sd2app.training.text import (
     steps_text,
     store_text,
 )
+from sd2app.widgets.estimate import EstimateLines
 from sd2app.widgets.inputs import Choice, NumberBox
 from sd2app.widgets.panel import ElidedLabel, data_row, outlined, sentence, title
 

@@ -10,9 +10,7 @@ from sd2app.training.history import EpochPoint
 from sd2app.widgets.text import about, duration_text, error_text, exact_text
 
 if TYPE_CHECKING:
-    from sd2app.background.step_times import StepKey, StepTime, StepTimes
-    from sd2app.training.history import TrainingHistory
-    from sd2app.training.result import Gain
+    from sd2app.training.history import Improvement, TrainingHistory
     from sd2app.training.run import TrainingMonitor
     from sd2core.pairs.summary import PairFacts
     from sd2core.runs.folder import State
@@ -109,32 +107,9 @@ def _listed(names: tuple[str, ...]) -> str:
     return " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
 
 
-def estimate_text(seconds: float | None) -> str:
-    """Estimated time."""
-    return "Time: not known yet" if seconds is None else f"Takes {about(seconds)}"
-
-
-def estimate_source_text(count: str, step: StepTime | None, key: StepKey, times: StepTimes) -> str:
-    """Source of the estimate; ``count`` names the data and ends with the number of steps."""
-    if step is not None:
-        known = "as in the last run here" if step.source == "run" else "timed here"
-        return f"{count} of about {step_text(step.seconds)}, {known}."
-    if times.timing == key:
-        return f"{count}. Timing a few of them…"
-    why_not = times.why_not(key)
-    return f"{count}. They could not be timed: {why_not}" if why_not else f"{count}."
-
-
 def steps_text(steps: int) -> str:
     """Such as ``160 steps``."""
     return f"{steps:,} {'step' if steps == 1 else 'steps'}"
-
-
-def step_text(seconds: float) -> str:
-    """Time of a step."""
-    if seconds >= 0.95:
-        return f"{seconds:.1f} s"
-    return f"{float(f'{1000 * seconds:.2g}'):g} ms"
 
 
 def headline(run: TrainingMonitor) -> str:
@@ -206,7 +181,7 @@ def about_text(run: TrainingMonitor) -> str:
     return " · ".join(parts)
 
 
-def gain_summary(gain: Gain | None, has_radar: bool) -> str:
+def gain_summary(gain: Improvement | None, has_radar: bool) -> str:
     """Caption of the figures below, or the reason why there are none."""
     if gain is not None:
         radar = "the simulated radar's" if gain.simulated else "the radar's"
@@ -220,7 +195,7 @@ def gain_summary(gain: Gain | None, has_radar: bool) -> str:
     return "Denoising this recording…"
 
 
-def gain_rows(gain: Gain) -> list[tuple[str, str]]:
+def gain_rows(gain: Improvement) -> list[tuple[str, str]]:
     """Before and after."""
 
     def row(name: str, value_mps: float) -> tuple[str, str]:

@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from sd2app.background.model_worker.client import DenoiseProcess
+from sd2app.background.model_worker.client import ModelProcess
 from sd2core.denoise.card import ModelCard
 from sd2core.denoise.live import TrainedDenoiser
 from sd2core.denoise.registry import build
@@ -61,7 +61,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def process():
-    process = DenoiseProcess()
+    process = ModelProcess()
     yield process
     process.close()
     assert not process.running
@@ -116,14 +116,14 @@ def test_one_that_died_is_started_again(process, folder):
 
 
 def test_what_is_closed_stays_closed(folder):
-    process = DenoiseProcess()
+    process = ModelProcess()
     process.close()
     with pytest.raises(Sd2Error, match="closed"):
         process.load(folder / "gru.safetensors")
 
 
 def test_a_process_that_ends_at_once_is_an_error_in_words(folder):
-    process = DenoiseProcess([sys.executable, "-c", "pass"])
+    process = ModelProcess([sys.executable, "-c", "pass"])
     with pytest.raises(Sd2Error, match="has ended"):
         process.load(folder / "gru.safetensors")
     process.close()
@@ -173,8 +173,8 @@ def test_the_window_itself_never_loads_torch():
         "import sys\n"
         "import sd2app.shell.wiring, sd2app.denoise.model, sd2app.denoise.library as library\n"
         "import sd2app.classify.library as classifiers\n"
-        "from sd2app.background.model_worker.client import DenoiseProcess\n"
-        "process = DenoiseProcess()\n"
+        "from sd2app.background.model_worker.client import ModelProcess\n"
+        "process = ModelProcess()\n"
         "library.core_library(process).available()\n"
         "classifiers.core_classifiers(process).available()\n"
         "assert 'torch' not in sys.modules, 'torch'\n"

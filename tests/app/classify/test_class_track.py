@@ -12,7 +12,7 @@ from fake_classifiers import CLASSES, FakeClassifier, FakeClassifiers, class_car
 from sd2app.classify.text import reading_text
 from sd2app.classify.track import ClassTrack
 from sd2app.denoise.map import AT_ONCE
-from sd2app.session.tracks import MapModel
+from sd2app.session.maps import MapModel
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis

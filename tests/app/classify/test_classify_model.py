@@ -12,8 +12,8 @@ from PySide6.QtCore import QObject, Signal
 from sd2app.classify.model import ClassifyModel
 from sd2app.classify.text import classifier_page, reading_text
 from sd2app.labels.model import LabelsModel
+from sd2app.session.maps import MapModel
 from sd2app.session.playback import PlaybackModel
-from sd2app.session.tracks import MapModel
 from sd2app.settings import Settings
 from sd2core.errors import Sd2Error
 from sd2core.labels.label_set import Label, LabelSet

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from labelled import even, imported, random_edit
 
-from sd2app.labels.autosave import LabelSession
+from sd2app.labels.autosave import LabelAutosave
 from sd2app.labels.dragging import LabelDragging
 from sd2app.labels.edits import LabelEdits
 from sd2app.labels.marking import LabelMarking, ReactionModel
@@ -33,7 +33,7 @@ class Desk:
         self.qtbot, self.root = qtbot, root
         self.document = DocumentModel(TaskList())
         self.labels, self.playback = LabelsModel(), PlaybackModel()
-        self.session = LabelSession(self.document, self.labels, root)
+        self.session = LabelAutosave(self.document, self.labels, root)
         self.edits = LabelEdits(self.document, self.labels, self.playback, self.session)
         self.marking = LabelMarking(
             self.labels, self.playback, ReactionModel(Settings.forgetful()), self.edits

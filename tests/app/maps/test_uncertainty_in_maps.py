@@ -7,7 +7,7 @@ import pytest
 
 from sd2app.maps.heatmap_image import heatmap_image, uncertain_columns
 from sd2app.session.display import COLOUR_MAPS, HeatmapLevels
-from sd2app.session.tracks import MapModel
+from sd2app.session.maps import MapModel
 from sd2app.widgets.colour_maps import lookup_table, uncertain_table
 from sd2core.maps import CellUncertainty, DopplerMap
 from sd2core.sensor import VelocityAxis

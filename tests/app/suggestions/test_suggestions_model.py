@@ -10,8 +10,8 @@ import pytest
 from sd2app.labels.dragging import LabelDragging
 from sd2app.labels.edits import LabelEdits
 from sd2app.labels.model import LabelsModel
+from sd2app.session.maps import MapModel
 from sd2app.session.playback import PlaybackModel
-from sd2app.session.tracks import MapModel
 from sd2app.suggestions.finders import Found, MotionFinder, Threshold
 from sd2app.suggestions.model import SuggestionsModel
 from sd2core.labels.spans import Labels, LabelTrack, Span

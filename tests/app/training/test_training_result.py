@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.session.tracks import MapModel
+from sd2app.session.maps import MapModel
 from sd2app.training import result as training_use
-from sd2app.training.result import TrainingUse
+from sd2app.training.result import ModelAdoption
 from sd2app.training.text import gain_rows, gain_summary
 from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis
@@ -74,9 +74,11 @@ def run(tmp_path) -> Path:
 def made(qtbot, run, tmp_path, monkeypatch):
     monkeypatch.setattr(training_use, "CALM_MS", 1)
 
-    def make(denoise: FakeDenoising) -> tuple[TrainingUse, dict[str, MapModel]]:
+    def make(denoise: FakeDenoising) -> tuple[ModelAdoption, dict[str, MapModel]]:
         tracks = {name: MapModel(name) for name in ("plain", "before", "now", "radar")}
-        use = TrainingUse(FakeTraining(run), denoise, *tracks.values(), lambda: tmp_path / "models")
+        use = ModelAdoption(
+            FakeTraining(run), denoise, *tracks.values(), lambda: tmp_path / "models"
+        )
         return use, tracks
 
     return make

@@ -23,14 +23,14 @@ from training_pairs import write_pairs
 
 from sd2app.background import run_monitor
 from sd2app.session.display import DisplayModel
-from sd2app.session.tracks import MapModel
+from sd2app.session.maps import MapModel
 from sd2app.settings import Settings
 from sd2app.shell.side_panel import SidePanel
 from sd2app.training.curves import TrainingCurves
 from sd2app.training.dialogs import TrainingDialogs
 from sd2app.training.model import TrainingModel
 from sd2app.training.panel import TrainingPanel
-from sd2app.training.result import TrainingUse
+from sd2app.training.result import ModelAdoption
 from sd2app.widgets.inputs import Choice, NumberBox
 from sd2app.widgets.theme import apply_theme
 
@@ -72,7 +72,9 @@ class Window:
         self.training = TrainingModel(settings, None, command, timing, folder / "runs")
         self.denoise = FakeDenoising()
         self.tracks = [MapModel(name) for name in ("Synthetic", "Before", "Denoised", "Real")]
-        self.use = TrainingUse(self.training, self.denoise, *self.tracks, lambda: folder / "models")
+        self.use = ModelAdoption(
+            self.training, self.denoise, *self.tracks, lambda: folder / "models"
+        )
         self.said: list[str] = []
         self.display = DisplayModel()
         self.dialogs = TrainingDialogs(None, self.training, self.use, self.said.append)

@@ -29,7 +29,7 @@ from sd2core.processes import ONE_THREAD
 COMMAND = (sys.executable, "-m", "sd2app.background.model_worker.server")
 
 
-class DenoiseProcess:
+class ModelProcess:
     """Started with the first model and again when it dies; one request at a time.
 
     Its methods wait for the answer: they belong into background threads.
@@ -147,7 +147,7 @@ class _Remote:
 
     _LOAD: ClassVar[str]
 
-    def __init__(self, process: DenoiseProcess, path: Path) -> None:
+    def __init__(self, process: ModelProcess, path: Path) -> None:
         self._process = process
         self._path = path
         self._load()
@@ -216,7 +216,7 @@ class RemoteClassifier(_Remote):
 class _RemoteSession:
     """A clip whose frames come one after another."""
 
-    def __init__(self, process: DenoiseProcess, number: int) -> None:
+    def __init__(self, process: ModelProcess, number: int) -> None:
         self._process = process
         self._number = number
         self._generation = process.generation
@@ -254,7 +254,7 @@ class RemoteClasses(_RemoteSession):
 class RemoteLive(_RemoteSession):
     """Frames in; for each of them what the model makes of it."""
 
-    def __init__(self, process: DenoiseProcess, number: int, equals_batch: bool) -> None:
+    def __init__(self, process: ModelProcess, number: int, equals_batch: bool) -> None:
         super().__init__(process, number)
         self.equals_batch = equals_batch
 

@@ -5,7 +5,7 @@ import pytest
 
 from sd2app.maps.heatmap_image import shade_columns
 from sd2app.session.display import HeatmapLevels
-from sd2app.session.tracks import MapModel
+from sd2app.session.maps import MapModel
 from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
