@@ -26,41 +26,21 @@ BACKGROUND = "background"
 
 @dataclass(frozen=True)
 class ClassifierCard:
-    """Description of a trained classifier, without its weights.
+    """Description of a trained classifier, without its weights."""
 
-    Parameters
-    ----------
-    model : str
-        A name of :data:`sd2core.classify.defaults.MODELS`.
-    options : mapping
-        What it was built with.
-    features : Features
-        What it is shown, of which maps.
-    classes : tuple of str
-        In the order of its answers; at least two.
-    trained_on : tuple of str
-        Kinds of maps that it learnt from, as :data:`sd2core.maps.MapKind` calls them.
-    delay_frames : int
-        So many frames are seen after one before it is answered.
-    title : str
-        To call it in a list; the file's name where it is empty.
-    about : mapping
-        ``data``, ``command``, ``metrics`` and what else fits into JSON.
-    parameters : int
-        Numbers that were learnt; known when the card comes from a file.
-    path : Path, optional
-        The file.
-    """
-
-    model: str
-    options: Mapping[str, Any]
+    model: str  # a name of sd2core.classify.defaults.MODELS
+    options: Mapping[str, Any]  # of the network
     features: Features
-    classes: tuple[str, ...]
-    trained_on: tuple[str, ...]
+    """Its input, and the maps that it is computed from."""
+    classes: tuple[str, ...]  # in the order of its answers; at least two
+    trained_on: tuple[str, ...]  # sd2core.maps.MapKind
     delay_frames: int = 0
-    title: str = ""
+    """Number of frames seen after one before it is answered."""
+    title: str = ""  # shown in lists; the file's name where it is empty
     about: Mapping[str, Any] = field(default_factory=dict)
+    """``data``, ``command``, ``metrics`` and what else fits into JSON."""
     parameters: int = 0
+    """Number of weights; known when the card comes from a file."""
     path: Path | None = None
 
     def __post_init__(self) -> None:

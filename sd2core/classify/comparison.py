@@ -46,25 +46,13 @@ QUICK_SHARES = (0.1, 1.0)
 
 @dataclass(frozen=True)
 class TableOptions:
-    """Options of a comparison: its trainings.
-
-    Parameters
-    ----------
-    seeds : int
-        Each is another split of people, another draw and another network.
-    shares : tuple of float
-        Of the learning curve, ascending, up to 1.
-    network : Network
-        Of all trainings but those that compare networks.
-    others : tuple of Network
-        Compared with it on all real data.
-    training : TrainOptions
-        Equal for all; what a network says, and the seed, are not looked at.
-    """
+    """Options of a comparison: its trainings."""
 
     seeds: int = 5
-    shares: tuple[float, ...] = SHARES
+    """Each is another split of people, another draw and another network."""
+    shares: tuple[float, ...] = SHARES  # of the learning curve, ascending, up to 1
     network: Network = field(default_factory=Network)
+    """Network of all trainings but those that compare networks."""
     others: tuple[Network, ...] = (
         PAPER,
         replace(PAPER, features="columns"),
@@ -72,6 +60,7 @@ class TableOptions:
         Network("s4"),
     )
     training: TrainOptions = field(default_factory=TrainOptions)
+    """Equal for all; its network and its seed are ignored."""
 
     def __post_init__(self) -> None:
         if self.seeds < 1:
@@ -82,33 +71,17 @@ class TableOptions:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One training and its score.
-
-    Parameters
-    ----------
-    subjects : tuple of str
-        Who was judged.
-    real, added : dict
-        Frames per class that were learnt from.
-    score : Score
-        On what each movement's own sensor saw.
-    moved : Score or None
-        On what other placements saw, where there are any.
-    parameters : int
-        Numbers that were learnt.
-    cpu_s : float
-        Of the training alone.
-    """
+    """One training and its score."""
 
     condition: Condition
     seed: int
-    subjects: tuple[str, ...]
-    real: dict[str, int]
-    added: dict[str, int]
-    score: Score
-    moved: Score | None
+    subjects: tuple[str, ...]  # of the test
+    real: dict[str, int]  # training frames per class
+    added: dict[str, int]  # training frames per class
+    score: Score  # on maps of each movement's own sensor
+    moved: Score | None  # on maps of other placements, where there are any
     parameters: int
-    cpu_s: float
+    cpu_s: float  # of the training alone
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of a run's file."""
@@ -146,21 +119,14 @@ class Run:
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """All runs of a comparison.
-
-    Parameters
-    ----------
-    kind : str
-        ``simulated`` or ``real``: what the radar was.
-    by_movement : bool
-        One subject only: nothing is said about other people.
-    """
+    """All runs of a comparison."""
 
     classes: tuple[str, ...]
-    kind: str
+    kind: str  # "simulated" or "real": the radar
     options: TableOptions
     runs: tuple[Run, ...]
     by_movement: bool
+    """True with one subject only: nothing is said about other people."""
 
     def of(self, condition: Condition) -> tuple[Run, ...]:
         """Return the runs of one condition, by seed."""
@@ -173,13 +139,7 @@ class Table:
 
 
 def conditions_of(known: ClipSet, options: TableOptions, denoised: bool) -> list[Condition]:
-    """Return the conditions to train, each once.
-
-    Parameters
-    ----------
-    denoised : bool
-        Whether there is a denoiser for these maps.
-    """
+    """Return the conditions to train, each once; ``denoised`` if there is a denoiser."""
     base = Condition(network=options.network)
     found = [replace(base, network=other) for other in options.others]
     found.append(base)
@@ -203,16 +163,10 @@ def make_table(
     denoiser: TrainedDenoiser | None = None,
     progress: Progress = silent,
 ) -> Table:
-    """Train the missing runs and read the others.
+    """Train the missing runs and read the others from ``folder``, one small file per run.
 
-    Parameters
-    ----------
-    folder : Path
-        One small file per run; those of other data or settings are not looked at.
-    known : ClipSet
-        Radar's and synthetic maps.
-    progress : callable
-        Called with runs.
+    Files of other data or settings are ignored. ``known`` holds the radar's and the
+    synthetic maps; progress counts runs.
     """
     folder.mkdir(parents=True, exist_ok=True)
     conditions = conditions_of(known, options, denoiser is not None)

@@ -277,13 +277,7 @@ def confusion_figure(
     titles: Sequence[str],
     heading: str,
 ) -> Figure:
-    """Draw row-normalised confusion matrices in a row or two.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Bound to no window.
-    """
+    """Draw row-normalised confusion matrices in a row or two, bound to no window."""
     from matplotlib.figure import Figure
 
     columns = min(len(matrices), 3)

@@ -35,24 +35,17 @@ UNKNOWN = -1
 
 @dataclass(frozen=True, eq=False)
 class Clip:
-    """Uninterrupted part of a map with the class of every frame.
-
-    Parameters
-    ----------
-    movement : str
-        The same for all maps of one movement: kinds, and places of the sensor.
-    label : int8 array, shape (frames,)
-        Index into the classes, or :data:`UNKNOWN`.
-    placement : int
-        0 for the movement's own sensor; 1 and up are others (range synthesis).
-    """
+    """Uninterrupted part of a map with the class of every frame."""
 
     subject: str
     movement: str
+    """The same for all maps of one movement: kinds, and places of the sensor."""
     kind: MapKind
-    energies: NDArray[np.float32]
+    energies: NDArray[np.float32]  # (frames, bins)
     label: NDArray[np.int8]
+    """Index into the classes, or :data:`UNKNOWN`; shape (frames,)."""
     placement: int = 0
+    """0 for the movement's own sensor; 1 and up are others (range synthesis)."""
 
     def __post_init__(self) -> None:
         if self.energies.ndim != 2 or len(self.energies) != len(self.label):
@@ -82,22 +75,15 @@ class Clip:
 
 @dataclass(frozen=True, eq=False)
 class ClipSet:
-    """Clips that share an axis, a frame rate and classes.
-
-    Parameters
-    ----------
-    classes : tuple of str
-        The background first, where there is one.
-    provenance : dict
-        Where they are from; fits into JSON.
-    """
+    """Clips that share an axis, a frame rate and classes."""
 
     axis: VelocityAxis
     null_bins: tuple[int, ...]
     frame_rate_hz: float
-    classes: tuple[str, ...]
+    classes: tuple[str, ...]  # the background first, where there is one
     clips: tuple[Clip, ...]
     provenance: dict[str, Any] = field(default_factory=dict)
+    """Origin of the clips; fits into JSON."""
 
     @property
     def subjects(self) -> tuple[str, ...]:
@@ -144,12 +130,7 @@ def clips_of_pairs(
 ) -> ClipSet:
     """Return the clips of one kind of maps in a store of pairs.
 
-    Parameters
-    ----------
-    kind : {"simulated", "real", "synthetic", "denoised"}
-        The radar's are simulated or real, as the pairs say.
-    denoiser : TrainedDenoiser, optional
-        For denoised ones.
+    The radar's are simulated or real, as the pairs say; denoised ones need the denoiser.
     """
     if kind in ("simulated", "real") and kind != pairs.kind:
         raise Sd2Error(f"The pairs hold a {pairs.kind} radar", f"a {kind} one")
@@ -315,15 +296,7 @@ def _check_denoiser(pairs: PairSet, denoiser: TrainedDenoiser | None) -> None:
 
 
 def with_noise_floor(clip: Clip, null_bins: Sequence[int], rng: np.random.Generator) -> Clip:
-    """Add a random noise floor to a clip, as of a noisier receiver.
-
-    Parameters
-    ----------
-    null_bins : sequence of int
-        Stay empty.
-    rng : Generator
-        Draws the level, how even the noise is, and the noise.
-    """
+    """Add a random noise floor to a clip, as of a noisier receiver; ``null_bins`` stay empty."""
     level = clip.energies.max(initial=0.0) * 10.0 ** (-rng.uniform(*BELOW_LOUDEST_DB) / 10.0)
     looks = _MOST_LOOKS ** rng.random()
     noise = rng.gamma(looks, level / looks, clip.energies.shape).astype(np.float32)

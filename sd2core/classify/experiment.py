@@ -41,20 +41,12 @@ Denoise = Callable[[Clip], Clip]
 
 @dataclass(frozen=True)
 class Network:
-    """Network to train.
-
-    Parameters
-    ----------
-    width : int
-        Units or channels of its layers.
-    delay_s : float
-        So much later than a frame its answer is known.
-    """
+    """Network to train."""
 
     model: str = "lstm"
     features: Kind = "columns"
-    width: int = WIDTH
-    delay_s: float = DELAY_S
+    width: int = WIDTH  # units or channels of its layers
+    delay_s: float = DELAY_S  # from a frame to its answer
 
     def of(self, training: TrainOptions, seed: int) -> TrainOptions:
         """Return these training options with this network and seed."""
@@ -74,22 +66,14 @@ PAPER = Network("lstm", "peak", 16, 0.0)
 
 @dataclass(frozen=True)
 class Condition:
-    """Condition of a training: its data and its network.
+    """Condition of a training: its data and its network."""
 
-    Parameters
-    ----------
-    share : float
-        Of the real frames, 0 to 1.
-    added : {"nothing", "synthetic", "denoised", "radar"}
-        What of the other movements is added: ``radar`` is what the radar saw of them, which
-        is what synthetic maps are at best.
-    moved : bool
-        Range synthesis: the added ones also as other placements of the sensor see them.
-    """
-
-    share: float = 1.0
+    share: float = 1.0  # of the real frames, 0 to 1
     added: Added = "nothing"
+    """Maps of the other movements that are added. ``radar`` is what the radar saw of them, which
+    is what synthetic maps are at best."""
     moved: bool = False
+    """Range synthesis: the added ones also as other placements of the sensor see them."""
     network: Network = field(default_factory=Network)
 
     def __post_init__(self) -> None:
@@ -113,37 +97,22 @@ class Condition:
 
 @dataclass(frozen=True, eq=False)
 class Chosen:
-    """Clips of one run, by their use.
-
-    Parameters
-    ----------
-    real, added : tuple of Clip
-        Both are learnt from.
-    validation, test : tuple of Clip
-        As the radar saw them, each movement's own sensor.
-    moved : tuple of Clip
-        The test movements as the radar saw them from elsewhere.
-    by_movement : bool
-        See :class:`~sd2core.classify.splitting.Parts`.
-    """
+    """Clips of one run, by their use; real and added ones are both learnt from."""
 
     real: tuple[Clip, ...]
     added: tuple[Clip, ...]
-    validation: tuple[Clip, ...]
-    test: tuple[Clip, ...]
+    validation: tuple[Clip, ...]  # of the radar, each movement's own sensor
+    test: tuple[Clip, ...]  # likewise
     moved: tuple[Clip, ...]
-    by_movement: bool
+    """Test movements as the radar saw them from elsewhere."""
+    by_movement: bool  # see sd2core.classify.splitting.Parts
 
 
 def choose(known: ClipSet, condition: Condition, seed: int, denoise: Denoise) -> Chosen:
     """Choose the clips of one run, reproducibly; a larger share includes a smaller one.
 
-    Parameters
-    ----------
-    known : ClipSet
-        Radar's and synthetic maps of the same movements.
-    seed : int
-        Also says who is judged.
+    ``known`` holds the radar's and the synthetic maps of the same movements. The seed
+    determines the test subjects as well.
     """
     parts = fold(known, seed)
     real_pool, added_pool = _pools(known, parts, seed)

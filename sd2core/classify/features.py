@@ -48,18 +48,12 @@ _BLOCK = 4096
 
 
 class Heard(NamedTuple):
-    """State of the features after some frames.
-
-    Parameters
-    ----------
-    medians : float64 array, shape (up to the frames of 5 s,)
-        Of the last frames, the newest at the end.
-    loudest_log : float
-        Logarithm of the loudest cell so far; minus infinity where there was no energy.
-    """
+    """State of the features after some frames."""
 
     medians: NDArray[np.float64]
+    """Of the last frames (up to 5 s), the newest at the end."""
     loudest_log: float
+    """Logarithm of the loudest cell so far; minus infinity where there was no energy."""
 
 
 SILENCE = Heard(np.zeros(0), -np.inf)
@@ -68,17 +62,11 @@ SILENCE = Heard(np.zeros(0), -np.inf)
 
 @dataclass(frozen=True)
 class Features:
-    """Conversion of frames to features.
-
-    Parameters
-    ----------
-    null_bins : tuple of int
-        Bins that do not count.
-    """
+    """Conversion of frames to features."""
 
     kind: Kind
     axis: VelocityAxis
-    null_bins: tuple[int, ...]
+    null_bins: tuple[int, ...]  # ignored
     frame_rate_hz: float
 
     def __post_init__(self) -> None:
@@ -97,18 +85,10 @@ class Features:
     def of(
         self, energies: NDArray[np.floating], heard: Heard = SILENCE
     ) -> tuple[NDArray[np.float32], Heard]:
-        """Compute the features of the next frames.
+        """Compute the features of the next frames: float32, shape (frames, :attr:`size`).
 
-        Parameters
-        ----------
-        energies : float array, shape (frames, bins)
-            Not negative.
-        heard : Heard
-            What the call before gave; nothing at the beginning of a clip.
-
-        Returns
-        -------
-        float32 array, shape (frames, :attr:`size`), and what to remember
+        ``energies`` (frames, bins) are not negative. ``heard`` is the state that the
+        previous call returned; the default begins a clip.
         """
         if energies.ndim != 2 or energies.shape[1] != self.axis.bins:
             raise Sd2Error(

@@ -17,17 +17,10 @@ _EXPECTED = "a classifier (.safetensors) written by `sd2 classify train`"
 
 
 def save_classifier(path: Path, trained: TrainedClassifier) -> ClassifierCard:
-    """Write a classifier to one file, in one step.
+    """Write a classifier to one file, in one step, and return the card as it is in the file.
 
-    Returns
-    -------
-    ClassifierCard
-        As it is in the file.
-
-    Raises
-    ------
-    Sd2Error
-        When the name does not end in ``.safetensors``, or the card holds what JSON cannot.
+    Raises Sd2Error if the name does not end in ``.safetensors``, or the card holds what
+    JSON cannot.
     """
     from sd2core.denoise.model import parameter_count
 
@@ -40,22 +33,13 @@ def save_classifier(path: Path, trained: TrainedClassifier) -> ClassifierCard:
 def describe_classifier(path: Path) -> ClassifierCard:
     """Read the card of a classifier's file, without its weights and without torch.
 
-    Raises
-    ------
-    Sd2Error
-        When it is missing, damaged, of a newer version, or something else.
+    Raises Sd2Error if it is missing, damaged, of a newer version, or something else.
     """
     return _read_header(Path(path))[0]
 
 
 def load_classifier(path: Path) -> TrainedClassifier:
-    """Load a classifier.
-
-    Raises
-    ------
-    Sd2Error
-        When there is none, or it is damaged or does not fit together.
-    """
+    """Load a classifier. Raises Sd2Error if it is missing, damaged or inconsistent."""
     path = Path(path)
     card, shapes = _read_header(path)
 

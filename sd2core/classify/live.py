@@ -35,13 +35,7 @@ class Memory(NamedTuple):
 
 
 class TrainedClassifier:
-    """Network with its card.
-
-    Parameters
-    ----------
-    network : Classifier
-        Put into evaluation mode.
-    """
+    """Network, put into evaluation mode, with its card."""
 
     def __init__(self, network: Classifier, card: ClassifierCard) -> None:
         self.network = network.eval()
@@ -169,13 +163,7 @@ class TrainedClassifier:
 
 
 def judge(classifier: TrainedClassifier, clips: Sequence[Clip], known: ClipSet) -> Score:
-    """Score a classifier on clips.
-
-    Parameters
-    ----------
-    known : ClipSet
-        What the clips are of.
-    """
+    """Score a classifier on clips of ``known``."""
     card = classifier.card
     strange = [name for name in known.classes if name not in card.classes]
     if strange:

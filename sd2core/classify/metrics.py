@@ -47,25 +47,16 @@ def mean_recall(confusion: Confusion) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Score:
-    """Score of a classifier on some clips.
-
-    Parameters
-    ----------
-    frames : int64 array, shape (classes, classes)
-        Confusion matrix of frames.
-    gestures : int64 array, shape (classes, classes)
-        Of gestures: what most frames of a labelled gesture were taken for.
-    latencies_s : float64 array, shape (gestures that were recognised,)
-        From a gesture's beginning until it is known that a frame of it shows it.
-    missed : int
-        Gestures without any frame that is right.
-    """
+    """Score of a classifier on some clips."""
 
     classes: tuple[str, ...]
     frames: Confusion
+    """Confusion matrix of frames, shape (classes, classes)."""
     gestures: Confusion
+    """Of gestures: the class of most frames of a labelled gesture."""
     latencies_s: NDArray[np.float64]
-    missed: int
+    """From the beginning of each recognised gesture until a frame of it is recognised."""
+    missed: int  # gestures without any correct frame
 
     @property
     def mean_recall(self) -> float:
@@ -130,14 +121,8 @@ def score(
 ) -> Score:
     """Compare classes frame by frame and gesture by gesture.
 
-    Parameters
-    ----------
-    truths, answers : sequence of int array, shape (frames,)
-        Of one clip each.
-    background : int or None
-        The class that is no gesture.
-    delay_s : float
-        So much later than a frame its answer is known.
+    ``truths`` and ``answers`` hold one integer array (frames,) per clip; ``background`` is
+    the class that is no gesture, ``delay_s`` the time from a frame to its answer.
     """
     number = len(classes)
     frames = np.zeros((number, number), np.int64)

@@ -20,12 +20,7 @@ class Classifier(nn.Module):
     """Base of the classifiers: layers along time, then a common head.
 
     The head is the paper's: layer norm, dense, dropout, dense (softmax is left to the loss
-    and to :func:`probabilities_of`).
-
-    Parameters
-    ----------
-    width : int
-        Numbers per frame that the layers along time give.
+    and to :func:`probabilities_of`). ``width`` is the number of channels before it.
     """
 
     whole: bool = False
@@ -59,15 +54,7 @@ class Classifier(nn.Module):
 
 
 class LstmClassifier(Classifier):
-    """Two stateful LSTM layers, as in the paper (there of 16 units).
-
-    Parameters
-    ----------
-    size : int
-        Features per frame.
-    width : int
-        Units of each layer.
-    """
+    """Two stateful LSTM layers of ``width`` units, as in the paper (there 16)."""
 
     def __init__(
         self, size: int, classes: int, *, width: int = WIDTH, depth: int = 2, dropout: float = 0.2
@@ -98,16 +85,8 @@ class LstmClassifier(Classifier):
 class S4Classifier(Classifier):
     """S4 layers of the denoiser between a linear layer and the head.
 
-    Parameters
-    ----------
-    size : int
-        Features per frame.
-    width : int
-        Channels of the layers.
-    state_size : int
-        Numbers that each channel remembers.
-    dropout : float
-        Also within the layers.
+    ``size`` is the number of features per frame, ``width`` the channels, ``state_size`` the
+    numbers that each channel remembers; the dropout also applies within the layers.
     """
 
     whole = True
@@ -173,16 +152,9 @@ def options(name: str) -> dict[str, Any]:
 
 
 def build(name: str, size: int, classes: int, **given: Any) -> Classifier:
-    """Build a network with random weights from torch's generator.
+    """Build one of :data:`MODELS` with random weights from torch's generator.
 
-    Parameters
-    ----------
-    name : str
-        One of :data:`MODELS`.
-    size : int
-        Features per frame.
-    **given
-        Options in place of :func:`options`.
+    ``size`` is the number of features per frame; ``given`` replaces :func:`options`.
     """
     known = options(name)
     for option, value in given.items():

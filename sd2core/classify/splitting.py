@@ -21,19 +21,14 @@ _LEAST_SUBJECTS = 3
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """Clips of training, validation and test; no movement is in two parts.
-
-    Parameters
-    ----------
-    by_movement : bool
-        True with one subject: then movements are kept apart, not people, and what is
-        measured says nothing about other people.
-    """
+    """Clips of training, validation and test; no movement is in two parts."""
 
     training: tuple[Clip, ...]
     validation: tuple[Clip, ...]
     test: tuple[Clip, ...]
     by_movement: bool
+    """True with one subject: movements are kept apart, not people, and the score says nothing
+    about other people."""
 
     def to_json(self) -> dict[str, Any]:
         """Return the subjects of each part."""
@@ -55,13 +50,9 @@ def split_clips(
 ) -> Parts:
     """Split by subject, or with one subject by movement.
 
-    Parameters
-    ----------
-    validation, test : sequence of str, optional
-        As :func:`sd2core.train.data.split_subjects` has them.
-    first_only : bool
-        Learn only from what every movement's own sensor saw, or the first one where it was
-        not its own; validation and test always do.
+    ``validation`` and ``test`` are subjects, see :func:`sd2core.train.data.split_subjects`.
+    With ``first_only`` the training part, too, holds only what each movement's own sensor
+    saw, or the first one where it was not its own; validation and test always do.
     """
     split = split_subjects(known.subjects, validation, test)
     parts = {name: known.of(getattr(split, name)) for name in ("training", "validation", "test")}

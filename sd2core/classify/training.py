@@ -30,48 +30,27 @@ Watch = Callable[[dict[str, Any]], None]
 
 @dataclass(frozen=True)
 class TrainOptions:
-    """Options of a training.
-
-    Parameters
-    ----------
-    delay_s : float
-        So much of what follows a frame is seen before it is answered.
-    options : mapping
-        Of the model, in place of its own.
-    noisy_share : float
-        Of the clips that are learnt from, so many get a noise floor
-        (:mod:`sd2core.classify.data`).
-    steps : int
-        Batches that are learnt from.
-    batch : int
-        Stretches per batch; of few clips several each, cut at other places.
-    window_frames : int
-        Length of a stretch; clips that are longer are cut at random places.
-    piece_frames : int
-        A model that carries its state learns from pieces of this length, one after
-        another (truncated backpropagation); the state is kept between them.
-    learning_rate, ssm_learning_rate : float
-        At their highest; they rise for a tenth of the steps and fall along a cosine.
-    check_steps : int
-        Between looks at the validation subjects.
-    patience : int
-        Looks without a better one after which it ends; the best is kept.
-    """
+    """Options of a training."""
 
     model: str = "lstm"
     features: Kind = "columns"
-    delay_s: float = DELAY_S
-    options: Mapping[str, Any] = field(default_factory=dict)
+    delay_s: float = DELAY_S  # part after a frame that is seen before it is answered
+    options: Mapping[str, Any] = field(default_factory=dict)  # of the model, in place of its own
     noisy_share: float = 0.5
-    steps: int = 300
-    batch: int = 32
-    window_frames: int = 300
+    """Share of the training clips that get a noise floor (:mod:`sd2core.classify.data`)."""
+    steps: int = 300  # batches that are learnt from
+    batch: int = 32  # windows per batch; of few clips several each, cut at other places
+    window_frames: int = 300  # longer clips are cut at random places
     piece_frames: int = 50
+    """A model that carries its state learns from pieces of this length, one after another
+    (truncated backpropagation); the state is kept between them."""
     learning_rate: float = 0.01
+    """Highest rate, like the other: both rise for a tenth of the steps and fall along a cosine."""
     ssm_learning_rate: float = 0.003
     weight_decay: float = 0.01
-    check_steps: int = 20
+    check_steps: int = 20  # between two validations
     patience: int = 10
+    """Validations without a better one after which it ends; the best is kept."""
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -93,35 +72,21 @@ class TrainOptions:
 
 
 class Trained(NamedTuple):
-    """Result of a training.
+    """Result of a training."""
 
-    Parameters
-    ----------
-    classifier : TrainedClassifier
-        The best one on validation, or the last where nothing validates.
-    events : list of dict
-        Events of the training.
-    """
-
-    classifier: TrainedClassifier
+    classifier: TrainedClassifier  # the best on validation, or the last without validation
     events: list[dict[str, Any]]
     interrupted: bool
 
 
 class Material(NamedTuple):
-    """Features and labels of clips.
-
-    Parameters
-    ----------
-    features : list of float32 array, shape (frames, size)
-        Of whole clips, so what was before a window is known.
-        After them the silence that a clip's last answers are found in.
-    labels : list of int64 array, shape (frames,)
-        Those of earlier frames, where answers are late.
-    """
+    """Features and labels of clips."""
 
     features: list[NDArray[np.float32]]
+    """Float32 (frames, size) of whole clips, so that what was before a window is known; then the
+    silence in which a clip's last answers are found."""
     labels: list[NDArray[np.int64]]
+    """Int64 (frames,); those of earlier frames, where answers are late."""
 
     @classmethod
     def of(cls, clips: Sequence[Clip], features: Features, delay_frames: int) -> Material:
@@ -144,20 +109,12 @@ def train(
     about: Mapping[str, Any] | None = None,
     watch: Watch = lambda event: None,
 ) -> Trained:
-    """Train a classifier on clips.
+    """Train a classifier on clips of ``known``.
 
     The loss is the cross entropy, every class weighted by the inverse of its number of
     frames, so that all of them count the same. The clips are shuffled again when all have
-    been seen. The best on validation is the one with the highest mean recall of frames.
-
-    Parameters
-    ----------
-    training, validation : sequence of Clip
-        Without validation the last one is taken.
-    known : ClipSet
-        Axis, frame rate and classes of the clips.
-    about : mapping, optional
-        For the card.
+    been seen. The best on validation is the one with the highest mean recall of frames;
+    without validation the last one is taken. ``about`` goes onto the card.
     """
     chosen = chosen or TrainOptions()
     weights = _class_weights(training, known.classes)
