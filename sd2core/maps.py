@@ -25,18 +25,10 @@ FORMAT_VERSION = 1
 
 @dataclass(frozen=True, eq=False)
 class CellUncertainty:
-    """Uncertainty of the values of a map.
+    """Uncertainty of the values of a map; both arrays have the shape (bins, frames)."""
 
-    Parameters
-    ----------
-    expected : float32 array, shape (bins, frames)
-        Expected values of the map: its values, blurred by the uncertainty of the velocities.
-    sd : float32 array, shape (bins, frames)
-        Standard deviation of every value.
-    """
-
-    expected: NDArray[np.float32]
-    sd: NDArray[np.float32]
+    expected: NDArray[np.float32]  # The map's values, blurred by the uncertainty of the velocities.
+    sd: NDArray[np.float32]  # Standard deviation of every value.
 
     def __post_init__(self) -> None:
         for name in ("expected", "sd"):
@@ -251,11 +243,7 @@ def peak_velocity_mps(
 ) -> NDArray[np.float64]:
     """Centre of the strongest bin per frame, (frames,); NaN where a frame is empty.
 
-    Parameters
-    ----------
-    energies : float array, shape (frames, bins)
-    floor : float
-        A frame that does not exceed it counts as empty.
+    ``energies`` has the shape (frames, bins); a frame that does not exceed ``floor`` is empty.
     """
     _check(energies, axis)
     peak = axis.centres_mps[energies.argmax(axis=1)]
@@ -281,10 +269,7 @@ def mean_velocity_mps(
 ) -> NDArray[np.float64]:
     """Energy-weighted mean velocity per frame, (frames,); NaN where a frame is empty.
 
-    Parameters
-    ----------
-    energies, axis, floor
-        As for :func:`peak_velocity_mps`.
+    Parameters as for :func:`peak_velocity_mps`.
     """
     _check(energies, axis)
     values = energies.astype(np.float64)

@@ -46,10 +46,7 @@ class Cut:
 def plan_cuts(source: CutSource, spans: Iterable[Span], folder: Path) -> list[Cut]:
     """List the cut-outs of spans in the order of time, compared with a folder's content.
 
-    Raises
-    ------
-    Sd2Error
-        When there are no spans, or one has no frame of the recording.
+    Raises Sd2Error when there are no spans, or one has no frame of the recording.
     """
     cuts = []
     for span in sorted(spans, key=lambda one: (one.start_s, one.end_s, one.id)):
@@ -71,32 +68,12 @@ def cut_out(
     replace_others: bool = False,
     progress: Progress = silent,
 ) -> list[Path]:
-    """Write the folders that do not exist yet, and an index of all.
+    """Write the folders that do not exist yet, and an index of all; return the written folders.
 
     A folder has its name only once it is complete. Folders with the same content are kept, so a
-    stopped export continues where it was.
-
-    Parameters
-    ----------
-    source : CutSource
-    cuts : sequence of Cut
-        Of :func:`plan_cuts`.
-    folder : Path
-        Made where it does not exist.
-    replace_others : bool
-        Replace folders of the same name that hold something else; otherwise they stay.
-    progress : Progress
-        In frames; it may raise ``Cancelled``.
-
-    Returns
-    -------
-    list of Path
-        The folders that were written.
-
-    Raises
-    ------
-    Sd2Error
-        When another process is writing there.
+    stopped export continues where it was. Folders of the same name that hold something else stay
+    unless ``replace_others``. ``progress`` counts frames and may raise ``Cancelled``. Raises
+    Sd2Error when another process is writing there.
     """
     folder.mkdir(parents=True, exist_ok=True)
     lock = FileLock(folder / _LOCK)

@@ -49,13 +49,11 @@ def decimate(mesh: MeshSequence, kept: float, *, frame: int | None = None) -> Me
 
     Parameters
     ----------
-    mesh : MeshSequence
-        With faces.
     kept : float
         Share of the faces, and so of a closed surface's vertices, above 0 and up
         to 1. 1 gives the mesh itself.
     frame : int, optional
-        Whose surface is simplified; by default the one in the middle.
+        Frame whose surface is simplified; by default the one in the middle.
 
     Returns
     -------
@@ -67,7 +65,7 @@ def decimate(mesh: MeshSequence, kept: float, *, frame: int | None = None) -> Me
     Raises
     ------
     Sd2Error
-        For a share that is none, a point cloud, or a frame that is not finite.
+        For a share out of range, a point cloud, or a frame that is not finite.
     """
     name = mesh.source or "The mesh"
     if not 0 < kept <= 1:

@@ -21,23 +21,12 @@ class VelocityUncertainty:
     so there are two of them, and a sensor elsewhere sees a mixture
     (:meth:`towards`). All vertices of a limb are wrong by the same velocity; limbs are
     wrong independently of each other (docs/decisions/0021).
-
-    Parameters
-    ----------
-    limbs : tuple of str
-        Names, L of them.
-    vertex_limb : uint8 array, shape (V,)
-        Which limb every vertex follows.
-    along_mps : float32 array, shape (T, L)
-        Standard deviation along the line from the camera to the limb.
-    across_mps : float32 array, shape (T, L)
-        Standard deviation in any direction at right angles to it.
     """
 
-    limbs: tuple[str, ...]
-    vertex_limb: NDArray[np.uint8]
-    along_mps: NDArray[np.float32]
-    across_mps: NDArray[np.float32]
+    limbs: tuple[str, ...]  # Names, L of them.
+    vertex_limb: NDArray[np.uint8]  # Limb that each vertex follows, (V,).
+    along_mps: NDArray[np.float32]  # Along the line from the camera to the limb, (T, L).
+    across_mps: NDArray[np.float32]  # In any direction at right angles to that line, (T, L).
 
     def __post_init__(self) -> None:
         limbs = tuple(str(name) for name in self.limbs)
@@ -88,22 +77,11 @@ class VelocityUncertainty:
     def towards(
         self, sensor_m: ArrayLike, limbs_m: NDArray[np.floating[Any]], start: int = 0
     ) -> NDArray[np.float64]:
-        """Standard deviation of each limb's velocity along the line to a sensor.
+        """Standard deviation of each limb's velocity along the line to a sensor, m/s, (n, L).
 
-        With the angle between the lines from the limb to the camera and to the sensor,
-        σ² = σ_along² cos² + σ_across² sin².
-
-        Parameters
-        ----------
-        sensor_m : array_like, shape (3,)
-            Camera frame.
-        limbs_m : float array, shape (n, L, 3)
-            Where the limbs are in the frames from ``start`` on.
-
-        Returns
-        -------
-        float64 array, shape (n, L)
-            m/s.
+        With the angle between the lines from the limb to the camera and to the sensor, σ² =
+        σ_along² cos² + σ_across² sin². The sensor and the places of the limbs, (n, L, 3) in the
+        frames from ``start`` on, are in the camera frame.
         """
         place = np.asarray(limbs_m, np.float64)
         to_camera, to_sensor = -place, np.asarray(sensor_m, np.float64) - place

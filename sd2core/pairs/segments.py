@@ -41,16 +41,9 @@ def cut(
 def join(
     windows: NDArray[np.float32], starts: NDArray[np.int64], frames: int
 ) -> NDArray[np.float32]:
-    """Join windows, blended linearly where they overlap.
+    """Join windows, blended linearly where they overlap, to an array of shape (frames, bins).
 
-    Parameters
-    ----------
-    starts : int array, shape (windows,)
-        They cover every frame.
-
-    Returns
-    -------
-    float32 array, shape (frames, bins)
+    ``starts`` are first frames, one per window; together the windows cover every frame.
     """
     length = windows.shape[1]
     # Towards its ends a window knows less of what is around a frame.

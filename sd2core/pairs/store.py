@@ -41,34 +41,16 @@ class TakeKey(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Take:
-    """Uninterrupted part of a movement, seen by one sensor.
-
-    Parameters
-    ----------
-    name : str
-        Unique within the subject.
-    synthetic : float32 array, shape (frames, bins)
-        Input: share of vertices per bin.
-    radar : float32 array, shape (frames, bins)
-        Target, on the same axis.
-    times_s : float64 array, shape (frames,)
-        From the start of the take.
-    label : int8 array, shape (frames,)
-        Index into :attr:`PairSet.labels`; 0 is background.
-    sensor_position_m : float64 array, shape (3,)
-        (0, 0, 0) is at the camera.
-    placement : int
-        0 for the take's own sensor; 1 and up are the same movement seen from elsewhere.
-    """
+    """Uninterrupted part of a movement, seen by one sensor."""
 
     subject: str
-    name: str
-    synthetic: NDArray[np.float32]
-    radar: NDArray[np.float32]
-    times_s: NDArray[np.float64]
-    label: NDArray[np.int8]
-    sensor_position_m: NDArray[np.float64]
-    placement: int = 0
+    name: str  # Unique within the subject.
+    synthetic: NDArray[np.float32]  # Input: share of vertices per bin, (frames, bins).
+    radar: NDArray[np.float32]  # Target, on the same axis, (frames, bins).
+    times_s: NDArray[np.float64]  # From the start of the take.
+    label: NDArray[np.int8]  # Index into :attr:`PairSet.labels` per frame; 0 is background.
+    sensor_position_m: NDArray[np.float64]  # (0, 0, 0) is at the camera.
+    placement: int = 0  # 0: the take's own sensor; 1 and up: the same movement from elsewhere.
 
     def __post_init__(self) -> None:
         frames = len(self.times_s)
@@ -105,25 +87,15 @@ class Take:
 
 @dataclass(frozen=True, eq=False)
 class PairSet:
-    """Takes that share an axis, a frame rate and labels.
-
-    Parameters
-    ----------
-    null_bins : tuple of int
-        Bins set to zero in input and target.
-    labels : tuple of str
-        The first is the background.
-    provenance : dict
-        How it was made; kept as JSON.
-    """
+    """Takes that share an axis, a frame rate and labels."""
 
     kind: PairKind
     axis: VelocityAxis
-    null_bins: tuple[int, ...]
+    null_bins: tuple[int, ...]  # Bins set to zero in input and target.
     frame_rate_hz: float
-    labels: tuple[str, ...]
+    labels: tuple[str, ...]  # The first is the background.
     takes: tuple[Take, ...]
-    provenance: dict[str, Any] = field(default_factory=dict)
+    provenance: dict[str, Any] = field(default_factory=dict)  # Origin of the set; kept as JSON.
 
     @property
     def subjects(self) -> tuple[str, ...]:
@@ -138,10 +110,7 @@ class PairSet:
     def of(self, subjects: Iterable[str]) -> PairSet:
         """Return the set of takes of these subjects.
 
-        Raises
-        ------
-        Sd2Error
-            When a subject has no take.
+        Raises Sd2Error when a subject has no take.
         """
         wanted = tuple(subjects)
         missing = [name for name in wanted if name not in self.subjects]
@@ -161,17 +130,9 @@ class PairSet:
 class PairWriter:
     """Writer that appends takes to a new store or to one that was begun.
 
-    Parameters
-    ----------
-    path : Path
-        Folder of the Zarr store; made when it is not there.
-    kind, axis, null_bins, frame_rate_hz, labels, provenance
-        As :class:`PairSet` has them. What is there already must agree.
-
-    Raises
-    ------
-    Sd2Error
-        When the path holds something else, or pairs of another kind.
+    ``path`` is the folder of the Zarr store, made when it is not there; what is there already must
+    agree with the other arguments, which are those of :class:`PairSet`. Raises Sd2Error when the
+    path holds something else, or pairs of another kind.
     """
 
     def __init__(
@@ -214,10 +175,7 @@ class PairWriter:
     def append(self, take: Take) -> None:
         """Add one take.
 
-        Raises
-        ------
-        Sd2Error
-            When it is there already, or of other bins or labels.
+        Raises Sd2Error when it is there already, or of other bins or labels.
         """
         if take.key in self._done:
             raise Sd2Error(f"{self._path} already holds the take {take.title}", "each take once")
@@ -305,10 +263,7 @@ def read_pairs(path: Path) -> PairSet:
 def open_takes(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]], dict[str, Any]]:
     """Open a store: header, lines of takes, and arrays not yet read.
 
-    Raises
-    ------
-    Sd2Error
-        When it holds no pairs, of a newer version, empty or damaged.
+    Raises Sd2Error when it holds no pairs, of a newer version, empty or damaged.
     """
     import zarr
 
@@ -331,10 +286,7 @@ def open_takes(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]], dict[s
 def read_description(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """Read the header of a store and its lines of takes, but no array.
 
-    Raises
-    ------
-    Sd2Error
-        When it is none, of another version or kind, or empty.
+    Raises Sd2Error when it is none, of another version or kind, or empty.
     """
     if not is_pair_store(path):
         raise Sd2Error(

@@ -77,7 +77,6 @@ class Recording:
     bundled_denoiser : str or None
         Name of a model that comes with the program, instead; empty if the map is not to be
         denoised. None: not chosen.
-    sensor : VirtualSensor
     placements : PlacementGrid, PlacementCloud or None
         Planned sensors around the body.
     spans : tuple of Span
@@ -86,7 +85,6 @@ class Recording:
         Those in ``labels.json``, which replace ``spans``; see :attr:`labelled`.
     labels_elsewhere : bool
         True while another process edits them: ``labels.json`` is then left as it is.
-    title : str
     simulated : bool
         True for a recording without a real camera and radar.
     camera : CameraEntry or None

@@ -59,14 +59,7 @@ class Control:
         return word
 
     def wait_while_paused(self) -> tuple[Word, float]:
-        """Wait until the word is another than ``pause``.
-
-        Returns
-        -------
-        word : Word
-        seconds : float
-            Time that passed.
-        """
+        """Wait until the word is another than ``pause``; return it and the seconds that passed."""
         begun_s = time.monotonic()
         while (word := self.word()) == "pause":
             time.sleep(_PAUSED_POLL_S)

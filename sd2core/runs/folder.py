@@ -38,13 +38,7 @@ _PATIENCE_S = 2.0
 
 
 class RunFolder:
-    """Folder of one run on disk; subclasses name its kind.
-
-    Parameters
-    ----------
-    path : Path
-        May not be there yet.
-    """
+    """Folder of one run on disk, which may not be there yet; subclasses name its kind."""
 
     format: ClassVar[str]
     file_name: ClassVar[str]  # of the description
@@ -108,10 +102,7 @@ class RunFolder:
     def lock(self) -> FileLock:
         """Take the run for this process.
 
-        Raises
-        ------
-        Sd2Error
-            When another process works in it.
+        Raises Sd2Error when another process works in it.
         """
         lock = FileLock(self._lock)
         until_s = time.monotonic() + _PATIENCE_S
@@ -141,10 +132,7 @@ class RunFolder:
     def state(self) -> State:
         """Current state.
 
-        Raises
-        ------
-        Sd2Error
-            When there is no run, or its description is damaged.
+        Raises Sd2Error when there is no run, or its description is damaged.
         """
         return self.state_and_about()[0]
 
@@ -161,10 +149,7 @@ class RunFolder:
     def about(self) -> dict[str, Any]:
         """Content of the description, which says of a run that died that it runs.
 
-        Raises
-        ------
-        Sd2Error
-            When there is no run, or its description is damaged.
+        Raises Sd2Error when there is no run, or its description is damaged.
         """
         path = self.description
         try:
@@ -189,10 +174,7 @@ class RunFolder:
     def tell(self, word: Word) -> None:
         """Tell the process what to do.
 
-        Raises
-        ------
-        Sd2Error
-            When there is no run, or no process works on it.
+        Raises Sd2Error when there is no run, or no process works on it.
         """
         state = self.state()
         if state not in LIVE:

@@ -18,14 +18,9 @@ Event = dict[str, Any]
 
 
 class ProgressWriter:
-    """Appends lines to a file and flushes each.
+    """Writer that appends lines to a file, made when missing, and flushes each.
 
-    Parameters
-    ----------
-    path : Path
-        Made when it is not there. A last line that a kill tore off is ended first.
-    watch : callable, optional
-        Called with every line.
+    A last line that a kill tore off is ended first. ``watch`` is called with every line.
     """
 
     def __init__(self, path: Path, watch: Callable[[Event], None] | None = None) -> None:

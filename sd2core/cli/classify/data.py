@@ -70,12 +70,8 @@ def clips_of(
 ) -> ClipSet:
     """Return all clips of the sources as one set.
 
-    Parameters
-    ----------
-    maps : sequence of str, optional
-        None: the radar's and, where there are some, synthetic ones.
-    denoiser : TrainedDenoiser, optional
-        For denoised maps of pairs.
+    ``maps`` None: the radar's and, where there are some, synthetic ones. The denoiser makes the
+    denoised maps of pairs.
     """
     from sd2core.classify.data import clips_of_pairs, merged
     from sd2core.datasets.labelled import unfolded
