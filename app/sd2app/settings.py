@@ -135,17 +135,10 @@ class Settings:
 
 
 class StoredChoices:
-    """Values of the types of their defaults.
+    """Choices kept under ``place`` in the settings, of the types of their defaults.
 
-    Parameters
-    ----------
-    settings : Settings
-    place : str
-        Under which they are kept.
-    defaults : mapping
-        By name; also where what is kept is of another type, or not among those known.
-    known : mapping, optional
-        Values that there are, of choices that have no others.
+    A default also replaces a stored value of another type, or one that is not among the
+    ``known`` values of its choice.
     """
 
     def __init__(

@@ -41,29 +41,16 @@ class _Surveyed(NamedTuple):
 
 
 class AccuracyModel(QObject):
-    """Chooses a plan for the scene that is open, in the background; the newest wish wins.
+    """Chooses a plan for the open scene in the background; the newest request wins.
 
     At rest the tolerance rules, unless the user clicked a point: then that plan
     stays until the tolerance is set again. While the sensor is dragged a budget
     rules.
-
-    Signals
-    -------
-    plan_changed
-        The plan at rest or the one for dragging is another one, or newly known.
-    decided
-        A choice came back, whether it is another plan or not, or failed to.
-    wished
-        Another tolerance; the receiver knows if the sensor rests, and asks for a choice.
-    changed
-        Anything that is shown.
-    noted, failed : str
-        Sentences for the user.
     """
 
-    plan_changed = Signal()
-    decided = Signal()
-    wished = Signal()
+    plan_changed = Signal()  # the plan at rest or that for dragging, also when it becomes known
+    decided = Signal()  # a choice ended: the same plan, another one, or an error
+    wished = Signal()  # another tolerance; the receiver asks for a choice if the sensor rests
     changed = Signal()
     noted = Signal(str)
     failed = Signal(str)
@@ -187,14 +174,7 @@ class AccuracyModel(QObject):
         self.measured.rest_at(sensor)
 
     def choose(self, sensor: VirtualSensor, budget_ms: float) -> None:
-        """Choose for the sensor at rest, and for a drag from there.
-
-        Parameters
-        ----------
-        sensor : VirtualSensor
-        budget_ms : float
-            Per frame, for a plan that keeps up with a mouse drag.
-        """
+        """Choose for the sensor at rest, and for a drag from there at ``budget_ms`` per frame."""
         wish = self._wish(sensor, budget_ms)
         if self._scene is None or wish == self._decided_for:
             return

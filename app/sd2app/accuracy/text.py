@@ -16,26 +16,13 @@ Origin = Literal["chosen", "clicked"]
 
 @dataclass(frozen=True)
 class InUse:
-    """Plan in use with its error and cost.
-
-    Parameters
-    ----------
-    plan : AccuracyPlan
-    error : float
-        Relative L1 after smoothing, as measured on this scene.
-    cost_ms : float
-        Per frame, on all cores.
-    origin : {"chosen", "clicked"}
-        By tolerance or budget, or a point of the plot.
-    elsewhere : bool
-        Whether error and cost were measured with the sensor at another place.
-    """
+    """Plan in use with its error and cost."""
 
     plan: AccuracyPlan
-    error: float
-    cost_ms: float
-    origin: Origin = "chosen"
-    elsewhere: bool = False
+    error: float  # relative L1 after smoothing, as measured on this scene
+    cost_ms: float  # per frame, on all cores
+    origin: Origin = "chosen"  # by tolerance or budget, or a point of the plot
+    elsewhere: bool = False  # measured with the sensor at another place
 
     @property
     def figures(self) -> str:

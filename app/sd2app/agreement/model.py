@@ -26,18 +26,11 @@ class _Compared(NamedTuple):
 class AgreementModel(QObject):
     """Agreement with the labels of a file, compared again when the recording's labels change.
 
-    Suggestions that nobody has accepted are no answers and are left out.
-
-    Signals
-    -------
-    changed
-        What is compared, what came of it, or which disagreement is looked at.
-    failed : str
-        Why a file could not be read.
+    Suggestions that are not accepted yet are left out.
     """
 
     changed = Signal()
-    failed = Signal(str)
+    failed = Signal(str)  # reason why a file could not be read
 
     def __init__(
         self,

@@ -15,18 +15,10 @@ _KEPT_BYTES = 64 * 1024
 
 @dataclass(frozen=True)
 class Ending:
-    """Exit code and error output of a process.
+    """Exit code and error output of a process."""
 
-    Parameters
-    ----------
-    code : int or None
-        Exit code; None when it did not start, was killed or died.
-    errors : str
-        What it wrote to standard error, or why it did not start.
-    """
-
-    code: int | None
-    errors: str
+    code: int | None  # None when it did not start, was killed or died
+    errors: str  # standard error, or why it did not start
 
     def reason(self, otherwise: str) -> str:
         """Reason of a failure from the last line of ``sd2``, or else these words."""
@@ -35,18 +27,10 @@ class Ending:
 
 
 class LineProcess(QObject):
-    """Runs a program once; lines arrive whole, however the pipe cuts them.
-
-    Signals
-    -------
-    line : str
-        One line of standard output.
-    ended : Ending
-        Exactly once, after the last line.
-    """
+    """Runs a program once; lines arrive whole, however the pipe cuts them."""
 
     line = Signal(str)
-    ended = Signal(object)
+    ended = Signal(object)  # Ending: exactly once, after the last line
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)

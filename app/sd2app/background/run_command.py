@@ -44,10 +44,7 @@ def launch(
 ) -> ProcessId:
     """Start a program that outlives this process; what it prints goes to a file.
 
-    Raises
-    ------
-    Sd2Error
-        When it cannot be started.
+    Raises Sd2Error if it cannot be started.
     """
     with output.open("ab") as stream:
         try:
@@ -139,26 +136,11 @@ class CommandFolder(RunFolder):
         command: Sequence[str] = COMMAND_IN_FOLDER,
         environment: Mapping[str, str] = ONE_THREAD,
     ) -> ProcessId:
-        """Start a command, or start it again in the same folder.
+        """Start an ``sd2`` command with these arguments, or start it again in the same folder.
 
-        Parameters
-        ----------
-        arguments : sequence of str
-            Arguments of ``sd2``.
-        about : mapping
-            Facts to be kept with it; fit into JSON.
-        command : sequence of str
-            Program that runs it.
-        environment : mapping
-            Variables besides those of this process. By default it uses one processor:
-            what moves on the screen comes first.
-
-        Raises
-        ------
-        Sd2Error
-            When it cannot be started.
-        OSError
-            When the folder cannot be made.
+        ``about`` is kept with it and must fit into JSON. ``environment`` is added to that of
+        this process; by default the command uses one processor, so that the window stays quick.
+        Raises Sd2Error if it cannot be started, OSError if the folder cannot be made.
         """
         self.path.mkdir(parents=True, exist_ok=True)
         for path in (self.description, self.output, self._launched, *self._of_yesterday):

@@ -59,18 +59,10 @@ def take_lines(target: T, readers: Readers[T], events: Iterable[dict[str, Any]])
 
 
 class Poller(QObject):
-    """Calls a function in a thread at intervals and on demand, never twice at a time.
-
-    Signals
-    -------
-    found : object
-        Result of a call.
-    failed : Exception
-        Error of a call; the next one follows all the same.
-    """
+    """Calls a function in a thread at intervals and on demand, never twice at a time."""
 
     found = Signal(object)
-    failed = Signal(object)
+    failed = Signal(object)  # the exception of a call; the next call follows all the same
 
     def __init__(
         self, name: str, look: Callable[[], Any], every_ms: int, parent: QObject | None = None
@@ -117,27 +109,13 @@ class _Found(NamedTuple):
 class RunMonitor(QObject, Generic[F]):
     """State and progress of one run, and orders to its process.
 
-    Subclasses read its lines (:meth:`on_events`) and say what they tell.
-
-    Parameters
-    ----------
-    folder : RunFolder
-        May not be there yet.
-    process : ProcessId, optional
-        Process that was just started for it.
-
-    Signals
-    -------
-    changed
-        A line was read, or the phase is another.
-    phase_changed
-    ended
-        The run came to its end while it was followed.
+    Subclasses read its lines (:meth:`on_events`). The folder may be missing at first;
+    ``process`` is one that was just started for it.
     """
 
     changed = Signal()
     phase_changed = Signal()
-    ended = Signal()
+    ended = Signal()  # the run came to its end while it was followed
 
     stop_patience_s: ClassVar[float | None] = None
     """A process that does not stop within this time is killed; None: it may take its time."""
@@ -243,13 +221,7 @@ class RunMonitor(QObject, Generic[F]):
     # --- steering ---------------------------------------------------------------------------
 
     def tell(self, word: Word) -> None:
-        """Give the process an order; the last one counts, and none follows a stop but a cancel.
-
-        Raises
-        ------
-        OSError
-            When it cannot be written.
-        """
+        """Give the process an order, or raise OSError; only a cancel may follow a stop."""
         if not self.under_way or (self._wish in ("stop", "cancel") and word != "cancel"):
             return
         if word == "stop" and self.is_saving:

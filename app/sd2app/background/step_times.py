@@ -23,13 +23,7 @@ _PATIENCE_MS = 500
 
 @dataclass(frozen=True)
 class StepKey:
-    """Settings that the time of a step depends on.
-
-    Parameters
-    ----------
-    words : tuple of str
-        As :mod:`sd2app.background.step_timer` takes them.
-    """
+    """Settings that determine the time of a step, in the form of its command's arguments."""
 
     words: tuple[str, ...]
 
@@ -51,14 +45,7 @@ class StepKey:
 
 @dataclass(frozen=True)
 class StepTime:
-    """Seconds per step, and how that is known.
-
-    Parameters
-    ----------
-    seconds : float
-    source : {"run", "timed"}
-    unix_s : float
-    """
+    """Seconds per step, measured in a run or timed on purpose, and the time of measurement."""
 
     seconds: float
     source: Literal["run", "timed"]
@@ -66,15 +53,9 @@ class StepTime:
 
 
 class StepTimes(QObject):
-    """Remembers times; times a few steps in a process of its own when asked.
+    """Remembers times of steps; times a few steps in a separate process on demand."""
 
-    Signals
-    -------
-    changed
-        A time is known, or timing began or ended.
-    """
-
-    changed = Signal()
+    changed = Signal()  # a time is known, or timing began or ended
 
     def __init__(
         self,
@@ -165,11 +146,7 @@ class StepTimes(QObject):
 class PatientTiming(QObject):
     """Starts the timing of a step after a delay, so that it waits while the user changes numbers.
 
-    Parameters
-    ----------
-    times : StepTimes
-    wanted : callable
-        What is to be timed now; None where nobody looks, or nothing can be started.
+    ``wanted`` gives the step to time; None while the estimate is hidden or no run can start.
     """
 
     def __init__(

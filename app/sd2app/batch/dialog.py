@@ -307,12 +307,9 @@ class BatchWindow(QDialog):
 
 
 def paths_of(result: Result) -> list[Path]:
-    """What is opened in the window for a result: the recording, or a video with its mesh.
+    """Files to open for a result: the recording, or a video with its mesh.
 
-    Raises
-    ------
-    Sd2Error
-        When the recording is damaged.
+    Raises Sd2Error if the recording is damaged.
     """
     source = Path(result.source)
     video = source if source.suffix.lower() in VIDEO_SUFFIXES else None

@@ -22,24 +22,11 @@ from sd2core.errors import Sd2Error
 class BatchModel(QObject):
     """One batch in view, or a new one that is being set up.
 
-    Parameters
-    ----------
-    settings : Settings
-    command : sequence of str
-        What runs ``sd2`` commands.
-
-    Signals
-    -------
-    changed
-        Anything that is shown.
-    phase_changed
-        How the batch in view stands, or another one is in view.
-    noted, failed : str
-        Sentences for the user.
+    ``command`` is the program that runs ``sd2`` commands.
     """
 
     changed = Signal()
-    phase_changed = Signal()
+    phase_changed = Signal()  # phase of the batch in view, or another batch is in view
     noted = Signal(str)
     failed = Signal(str)
 
@@ -101,13 +88,7 @@ class BatchModel(QObject):
             self._follow(BatchMonitor(path, self))
 
     def open_batch(self, path: Path) -> None:
-        """Show a batch that lies elsewhere, as of a command in a terminal.
-
-        Raises
-        ------
-        Sd2Error
-            When there is none.
-        """
+        """Show a batch of another folder, such as a terminal's; Sd2Error if there is none."""
         BatchFolder(path).about()
         self.select(path)
 
@@ -117,15 +98,7 @@ class BatchModel(QObject):
             self.estimate.ask(self.setup.plan(), self.setup.workers)
 
     def start(self) -> None:
-        """Begin as it is set up.
-
-        Raises
-        ------
-        Sd2Error
-            When it cannot be started.
-        OSError
-            When its plan cannot be written.
-        """
+        """Begin as set up; Sd2Error if it cannot start, OSError if its plan cannot be written."""
         if self.why_not_start:
             raise Sd2Error(self.why_not_start)
         plan = self.setup.plan()
@@ -137,13 +110,7 @@ class BatchModel(QObject):
         self._launch(out, file)
 
     def resume(self) -> None:
-        """Go on with the batch in view.
-
-        Raises
-        ------
-        Sd2Error
-            When it cannot be started.
-        """
+        """Continue the batch in view, or raise Sd2Error."""
         run = self._monitor
         if run is not None and run.resumable:
             self._launch(run.path, run.folder.plan)

@@ -31,30 +31,16 @@ _COLUMNS = ("Recording", "Subject", "Place", "Seen from the body", "Maps")
 
 @dataclass(frozen=True)
 class Result:
-    """One map of a recording from one place.
-
-    Parameters
-    ----------
-    recording, subject : str
-    source, mesh : str
-        The file that was worked on, and the mesh that the map is of.
-    placement : int
-        0 is the recording's own sensor.
-    sensor : VirtualSensor
-    target_m : tuple of 3 floats
-        Where the body is.
-    maps : dict of str to str
-        File of each kind of map, relative to the folder of the batch.
-    """
+    """One map of a recording from one place."""
 
     recording: str
     subject: str
-    source: str
-    mesh: str
-    placement: int
+    source: str  # the processed file
+    mesh: str  # the mesh that the map is of
+    placement: int  # 0 is the recording's own sensor
     sensor: VirtualSensor
-    target_m: Vector
-    maps: dict[str, str]
+    target_m: Vector  # position of the body
+    maps: dict[str, str]  # file of each kind of map, relative to the folder of the batch
 
 
 class BatchResults(QAbstractTableModel):

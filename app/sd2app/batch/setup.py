@@ -40,33 +40,16 @@ _DEFAULTS: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class Entry:
-    """A file, or all recordings in a folder.
-
-    Parameters
-    ----------
-    path : Path
-        The file or the folder.
-    patterns : tuple of str
-        What the plan names; none while it is looked at.
-    count : int or None
-        Files; None while it is looked at.
-    problem : str
-        Why it cannot be used.
-    """
+    """A file, or all recordings in a folder."""
 
     path: Path
-    patterns: tuple[str, ...] = ()
-    count: int | None = None
-    problem: str = ""
+    patterns: tuple[str, ...] = ()  # as the plan names them; empty until it has been read
+    count: int | None = None  # files; None until it has been read
+    problem: str = ""  # why it cannot be used
 
 
 class BatchSetupModel(QObject):
-    """The choices, kept from one start to the next; placements are those of the day.
-
-    Parameters
-    ----------
-    settings : Settings
-    """
+    """Choices of a batch; all but the placements are kept from one start to the next."""
 
     changed = Signal()
 
@@ -129,13 +112,7 @@ class BatchSetupModel(QObject):
         return self._values[name]
 
     def set_value(self, name: str, value: Any) -> None:
-        """Choose something.
-
-        Raises
-        ------
-        KeyError
-            When there is no such choice.
-        """
+        """Choose something; KeyError if there is no such choice."""
         if self._values.set(name, value):
             self.changed.emit()
 
@@ -196,13 +173,7 @@ class BatchSetupModel(QObject):
         return sum(entry.count or 0 for entry in self._entries)
 
     def plan(self) -> BatchPlan:
-        """Plan in the form that the library takes.
-
-        Raises
-        ------
-        Sd2Error
-            When something is missing.
-        """
+        """Plan in the form that the library takes; Sd2Error if something is missing."""
         if self.problem:
             raise Sd2Error(self.problem)
         assert self.out is not None

@@ -20,23 +20,12 @@ from sd2core.train.data import Split, split_subjects
 
 @dataclass(frozen=True)
 class DataSource:
-    """Something labelled that was chosen.
-
-    Parameters
-    ----------
-    path : Path
-    person : str
-        Who it is of; empty where nobody was named.
-    facts : tuple of LabelledFacts
-        Of it, or of all that a folder holds; none until it has been looked into.
-    problem : str
-        Why it cannot be used.
-    """
+    """A labelled recording, radar file, data set or folder that was chosen."""
 
     path: Path
-    person: str = ""
-    facts: tuple[LabelledFacts, ...] = ()
-    problem: str = ""
+    person: str = ""  # empty where the user has named no one
+    facts: tuple[LabelledFacts, ...] = ()  # of all that a folder holds; empty until read
+    problem: str = ""  # why it cannot be used
 
     @property
     def nameable(self) -> bool:
@@ -89,14 +78,10 @@ def looked_into(path: Path, person: str) -> DataSource:
 
 
 def division_of(data: Sequence[DataSource]) -> Split | None:
-    """Division of people into training, validation and test; None where there are none.
+    """Division of people into training, validation and test; None where there are no people.
 
-    As ``sd2 classify train`` has it: data sets say it themselves, where there is nothing else.
-
-    Raises
-    ------
-    Sd2Error
-        When data sets contradict each other.
+    Like ``sd2 classify train``: where there is nothing but data sets, they state it themselves.
+    Raises Sd2Error if data sets contradict each other.
     """
     facts = [one for source in data for one in source.facts]
     people = people_of(facts)

@@ -40,19 +40,9 @@ class Classifier(Protocol):
 
 @dataclass(frozen=True)
 class ClassifierLibrary:
-    """Functions of :mod:`sd2core.classify` that the models call.
+    """Functions of :mod:`sd2core.classify` that the models call; loading takes seconds at first."""
 
-    Parameters
-    ----------
-    available : callable
-        Cards of the user's classifiers.
-    describe : callable
-        Card of a file.
-    load : callable
-        Loads a file; takes seconds the first time.
-    """
-
-    available: Callable[[], Sequence[ClassifierCard]]
+    available: Callable[[], Sequence[ClassifierCard]]  # the user's classifiers
     describe: Callable[[Path], ClassifierCard]
     load: Callable[[Path], Classifier]
 

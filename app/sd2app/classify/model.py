@@ -32,28 +32,14 @@ class _Loaded(NamedTuple):
 
 
 class ClassifyModel(QObject):
-    """A classifier is the user's choice, for all recordings, and remembered.
+    """The chosen classifier, remembered and used for all recordings, and the map that it reads.
 
-    Parameters
-    ----------
-    maps : sequence of MapModel
-        Synthetic, denoised, and the radar's.
-
-    Signals
-    -------
-    changed
-        The classifier, the map that is looked at, whether it is shown.
-    moved
-        What it makes of the frames, or the frame on screen.
-    counts_changed
-        Whether what it makes of them counts: the sensor has moved, or the map has followed.
-    failed : str
-        A sentence for the user.
+    ``maps`` are the synthetic, the denoised and the radar's.
     """
 
-    changed = Signal()
-    moved = Signal()
-    counts_changed = Signal()
+    changed = Signal()  # the classifier, the map that it reads, or its visibility
+    moved = Signal()  # probabilities of frames, or the frame on screen
+    counts_changed = Signal()  # probabilities are valid or outdated: sensor moved, or map followed
     failed = Signal(str)
 
     def __init__(
@@ -175,13 +161,7 @@ class ClassifyModel(QObject):
     # --- requests -------------------------------------------------------------------------
 
     def use(self, path: Path | None) -> None:
-        """Classify with a file, or not at all.
-
-        Raises
-        ------
-        Sd2Error
-            When the file is no classifier.
-        """
+        """Classify with a file, or with none; Sd2Error if the file is no classifier."""
         card = self.describe(path) if path is not None else None
         self._path = None if path is None else Path(path).absolute()
         self._settings.set_paths(_MODEL, [self._path] if self._path is not None else [])

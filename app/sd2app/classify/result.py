@@ -38,27 +38,13 @@ class Spread:
 
 @dataclass(frozen=True, eq=False)
 class Matrix:
-    """Confusion matrix: answers per true class.
+    """Confusion matrix, shape (classes, classes): shares of answers per true class."""
 
-    Parameters
-    ----------
-    title : str
-        What was learnt from, or what was counted.
-    mean : float array, shape (classes, classes)
-        Rows are true classes and add up to 1; NaN without such frames.
-    sd : float array, shape (classes, classes)
-        Over seeds; zero where there is one.
-    recall : Spread
-        Mean over classes.
-    gain : Spread or None
-        Over learning from the radar's maps alone.
-    """
-
-    title: str
-    mean: NDArray[np.float64]
-    sd: NDArray[np.float64]
-    recall: Spread
-    gain: Spread | None = None
+    title: str  # the training data, or the judged data
+    mean: NDArray[np.float64]  # rows are true classes with sum 1, NaN without frames
+    sd: NDArray[np.float64]  # over seeds; zero for one seed
+    recall: Spread  # mean over classes
+    gain: Spread | None = None  # over learning from the radar's maps alone
 
     def cell(self, row: int, column: int) -> Spread:
         """One of its cells."""
@@ -76,35 +62,16 @@ class CurvePoint:
 
 @dataclass(frozen=True)
 class ClassResult:
-    """Results of a comparison, or of the evaluation of a classifier.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    kind : str
-        Of the maps that were judged: simulated is called so.
-    classes : tuple of str
-    seeds : int
-        0 where one classifier was judged.
-    matrices : tuple of Matrix
-        The first one is what the others are compared with.
-    curves : tuple of tuple of CurvePoint
-        From small to large shares.
-    by_movement : bool
-        All data is of one person: nothing is said about other people.
-    notes : tuple of str
-        What else is to be said.
-    """
+    """Results of a comparison, or of the evaluation of a classifier."""
 
     path: Path
-    kind: str
+    kind: str  # kind of the judged maps, such as simulated
     classes: tuple[str, ...]
-    seeds: int
-    matrices: tuple[Matrix, ...]
-    curves: tuple[tuple[CurvePoint, ...], ...] = ()
-    by_movement: bool = False
-    notes: tuple[str, ...] = ()
+    seeds: int  # 0 if one classifier was judged
+    matrices: tuple[Matrix, ...]  # the first is the reference of the others
+    curves: tuple[tuple[CurvePoint, ...], ...] = ()  # from small to large shares
+    by_movement: bool = False  # all data is of one person: no result for other people
+    notes: tuple[str, ...] = ()  # further remarks
 
     @property
     def heading(self) -> str:
@@ -136,13 +103,7 @@ class ClassResult:
 
 
 def read_result(path: Path) -> ClassResult:
-    """Read a file, or a folder with a table.
-
-    Raises
-    ------
-    Sd2Error
-        When there is none, or it is something else.
-    """
+    """Read a file, or a folder with a table; Sd2Error if there is none or it is something else."""
     path = Path(path)
     if path.is_dir():
         inside = next(

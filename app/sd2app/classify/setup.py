@@ -70,13 +70,7 @@ class ClassSetup(QObject):
         return self._values[name]
 
     def set_value(self, name: str, value: Any) -> None:
-        """Choose a setting.
-
-        Raises
-        ------
-        KeyError
-            When there is no such setting.
-        """
+        """Choose a setting; KeyError if there is no such setting."""
         if self._values.set(name, value):
             self.changed.emit()
 

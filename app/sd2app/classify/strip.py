@@ -321,17 +321,9 @@ def stacked_image(
 ) -> QImage:
     """Columns of stacked shares, the first class at the bottom.
 
-    Parameters
-    ----------
-    shares : float32 array, shape (frames, classes)
-        NaN where nothing is known: left clear.
-    done : bool array, shape (frames,)
-        Others are faint.
-    frames : int64 array, shape (columns,)
-        The frame of every column; −1 is left clear.
-    colours : list of int
-        ``0xAARRGGBB`` of every class.
-    height : int
+    ``shares``, shape (frames, classes), is NaN where unknown and left clear; frames that are
+    not ``done``, shape (frames,), are faint. ``frames`` holds the frame of every column; −1 is
+    left clear. ``colours`` holds ``0xAARRGGBB`` of every class.
     """
     known = frames >= 0
     chosen = shares[np.where(known, frames, 0)]  # (columns, classes)

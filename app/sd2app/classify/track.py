@@ -32,27 +32,13 @@ _BETWEEN_MS = 120
 
 @dataclass(frozen=True)
 class ClassReading:
-    """Class probabilities of one frame.
-
-    Parameters
-    ----------
-    classes : tuple of str
-    shares : tuple of float
-        Probability of each of them.
-    current : bool
-        False while the map is another than the one that this was read from.
-    nobody : bool
-        Whether there is no person in the frame.
-    ago_s : float
-        So much earlier than the time that was asked for: of a map that still grows, a
-        classifier which answers late knows no later frame.
-    """
+    """Class probabilities of one frame."""
 
     classes: tuple[str, ...]
     shares: tuple[float, ...]
-    current: bool
-    nobody: bool
-    ago_s: float = 0.0
+    current: bool  # False while the map differs from the one that this was read from
+    nobody: bool  # no person in the frame
+    ago_s: float = 0.0  # lag behind the requested time, if the classifier is late on a growing map
 
     @property
     def best(self) -> int:
@@ -81,19 +67,10 @@ class ClassTrack(QObject):
 
     Classifiers are causal: what stands before that frame stays right, and where the map
     only grows, the classifier goes on with what it remembers, as beside a live radar.
-
-    Parameters
-    ----------
-    counts : callable
-        Whether a map is of the sensor where it stands: else nothing of it is current.
-
-    Signals
-    -------
-    changed
-        What is known of the frames.
+    ``counts`` tells if a map is of the sensor's present place; otherwise all of it is outdated.
     """
 
-    changed = Signal()
+    changed = Signal()  # probabilities of frames
 
     def __init__(self, counts: Callable[[MapModel], bool], parent: QObject | None = None) -> None:
         super().__init__(parent)

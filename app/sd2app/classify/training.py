@@ -32,24 +32,9 @@ class KnownRun(NamedTuple):
 class ClassTraining(QObject):
     """One run in view, the others in a list; one under way at a time.
 
-    Parameters
-    ----------
-    settings : Settings
-    use : callable
-        Classify with a file.
-    folder : Path, optional
-        Of the classifiers; runs are in ``runs`` below it.
-    command : sequence of str
-        What runs ``sd2`` commands in a folder.
-    step_times : StepTimes, optional
-        Shared with the training of denoisers.
-
-    Signals
-    -------
-    changed
-        Anything that is shown.
-    noted, failed : str
-        Sentences for the user.
+    ``use`` classifies with a file. ``folder`` is that of the classifiers, with the runs in
+    ``runs`` below it. ``command`` is the program that runs ``sd2`` commands in a folder.
+    ``step_times`` is shared with the training of denoisers.
     """
 
     changed = Signal()
@@ -185,15 +170,7 @@ class ClassTraining(QObject):
         self.changed.emit()
 
     def train(self) -> None:
-        """Begin to train as it is set up.
-
-        Raises
-        ------
-        Sd2Error
-            When it cannot be started.
-        OSError
-            When the folder of the run cannot be made.
-        """
+        """Begin as set up; Sd2Error if it cannot start, OSError if its folder cannot be made."""
         if self.why_not_train:
             raise Sd2Error(self.why_not_train)
         path = self._new_folder(str(self.setup.value("model")))
@@ -223,10 +200,7 @@ class ClassTraining(QObject):
     def use_model(self) -> None:
         """Keep the model of the run in view among the classifiers, and classify with it.
 
-        Raises
-        ------
-        Sd2Error, OSError
-            When it cannot be read or kept.
+        Raises Sd2Error or OSError if it cannot be read or kept.
         """
         run = self._run
         if run is None or run.result is None or run.compares:

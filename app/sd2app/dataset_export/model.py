@@ -36,31 +36,15 @@ MAPS: dict[str, tuple[MapKind, ...]] = {
 
 @dataclass(frozen=True)
 class ExportChoice:
-    """Choices for a data set.
+    """Choices for a data set."""
 
-    Parameters
-    ----------
-    place : Path or None
-        A recording, or a folder of recordings.
-    maps : frozenset of str
-        Some of :data:`MAPS`.
-    planned : bool
-        From all places that each recording plans, besides its own sensor.
-    subjects : tuple of str
-        Who each recording is of; empty: each of a different person.
-    length, overlap : int
-        Frames.
-    ending : str
-        One of :data:`ENDINGS`.
-    """
-
-    place: Path | None = None
-    maps: frozenset[str] = frozenset(MAPS)
-    planned: bool = False
-    subjects: tuple[str, ...] = ()
-    length: int = LENGTH
-    overlap: int = OVERLAP
-    ending: str = ".zarr"
+    place: Path | None = None  # a recording, or a folder of recordings
+    maps: frozenset[str] = frozenset(MAPS)  # some of MAPS
+    planned: bool = False  # also from all places that each recording plans
+    subjects: tuple[str, ...] = ()  # person of each recording; empty: each of a different person
+    length: int = LENGTH  # frames
+    overlap: int = OVERLAP  # frames
+    ending: str = ".zarr"  # one of ENDINGS
 
     @property
     def kinds(self) -> tuple[MapKind, ...]:
@@ -108,29 +92,13 @@ class _Counted(NamedTuple):
 class ExportModel(QObject):
     """Counts while choices are made, and has one data set written at a time.
 
-    The writing outlives the window, and is found again by the next one.
-
-    Parameters
-    ----------
-    jobs : TaskList
-    command : sequence of str
-        What runs ``sd2`` commands in a folder.
-    folder : Path, optional
-        Where exports under way are noted.
-
-    Signals
-    -------
-    changed
-        A choice, a count, or how far the writing is.
-    noted : str
-        What was written.
-    failed : str
-        Why nothing was written, or what was left out.
+    The export outlives the window and is found again by the next one. ``command`` runs ``sd2``
+    commands in a folder; ``folder`` is where running exports are noted.
     """
 
     changed = Signal()
     noted = Signal(str)
-    failed = Signal(str)
+    failed = Signal(str)  # why it was not written, or what was left out
 
     def __init__(
         self,

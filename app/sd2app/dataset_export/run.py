@@ -23,32 +23,20 @@ def user_exports_folder() -> Path:
 
 @dataclass(frozen=True)
 class Exported:
-    """A data set that is written.
-
-    Parameters
-    ----------
-    path, card, sheet : Path
-    segments, sources : int
-    left_out : tuple of str
-        Sources that could not be made, each with its reason.
-    """
+    """A finished data set."""
 
     path: Path
     card: Path
     sheet: Path
     segments: int
     sources: int
-    left_out: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()  # sources that could not be made, each with its reason
 
 
 class ExportRun(RunMonitor[CommandFolder]):
     """An export; its folder is that of the command, not the data set.
 
-    Attributes
-    ----------
-    done, total : int
-        Steps; 0 of 0 while the preview sheet is drawn.
-    written : Exported or None
+    ``done`` and ``total`` count steps; 0 of 0 while the preview sheet is drawn.
     """
 
     def __init__(

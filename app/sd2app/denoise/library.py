@@ -32,18 +32,10 @@ class LiveSession(Protocol):
 
 
 class Denoiser(Protocol):
-    """A model that is loaded; its methods take a while.
+    """A loaded model; its methods take a while."""
 
-    Attributes
-    ----------
-    equals_batch : bool
-        Whether frame after frame gives what the whole map does.
-    frame_rate_hz : float
-        Of the maps that it learned from.
-    """
-
-    equals_batch: bool
-    frame_rate_hz: float
+    equals_batch: bool  # frame after frame gives what the whole map does
+    frame_rate_hz: float  # of the maps that it learned from
 
     def denoise(self, doppler: DopplerMap) -> DopplerMap:
         """Denoise a synthetic map."""
@@ -54,24 +46,12 @@ class Denoiser(Protocol):
 
 @dataclass(frozen=True)
 class DenoiserLibrary:
-    """Functions of :mod:`sd2core.denoise` that the models call; tests replace them.
+    """Functions of :mod:`sd2core.denoise` that the models call; tests replace them."""
 
-    Parameters
-    ----------
-    available : callable
-        Cards of the bundled models and the user's own.
-    describe : callable
-        Card of a file.
-    load : callable
-        Loads a file; takes seconds the first time.
-    close : callable
-        Let go of everything.
-    """
-
-    available: Callable[[], Sequence[ModelCard]]
+    available: Callable[[], Sequence[ModelCard]]  # bundled models and the user's own
     describe: Callable[[Path], ModelCard]
-    load: Callable[[Path], Denoiser]
-    close: Callable[[], None] = lambda: None
+    load: Callable[[Path], Denoiser]  # takes seconds the first time
+    close: Callable[[], None] = lambda: None  # release everything
 
     def named(self, name: str) -> ModelCard | None:
         """Card of a model that comes with the program; a user's own of that name goes first."""

@@ -70,17 +70,10 @@ class DenoisedMap(QObject):
     together. At rest one piece after another is denoised behind the synthetic map. Pieces
     of a long clip are a preview, where a model remembers more than is around them: when
     the synthetic map stands, the clip is gone through in order (:meth:`finish`).
-
-    Signals
-    -------
-    failed : str
-        The model could not do it.
-    idle
-        Everything is denoised.
     """
 
     failed = Signal(str)
-    idle = Signal()
+    idle = Signal()  # everything is denoised
 
     _stumbled = Signal(str)
 
@@ -182,18 +175,10 @@ class DenoisedMap(QObject):
     def take(
         self, source: DopplerMap, known: NDArray[np.bool_], sensor: object, piece: View
     ) -> None:
-        """A part of the synthetic map changed in the background.
+        """Take a changed piece of the synthetic map from its background task.
 
-        Parameters
-        ----------
-        source : DopplerMap
-            The synthetic map; its values may change in place.
-        known : bool array, shape (T,)
-            Frames of it that hold something.
-        sensor : object
-            Placement that all of it is for.
-        piece : tuple of int
-            What changed.
+        ``source`` is the synthetic map, whose values may change in place; ``known``, shape (T,),
+        is true for its computed frames; all of them are for the placement ``sensor``.
         """
         self._took_s.clear()
         if not self._held:
@@ -442,12 +427,8 @@ class DenoisedMap(QObject):
 def next_piece(wanted: NDArray[np.bool_], view: View) -> View | None:
     """Part to be denoised next, half-open; None when there is none.
 
-    Parameters
-    ----------
-    wanted : bool array, shape (T,)
-        Frames that are known, and whose answer is not.
-    view : tuple of int
-        Frames on screen: these first, then those that follow, then those before.
+    ``wanted``, shape (T,), is true for known frames without an answer. Frames in ``view``
+    come first, then those that follow, then those before.
     """
     if len(wanted) <= AT_ONCE:
         return (0, len(wanted)) if wanted.any() else None

@@ -40,17 +40,9 @@ class Loaded:
 
 
 class DenoiseModel(QObject):
-    """Follows what the recording says, loads the model in the background, and uses it.
+    """Follows the recording's choice, loads the model in the background, and uses it."""
 
-    Signals
-    -------
-    changed
-        Choice, model, or what is compared.
-    noted, failed : str
-        Sentences for the user.
-    """
-
-    changed = Signal()
+    changed = Signal()  # choice, model or comparison
     noted = Signal(str)
     failed = Signal(str)
 
@@ -168,10 +160,7 @@ class DenoiseModel(QObject):
     def use(self, path: Path | None) -> None:
         """Denoise this recording with a model file, or with none; can be undone.
 
-        Raises
-        ------
-        Sd2Error
-            When the file is no model.
+        Raises Sd2Error if the file is no model.
         """
         if self._document.recording is None:
             self.noted.emit("Open a recording first: a model is chosen for a recording.")
@@ -194,10 +183,7 @@ class DenoiseModel(QObject):
     def export(self, path: Path) -> None:
         """Write the denoised map on screen, computed again with its provenance.
 
-        Raises
-        ------
-        Sd2Error
-            When there is none yet.
+        Raises Sd2Error if there is none yet.
         """
         if self._loaded is None:
             raise Sd2Error("No model denoises this recording", "one", "Choose it under Model")

@@ -11,16 +11,9 @@ from sd2app.session.sensor import SensorModel
 
 
 class MapValidity(QObject):
-    """A map stays on screen until there is a better one, also when the sensor has moved on.
+    """Tells which maps are of the sensor's present place; only these two follow the sensor.
 
-    Parameters
-    ----------
-    synthetic, denoised : MapModel
-        Maps that follow the sensor; all others do not.
-
-    Signals
-    -------
-    changed
+    A map stays on screen until there is a better one, also when the sensor has moved on.
     """
 
     changed = Signal()

@@ -24,40 +24,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class FigureChoice:
-    """Content of a figure.
+    """Content of a figure."""
 
-    Parameters
-    ----------
-    left_out : frozenset of str
-        Titles of maps that are there and not shown.
-    whole : bool
-        The whole recording instead of the time window.
-    with_labels : bool
-    with_difference : bool
-        Where the difference to the radar is on screen.
-    """
-
-    left_out: frozenset[str] = frozenset()
-    whole: bool = False
+    left_out: frozenset[str] = frozenset()  # titles of hidden maps
+    whole: bool = False  # the whole recording instead of the time window
     with_labels: bool = True
-    with_difference: bool = True
+    with_difference: bool = True  # if the difference to the radar is on screen
 
 
 class FigureModel(DrawnFigure):
     """Draws the maps as they are when it is made.
 
-    Parameters
-    ----------
-    tracks : sequence of (MapModel, str)
-        From top to bottom, each with what is to be said beside its title; those without
-        a map are left out.
-    difference : DifferenceModel
-    levels : HeatmapLevels
-    labels : Labels
-    view_s, whole_s : (float, float)
-        The time window, and all of the recording.
-    about : dict
-        Goes into the file, fit for JSON; ``recording`` and ``simulated`` are its heading.
+    ``tracks`` are from top to bottom, each with a note beside its title; those without a map
+    are left out. ``view_s`` is the time window, ``whole_s`` all of the recording. ``about``
+    goes into the file and must fit into JSON; ``recording`` and ``simulated`` make its heading.
     """
 
     def __init__(

@@ -64,21 +64,11 @@ class FigurePreview(QWidget):
 
 
 class DrawnFigure(QObject):
-    """Draws in the background; the newest choice wins.
+    """Draws in the background; the newest choice wins."""
 
-    Signals
-    -------
-    changed
-        A choice, or whether it is being drawn.
-    drawn
-        Another preview.
-    written : Path
-        The file is there.
-    """
-
-    changed = Signal()
-    drawn = Signal()
-    written = Signal(object)
+    changed = Signal()  # a choice, or drawing began or ended
+    drawn = Signal()  # another preview
+    written = Signal(object)  # Path
 
     def __init__(self, name: str, parent: QObject | None = None) -> None:
         super().__init__(parent)

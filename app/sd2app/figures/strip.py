@@ -30,22 +30,12 @@ Way = Literal["spread", "around", "list"]
 
 @dataclass(frozen=True)
 class StripChoice:
-    """Frames and layout of a strip, as the user chose them.
+    """Frames and layout of a strip, as the user chose them."""
 
-    Parameters
-    ----------
-    way : str
-        Frames ``spread`` evenly, ``around`` the cursor, or a ``list``.
-    count, step : int
-        How many, and how many frames apart around the cursor.
-    text : str
-        The list, as on the command line.
-    """
-
-    way: Way = "spread"
+    way: Way = "spread"  # spread evenly, around the cursor, or a list
     count: int = 8
-    step: int = 5
-    text: str = "0:60:10"
+    step: int = 5  # in frames, around the cursor
+    text: str = "0:60:10"  # the list, as on the command line
 
 
 class StripModel(DrawnFigure):

@@ -19,16 +19,10 @@ _HEIGHT = 40
 
 
 class FitBar(QFrame):
-    """Hidden where there is nothing to say.
+    """Offer, progress and end of a fit; hidden otherwise.
 
-    Parameters
-    ----------
-    begin : callable
-        Asks for what a new fit needs.
-    open_result : callable
-        Opens the recording that a finished fit has made.
-    resume : callable
-        Continues what was stopped.
+    ``begin`` asks for what a new fit needs, ``open_result`` opens the recording of a finished
+    fit, ``resume`` continues a stopped one.
     """
 
     def __init__(

@@ -20,15 +20,9 @@ from sd2core.recording.recording import FILE_NAME, Recording, open_recording
 
 
 class FitResultImporter(QObject):
-    """Makes the recording as soon as its mesh is there.
+    """Makes the recording as soon as its mesh is there."""
 
-    Signals
-    -------
-    noted : str
-        What the fit had to say, once its recording is on screen.
-    """
-
-    noted = Signal(str)
+    noted = Signal(str)  # remarks of the fit, once its recording is on screen
 
     def __init__(
         self,
@@ -81,22 +75,10 @@ class FitResultImporter(QObject):
 def make_recording(
     request: FitRequest, size: tuple[int, int] | None, base: Recording | None
 ) -> Recording:
-    """Record video, mesh and camera.
+    """Record video, written mesh and camera of a request; ``size`` is (width, height) upright.
 
-    Parameters
-    ----------
-    request : FitRequest
-        Its mesh has been written.
-    size : (int, int), optional
-        Width and height of the upright picture, where it is known.
-    base : Recording, optional
-        What is open: where it is of the same video and has no mesh, its radar, labels
-        and sensor are taken along.
-
-    Raises
-    ------
-    Sd2Error, OSError
-        When the recording cannot be written.
+    ``base`` is the open recording: where it is of the same video and has no mesh, its radar,
+    labels and sensor are taken along. Raises Sd2Error or OSError if it cannot be written.
     """
     camera = camera_of(request, size)
     if (request.folder / FILE_NAME).exists():

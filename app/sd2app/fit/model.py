@@ -26,24 +26,12 @@ _CLOSING_S = 10.0
 
 
 class FitModel(QObject):
-    """At most one fit at a time; one that was stopped can be continued, also after a restart.
+    """At most one fit at a time; a stopped one can be continued, also after a restart."""
 
-    Signals
-    -------
-    changed
-        State, stage or count; at most ten times a second while running.
-    state_changed
-        The state alone.
-    advanced : int
-        Landmarks of this frame (and of some before) are there; as often.
-    finished : FitRequest
-        The mesh is written.
-    """
-
-    changed = Signal()
-    advanced = Signal(int)
-    finished = Signal(object)
-    state_changed = Signal()
+    changed = Signal()  # state, stage or count; at most ten times a second while running
+    advanced = Signal(int)  # landmarks of this frame (and some before) are there; as often
+    finished = Signal(object)  # FitRequest: the mesh is written
+    state_changed = Signal()  # the state alone
 
     def __init__(
         self,
@@ -107,12 +95,8 @@ class FitModel(QObject):
     def start(self, request: FitRequest) -> None:
         """Begin, or continue what was stopped in the same folder.
 
-        Raises
-        ------
-        Sd2Error
-            When a fit is under way, here or in another window, or the folder cannot be used.
-        OSError
-            When the folder cannot be written.
+        Raises Sd2Error if a fit is under way, here or in another window, or the folder cannot
+        be used; OSError if the folder cannot be written.
         """
         if self.busy:
             raise Sd2Error(

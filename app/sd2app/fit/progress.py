@@ -39,14 +39,9 @@ class Progressed:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Landmarks of one frame.
+    """Landmarks of one frame: shape (33, 3), x and y in pixels of the upright picture, visibility.
 
-    Parameters
-    ----------
-    frame : int
-    points : float32 array, shape (33, 3)
-        x and y in pixels of the upright picture, and visibility from 0 to 1; NaN
-        where there is nobody.
+    Visibility is from 0 to 1; NaN where there is no person.
     """
 
     frame: int

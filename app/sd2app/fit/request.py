@@ -34,30 +34,14 @@ class Person:
 
 @dataclass(frozen=True)
 class FitRequest:
-    """One body from one video.
-
-    Parameters
-    ----------
-    video : Path
-    folder : Path
-        The recording ``NAME.sd2``: to be made, or one of this video without a mesh.
-    stature_m : float, optional
-        How tall the person is; estimated by default.
-    focal_px : float, optional
-        Focal length in pixels of the upright picture; by default as the file says, or
-        the usual field of view.
-    person : Person, optional
-        Who is meant; by default who is seen best.
-    mesh_name : str
-        In ``folder``.
-    """
+    """One body from one video."""
 
     video: Path
-    folder: Path
-    stature_m: float | None = None
-    focal_px: float | None = None
-    person: Person | None = None
-    mesh_name: str = MESH_NAME
+    folder: Path  # the recording NAME.sd2: to be made, or one of this video without a mesh
+    stature_m: float | None = None  # None: estimated
+    focal_px: float | None = None  # upright picture; None: from the file, or usual field of view
+    person: Person | None = None  # None: the one seen best
+    mesh_name: str = MESH_NAME  # in the folder
 
     @property
     def mesh(self) -> Path:
@@ -152,10 +136,7 @@ def _request(folder: Path, content: dict[str, Any]) -> FitRequest | None:
 def settled(request: FitRequest) -> FitRequest:
     """The request with full paths, its folder a recording that can take the mesh.
 
-    Raises
-    ------
-    Sd2Error
-        When the folder cannot be made, or is a recording of something else.
+    Raises Sd2Error if the folder cannot be made, or is a recording of something else.
     """
     folder = plain_path(request.folder)
     if folder.suffix != SUFFIX:

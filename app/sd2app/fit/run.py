@@ -27,14 +27,7 @@ _PATIENCE_S = 3.0
 
 
 class FitRun(RunMonitor[CommandFolder]):
-    """A fit with its progress, its notes and the landmarks that it finds.
-
-    Parameters
-    ----------
-    folder : CommandFolder
-    landmarks : dict
-        By frame; filled further.
-    """
+    """A fit with its progress, its notes and the landmarks that it adds to the given dict."""
 
     stop_patience_s = _PATIENCE_S
 

@@ -26,17 +26,9 @@ _SMALLEST_PERSON = 0.02
 
 
 class FitSetupModel(QObject):
-    """The choices, and the picture they are made on.
+    """Choices for a fit, and the frame of the video on which the person is picked."""
 
-    Signals
-    -------
-    changed
-        Any choice, or whether the video is there.
-    picture_changed
-        Another frame of it.
-    """
-
-    changed = Signal()
+    changed = Signal()  # any choice, or the video's presence
     picture_changed = Signal()
 
     def __init__(self, parent: QObject | None = None) -> None:

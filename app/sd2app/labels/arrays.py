@@ -20,51 +20,27 @@ UNKNOWN_COLOUR = "#8a8f98"
 
 @dataclass(frozen=True, eq=False)
 class SpanColumns:
-    """Spans in view at some scale.
+    """Spans in view at some scale."""
 
-    Parameters
-    ----------
-    wide : int64 array
-        Rows of :class:`SpanArrays` that are wide enough for a box of their own, in order.
-    share : float32 array, shape (lanes, columns)
-        Share of a column covered by narrow spans, 0 to 1.
-    tone : int64 array, shape (lanes, columns)
-        Colour of those that cover most of it.
-    selected : bool array, shape (lanes, columns)
-        True where one of them is selected.
-    """
-
-    wide: NDArray[np.int64]
-    share: NDArray[np.float32]
-    tone: NDArray[np.int64]
-    selected: NDArray[np.bool_]
+    wide: NDArray[np.int64]  # rows of SpanArrays wide enough for a box of their own, in order
+    share: NDArray[np.float32]  # (lanes, columns): part of a column covered by narrow spans
+    tone: NDArray[np.int64]  # (lanes, columns): colour of those that cover most of it
+    selected: NDArray[np.bool_]  # (lanes, columns): True where one of them is selected
 
 
 @dataclass(frozen=True, eq=False)
 class SpanArrays:
-    """All spans, one row each, in the order of labels.
-
-    Parameters
-    ----------
-    spans : tuple of Span
-    starts_s, ends_s : float64 array, shape (n,)
-    ids, tracks, lanes, tones : int64 array, shape (n,)
-        Id, number of the track, lane within it, number of the colour.
-    lanes_of_track : tuple of int
-        Number of lanes of each track: more than one where spans overlap.
-    colours : tuple of str
-        ``#rrggbb``; the last is for labels outside the label set.
-    """
+    """All spans, one row each, in the order of labels."""
 
     spans: tuple[Span, ...]
     starts_s: NDArray[np.float64]
     ends_s: NDArray[np.float64]
     ids: NDArray[np.int64]
     tracks: NDArray[np.int64]
-    lanes: NDArray[np.int64]
-    tones: NDArray[np.int64]
-    lanes_of_track: tuple[int, ...]
-    colours: tuple[str, ...]
+    lanes: NDArray[np.int64]  # lane within the track
+    tones: NDArray[np.int64]  # number of the colour
+    lanes_of_track: tuple[int, ...]  # lanes per track: more than one where spans overlap
+    colours: tuple[str, ...]  # #rrggbb; the last is for labels outside the label set
 
     @classmethod
     def of(cls, labels: Labels) -> SpanArrays:
@@ -117,18 +93,10 @@ class SpanArrays:
         *,
         together: bool = False,
     ) -> SpanColumns:
-        """Compute what a time window shows in so many columns.
+        """Compute the content of a time window in a number of columns.
 
-        Parameters
-        ----------
-        columns : int
-            Number of columns.
-        wide_columns : float
-            Spans of this width get a box; narrower ones share columns.
-        chosen : int64 array
-            Rows of the selected spans.
-        together : bool
-            All tracks in one lane.
+        Spans at least ``wide_columns`` wide get a box; narrower ones share columns. ``chosen`` are
+        the rows of the selected spans. ``together`` puts all tracks in one lane.
         """
         view = self.within(start_s, end_s)
         per_s = columns / (end_s - start_s)

@@ -26,16 +26,9 @@ class LabelAutosave(QObject):
 
     One window edits; another is read-only and says why. A journal begins with the first edit.
     ``root`` is the recovery folder, shared by all windows.
-
-    Signals
-    -------
-    changed
-        Read-only state, offers or notes.
-    noted, failed : str
-        Sentences for the user.
     """
 
-    changed = Signal()
+    changed = Signal()  # read-only state, offers or notes
     noted = Signal(str)
     failed = Signal(str)
 

@@ -40,40 +40,19 @@ class Edge:
 
 @dataclass(frozen=True)
 class Column:
-    """One column.
-
-    Parameters
-    ----------
-    id, heading, tip : str
-    text : callable
-        Text of a cell.
-    order : callable
-        Sort key; ties stay in the order of time.
-    typed : callable, optional
-        Makes the edit of a typed text; without it the column is not editable.
-    listed : {"label", "track"}, optional
-        The cell is chosen from a list, for all selected spans.
-    wide : str
-        A text as wide as the column is at first.
-    number : bool
-        Aligned to the right.
-    hidden : bool
-        Hidden at first.
-    edge : Edge, optional
-        Edge that typing moves, in a column of times.
-    """
+    """One column of the table of spans."""
 
     id: str
     heading: str
     tip: str
     text: Callable[[Span, Timebase], str]
-    order: Callable[[Span], Any]
-    typed: Typed | None = None
-    listed: Literal["label", "track"] | None = None
-    wide: str = "000.000"
+    order: Callable[[Span], Any]  # sort key; ties stay in the order of time
+    typed: Typed | None = None  # makes the edit of a typed text; None: not editable
+    listed: Literal["label", "track"] | None = None  # chosen from a list, for all selected spans
+    wide: str = "000.000"  # a text as wide as the column is at first
     number: bool = False
-    hidden: bool = False
-    edge: Edge | None = None
+    hidden: bool = False  # at first
+    edge: Edge | None = None  # edge that typing moves, in a column of times
 
 
 _START = Edge("start", lambda text, _, base: typed_start(text, base))

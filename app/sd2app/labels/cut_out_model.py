@@ -35,19 +35,12 @@ class _Done(NamedTuple):
 
 
 class CutOutModel(QObject):
-    """Looks at the folder first; where it holds something else, the user decides.
+    """Cuts spans out into folders; asks first where a folder holds something else.
 
     ``maps`` are named by their files.
-
-    Signals
-    -------
-    asked : int, str
-        Number of folders that hold something else, and one of them; answered by :meth:`go_on` or
-        :meth:`give_up`.
-    noted, failed : str
     """
 
-    asked = Signal(int, str)
+    asked = Signal(int, str)  # number of occupied folders, one of them; answer: go_on or give_up
     noted = Signal(str)
     failed = Signal(str)
 

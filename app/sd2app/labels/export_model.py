@@ -30,17 +30,10 @@ class Written:
 
 
 class LabelExportModel(QObject):
-    """Computes the losses beforehand by writing to a temporary folder.
+    """Computes the losses beforehand by writing to a temporary folder."""
 
-    Signals
-    -------
-    changed
-        Format, losses or problem.
-    written : Written
-    """
-
-    changed = Signal()
-    written = Signal(object)
+    changed = Signal()  # format, losses or problem
+    written = Signal(object)  # Written
 
     def __init__(
         self,

@@ -26,15 +26,9 @@ def is_label_file(path: Path) -> bool:
 
 
 class LabelImportModel(QObject):
-    """Reads a file in the background, again when its format is chosen.
+    """Reads a file in the background, again when its format is chosen."""
 
-    Signals
-    -------
-    changed
-        Content, problem or choices.
-    """
-
-    changed = Signal()
+    changed = Signal()  # content, problem or choices
 
     def __init__(
         self, path: Path, labels: Labels, timebase: Timebase, parent: QObject | None = None

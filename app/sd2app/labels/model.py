@@ -26,21 +26,11 @@ class Mark:
 
 
 class LabelsModel(QObject):
-    """Current labels; only :class:`sd2app.labels.edits.LabelEdits` changes them.
+    """Current labels; only :class:`sd2app.labels.edits.LabelEdits` changes them."""
 
-    Signals
-    -------
-    changed
-        Spans, tracks or the label set.
-    selection_changed
-        Selected spans, or the track or label for new ones.
-    marks_changed
-        Marks in progress.
-    """
-
-    changed = Signal()
-    selection_changed = Signal()
-    marks_changed = Signal()
+    changed = Signal()  # spans, tracks or the label set
+    selection_changed = Signal()  # selected spans, or the track or label for new ones
+    marks_changed = Signal()  # marks in progress
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)

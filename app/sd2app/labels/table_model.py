@@ -43,15 +43,9 @@ class SpanFilter:
 
 
 class SpanTableModel(RecordTableModel[Span]):
-    """A row per span. Rows are moved rather than rebuilt, so that a view keeps its current span.
+    """A row per span. Rows are moved rather than rebuilt, so that a view keeps its current span."""
 
-    Signals
-    -------
-    noted : str
-        Reports a typed time that could not be reached.
-    """
-
-    noted = Signal(str)
+    noted = Signal(str)  # a typed time could not be reached
 
     def __init__(
         self,

@@ -19,17 +19,10 @@ class DifferenceModel(QObject):
     Counted and measured energies have no common unit, so each is taken relative to its
     own reference, as the heatmaps show it; what is below the faintest level shown counts
     as that level. On a linear scale it is the difference of shares of the references.
-
-    Signals
-    -------
-    changed
-        Its values.
-    state_changed
-        Whether there is one, or whether it is shown.
     """
 
-    changed = Signal()
-    state_changed = Signal()
+    changed = Signal()  # values
+    state_changed = Signal()  # existence or visibility
 
     def __init__(
         self,

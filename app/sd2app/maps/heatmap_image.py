@@ -31,22 +31,12 @@ def column_frames(
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """Frames of a map that share a pixel column.
+    """Frames of a map that share a pixel column."""
 
-    Parameters
-    ----------
-    filled : bool array, shape (columns,)
-        Columns with a frame.
-    begin, end : int
-        Frames that are in view, half-open.
-    starts : int64 array, shape (filled columns,)
-        First frame of every filled column, counted from ``begin``.
-    """
-
-    filled: NDArray[np.bool_]
-    begin: int
+    filled: NDArray[np.bool_]  # (columns,): True with a frame
+    begin: int  # frames in view, half-open
     end: int
-    starts: NDArray[np.int64]
+    starts: NDArray[np.int64]  # first frame of every filled column, counted from begin
 
     @classmethod
     def of(cls, track: MapModel, start_s: float, stop_s: float, columns: int) -> Columns:
@@ -79,15 +69,10 @@ class Columns:
 def shade_columns(
     track: MapModel, levels: HeatmapLevels, start_s: float, stop_s: float, columns: int
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Shades of the time window, and which columns have something to show.
+    """Shades of the time window, shape (bins, columns), and a mask of the filled columns.
 
     Where several frames share a column the strongest value is shown, so that a
     short gesture does not vanish when zoomed out.
-
-    Returns
-    -------
-    shades : float32 array, shape (bins, columns)
-    filled : bool array, shape (columns,)
     """
     values, filled = _strongest_columns(track, start_s, stop_s, columns)
     return track.shade(values, levels), filled

@@ -55,11 +55,6 @@ class SynthesisModel(QObject):
     background, the time window first; then a plan is chosen for the new
     place, applied if it is another, and at last one for the next drag. Any
     new move interrupts all of it. A map stays until it is replaced.
-
-    Signals
-    -------
-    painted : Part
-        A stretch came onto the map.
     """
 
     frame_changed = Signal()
@@ -67,7 +62,7 @@ class SynthesisModel(QObject):
     readout_changed = Signal()
     moving_changed = Signal()
     completed = Signal()
-    painted = Signal(object)
+    painted = Signal(object)  # Part that came onto the map
     failed = Signal(str)
 
     def __init__(
@@ -214,10 +209,7 @@ class SynthesisModel(QObject):
     def whole_map(self) -> DopplerMap:
         """Recompute the map on screen with its provenance, the plan included.
 
-        Raises
-        ------
-        Sd2Error
-            When it is not complete.
+        Raises Sd2Error if it is not complete.
         """
         if self._synthesizers is None or not self.complete:
             raise Sd2Error("The synthetic map is not complete yet", "a final map", "Wait for it")

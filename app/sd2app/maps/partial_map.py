@@ -26,20 +26,11 @@ View = tuple[int, int]
 
 @dataclass(eq=False)
 class PartialMap:
-    """Doppler map of which some frames are computed.
+    """Doppler map of which some frames are computed."""
 
-    Parameters
-    ----------
-    values : float32 array, shape (bins, T)
-    quality : uint8 array, shape (T,)
-        See :data:`FINAL`.
-    sensor : VirtualSensor or None
-        Placement that all of it is for.
-    """
-
-    values: NDArray[np.float32]
-    quality: NDArray[np.uint8]
-    sensor: VirtualSensor | None = None
+    values: NDArray[np.float32]  # (bins, T)
+    quality: NDArray[np.uint8]  # (T,), see FINAL
+    sensor: VirtualSensor | None = None  # placement that all of it is for
 
     @classmethod
     def blank(cls, bins: int, frames: int) -> PartialMap:

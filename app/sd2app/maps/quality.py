@@ -50,15 +50,10 @@ def preview_quality(
     dragging: InUse | None,
     moved_m: float,
 ) -> QualityLevel:
-    """For a moving sensor, and where nothing is known yet.
+    """Quality for a moving sensor, and where no frame is computed yet.
 
-    Parameters
-    ----------
-    plan : AccuracyPlan or None
-        In use at rest: its masks serve until one for dragging is known.
-    dragging : InUse or None
-    moved_m : float
-        From where masks for dragging were made.
+    ``plan`` is in use at rest: its masks serve until one for dragging is known. ``moved_m`` is
+    the distance from where masks for dragging were made.
     """
     synthesizer = synthesizers.ready(dragging.plan) if dragging is not None else None
     if dragging is not None and synthesizer is not None:
@@ -96,24 +91,12 @@ def final_words(synthesizers: SynthesizerCache, in_use: InUse | None) -> str:
 
 @dataclass(frozen=True, eq=False)
 class QualityLevel:
-    """Synthesizer and visibility with which frames are computed.
+    """Synthesizer and visibility with which frames are computed."""
 
-    Parameters
-    ----------
-    synthesizer : callable
-        Gives the synthesizer; the first call may take long.
-    quality : int
-        What the frames are worth.
-    words : str
-        The same for people.
-    visibility : str, optional
-        Otherwise that of the synthesizer's options.
-    """
-
-    synthesizer: Callable[[], Synthesizer]
-    quality: int
-    words: str
-    visibility: Visibility | None = None
+    synthesizer: Callable[[], Synthesizer]  # the first call may take long
+    quality: int  # rank of the computed frames
+    words: str  # the same for people
+    visibility: Visibility | None = None  # None: that of the synthesizer's options
 
 
 def compute_part(
@@ -151,24 +134,12 @@ def refine(
     *,
     only_view: bool = False,
 ) -> None:
-    """Raise the quality of every frame, what is in view first.
+    """Raise the quality of every frame: those in ``view`` first, those that follow, those before.
 
-    Parameters
-    ----------
-    quality : uint8 array, shape (T,)
-        What is known already; raised in place.
-    view : tuple of int
-        Frames on screen: these first, then those that follow, then those before.
-    rough : QualityLevel
-        For frames of which nothing is known.
-    final : QualityLevel, optional
-        What every frame ends as; None stops at rough ones.
-    vertices : int
-        How many the mesh has: decides how much is done at once.
-    emit : callable
-        Receives each :class:`Part`, and ``(done, total)`` frames; raises to stop.
-    only_view : bool
-        Leave the others for later.
+    ``quality``, shape (T,), is raised in place. ``rough`` is for frames without any value;
+    ``final`` is the last stage of every frame, None stops at rough ones. ``vertices``, the size
+    of the mesh, decides how much is done at once. ``emit`` receives each :class:`Part` and
+    ``(done, total)`` frames, and raises to stop. ``only_view`` leaves the other frames for later.
     """
     rough_size = max(AT_ONCE // vertices, 64)
     final_size = min(max(len(quality) // _EXACT_PARTS, 8), max(rough_size // 16, 8))

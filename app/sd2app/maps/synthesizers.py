@@ -20,23 +20,12 @@ _KEPT = 3
 
 
 class SynthesizerCache:
-    """Makes a synthesizer per plan where it is asked for, and keeps the newest.
+    """Makes a synthesizer per plan on demand, and keeps the newest.
 
     Those that count as many vertices share what is prepared, as far as they can.
-
-    Parameters
-    ----------
-    mesh : MeshSequence
-    options : SynthesisOptions
-        What no plan chooses.
-    ladder : Ladder
-        Makes synthesizers; decimating the mesh takes long.
-
-    Attributes
-    ----------
-    full : Synthesizer
-        On the full mesh with the options as they are, for what is said of single
-        vertices; also what works without a plan.
+    ``options`` are those that no plan chooses; ``ladder`` makes synthesizers, where decimating
+    the mesh takes long. ``full`` is the synthesizer on the full mesh with these options, for
+    readouts of single vertices and for use without a plan.
     """
 
     def __init__(self, mesh: MeshSequence, options: SynthesisOptions, ladder: Ladder) -> None:

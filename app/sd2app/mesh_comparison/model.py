@@ -44,15 +44,9 @@ class _Result:
 
 
 class ComparisonModel(QObject):
-    """Two meshes: number 0 is the recording's, number 1 the other.
+    """Two meshes: number 0 is the recording's, number 1 the other."""
 
-    Signals
-    -------
-    changed
-        Result, reference, joint, or whether it is being worked on.
-    """
-
-    changed = Signal()
+    changed = Signal()  # result, reference, joint, or computing began or ended
 
     def __init__(
         self,
@@ -271,10 +265,7 @@ def name_of(path: Path) -> str:
 def load_other(path: Path, recording: Recording, focal_px: float) -> MeshSequence:
     """Load the mesh of another recording, or a file placed by the video of this one.
 
-    Raises
-    ------
-    Sd2Error
-        When it cannot be read.
+    Raises Sd2Error if it cannot be read.
     """
     if is_recording(path):
         return open_recording(path).load_mesh()

@@ -36,25 +36,13 @@ class Margins:
 
 @dataclass(frozen=True)
 class EyePose:
-    """Pose of the virtual camera that looks at ``focus`` from ``distance_m``.
+    """Pose of the virtual camera that looks at ``focus`` from ``distance_m``."""
 
-    Parameters
-    ----------
-    focus : tuple of 3 floats
-        Point that the eye turns around, metres.
-    azimuth_deg, elevation_deg : float
-        Direction of view: azimuth to the right of +z, elevation above the horizon.
-    distance_m : float
-        From the eye to the focus.
-    angle_deg : float
-        Vertical opening angle.
-    """
-
-    focus: tuple[float, float, float] = (0.0, 0.0, 2.0)
-    azimuth_deg: float = 0.0
-    elevation_deg: float = 0.0
+    focus: tuple[float, float, float] = (0.0, 0.0, 2.0)  # point that the eye turns around, metres
+    azimuth_deg: float = 0.0  # to the right of +z
+    elevation_deg: float = 0.0  # above the horizon
     distance_m: float = 5.0
-    angle_deg: float = STANDARD_ANGLE_DEG
+    angle_deg: float = STANDARD_ANGLE_DEG  # vertical opening angle
 
     @cached_property
     def axes(self) -> tuple[Vector, Vector, Vector]:

@@ -15,22 +15,12 @@ _SAMPLED_VERTICES = 400
 
 @dataclass(frozen=True, eq=False)
 class Extent:
-    """Bounds of the body during the whole clip, from a few frames.
+    """Bounds of the body during the whole clip, from a few frames."""
 
-    Parameters
-    ----------
-    points_m : array, shape (n, 3)
-        A sample of vertices of several frames.
-    low_m, high_m : arrays, shape (3,)
-        Box around them.
-    floor_m : float
-        Height of the floor (y): where the feet are.
-    """
-
-    points_m: NDArray[np.float64]
-    low_m: NDArray[np.float64]
+    points_m: NDArray[np.float64]  # (n, 3): a sample of vertices of several frames
+    low_m: NDArray[np.float64]  # (3,), with high_m the box around them
     high_m: NDArray[np.float64]
-    floor_m: float
+    floor_m: float  # y of the floor: where the feet are
 
     @classmethod
     def of_points(cls, points: NDArray[np.floating], floor_m: float | None = None) -> Extent:

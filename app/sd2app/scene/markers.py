@@ -43,16 +43,10 @@ class Markers:
         range_m: NDArray[np.floating],
         beyond: NDArray[np.bool_] | None,
     ) -> None:
-        """Show other places.
+        """Show N other places, or none.
 
-        Parameters
-        ----------
-        sensors : tuple of VirtualSensor
-            N of them; none hides the markers.
-        range_m : array, shape (N,)
-            From the body, for the colours.
-        beyond : bool array, shape (N,), optional
-            Which ones a radar would see folded.
+        ``range_m``, shape (N,), is the distance from the body, for the colours; ``beyond``, shape
+        (N,), marks those that a radar would see folded.
         """
         self.positions_m = np.array([one.position_m for one in sensors]).reshape(-1, 3)
         self._directions = np.array([one.boresight for one in sensors]).reshape(-1, 3)

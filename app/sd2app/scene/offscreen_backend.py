@@ -149,10 +149,7 @@ class ImageBackend(QWidget):
 def _off_screen_window() -> vtkRenderWindow:
     """A render window that needs no screen.
 
-    Raises
-    ------
-    NoOpenGL
-        When no driver answers: rendering would end the program.
+    Raises NoOpenGL if no driver answers: rendering would end the program.
     """
     uses_egl = sys.platform.startswith("linux") and hasattr(opengl, "vtkEGLRenderWindow")
     with _quiet_vtk():

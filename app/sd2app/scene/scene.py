@@ -34,14 +34,9 @@ _NOTHING = Extent.of_points(np.array([[-0.4, -0.6, 1.8], [0.4, 1.1, 2.6]]))
 
 
 class Scene:
-    """Mesh, sensor, camera, ground and light.
+    """Mesh, sensor, camera, ground and light in an empty renderer.
 
     Nothing is rendered here: a backend calls :meth:`prepare` and renders.
-
-    Parameters
-    ----------
-    renderer : vtkRenderer
-        Empty; a plotter's ``renderer`` will do.
     """
 
     def __init__(self, renderer: vtkRenderer) -> None:
@@ -250,12 +245,8 @@ class Scene:
     def prepare(self, size_px: tuple[float, float], pixel_scale: float) -> None:
         """Bring everything up to date for the next rendering.
 
-        Parameters
-        ----------
-        size_px : tuple of 2 floats
-            Size of the widget in device-independent pixels.
-        pixel_scale : float
-            Pixels of the render window per device-independent pixel.
+        ``size_px`` is the widget's size in device-independent pixels, ``pixel_scale`` the pixels of
+        the render window per such pixel.
         """
         if self._stale_colours:
             self._colour_mesh()

@@ -45,14 +45,10 @@ class Ground:
 
 
 def cone(field_of_view_deg: float, sides: int = 48) -> tuple[NDArray, NDArray, NDArray]:
-    """Unit-length cone along +z with its apex at the origin.
+    """Points (sides + 1, 3), triangles (sides, 3) and wire segments (sides + 4, 2) of a cone.
 
-    Returns
-    -------
-    points (sides + 1, 3), triangles (sides, 3), wire segments (sides + 4, 2)
-        Point 0 is the apex. Rays that leave at the edge of the field of view
-        have length one, so a wide angle does not make a huge rim. The wire is
-        the rim and four ribs.
+    It is along +z with its apex, point 0, at the origin. Rays at the edge of the field of view
+    have length one, so a wide angle does not make a huge rim. The wire is the rim and four ribs.
     """
     half = math.radians(field_of_view_deg) / 2
     angle = np.arange(sides) * (2 * math.pi / sides)
@@ -111,12 +107,9 @@ def frustum(width: float = 4.0, height: float = 3.0, depth: float = 3.4) -> tupl
 def pyramids(
     positions: NDArray[np.floating], directions: NDArray[np.floating], length: float
 ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-    """Pyramids at N places whose tips point along N unit vectors.
+    """Points (5 N, 3) and triangles (6 N, 3) of pyramids whose tips point along N unit vectors.
 
-    Returns
-    -------
-    points (5 N, 3), triangles (6 N, 3)
-        Of each its tip first, then its base, in the middle of which the place is.
+    Each has its tip first, then its base, with the given position in the middle.
     """
     half = _PYRAMID_WIDTH * length / 2
     # As rotation_to, for all at once.

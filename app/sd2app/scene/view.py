@@ -47,14 +47,10 @@ _NOTCH = 120.0
 class SceneView(QWidget):
     """Mesh, sensor, camera and planned places; the sensor can be dragged, a place picked.
 
-    It changes no model: a drag goes to the three callables, a click on a place to the model of
-    placements, which makes it an edit, and what is on screen follows the models' signals.
-    Vertices and colours are fetched when the picture is drawn, so a hidden view costs nothing.
-
-    Parameters
-    ----------
-    begin_drag, drag, end_drag : callables
-        Receive a drag of the sensor; ``drag`` gets its position in metres.
+    It changes no model: a drag goes to the three callables (``drag`` gets the position in
+    metres), a click on a place to the model of placements, which makes it an edit, and what is
+    on screen follows the models' signals. Vertices and colours are fetched when the picture is
+    drawn, so a hidden view costs nothing.
     """
 
     def __init__(
@@ -350,12 +346,9 @@ class SceneView(QWidget):
 
 
 def make_backend(parent: QWidget) -> Backend:
-    """The way to draw that suits the machine, off-screen when the other one fails.
+    """Make the backend that suits the machine, off-screen when the other one fails.
 
-    Raises
-    ------
-    NoOpenGL
-        When neither works; its message is for the user.
+    Raises NoOpenGL, with a message for the user, if neither works.
     """
     try:
         if chosen_backend() == "gl":

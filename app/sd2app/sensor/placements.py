@@ -20,20 +20,11 @@ from sd2core.sensor import VelocityAxis, VirtualSensor
 
 @dataclass(frozen=True, eq=False)
 class Planned:
-    """The places of a plan around one body.
-
-    Parameters
-    ----------
-    places : tuple of Place
-    sensors : tuple of VirtualSensor
-        One per place.
-    coverage : SensorCoverage or None
-        What each sees; None while that is being found out.
-    """
+    """The places of a plan around one body, with a sensor per place."""
 
     places: tuple[Place, ...] = ()
     sensors: tuple[VirtualSensor, ...] = ()
-    coverage: SensorCoverage | None = None
+    coverage: SensorCoverage | None = None  # what each sees; None while it is computed
 
 
 class PlanEdits(Protocol):
@@ -58,24 +49,10 @@ class _Wish(NamedTuple):
 
 
 class PlacementsModel(QObject):
-    """Plan of the open recording; its placements are computed in the background.
+    """Plan of the open recording; its placements are computed in the background."""
 
-    Parameters
-    ----------
-    document, sensor, trade
-    edits : PlanEdits
-
-    Signals
-    -------
-    changed
-        Places, what is known of them, or their cost.
-    current_changed
-        The sensor is at another of them, or elsewhere.
-    failed : str
-    """
-
-    changed = Signal()
-    current_changed = Signal()
+    changed = Signal()  # places, their coverage or their cost
+    current_changed = Signal()  # the sensor is at another of them, or elsewhere
     failed = Signal(str)
 
     def __init__(

@@ -54,12 +54,8 @@ _NO_BODY = "There is no body in this recording to place sensors around."
 class PlacementsPage(QWidget):
     """A view of :class:`PlacementsModel`.
 
-    Parameters
-    ----------
-    placements : PlacementsModel
-    trade : AccuracyModel
-    take, export, batch : callable
-        Ask for a file with a plan; ask where to write one; set up a batch with it.
+    ``take`` asks for a file with a plan, ``export`` where to write one; ``batch`` sets up a
+    batch with it.
     """
 
     def __init__(

@@ -70,10 +70,8 @@ class Content:
 def recording_of(paths: Sequence[Path], base: Recording | None = None) -> Recording:
     """A recording made of the paths, added to those of ``base``.
 
-    Raises
-    ------
-    Sd2Error
-        When a path is of no known kind, two are of the same, or a recording is to be added.
+    Raises Sd2Error if a path is of no known kind, two are of the same, or a recording is to
+    be added.
     """
     kinds: dict[Kind, Path] = {}
     for path in paths:

@@ -14,18 +14,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class DenoiserChoice:
-    """A file, a model that comes with the program, no model, or nothing said.
+    """A file, a bundled model, no model, or no choice."""
 
-    Parameters
-    ----------
-    path : Path or None
-        Model file.
-    bundled : str or None
-        Name of a model that comes with the program; empty for none at all.
-    """
-
-    path: Path | None = None
-    bundled: str | None = None
+    path: Path | None = None  # model file
+    bundled: str | None = None  # name of a model that comes with the program; empty for none at all
 
     @classmethod
     def of(cls, recording: Recording | None) -> DenoiserChoice:

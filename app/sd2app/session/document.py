@@ -31,23 +31,11 @@ if TYPE_CHECKING:
 
 
 class DocumentModel(QObject):
-    """One recording, its parts, and the history of its edits.
+    """One recording, its parts, and the history of its edits."""
 
-    Signals
-    -------
-    opened
-        Another recording (or none) is there now.
-    changed
-        Something in it or its place on disk changed.
-    saved
-        It is on disk with all edits, maybe in another place than before.
-    noted, failed : str
-        Sentences for the user.
-    """
-
-    opened = Signal()
-    changed = Signal()
-    saved = Signal()
+    opened = Signal()  # another recording, or none
+    changed = Signal()  # something in it, or its place on disk
+    saved = Signal()  # on disk with all edits, maybe in another place than before
     noted = Signal(str)
     failed = Signal(str)
 
@@ -276,13 +264,7 @@ class DocumentModel(QObject):
     # --- saving ---------------------------------------------------------------------------
 
     def save(self) -> None:
-        """Write the recording where it came from.
-
-        Raises
-        ------
-        Sd2Error, OSError
-            When the folder cannot be written.
-        """
+        """Write the recording where it came from; Sd2Error or OSError if that fails."""
         if self._content is not None and self._content.saved:
             self._content.recording.save(self._content.timebase)
             self._tell_saved()
@@ -310,13 +292,7 @@ class DocumentModel(QObject):
         return relinked
 
     def read_labels_again(self) -> None:
-        """Take over what another program has made of the labels meanwhile.
-
-        Raises
-        ------
-        Sd2Error
-            When their file is damaged.
-        """
+        """Take over labels that another program has written; Sd2Error if the file is damaged."""
         if self._content is not None and self._content.saved:
             self._content.recording.read_labels_again()
 

@@ -195,12 +195,8 @@ class MapModel(QObject):
 
         Where nothing shows, being fainter than the faintest level, those that may well
         show after all: whose deviation is a tenth of the highest level.
-        Deviations are those of :meth:`CellUncertainty.deviation`.
-
-        Returns
-        -------
-        bool array, shape (bins, stop - start), or None
-            None where nothing is known of uncertainty.
+        Deviations are those of :meth:`CellUncertainty.deviation`. The shape is
+        (bins, stop - start); None if no uncertainty is known.
         """
         if self._map is None or self._uncertainty is None:
             return None

@@ -26,20 +26,10 @@ class SuggestionsModel(QObject):
 
     Another threshold takes the place of the step before as long as nothing else was done, so
     that trying thresholds is one step. What was rejected does not come again while the
-    recording is open.
-
-    Parameters
-    ----------
-    finders : sequence of SpanFinder
-        The first one is used unless another is asked for.
-
-    Signals
-    -------
-    changed
-        Whether suggestions are asked for, how many there are, what they are made of.
+    recording is open. The first of ``finders`` is the default.
     """
 
-    changed = Signal()
+    changed = Signal()  # use of suggestions, their number, or their source
 
     def __init__(
         self,

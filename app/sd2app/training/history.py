@@ -18,39 +18,21 @@ _MOST_STEPS = 2000
 
 @dataclass(frozen=True)
 class StepPoint:
-    """Error on the batches up to a step.
+    """Error on the batches up to a step."""
 
-    Parameters
-    ----------
-    at : float
-        In epochs: 1.5 is the middle of the second.
-    train_rmse : float
-    """
-
-    at: float
+    at: float  # in epochs: 1.5 is the middle of the second
     train_rmse: float
 
 
 @dataclass(frozen=True)
 class EpochPoint:
-    """Errors after an epoch; NaN what was not told.
+    """Errors after an epoch; NaN if not reported."""
 
-    Parameters
-    ----------
-    epoch : int
-        From 1.
-    train_rmse, validation_rmse : float
-    validation_mae_mps : float
-        Of the peak velocity per frame.
-    best : bool
-        Whether it was better than all before.
-    """
-
-    epoch: int
+    epoch: int  # from 1
     train_rmse: float
     validation_rmse: float
-    validation_mae_mps: float
-    best: bool
+    validation_mae_mps: float  # of the peak velocity per frame
+    best: bool  # better than all before
 
 
 class TrainingHistory:

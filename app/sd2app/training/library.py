@@ -17,13 +17,7 @@ from sd2core.train.folder import RunStatus, TrainingFolder, runs_in
 
 @dataclass(frozen=True)
 class KnownRun:
-    """One run, as it was found.
-
-    Parameters
-    ----------
-    path : Path
-    status : RunStatus
-    """
+    """A run found in the folder."""
 
     path: Path
     status: RunStatus
@@ -49,18 +43,10 @@ def user_runs_folder() -> Path:
 
 
 class TrainingLibrary(QObject):
-    """Looks through a folder in the background; the newest run comes first.
+    """Looks through a folder in the background; the newest run comes first."""
 
-    Signals
-    -------
-    changed
-        Other runs, or one stands otherwise.
-    refreshed
-        It has looked again.
-    """
-
-    changed = Signal()
-    refreshed = Signal()
+    changed = Signal()  # other runs, or another state of one
+    refreshed = Signal()  # the folder has been read again
 
     def __init__(self, folder: Path, parent: QObject | None = None) -> None:
         super().__init__(parent)

@@ -36,26 +36,12 @@ _LIBRARY_MS = 3000
 class TrainingModel(QObject):
     """One run in view, the others in a list; one that the window started at a time.
 
-    Parameters
-    ----------
-    settings : Settings
-    command, timing_command : sequence of str
-        What runs ``sd2`` commands, and what times a step.
-    folder : Path, optional
-        Where runs are; by default as the settings say, or the user's data directory.
-
-    Signals
-    -------
-    changed
-        Anything that is shown.
-    phase_changed
-        How the run in view stands, or another one is in view.
-    noted, failed : str
-        Sentences for the user.
+    ``command`` runs ``sd2`` commands, ``timing_command`` times a step. ``folder`` holds the
+    runs; by default as the settings say, or in the user's data directory.
     """
 
     changed = Signal()
-    phase_changed = Signal()
+    phase_changed = Signal()  # phase of the run in view, or another run is in view
     noted = Signal(str)
     failed = Signal(str)
 
@@ -149,13 +135,7 @@ class TrainingModel(QObject):
 
     @property
     def command(self) -> str:
-        """Command for a terminal that does what is set up.
-
-        Raises
-        ------
-        Sd2Error
-            When it cannot be started.
-        """
+        """Command for a terminal that does what is set up; Sd2Error if it cannot be started."""
         config = self.setup.config
         return quoted(train_arguments(config, Path(new_run_folder(Path(), config).name)))
 
@@ -188,26 +168,12 @@ class TrainingModel(QObject):
             self._follow(TrainingMonitor(path, self))
 
     def open_run(self, path: Path) -> None:
-        """Show a run that lies elsewhere.
-
-        Raises
-        ------
-        Sd2Error
-            When there is none.
-        """
+        """Show a run of another folder; Sd2Error if there is none."""
         TrainingFolder(path).state()
         self.select(path)
 
     def start(self) -> None:
-        """Begin as it is set up.
-
-        Raises
-        ------
-        Sd2Error
-            When it cannot be started.
-        OSError
-            When the folder of the runs cannot be made.
-        """
+        """Begin as set up; Sd2Error if it cannot start, OSError if its folder cannot be made."""
         if self.why_not_start:
             raise Sd2Error(self.why_not_start)
         config = self.setup.config

@@ -17,28 +17,14 @@ COMMAND = (sys.executable, "-u", "-m", "sd2app.background.run_command")
 
 
 class PairMaker(QObject):
-    """Runs ``sd2 pairs recordings`` once at a time.
+    """Runs ``sd2 pairs recordings`` once at a time, with ``command``.
 
-    Parameters
-    ----------
-    folder : Path
-        Where pairs are kept; made when it is not there.
-    command : sequence of str
-        What runs ``sd2`` commands.
-
-    Signals
-    -------
-    changed
-        Something is being made, or no longer.
-    made : Path
-        A store is ready.
-    failed : str
-        Why there is none.
+    Pairs are kept in ``folder``, which is made on demand.
     """
 
-    changed = Signal()
-    made = Signal(object)
-    failed = Signal(str)
+    changed = Signal()  # making pairs began or ended
+    made = Signal(object)  # path of a finished store
+    failed = Signal(str)  # why there is none
 
     def __init__(
         self,
@@ -66,12 +52,8 @@ class PairMaker(QObject):
     def make(self, place: Path) -> None:
         """Make pairs of a recording, or of all recordings in a folder.
 
-        Raises
-        ------
-        Sd2Error
-            When there is none with a mesh and a radar capture, or some are being made.
-        OSError
-            When the folder cannot be read, or that of the pairs not be made.
+        Raises Sd2Error if there is none with a mesh and a radar capture, or some are being made;
+        OSError if the folder cannot be read, or that of the pairs not be made.
         """
         if self._out is not None:
             raise Sd2Error(
@@ -121,10 +103,7 @@ class PairMaker(QObject):
 def usable_recordings(place: Path) -> list[Path]:
     """The recording itself, or those in a folder that have a mesh and a radar capture.
 
-    Raises
-    ------
-    Sd2Error
-        When there is none.
+    Raises Sd2Error if there is none.
     """
     folders = [place] if is_recording(place) else sorted(place.iterdir())
     found = []

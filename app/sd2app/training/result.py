@@ -47,25 +47,11 @@ class Denoising(Protocol):
 class ModelAdoption(QObject):
     """Keeps the best model of a run among the user's models, and denoises with it.
 
-    Parameters
-    ----------
-    training : TrainingModel
-    denoise : Denoising
-    plain, before, now, radar : MapModel
-        The synthetic map, that denoised by the model before, by the model in use, and
-        the radar's.
-    models : callable
-        Folder of the user's models.
-
-    Signals
-    -------
-    changed
-        What is in use, or what it gains.
-    noted, failed : str
-        Sentences for the user.
+    ``plain`` is the synthetic map, ``before`` and ``now`` are that map denoised by the previous
+    model and by the model in use. ``models`` gives the folder of the user's models.
     """
 
-    changed = Signal()
+    changed = Signal()  # the model in use, or its gain
     noted = Signal(str)
     failed = Signal(str)
 

@@ -49,14 +49,7 @@ _BUTTONS: dict[Phase, tuple[str, ...]] = {
 class TrainingRunView(QWidget):
     """A view of :class:`TrainingMonitor`.
 
-    Parameters
-    ----------
-    training : TrainingModel
-    display : DisplayModel
-    use, resume, delete : callable
-        They may ask first, or be refused.
-    gain : QWidget, optional
-        Put under the buttons.
+    The callables may ask first, or be refused. ``gain`` is put under the buttons.
     """
 
     def __init__(

@@ -39,39 +39,20 @@ _DEFAULTS: dict[str, str | int | float] = {
 
 @dataclass(frozen=True)
 class Store:
-    """A store of pairs that was chosen.
-
-    Parameters
-    ----------
-    path : Path
-    facts : PairFacts or None
-        None while it is being read, and where it cannot be.
-    problem : str
-        Why it cannot be used.
-    """
+    """A chosen store of pairs."""
 
     path: Path
-    facts: PairFacts | None = None
-    problem: str = ""
+    facts: PairFacts | None = None  # None until it has been read, and if it cannot be
+    problem: str = ""  # why it cannot be used
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """Estimated time of a run, and its source.
+    """Estimated time of a run, and its source."""
 
-    Parameters
-    ----------
-    segments : int
-        To learn from, once per epoch.
-    steps_per_epoch : int
-    step : StepTime or None
-        None until a step has been timed.
-    seconds : float or None
-    """
-
-    segments: int
+    segments: int  # training segments per epoch
     steps_per_epoch: int
-    step: StepTime | None
+    step: StepTime | None  # None until a step has been timed
     seconds: float | None
 
 
@@ -123,13 +104,7 @@ class TrainingSetupModel(QObject):
         return bool(self._values.others.keys() - {"model"})
 
     def set_value(self, name: str, value: Any) -> None:
-        """Choose a setting.
-
-        Raises
-        ------
-        KeyError
-            When there is no such setting.
-        """
+        """Choose a setting; KeyError if there is no such setting."""
         if self._values.set(name, value):
             self.changed.emit()
 
@@ -194,13 +169,7 @@ class TrainingSetupModel(QObject):
 
     @property
     def config(self) -> TrainConfig:
-        """Configuration in the form that the library takes.
-
-        Raises
-        ------
-        Sd2Error
-            When it cannot be started.
-        """
+        """Configuration in the form that the library takes; Sd2Error if it cannot be started."""
         if self.problem:
             raise Sd2Error(self.problem)
         values = self._values

@@ -51,12 +51,8 @@ _MORE = (
 class TrainingSetupView(QWidget):
     """A form over :class:`TrainingSetupModel`.
 
-    Parameters
-    ----------
-    training : TrainingModel
-    ask_store, ask_recordings : callable
-        Let the user choose a store of pairs, or recordings to make one of.
-    start, copy_command : callable
+    ``ask_store`` lets the user choose a store of pairs, ``ask_recordings`` recordings to make
+    one from.
     """
 
     def __init__(

@@ -48,17 +48,10 @@ _BONES = bones()
 def draw_landmarks(
     painter: QPainter, points: NDArray[np.float32], box: QRectF, size: tuple[int, int]
 ) -> None:
-    """Draw a skeleton: the person's left blue, their right orange, what is hidden faint.
+    """Draw a skeleton: the person's left blue, their right orange, hidden landmarks faint.
 
-    Parameters
-    ----------
-    painter : QPainter
-    points : float32 array, shape (33, 3)
-        x, y in pixels of the picture and visibility from 0 to 1.
-    box : QRectF
-        Where the picture is on the widget.
-    size : (int, int)
-        Width and height of the picture.
+    ``points``, shape (33, 3), holds x and y in pixels of the picture and visibility from 0 to 1.
+    The picture of ``size`` (width, height) fills ``box`` on the widget.
     """
     scale = box.width() / size[0], box.height() / size[1]
     places = [QPointF(box.x() + x * scale[0], box.y() + y * scale[1]) for x, y, _ in points]

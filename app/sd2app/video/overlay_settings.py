@@ -11,20 +11,11 @@ from sd2app.settings import Settings
 
 @dataclass(frozen=True)
 class OverlayStyle:
-    """Style of the mesh over the video.
-
-    Parameters
-    ----------
-    shown : bool
-    opacity : float
-        From 0 (nothing to be seen) to 1 (it hides the person).
-    as_dots : bool
-        Vertices instead of the surface.
-    """
+    """Style of the mesh over the video."""
 
     shown: bool = True
-    opacity: float = 0.5
-    as_dots: bool = False
+    opacity: float = 0.5  # from 0 (invisible) to 1 (it hides the person)
+    as_dots: bool = False  # vertices instead of the surface
 
 
 class OverlayModel(QObject):

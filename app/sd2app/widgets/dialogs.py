@@ -21,14 +21,7 @@ def may_delete(parent: QWidget, title: str, what: str) -> bool:
 
 
 class ExportButtons(QDialogButtonBox):
-    """Export… asks where to, and Cancel ends the dialog.
-
-    Parameters
-    ----------
-    dialog : QDialog
-    ask : callable
-        Where to; called when the first is pressed.
-    """
+    """Buttons Export…, which calls ``ask`` for a destination, and Cancel, which ends the dialog."""
 
     def __init__(self, dialog: QDialog, ask: Callable[[], None]) -> None:
         super().__init__(QDialogButtonBox.StandardButton.Cancel, dialog)

@@ -171,20 +171,13 @@ class SearchLine(QLineEdit):
 
 
 class TypedLine(QLineEdit):
-    """Says what is typed while it is typed; Escape takes it back.
+    """Reports each change of the typed text; Escape takes it back.
 
     Return and Escape give the keyboard back to the window.
-
-    Signals
-    -------
-    typed : str
-        What it holds now.
-    ended
-        The keyboard is elsewhere again.
     """
 
     typed = Signal(str)
-    ended = Signal()
+    ended = Signal()  # the keyboard is elsewhere again
 
     def __init__(self, name: str, tip: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)

@@ -23,19 +23,9 @@ def draw_mesh(
 ) -> None:
     """Draw a mesh over a picture that is on the screen already.
 
-    Parameters
-    ----------
-    painter : QPainter
-    box : QRectF
-        Where the camera's whole picture is.
-    vertices_m : float array, shape (V, 3)
-        Metres in the camera's frame.
-    faces : int32 array, shape (F, 3), or None
-        Dots where there are none, and while the kernels are being compiled.
-    camera : PinholeCamera
-    colour : QColor
-    opacity : float
-        From 0 to 1.
+    ``box`` is the place of the camera's whole picture. ``vertices_m``, shape (V, 3), are in the
+    camera's frame; without ``faces``, shape (F, 3), and while the kernels are being compiled,
+    they are drawn as dots. ``opacity`` is from 0 to 1.
     """
     if box.width() < 1 or box.height() < 1:
         return

@@ -31,21 +31,11 @@ class Face(NamedTuple):
 
 
 class Chooser(Protocol):
-    """Models to choose from, as texts.
+    """Models to choose from, as texts."""
 
-    Attributes
-    ----------
-    title : str
-        Of the menu.
-    role : str
-        What a model does, for screen readers.
-    none_tip : str
-        What becomes of it without a model.
-    """
-
-    title: str
-    role: str
-    none_tip: str
+    title: str  # of the menu
+    role: str  # purpose of a model, for screen readers
+    none_tip: str  # effect of using no model
 
     @property
     def changed(self) -> SignalInstance:

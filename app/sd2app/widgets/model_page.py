@@ -14,23 +14,12 @@ _UNITS = {"mps": "m/s", "db": "dB", "s": "s", "hz": "Hz"}
 
 
 class ModelPage(NamedTuple):
-    """Facts of a model file, as rows of a page.
-
-    Parameters
-    ----------
-    title : str
-    simulated : bool
-        Whether no real radar was there when it learned.
-    rows : list of tuple
-        Facts, a name and a text each.
-    sections : list of tuple
-        What its makers say, by heading.
-    """
+    """Facts of a model file, as rows of a page."""
 
     title: str
-    simulated: bool
-    rows: list[tuple[str, str]]
-    sections: list[tuple[str, list[tuple[str, str]]]]
+    simulated: bool  # learned without a real radar
+    rows: list[tuple[str, str]]  # name and text of each fact
+    sections: list[tuple[str, list[tuple[str, str]]]]  # what its makers say, by heading
 
 
 def map_and_file_rows(

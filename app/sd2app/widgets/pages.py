@@ -26,21 +26,9 @@ class InnerPage(NamedTuple):
 
 
 class InnerPages(QWidget):
-    """Buttons on top, the page below.
+    """Buttons on top, the page below; ``beside`` is put to the right of the buttons."""
 
-    Parameters
-    ----------
-    pages : sequence of InnerPage
-    beside : QWidget, optional
-        Put to the right of the buttons.
-
-    Signals
-    -------
-    turned : int
-        Number of the page that is shown now.
-    """
-
-    turned = Signal(int)
+    turned = Signal(int)  # number of the page that is shown now
 
     def __init__(
         self,

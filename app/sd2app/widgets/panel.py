@@ -104,11 +104,8 @@ def side_by_side(*widgets: QWidget, spacing_px: int = 8) -> QHBoxLayout:
 class FactRows(QWidget):
     """Rows of a name and a value, as many as there are facts, up to ``most``.
 
-    Parameters
-    ----------
-    most : int
-    at_the_edge : bool
-        Values stand at the right edge and long names wrap, instead of values following names.
+    ``at_the_edge``: values stand at the right edge and long names wrap, instead of values
+    following names.
     """
 
     def __init__(self, most: int, at_the_edge: bool, parent: QWidget | None = None) -> None:

@@ -83,15 +83,10 @@ def tick_text(value: float) -> str:
 
 
 class PointPlot(QWidget):
-    """Axes, the point that is pointed at, and who has the keyboard.
+    """Base of plots of points with axes, a point under the pointer and a keyboard focus.
 
     A plot says what its points are, where they stand and what they mean, and draws them.
-
-    Parameters
-    ----------
-    display : Themed
-    name : str
-        What a screen reader calls it.
+    ``name`` is for screen readers.
     """
 
     MARGINS_PX: ClassVar[tuple[int, int, int, int]]

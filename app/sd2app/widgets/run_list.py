@@ -29,19 +29,11 @@ class Runs(Protocol):
 
 
 class RunPanel(QWidget):
-    """The list of runs on top, below it the one in view, or what a new one is to be.
+    """The list of runs on top; below it the run in view, or the setup of a new one.
 
-    Parameters
-    ----------
-    runs : Runs
-    known : callable
-        Path and title of every run, the newest first.
-    here : callable
-        Path of the run in view; None while a new one is being set up.
-    tip : str
-        What is in the list.
-    open_other : callable, optional
-        Lets the user choose a run that lies elsewhere.
+    ``known`` gives path and title of every run, the newest first; ``here`` the path of the run in
+    view, None while a new one is being set up. ``tip`` describes the list. ``open_other`` lets the
+    user choose a run of another folder.
     """
 
     def __init__(
@@ -96,16 +88,10 @@ class RunPanel(QWidget):
 
 
 class RunChoice(Choice):
-    """Runs by their titles.
+    """List of runs by their titles, described by ``tip``.
 
-    Parameters
-    ----------
-    tip : str
-        What is in the list.
-    select : callable
-        Shows a run, or None for a new one.
-    open_other : callable, optional
-        Lets the user choose a run that lies elsewhere.
+    ``select`` shows a run, or None for a new one; ``open_other`` lets the user choose a run of
+    another folder.
     """
 
     def __init__(

@@ -36,19 +36,10 @@ _Move = QAbstractItemView.CursorAction
 
 
 class Choosable(NamedTuple):
-    """One entry of a list in a cell.
+    """One entry of a list in a cell."""
 
-    Parameters
-    ----------
-    text : str
-        What it says.
-    value : str
-        What the model is given.
-    icon : QIcon, optional
-    """
-
-    text: str
-    value: str
+    text: str  # shown to the user
+    value: str  # passed to the model
     icon: QIcon | None = None
 
 

@@ -32,12 +32,8 @@ COMMAND = (sys.executable, "-m", "sd2app.background.model_worker.server")
 class ModelProcess:
     """Started with the first model and again when it dies; one request at a time.
 
-    Its methods wait for the answer: they belong into background threads.
-
-    Attributes
-    ----------
-    generation : int
-        How often it was started: a new one knows nothing of what the others had loaded.
+    Its methods wait for the answer: they belong into background threads. ``generation``
+    counts the starts: a new process has none of the models that earlier ones had loaded.
     """
 
     def __init__(self, command: Sequence[str] = COMMAND) -> None:
@@ -53,33 +49,15 @@ class ModelProcess:
         return self._process is not None and self._process.poll() is None
 
     def load(self, path: Path) -> RemoteDenoiser:
-        """Load a model; the first one takes as long as loading torch.
-
-        Raises
-        ------
-        Sd2Error
-            When it cannot be loaded.
-        """
+        """Load a model, or raise Sd2Error; the first one takes as long as loading torch."""
         return RemoteDenoiser(self, path)
 
     def load_classifier(self, path: Path) -> RemoteClassifier:
-        """Load a classifier; it works beside the denoisers.
-
-        Raises
-        ------
-        Sd2Error
-            When it cannot be loaded.
-        """
+        """Load a classifier beside the denoisers, or raise Sd2Error."""
         return RemoteClassifier(self, path)
 
     def ask(self, content: dict[str, Any], numbers: bytes = b"") -> Message:
-        """Ask, and wait for the answer.
-
-        Raises
-        ------
-        Sd2Error
-            What the other side says, or that it is gone.
-        """
+        """Ask and wait for the answer; Sd2Error is what the process reports, or that it is gone."""
         with self._lock:
             process = self._started()
             assert process.stdin is not None
