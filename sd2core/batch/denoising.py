@@ -30,16 +30,9 @@ _kept = _Kept()
 
 
 def denoise(maps: Sequence[Path], model: str, digest: str, outs: Sequence[Path]) -> None:
-    """Denoise a map and write it.
+    """Denoise a map, given in parts in order, and write one file per part, in order.
 
-    Parameters
-    ----------
-    maps : sequence of Path
-        The stretches of the map, in order.
-    model, digest : str
-        Its file, and the hash of that.
-    outs : sequence of Path
-        One per stretch; written in order.
+    ``digest`` is the hash of the model's file.
     """
     trained = _model(model, digest)
     outs[0].parent.mkdir(parents=True, exist_ok=True)

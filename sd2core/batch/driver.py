@@ -61,16 +61,10 @@ class Driver:
     """One run over all tasks of a graph.
 
     The pool (Dask) queues, distributes, and repeats what a lost worker had; here it is
-    decided what is submitted next, and outcomes are counted.
-
-    Parameters
-    ----------
-    open_pool : callable
-        Called when the first task is to be done.
-    on_failure, on_note : callable
-        Receive every failure, and every sentence for the user.
-    tick : callable
-        Called several times a second; may raise :class:`Stopped`.
+    decided what is submitted next, and outcomes are counted. The pool is opened for the
+    first task that is to be done. ``on_failure`` and ``on_note`` receive every failure, and
+    every sentence for the user; ``tick`` is called several times a second and may raise
+    :class:`Stopped`.
     """
 
     def __init__(

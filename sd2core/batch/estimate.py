@@ -67,31 +67,15 @@ class TaskRate:
 
 @dataclass
 class StepEstimate:
-    """Estimate of one step.
+    """Estimate of one step."""
 
-    Parameters
-    ----------
-    there, to_do : int
-        Tasks that are done already, and that are not.
-    frames : int
-        Frames of the tasks to do.
-    seconds : float
-        Time of one process for the tasks to do.
-    bytes : int
-        Size of their results.
-    basis : str
-        Origin of the seconds, in words.
-    assumed : bool
-        True where the rate is of another machine.
-    """
-
-    there: int = 0
+    there: int = 0  # tasks that are done already
     to_do: int = 0
-    frames: int = 0
-    seconds: float = 0.0
-    bytes: int = 0
-    basis: str = ""
-    assumed: bool = False
+    frames: int = 0  # of the tasks to do
+    seconds: float = 0.0  # of one process for the tasks to do
+    bytes: int = 0  # of their results
+    basis: str = ""  # origin of the seconds, in words
+    assumed: bool = False  # True if the rate is of another machine
 
     def add(self, rate: TaskRate, frames: int, tasks: int) -> None:
         """Add so many tasks with so many frames altogether."""
@@ -109,24 +93,13 @@ class StepEstimate:
 
 @dataclass
 class BatchEstimate:
-    """Estimate of a whole batch.
-
-    Parameters
-    ----------
-    recordings : int
-    looked_at : int
-        Recordings that were inspected; the others are assumed to be alike.
-    workers : int
-    steps : dict
-    unusable : list of str
-        Inspected recordings that cannot be used, each with its reason.
-    """
+    """Estimate of a whole batch."""
 
     recordings: int
-    looked_at: int
+    looked_at: int  # inspected; the others are assumed to be alike
     workers: int
     steps: dict[str, StepEstimate]
-    unusable: list[str] = field(default_factory=list)
+    unusable: list[str] = field(default_factory=list)  # inspected recordings, each with its reason
 
     @property
     def hours(self) -> float:
@@ -154,12 +127,8 @@ class BatchEstimate:
 def estimate(plan: BatchPlan, workers: int, progress: Progress = silent) -> BatchEstimate:
     """Inspect some recordings, time their tasks on few frames, and add up.
 
-    Writes temporary files only. Results that are there add no seconds and bytes.
-
-    Raises
-    ------
-    Sd2Error
-        When the plan cannot be followed at all.
+    Writes temporary files only. Results that are there add no seconds and bytes. Raises
+    Sd2Error if the plan cannot be followed at all.
     """
     folder = BatchFolder(Path(plan.out))
     origins = find_origins(plan.recordings, folder.path)
@@ -321,20 +290,10 @@ def _sample(found: Sequence[Inspection]) -> list[Inspection]:
 
 
 def task_rates(graph: TaskGraph, found: Inspection) -> dict[str, TaskRate]:
-    """Time maps of a few frames of a mesh.
+    """Time maps of a few frames of a mesh, for a plan that synthesises.
 
-    Parameters
-    ----------
-    graph : TaskGraph
-        Its plan synthesises.
-    found : Inspection
-        With a mesh.
-
-    Returns
-    -------
-    dict
-        ``synthesise``, ``denoise`` and ``simulate`` per task, and ``open``, once per
-        recording.
+    Keys are ``synthesise``, ``denoise`` and ``simulate`` per task, and ``open``, once per
+    recording.
     """
     from sd2core.batch.denoising import denoise
 
@@ -438,14 +397,7 @@ def _seconds(work: Callable[[], Any]) -> float:
 def export_s(plan: BatchPlan, frames: int, kinds: tuple[MapKind, ...]) -> float:
     """Measure the seconds that a source of a data set takes to write; radar files not included.
 
-    Parameters
-    ----------
-    plan : BatchPlan
-        With a section ``[export]``.
-    frames : int
-        Length of a source.
-    kinds : tuple of str
-        Kinds of maps that the batch makes.
+    ``frames`` is the length of a source, ``kinds`` those of the maps that the batch makes.
     """
     from sd2core.batch.exporting import export_dataset
 

@@ -16,10 +16,7 @@ from sd2core.progress import silent
 def fit_choices(fit: Fit, subject: str, focal_px: float | None) -> dict[str, Any]:
     """Return the options for fitting one video, as JSON can hold them.
 
-    Parameters
-    ----------
-    focal_px : float, optional
-        As the recording knows it; what the plan says goes before.
+    The plan's focal length takes precedence over ``focal_px``, the recording's.
     """
     told = fit.focal_px is not None or fit.field_of_view_deg is not None
     choices = {

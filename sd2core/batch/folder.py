@@ -20,40 +20,21 @@ PROGRESS_VERSION = 1
 
 @dataclass(frozen=True)
 class BatchStatus:
-    """State and counts of a batch.
-
-    Parameters
-    ----------
-    state : State
-    pid : int or None
-        Of the process that works or worked on it.
-    started_unix_s : float
-        When the last run began.
-    total, done, there : dict of str to int
-        Per step: tasks that are known of so far, made by the last run, found made already.
-    failed : int
-        Tasks that cannot be done.
-    waiting : int
-        Tasks that are not done because of those.
-    running, workers : int
-    elapsed_s, left_s : float or None
-    error : str or None
-        Why the whole batch failed.
-    """
+    """State and counts of a batch."""
 
     state: State
-    pid: int | None
-    started_unix_s: float
-    total: dict[str, int] = field(default_factory=dict)
-    done: dict[str, int] = field(default_factory=dict)
-    there: dict[str, int] = field(default_factory=dict)
-    failed: int = 0
-    waiting: int = 0
+    pid: int | None  # of the process that works or worked on it
+    started_unix_s: float  # of the last run
+    total: dict[str, int] = field(default_factory=dict)  # per step: tasks that are known of so far
+    done: dict[str, int] = field(default_factory=dict)  # per step: made by the last run
+    there: dict[str, int] = field(default_factory=dict)  # per step: found made already
+    failed: int = 0  # tasks that cannot be done
+    waiting: int = 0  # not done because of those
     running: int = 0
     workers: int = 0
     elapsed_s: float | None = None
     left_s: float | None = None
-    error: str | None = None
+    error: str | None = None  # reason if the whole batch failed
 
 
 class BatchFolder(RunFolder):
@@ -87,10 +68,7 @@ class BatchFolder(RunFolder):
     def prepare(self) -> None:
         """Make the folder, or take over one of a batch.
 
-        Raises
-        ------
-        Sd2Error
-            When it holds something else, or there is nowhere to make it.
+        Raises Sd2Error if it holds something else, or cannot be made.
         """
         ours = {"lock", self.log.name}
         if self.path.exists() and not self.exists:
@@ -110,10 +88,7 @@ class BatchFolder(RunFolder):
     def status(self) -> BatchStatus:
         """Current status, from all lines of progress.
 
-        Raises
-        ------
-        Sd2Error
-            When there is no batch, or its description is damaged.
+        Raises Sd2Error if there is no batch, or its description is damaged.
         """
         state, about = self.state_and_about()
         return status_of(state, about, read_events(self.progress))

@@ -29,78 +29,48 @@ LARGEST_IN_MEMORY_BYTES = 256 << 20
 
 @dataclass(frozen=True)
 class Origin:
-    """Recording, video or mesh of a batch.
-
-    Parameters
-    ----------
-    name : str
-        Its path from the folder that holds all of them: unique within the batch.
-    """
+    """Recording, video or mesh of a batch."""
 
     path: str
     name: str
+    """Path from the folder that holds all of them: unique within the batch."""
     subject: str
 
 
 @dataclass(frozen=True)
 class MeshInput:
-    """Facts of a moving mesh that tasks need.
-
-    Parameters
-    ----------
-    identity : str
-        Hash of its content and of how it is read.
-    target_m : tuple of 3 floats
-        Where the body is, see :class:`~sd2core.placements.body_extent.BodyExtent`.
-    reading : mapping
-        Arguments for ``load_mesh``.
-    """
+    """Facts of a moving mesh that tasks need."""
 
     path: str
-    identity: str
+    identity: str  # hash of its content and of how it is read
     frames: int
     vertices: int
     frames_per_s: float
-    target_m: Vector
+    target_m: Vector  # see sd2core.placements.body_extent.BodyExtent
     faces: str | None = None
-    reading: Mapping[str, Any] | None = None
+    reading: Mapping[str, Any] | None = None  # arguments for load_mesh
 
 
 @dataclass(frozen=True)
 class VideoInput:
-    """Video to fit a body to.
-
-    Parameters
-    ----------
-    path, identity : str
-        The hash is of its content.
-    focal_px : float, optional
-        As far as the recording knows it.
-    """
+    """Video to fit a body to."""
 
     path: str
-    identity: str
+    identity: str  # hash of its content
     frames: int
     frames_per_s: float
-    focal_px: float | None = None
+    focal_px: float | None = None  # as far as the recording knows it
 
 
 @dataclass(frozen=True)
 class Inspection:
-    """Content of a recording; a mesh takes precedence over a video.
+    """Content of a recording; a mesh takes precedence over a video."""
 
-    Parameters
-    ----------
-    sensor : VirtualSensor
-        Its own one.
-    about : str
-        Hash of what else a data set takes from it: labels, and what its radar saw.
-    """
-
-    sensor: VirtualSensor
+    sensor: VirtualSensor  # the recording's own
     mesh: MeshInput | None = None
     video: VideoInput | None = None
     about: str = ""
+    """Hash of what else a data set takes from it: labels, and what its radar saw."""
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Inspection:
@@ -120,16 +90,10 @@ def mesh_input(content: Mapping[str, Any]) -> MeshInput:
 
 
 def find_origins(recordings: Recordings, apart_from: Path) -> list[Origin]:
-    """Return all files that match the patterns, sorted.
+    """Return all files that match the (absolute) patterns, sorted.
 
-    What lies inside of a recording or of a Zarr store that is found belongs to it.
-
-    Parameters
-    ----------
-    recordings : Recordings
-        With absolute patterns.
-    apart_from : Path
-        The folder of the batch, which is not searched for its own input.
+    What lies inside of a recording or of a Zarr store that is found belongs to it. The
+    batch's own folder, ``apart_from``, is not searched.
     """
     found: set[str] = set()
     for pattern in recordings.files:

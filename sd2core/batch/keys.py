@@ -62,11 +62,8 @@ _RESOURCES: dict[Step, tuple[str, ...]] = {"fit": ("body.npz", "lifter.npz")}
 def key_of(step: Step, content: dict[str, Any]) -> str:
     """Return the key of a result: 32 hexadecimal digits, the same on every machine.
 
-    Parameters
-    ----------
-    content : dict
-        All that the result depends on besides the code, as JSON can hold it. The order of
-        keys does not matter.
+    ``content`` is all that the result depends on besides the code, as JSON can hold it. The
+    order of keys does not matter.
     """
     text = json.dumps(
         [step, code_digest(step), content], sort_keys=True, allow_nan=False, ensure_ascii=True

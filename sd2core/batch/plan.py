@@ -52,68 +52,43 @@ class _Section(BaseModel):
 
 
 class Recordings(_Section):
-    """Section ``[recordings]``: the input files and their subjects.
-
-    Parameters
-    ----------
-    files : tuple of str
-        Recordings (``.sd2``), videos and meshes, by name or by pattern; ``**`` is any
-        number of folders. Relative to the plan's folder.
-    subjects : {"recording", "folder"}
-        Subject of a recording that ``subject_of`` does not name: one per recording, or one
-        per folder.
-    subject_of : mapping of str to str
-        Pattern of a file's name, or of the end of its path, to a subject; the first that
-        fits holds.
-    """
+    """Section ``[recordings]``: the input files and their subjects."""
 
     files: Annotated[tuple[Text, ...], Field(min_length=1)]
+    """Recordings (``.sd2``), videos and meshes, by name or by pattern, relative to the plan's
+    folder; ``**`` is any number of folders."""
     subjects: Literal["recording", "folder"] = "recording"
+    """Subject of a recording that ``subject_of`` does not name: one per recording, or one per
+    folder."""
     subject_of: Mapping[Text, Text] = Field(default_factory=dict)
+    """Pattern of a file's name, or of the end of its path, to a subject; the first that fits
+    holds."""
 
 
 class Fit(_Section):
-    """Section ``[fit]``: options of ``sd2 fit`` for videos without a mesh.
-
-    Parameters
-    ----------
-    stature_m : float, optional
-        Stature of subjects who are not in ``stature_of``.
-    stature_of : mapping of str to float
-        Subject to stature in metres.
-    focal_px, field_of_view_deg : float, optional
-        Of the camera.
-    max_gap_s : float, optional
-        The longest gap without the person that is bridged.
-    models : str, optional
-        Folder of the landmark models.
-    """
+    """Section ``[fit]``: options of ``sd2 fit`` for videos without a mesh."""
 
     resolution: Resolution = "medium"
-    stature_m: Positive | None = None
-    stature_of: Mapping[Text, Positive] = Field(default_factory=dict)
+    stature_m: Positive | None = None  # of subjects not in stature_of
+    stature_of: Mapping[Text, Positive] = Field(default_factory=dict)  # subject to metres
     focal_px: Positive | None = None
     field_of_view_deg: Positive | None = None
-    max_gap_s: NotNegative | None = None
-    models: Text | None = None
+    max_gap_s: NotNegative | None = None  # longest gap that is bridged
+    models: Text | None = None  # folder of the landmark models
 
 
 class Synthesise(_Section):
     """Section ``[synthesise]``: options of ``sd2 synth``.
 
-    Parameters
-    ----------
-    tolerance : float, optional
-        Error that is allowed, as a share: the cheapest plan within it is chosen once for each
-        mesh, and held to from the first, the middle and the last of its placements. Without
-        it the options say how.
-    others
-        As :class:`~sd2core.doppler.options.SynthesisOptions` has them; those that are not
-        given come from the preset.
+    Options that are not given come from the preset, see
+    :class:`~sd2core.doppler.options.SynthesisOptions`.
     """
 
     preset: Literal["paper", "vid2doppler"] = "paper"
     tolerance: Positive | None = None
+    """Allowed error, as a share. The cheapest plan within it is chosen once for each mesh and
+    checked at the first, the middle and the last of its placements. Without it the options
+    decide."""
     vertices_kept: Annotated[FiniteFloat, Field(gt=0, le=1)] | None = None
     visibility: Visibility | None = None
     depth_resolution: DepthResolution | None = None
@@ -167,51 +142,30 @@ _CHOSEN_BY_TOLERANCE = (
 
 
 class Denoise(_Section):
-    """Section ``[denoise]``: options of ``sd2 denoise``.
+    """Section ``[denoise]``: options of ``sd2 denoise``."""
 
-    Parameters
-    ----------
-    model : str
-        A model file, or the name of an installed model.
-    """
-
-    model: Text = "denoiser"
+    model: Text = "denoiser"  # a file, or the name of an installed model
 
 
 class Simulate(_Section):
-    """Section ``[simulate]``: options of ``sd2 export --simulate``.
+    """Section ``[simulate]``: options of ``sd2 export --simulate``."""
 
-    Parameters
-    ----------
-    radar : str
-        ``"paper"``, or the ``config.json`` of a capture.
-    seed : int
-        Of phases and noise.
-    """
-
-    radar: Text = "paper"
-    seed: Annotated[int, Field(ge=0)] = 0
+    radar: Text = "paper"  # "paper", or the config.json of a capture
+    seed: Annotated[int, Field(ge=0)] = 0  # of phases and noise
 
 
 class Export(_Section):
-    """Section ``[export]``: options of ``sd2 export``.
-
-    Parameters
-    ----------
-    kinds : tuple of str
-        Maps to take, where a recording has them; a radar's own with the recording's sensor.
-    frame_rate_hz : float, optional
-        Of all segments; otherwise that of the first source.
-    validation_subjects, test_subjects : tuple of str, optional
-        Otherwise they are chosen.
-    """
+    """Section ``[export]``: options of ``sd2 export``."""
 
     format: Literal["zarr", "h5", "npz"] = "zarr"
     kinds: Annotated[tuple[MapKind, ...], Field(min_length=1)] = KINDS
+    """Maps to take, where a recording has them; a radar's own with the recording's sensor."""
     segment_frames: Annotated[int, Field(ge=2, le=10_000)] = LENGTH
     overlap_frames: Annotated[int, Field(ge=0)] = OVERLAP
     frame_rate_hz: Positive | None = None
+    """Of all segments; otherwise that of the first source."""
     validation_subjects: tuple[Text, ...] | None = None
+    """Chosen automatically if not given, like the test subjects."""
     test_subjects: tuple[Text, ...] | None = None
     title: str = ""
 
@@ -223,25 +177,18 @@ class Export(_Section):
 
 
 class BatchPlan(_Section):
-    """Plan of a batch. A step whose section is absent is not done.
-
-    Parameters
-    ----------
-    out : str
-        Folder of the results, relative to the plan's folder.
-    placements : mapping
-        Where the sensor is put: ``kind = "recording"`` (each recording's own sensor, the
-        camera where it has none), ``kind = "positions"`` with ``positions_m``, or what
-        :func:`~sd2core.placements.placements.placements_from_dict` reads (``"grid"``,
-        ``"cloud"``), around the body of each recording. With ``own = true`` the recording's
-        own sensor besides.
-    """
+    """Plan of a batch. A step whose section is absent is not done."""
 
     format: Literal["sd2-batch-plan"] = FORMAT
     version: Literal[1] = VERSION
     out: Text
+    """Folder of the results, relative to the plan's folder."""
     recordings: Recordings
     placements: Mapping[str, Any] = Field(default_factory=lambda: {"kind": "recording"})
+    """Sensor positions: ``kind = "recording"`` (each recording's own sensor, the camera where it
+    has none), ``kind = "positions"`` with ``positions_m``, or a spec of
+    :func:`~sd2core.placements.placements.placements_from_dict` (``"grid"``, ``"cloud"``),
+    around the body of each recording. With ``own = true`` the recording's own sensor besides."""
     fit: Fit | None = None
     synthesise: Synthesise | None = None
     denoise: Denoise | None = None
@@ -276,12 +223,8 @@ class BatchPlan(_Section):
     def sensors(self, own: VirtualSensor, target_m: Vector) -> dict[int, VirtualSensor]:
         """Return the sensors around one recording, by the number of the placement.
 
-        Parameters
-        ----------
-        own : VirtualSensor
-            The recording's own one, whose number is 0.
-        target_m : tuple of 3 floats
-            Where its body is.
+        ``own`` is the recording's own one, whose number is 0; ``target_m`` is the position
+        of its body.
         """
         with_own, places = _placements(self.placements)
         if isinstance(places, tuple):

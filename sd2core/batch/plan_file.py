@@ -26,11 +26,8 @@ _HINT = "docs/formats.md says what a plan holds"
 def read_plan(path: Path) -> BatchPlan:
     """Read a TOML file; paths in the plan that is returned are absolute.
 
-    Raises
-    ------
-    Sd2Error
-        When it cannot be read, is no TOML, or says what is not allowed; it names file,
-        line and key.
+    Raises Sd2Error, with file, line and key, if it cannot be read, is no TOML, or holds
+    what is not allowed.
     """
     path = Path(path)
     try:
@@ -45,10 +42,7 @@ def read_plan(path: Path) -> BatchPlan:
 def plan_from_text(text: str, folder: Path, source: str = "The plan") -> BatchPlan:
     """Parse a plan from TOML; paths relative to ``folder`` become absolute.
 
-    Raises
-    ------
-    Sd2Error
-        As :func:`read_plan`.
+    Raises Sd2Error as :func:`read_plan`.
     """
     try:
         # Strict as JSON is: lists are lists and numbers are numbers. TOML's dates are neither.

@@ -44,20 +44,14 @@ _LOCAL_SETTINGS = {
 
 @dataclass(frozen=True, eq=False)
 class Ending:
-    """End of a bundle of tasks.
-
-    Parameters
-    ----------
-    outcomes : sequence of Outcome, optional
-        One per task; None where the bundle did not return.
-    killed : bool
-        True where it did not return because workers died too often.
-    """
+    """End of a bundle of tasks."""
 
     tasks: tuple[Task, ...]
     outcomes: Sequence[Outcome] | None = None
+    """One per task; None where the bundle did not return."""
     worker: str | None = None
     killed: bool = False
+    """True where it did not return because workers died too often."""
 
 
 class Pool(Protocol):
@@ -74,13 +68,7 @@ class Pool(Protocol):
 
 
 class DaskPool:
-    """Tasks on a Dask cluster.
-
-    Parameters
-    ----------
-    most_deaths : int
-        Number of workers that a task may end before it is given up.
-    """
+    """Tasks on a Dask cluster; one that has ended ``most_deaths`` workers is given up."""
 
     def __init__(self, client: Any, folder: BatchFolder, most_deaths: int) -> None:
         self._client, self._folder, self._most_deaths = client, folder, most_deaths
@@ -232,10 +220,7 @@ def local_pool(folder: BatchFolder, processes: int) -> Iterator[DaskPool]:
 def local_client(scratch: Path, processes: int) -> Iterator[Any]:
     """Start a cluster on this machine, as :func:`local_pool` does, and return its client.
 
-    Parameters
-    ----------
-    scratch : Path
-        Where Dask may put files.
+    Dask may put files into ``scratch``.
     """
     import dask
     from distributed import Client, LocalCluster

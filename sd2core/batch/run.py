@@ -40,22 +40,12 @@ may still be at its last task on another machine."""
 
 @dataclass(frozen=True)
 class BatchEnd:
-    """End of a run.
-
-    Parameters
-    ----------
-    failed : int
-        Tasks that cannot be done.
-    interrupted : bool
-        Whether Ctrl-C asked for the end.
-    facts : dict
-        What the line ``end`` says.
-    """
+    """End of a run."""
 
     outcome: Outcome
-    failed: int
-    interrupted: bool
-    facts: dict[str, Any]
+    failed: int  # tasks that cannot be done
+    interrupted: bool  # by Ctrl-C
+    facts: dict[str, Any]  # content of the line "end"
 
 
 def run_batch(
@@ -78,9 +68,9 @@ def run_batch(
     scheduler : str, optional
         Address of a dask-scheduler; otherwise ``processes`` are started here.
     watch : callable, optional
-        Told every line of the progress.
+        Called with every line of the progress.
     pool : context manager, optional
-        In place of both: what carries out the tasks.
+        Runs the tasks, in place of scheduler and processes.
 
     Raises
     ------
@@ -337,13 +327,7 @@ def _clear(folder: BatchFolder) -> None:
 
 
 def remove_old_leftovers(folder: Path, old_s: float = _OLD_S) -> None:
-    """Delete temporary files and folders that are no longer written to.
-
-    Parameters
-    ----------
-    folder : Path
-        Of a batch.
-    """
+    """Delete temporary files and folders of a batch that are no longer written to."""
     before_s = time.time() - old_s
     for kind in _KINDS:
         for shelf in _entries(folder / kind):

@@ -41,21 +41,11 @@ def stretches_of(frames: int, longest: int = LONGEST_FRAMES) -> list[Stretch]:
 
 @dataclass(frozen=True)
 class Choosing:
-    """Maps for which an accuracy plan is chosen: once for all maps of a mesh.
+    """Maps for which an accuracy plan is chosen: once for all maps of a mesh."""
 
-    Parameters
-    ----------
-    path : Path
-        Where the plan is kept.
-    places : sequence of VirtualSensor
-        Some of all, see :func:`sd2core.accuracy.places.spread`.
-    frames : int
-        Of all maps together.
-    """
-
-    path: Path
-    places: Sequence[VirtualSensor]
-    frames: int
+    path: Path  # file that keeps the plan
+    places: Sequence[VirtualSensor]  # some of all, see sd2core.accuracy.places.spread
+    frames: int  # of all maps together
 
 
 def choosing_of(content: Mapping[str, Any]) -> Choosing:
@@ -88,13 +78,8 @@ def synthesise(
 ) -> None:
     """Make the map of some frames and write it.
 
-    Parameters
-    ----------
-    stretch : (int, int)
-        Equal to these columns of the map of the whole clip: smoothing and the reuse of
-        masks look beyond the stretch.
-    choosing : Choosing, optional
-        Where the plan is section a tolerance.
+    It equals these columns of the map of the whole clip: smoothing and the reuse of masks
+    look beyond the stretch. ``choosing`` is for a section with a tolerance.
     """
     refuse_inside(mesh, sensor)
     plan = None if choosing is None else chosen_plan(mesh, section, choosing)
@@ -116,10 +101,7 @@ def simulate(
 ) -> None:
     """Make the map that a radar would show of some frames and write it.
 
-    Parameters
-    ----------
-    stretch : (int, int)
-        Equal to these columns of the map of the whole clip.
+    It equals these columns of the map of the whole clip.
     """
     from sd2core.datasets.simulating import simulated_map
 

@@ -32,26 +32,16 @@ _MAPS: tuple[Step, ...] = ("synthesise", "denoise", "simulate")
 
 @dataclass(frozen=True)
 class PlannedMap:
-    """Map of one recording from one place: one file per stretch.
-
-    Parameters
-    ----------
-    placement : int
-        0 is the recording's own sensor; 1 and up are the places of the plan.
-    synthesis : tuple of Task
-        One per stretch.
-    denoising : Task, optional
-        Of all stretches: a model remembers what was before.
-    simulation : tuple of Task
-        One per stretch, or none.
-    """
+    """Map of one recording from one place: one file per stretch."""
 
     placement: int
+    """0 is the recording's own sensor; 1 and up are the places of the plan."""
     sensor: VirtualSensor
     stretches: tuple[Stretch, ...]
-    synthesis: tuple[Task, ...]
+    synthesis: tuple[Task, ...]  # one per stretch
     denoising: Task | None = None
-    simulation: tuple[Task, ...] = ()
+    """Covers all stretches, because a model carries its state on."""
+    simulation: tuple[Task, ...] = ()  # one per stretch, or none
 
     @property
     def tasks(self) -> tuple[Task, ...]:
@@ -68,16 +58,8 @@ class PlannedMap:
 class TaskGraph:
     """Tasks of a batch, each known as soon as the tasks before it are done.
 
-    Parameters
-    ----------
-    plan : BatchPlan
-        With absolute paths.
-
-    Attributes
-    ----------
-    total : Counter
-        Tasks per step that are known of so far; a map counts once until it is known into
-        how many stretches it is cut.
+    The paths of the plan are absolute. ``total`` counts the tasks per step that are known
+    of so far; a map counts once until it is known into how many stretches it is cut.
     """
 
     def __init__(self, plan: BatchPlan, folder: BatchFolder, origins: Sequence[Origin]) -> None:

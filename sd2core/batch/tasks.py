@@ -30,30 +30,18 @@ _ONE_FILE = ("synthesise", "denoise", "simulate")
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """Function of paths and small values whose result is a file.
-
-    Parameters
-    ----------
-    key : str
-        Name of the result: tasks of one key have the same result.
-    details : mapping
-        Arguments, as JSON can hold them.
-    frames : int
-        Number of frames to work on, for rates.
-    group : str
-        Tasks of one group are best done by one process.
-    out : str
-        File that is written last; empty where that is not a file of its own.
-    """
+    """Function of paths and small values whose result is a file."""
 
     step: Step
     key: str
+    """Name of the result: tasks of one key have the same result."""
     origin: Origin
-    details: Mapping[str, Any]
+    details: Mapping[str, Any]  # arguments, as JSON can hold them
     placement: int | None = None
-    frames: int = 0
-    group: str = ""
+    frames: int = 0  # to work on, for rates
+    group: str = ""  # best done by one process
     out: str = ""
+    """File that is written last; empty where that is not a file of its own."""
 
     def record(self, folder: Path, most_deaths: int = 2) -> dict[str, Any]:
         """Return what is sent to a worker."""
@@ -70,27 +58,14 @@ class Task:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Result of one task, as the worker sends it back.
-
-    Parameters
-    ----------
-    seconds : float
-        Time that the task took.
-    error : mapping, optional
-        ``found``, ``expected`` and ``remedy`` of a failed task.
-    fatal : bool
-        True where no other task can be done either.
-    deaths : int
-        Workers that died during earlier attempts.
-    worker_died : bool
-        True where the task is given up because of that.
-    """
+    """Result of one task, as the worker sends it back."""
 
     seconds: float = 0.0
     error: dict[str, str] | None = None
-    fatal: bool = False
-    deaths: int = 0
-    worker_died: bool = False
+    """``found``, ``expected`` and ``remedy`` of a failed task."""
+    fatal: bool = False  # True if no other task can be done either
+    deaths: int = 0  # workers that died during earlier attempts
+    worker_died: bool = False  # True if the task is given up because of that
 
 
 def error_fields(error: Sd2Error) -> dict[str, str]:

@@ -39,26 +39,11 @@ class Learner(Protocol):
 
 
 class TrainingCallbacks:
-    """A run between its steps.
+    """Callbacks of a run between its steps.
 
-    Parameters
-    ----------
-    config : TrainConfig
-    folder : TrainingFolder
-    writer : ProgressWriter
-    control : Control
-    order : Order
-    exam : Exam
-    scaling : Scaling
-    axis : VelocityAxis
-    counted : tuple of int
-        Bins that are not nulled.
-    position : Position
-        Where to begin.
-    about : dict
-        What a checkpoint says besides.
-    save_best : callable
-        ``save_best(validation, epoch)`` writes the model that is to be used.
+    ``counted`` are the bins that are not nulled, ``position`` is the start, ``about`` goes
+    into checkpoints, and ``save_best(validation, epoch)`` writes the model that is to be
+    used.
     """
 
     def __init__(

@@ -22,57 +22,31 @@ _KEY = "sd2"
 
 @dataclass
 class Position:
-    """Position of a run: all that its continuation depends on besides the weights.
+    """Position of a run: all that its continuation depends on besides the weights."""
 
-    Parameters
-    ----------
-    epoch : int
-        Number of the epoch under way, from 0.
-    step : int
-        Steps of it that are done.
-    steps_done : int
-        In all.
-    elapsed_s : float
-        Time of training, without pauses and without what a kill has lost.
-    squares : float
-        Sum over the segments of this epoch of their mean square error.
-    segments : int
-        How many that are.
-    best : dict or None
-        ``epoch``, ``validation_rmse``, ``validation_mae_mps`` and ``score`` of the best
-        epoch so far.
-    epochs_since_best : int
-    """
-
-    epoch: int = 0
-    step: int = 0
-    steps_done: int = 0
+    epoch: int = 0  # under way, from 0
+    step: int = 0  # steps of this epoch that are done
+    steps_done: int = 0  # in all
     elapsed_s: float = 0.0
+    """Time of training, without pauses and without what a kill has lost."""
     squares: float = 0.0
-    segments: int = 0
+    """Sum over the segments of this epoch of their mean square error."""
+    segments: int = 0  # number of them
     best: dict[str, Any] | None = None
+    """``epoch``, ``validation_rmse``, ``validation_mae_mps`` and ``score`` of the best epoch."""
     epochs_since_best: int = 0
 
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """Weights, optimiser moments and position of a run.
+    """Weights, optimiser moments and position of a run."""
 
-    Parameters
-    ----------
-    weights : dict of Tensor
-        State of the model.
-    moments : dict of dict of Tensor
-        State of the optimiser, by number of parameter and name.
-    position : Position
-    about : dict
-        ``data_digest`` and what else must be the same to go on.
-    """
-
-    weights: dict[str, torch.Tensor]
+    weights: dict[str, torch.Tensor]  # state of the model
     moments: dict[int, dict[str, torch.Tensor]]
+    """State of the optimiser, by number of parameter and name."""
     position: Position
     about: dict[str, Any] = field(default_factory=dict)
+    """``data_digest`` and what else must be the same to resume."""
 
 
 def write_checkpoint(path: Path, record: Path, checkpoint: Checkpoint) -> None:
@@ -101,12 +75,9 @@ def write_checkpoint(path: Path, record: Path, checkpoint: Checkpoint) -> None:
 
 
 def read_checkpoint(path: Path) -> Checkpoint:
-    """Read what :func:`write_checkpoint` wrote, on the CPU.
+    """Read the file of :func:`write_checkpoint` onto the CPU.
 
-    Raises
-    ------
-    Sd2Error
-        When there is none, or it is damaged.
+    Raises Sd2Error if it is missing or damaged.
     """
     if not path.exists():
         raise Sd2Error(

@@ -6,13 +6,7 @@ import time
 
 
 class Clock:
-    """Seconds of training.
-
-    Parameters
-    ----------
-    elapsed_s : float
-        Of the time before.
-    """
+    """Seconds of training; ``elapsed_s`` are those of earlier processes."""
 
     def __init__(self, elapsed_s: float = 0.0) -> None:
         self._before_s = elapsed_s
@@ -29,13 +23,7 @@ class Clock:
         self._begun_s += seconds
 
     def left_s(self, share: float) -> float | None:
-        """Until the end, by the pace since this process began.
-
-        Parameters
-        ----------
-        share : float
-            Of the run that is done.
-        """
+        """Remaining time by the pace since this process began; ``share`` of the run is done."""
         if self._first_share is None:
             self._first_share = share
             return None

@@ -17,21 +17,12 @@ from sd2core.train.rules import Allowed, choice, flag, number, paths, refused, t
 
 @dataclass(frozen=True)
 class ConfigKey:
-    """One setting: where it stands and what it may be.
-
-    Parameters
-    ----------
-    section, name : str
-    default : Any
-    allowed : str
-        In words.
-    about : str
-    """
+    """One setting: its section, its name and the values that it may have."""
 
     section: str
     name: str
     default: Any
-    allowed: str
+    allowed: str  # in words
     about: str
 
 
@@ -150,7 +141,7 @@ class TrainingConfig:
 
 @dataclass(frozen=True)
 class MachineConfig:
-    """On what it learns."""
+    """Settings of the machine: device, precision, threads, priority."""
 
     device: str = _setting(
         "auto takes a GPU where there is one", choice("auto", "cpu", "cuda"), "auto"
@@ -174,15 +165,7 @@ class MachineConfig:
 
 @dataclass(frozen=True)
 class TrainConfig:
-    """All settings of a run.
-
-    Parameters
-    ----------
-    data : DataConfig
-    model : ModelConfig
-    training : TrainingConfig
-    machine : MachineConfig
-    """
+    """All settings of a run."""
 
     data: DataConfig
     model: ModelConfig = field(default_factory=ModelConfig)
@@ -225,21 +208,10 @@ def settings() -> list[ConfigKey]:
 def config_from(
     content: Mapping[str, Any], folder: Path, source: str = "The settings"
 ) -> TrainConfig:
-    """Settings from nested tables, as TOML gives them.
+    """Make settings from nested tables ``{section: {name: value}}``, as TOML gives them.
 
-    Parameters
-    ----------
-    content : mapping
-        ``{section: {name: value}}``.
-    folder : Path
-        Paths are relative to it.
-    source : str
-        Named in errors.
-
-    Raises
-    ------
-    Sd2Error
-        For unknown names and values that are not allowed.
+    Paths are relative to ``folder``; ``source`` is named in errors. Raises Sd2Error for
+    unknown names and values that are not allowed.
     """
     _refuse_unknown(content, tuple(_SECTIONS), source, "section")
     sections: dict[str, Any] = {}
@@ -262,10 +234,7 @@ def config_from(
 def read_config(path: Path) -> TrainConfig:
     """Read a TOML file; paths in it are relative to its folder.
 
-    Raises
-    ------
-    Sd2Error
-        When it cannot be read, is no TOML, or says what is not allowed.
+    Raises Sd2Error if it cannot be read, is no TOML, or holds what is not allowed.
     """
     path = Path(path)
     try:

@@ -23,38 +23,23 @@ RANGE_LAW = 4.0
 
 @dataclass(frozen=True)
 class Split:
-    """People for training, for choosing the best epoch, and for testing.
-
-    Parameters
-    ----------
-    training, validation, test : tuple of str
-        Subjects. They share nobody.
-    by_take : bool
-        True where nobody validates, as with one subject: then the last fifth of
-        everybody's takes does, and what is measured there says nothing about other people.
-    """
+    """Disjoint groups of people for training, for choosing the best epoch, and for testing."""
 
     training: tuple[str, ...]
     validation: tuple[str, ...]
     test: tuple[str, ...]
     by_take: bool = False
+    """True without people for validation, as with one subject: the last fifth of everyone's takes
+    is used instead, and the errors say nothing about other people."""
 
 
 @dataclass(frozen=True, eq=False)
 class Segments:
-    """Windows of equal length.
+    """Windows of equal length."""
 
-    Parameters
-    ----------
-    inputs, targets : float32 array, shape (segments, length, bins)
-        Synthetic Doppler and the radar's.
-    moving : bool array, shape (segments, length)
-        Frames in which the radar shows more than noise.
-    """
-
-    inputs: NDArray[np.float32]
-    targets: NDArray[np.float32]
-    moving: NDArray[np.bool_]
+    inputs: NDArray[np.float32]  # synthetic, (segments, length, bins)
+    targets: NDArray[np.float32]  # of the radar
+    moving: NDArray[np.bool_]  # (segments, length); the radar shows more than noise
 
     def __len__(self) -> int:
         return len(self.inputs)
@@ -62,21 +47,13 @@ class Segments:
 
 @dataclass(frozen=True, eq=False)
 class Windows:
-    """Segments that are cut while learning, so that they may lie elsewhere in every epoch.
+    """Segments that are cut while learning, so that they may lie elsewhere in every epoch."""
 
-    Parameters
-    ----------
-    inputs, targets : float32 array, shape (frames, bins)
-        All takes one after another.
-    earliest, latest : int64 array, shape (segments,)
-        Between which the first frame of every segment may lie: within half a step of its
-        own place, and within its take.
-    length : int
-    """
-
-    inputs: NDArray[np.float32]
+    inputs: NDArray[np.float32]  # (frames, bins), all takes one after another
     targets: NDArray[np.float32]
     earliest: NDArray[np.int64]
+    """Bounds, shape (segments,), of the first frame of every segment: within half a step of its
+    own place, and within its take."""
     latest: NDArray[np.int64]
     length: int
 
@@ -92,24 +69,13 @@ class Windows:
 
 @dataclass(frozen=True, eq=False)
 class TrainingData:
-    """Training and validation data of a run.
+    """Training and validation data of a run."""
 
-    Parameters
-    ----------
-    pairs : PairSet
-        All of it, the unseen subjects as well.
-    split : Split
-    training : Windows
-    validation : Segments
-    learnt_takes : tuple of Take
-        Those that the training segments are from.
-    """
-
-    pairs: PairSet
+    pairs: PairSet  # with those of the unseen subjects
     split: Split
     training: Windows
     validation: Segments
-    learnt_takes: tuple[Take, ...]
+    learnt_takes: tuple[Take, ...]  # sources of the training segments
 
     @property
     def digest(self) -> str:
@@ -126,14 +92,9 @@ class TrainingData:
 def read_mixed(paths: Sequence[Path]) -> PairSet:
     """Read one or several stores of pairs as one.
 
-    Subjects of the same name in different stores are different people: they are then
-    called ``STORE:NAME``. Labels are those of all stores. What holds anything simulated
-    is called simulated.
-
-    Raises
-    ------
-    Sd2Error
-        When axes, frame rates or null bins differ.
+    Subjects of the same name in different stores are different people: they are then called
+    ``STORE:NAME``. Labels are those of all stores. What holds anything simulated is called
+    simulated. Raises Sd2Error if axes, frame rates or null bins differ.
     """
     sets = [read_pairs(path) for path in paths]
     first = sets[0]
@@ -179,15 +140,11 @@ def split_subjects(
     validation: Sequence[str] | None = None,
     test: Sequence[str] | None = None,
 ) -> Split:
-    """Division of people into training and held-out parts.
+    """Split people into training and held-out parts.
 
-    By default a sixth of the subjects, at least one, is kept for the test (where there
-    are three or more) and as many for validation, from the end of the list.
-
-    Raises
-    ------
-    Sd2Error
-        When a subject is unknown or named twice, or nobody is left to learn from.
+    By default a sixth of the subjects, at least one, is kept for the test (where there are
+    three or more) and as many for validation, from the end of the list. Raises Sd2Error if
+    a subject is unknown or named twice, or none is left to learn from.
     """
     subjects = list(subjects)
     for key, named in (("validation", validation), ("test", test)):
@@ -224,13 +181,9 @@ def split_subjects(
 def prepare(pairs: PairSet, config: DataConfig) -> TrainingData:
     """Cut pairs into segments to learn from and to choose by.
 
-    Segments to choose by overlap only where a take's length makes them, so that every
-    frame counts about once, and are of the takes' own sensors.
-
-    Raises
-    ------
-    Sd2Error
-        When the subjects cannot be split, or no take is as long as a segment.
+    Segments to choose by overlap only where a take's length makes them, so that every frame
+    counts about once, and are of the takes' own sensors. Raises Sd2Error if the subjects
+    cannot be split, or no take is as long as a segment.
     """
     split = split_subjects(pairs.subjects, config.validation_subjects, config.test_subjects)
     learnt = pairs.of(split.training).takes
@@ -250,13 +203,7 @@ def prepare(pairs: PairSet, config: DataConfig) -> TrainingData:
 
 
 def windows_of(takes: Sequence[Take], config: DataConfig) -> Windows:
-    """All segments to learn from, in the order of their takes.
-
-    Raises
-    ------
-    Sd2Error
-        When there is none.
-    """
+    """All segments to learn from, in the order of their takes. Raises Sd2Error without any."""
     length, overlap = config.segment_frames, config.overlap_frames
     reach = (length - overlap) // 2 if config.segments == "shifted" else 0
     earliest, latest = [], []
@@ -281,13 +228,7 @@ def windows_of(takes: Sequence[Take], config: DataConfig) -> Windows:
 def segments_of(
     takes: Sequence[Take], length: int, overlap: int, null_bins: Sequence[int] = ()
 ) -> Segments:
-    """All segments of some takes, in their order.
-
-    Raises
-    ------
-    Sd2Error
-        When there is none.
-    """
+    """All segments of some takes, in their order. Raises Sd2Error without any."""
     inputs, targets, moving = [], [], []
     for take in takes:
         starts = segment_starts(len(take.times_s), length, overlap)
@@ -322,19 +263,13 @@ class Draw(NamedTuple):
 
 @dataclass(frozen=True)
 class Order:
-    """In which order segments are learnt from; depends on seed and epoch alone.
-
-    Parameters
-    ----------
-    segments, batch_size, seed : int
-    range_factor : float
-        Gains are drawn for ranges up to this factor nearer or farther.
-    """
+    """Order in which segments are learnt from; depends on seed and epoch alone."""
 
     segments: int
     batch_size: int
     seed: int
     range_factor: float = 1.0
+    """Gains are drawn for ranges up to this factor nearer or farther."""
 
     @property
     def steps(self) -> int:

@@ -42,15 +42,13 @@ def evaluate(
 ) -> Evaluation:
     """Measure models, and beside them what needs no training.
 
-    The filters are fitted on the subjects that the first model learnt from, as far as
-    they are there; else on all that are not judged.
-
     Parameters
     ----------
     models : sequence of TrainedDenoiser
-    pairs : PairSet
+        The filters are fitted on the subjects that the first model learnt from, as far as
+        they are there; else on all that are not judged.
     subjects : iterable of str, optional
-        Who is judged; by default the test subjects of the first model, or everybody.
+        Subjects to judge; by default the test subjects of the first model, or all.
     first_only : bool
         Judge only what every take's own sensor saw.
     progress : callable

@@ -15,27 +15,13 @@ from sd2core.denoise.metrics import MapError, VelocityError
 
 @dataclass(frozen=True)
 class Score:
-    """Errors on some frames.
+    """Errors on some frames."""
 
-    Parameters
-    ----------
-    frames : int
-        All of them.
-    peak : VelocityError
-        Of the peak velocity, where something moves.
-    peak_all : VelocityError
-        The same of all frames.
-    mean : VelocityError
-        Of the energy-weighted mean velocity, where something moves.
-    map : MapError
-        Of all cells of all frames.
-    """
-
-    frames: int
-    peak: VelocityError
-    peak_all: VelocityError
-    mean: VelocityError
-    map: MapError
+    frames: int  # all of them
+    peak: VelocityError  # of the peak velocity, where something moves
+    peak_all: VelocityError  # the same of all frames
+    mean: VelocityError  # of the energy-weighted mean velocity, where something moves
+    map: MapError  # of all cells of all frames
 
     def to_json(self) -> dict[str, Any]:
         """By name."""
@@ -48,19 +34,10 @@ _PARTS = ("peak", "peak_all", "mean", "map")
 
 @dataclass(frozen=True)
 class Report:
-    """Errors of one model.
-
-    Parameters
-    ----------
-    name : str
-        To tell it from others of its group: the file, or the filter.
-    card : ModelCard
-    seed : int or None
-    all : Score
-    by_label, by_subject : dict of Score
-    """
+    """Errors of one model."""
 
     name: str
+    """Distinguishes it within its group: the file, or the filter."""
     card: ModelCard
     seed: int | None
     all: Score
@@ -70,20 +47,11 @@ class Report:
 
 @dataclass(frozen=True)
 class Group:
-    """Models of one architecture that differ in their seeds.
-
-    Parameters
-    ----------
-    name : str
-    reports : tuple of Report
-        At least one.
-    trained : bool
-        False for what needs no training.
-    """
+    """Models of one architecture that differ in their seeds."""
 
     name: str
-    reports: tuple[Report, ...]
-    trained: bool
+    reports: tuple[Report, ...]  # at least one
+    trained: bool  # False for what needs no training
 
     def values(
         self, part: str, number: str, label: str | None = None, subject: str | None = None
@@ -95,29 +63,15 @@ class Group:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Errors of all groups on the same takes.
+    """Errors of all groups on the same takes."""
 
-    Parameters
-    ----------
-    kind : str
-        ``simulated`` or ``real`` radar.
-    subjects, labels : tuple of str
-        Labels that occur.
-    frames, moving : int
-        All, and those in which something moves.
-    groups : tuple of Group
-        The filters first.
-    notes : tuple of str
-        What one should know before believing it.
-    """
-
-    kind: str
+    kind: str  # "simulated" or "real" radar
     subjects: tuple[str, ...]
-    labels: tuple[str, ...]
+    labels: tuple[str, ...]  # those that occur
     frames: int
-    moving: int
-    groups: tuple[Group, ...]
-    notes: tuple[str, ...] = field(default=())
+    moving: int  # frames in which something moves
+    groups: tuple[Group, ...]  # the filters first
+    notes: tuple[str, ...] = field(default=())  # reservations about the result
 
     def to_json(self) -> dict[str, Any]:
         """All numbers of all models, and mean and sd over the models of a group."""

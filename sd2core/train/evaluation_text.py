@@ -31,13 +31,7 @@ def as_markdown(evaluation: Evaluation) -> str:
 
 
 def draw(evaluation: Evaluation) -> Figure:
-    """Error of the peak velocity: in all, per label, per subject; a dot is one model.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Bound to no window.
-    """
+    """Draw the error of the peak velocity: in all, per label, per subject; a dot is one model."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11.0, 4.2), dpi=120, layout="constrained")

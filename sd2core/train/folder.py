@@ -27,47 +27,23 @@ _OURS = (
 
 @dataclass(frozen=True)
 class RunStatus:
-    """Current state of a run.
-
-    Parameters
-    ----------
-    state : State
-    model : str
-        Name of its architecture.
-    pid : int or None
-        Of the process that trains or trained.
-    started_unix_s : float
-    epoch, epochs : int or None
-        Epochs that are done, of so many; None where it is not known yet, or where the
-        run is limited by time.
-    minutes : float or None
-        Training time that it may take, where that is its limit.
-    elapsed_s, left_s : float or None
-        Without pauses.
-    validation_rmse, validation_mae_mps : float or None
-        Of the best epoch.
-    resumable : bool
-        Whether ``sd2 train --resume`` can go on with it.
-    has_model : bool
-        Whether there is a best model to use.
-    error : str or None
-        Why it failed.
-    """
+    """Current state of a run."""
 
     state: State
-    model: str
-    pid: int | None
+    model: str  # name of its architecture
+    pid: int | None  # of the process that trains or trained
     started_unix_s: float
-    epoch: int | None
+    epoch: int | None  # epochs that are done
     epochs: int | None
-    minutes: float | None
-    elapsed_s: float | None
+    """None while unknown, or if the run is limited by time."""
+    minutes: float | None  # limit of its training time, if there is one
+    elapsed_s: float | None  # like left_s without pauses
     left_s: float | None
-    validation_rmse: float | None
+    validation_rmse: float | None  # of the best epoch
     validation_mae_mps: float | None
-    resumable: bool
-    has_model: bool
-    error: str | None
+    resumable: bool  # by ``sd2 train --resume``
+    has_model: bool  # a best model is there
+    error: str | None  # reason of a failure
 
 
 class TrainingFolder(RunFolder):
@@ -101,13 +77,7 @@ class TrainingFolder(RunFolder):
         return self.path / LAST_RECORD_NAME
 
     def make(self) -> None:
-        """Make the folder.
-
-        Raises
-        ------
-        Sd2Error
-            When there is something already, or nowhere to make it.
-        """
+        """Make the folder. Raises Sd2Error if it exists with content, or cannot be made."""
         if self.path.exists() and not self._is_empty():
             what = "a run" if self.exists else "something that is not an empty folder"
             raise Sd2Error(
@@ -124,23 +94,14 @@ class TrainingFolder(RunFolder):
         self.path.mkdir(exist_ok=True)
 
     def create(self, model: str) -> None:
-        """Make the folder and the description of the run.
-
-        Raises
-        ------
-        Sd2Error
-            As :meth:`make`.
-        """
+        """Make the folder and the description of the run. Raises Sd2Error as :meth:`make`."""
         self.make()
         self.set_state("starting", model=model, started_unix_s=time.time())
 
     def status(self) -> RunStatus:
         """Current status, from all lines of progress.
 
-        Raises
-        ------
-        Sd2Error
-            When there is no run, or its description is damaged.
+        Raises Sd2Error if there is no run, or its description is damaged.
         """
         state, about = self.state_and_about()
         return _status(self, state, about, standing(read_events(self.progress)))
@@ -165,12 +126,9 @@ class TrainingFolder(RunFolder):
 
 
 def runs_in(folder: Path) -> list[TrainingFolder]:
-    """The runs in a folder, by their names; the folder itself when it is one.
+    """Return the runs in a folder by their names; the folder itself if it is one.
 
-    Raises
-    ------
-    Sd2Error
-        When there is no such folder.
+    Raises Sd2Error if there is no such folder.
     """
     folder = Path(folder)
     if not folder.is_dir():

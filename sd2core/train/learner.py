@@ -32,16 +32,9 @@ class Step(NamedTuple):
 
 
 class Steps:
-    """Batches without end, from a position on.
+    """Endless batches from a position on, given by ``epoch`` and ``step``.
 
-    Parameters
-    ----------
-    order : Order
-    windows : Windows
-    epoch, step : int
-        The first.
-    rank, ranks : int
-        Of several processes each takes its share of every batch.
+    With several processes (``ranks``) each takes its share of every batch.
     """
 
     def __init__(
@@ -76,16 +69,10 @@ class Steps:
 
 
 class Learner(LightningModule):
-    """A denoiser with all that it learns from.
+    """Denoiser with all that it learns from.
 
-    Parameters
-    ----------
-    network : Denoiser
-    windows : Windows
-        Of energies; the course's scaling compresses them.
-    course : TrainingCallbacks
-    checkpoint : Checkpoint, optional
-        To go on from.
+    ``windows`` hold energies; the course's scaling compresses them. Training goes on from
+    ``checkpoint`` if there is one.
     """
 
     def __init__(

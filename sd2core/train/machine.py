@@ -1,4 +1,4 @@
-"""On what a run computes: device, precision, threads, priority."""
+"""Device, precision, threads and priority of a run."""
 
 from __future__ import annotations
 
@@ -26,13 +26,7 @@ _BESIDE_THE_POINT = (
 
 
 def device_of(machine: MachineConfig) -> Device:
-    """Device to compute on.
-
-    Raises
-    ------
-    Sd2Error
-        When a GPU is asked for and there is none, or not so many.
-    """
+    """Device to compute on. Raises Sd2Error if a GPU is asked for and there are too few."""
     found = torch.cuda.device_count() if torch.cuda.is_available() else 0
     if machine.device == "cpu" or (machine.device == "auto" and not found):
         return "cpu"
@@ -90,7 +84,7 @@ def settled(machine: MachineConfig, threads: int) -> Iterator[None]:
 
 
 def machine_words(device: Device, precision: str, threads: int) -> dict[str, Any]:
-    """On what a model was trained, for its card."""
+    """Description of the machine that a model was trained on, for its card."""
     name = torch.cuda.get_device_name() if device == "cuda" else _processor()
     return {
         "device": name,

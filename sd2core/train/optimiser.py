@@ -46,16 +46,10 @@ def set_rate(optimiser: torch.optim.Optimizer, factor: float) -> float:
 
 
 def rate_factor(done: float, warm_up: float, final: float) -> float:
-    """Share of the highest learning rate.
+    """Share of the highest learning rate when the share ``done`` (0 to 1) of the run is done.
 
-    Parameters
-    ----------
-    done : float
-        Share of the run that is done, 0 to 1.
-    warm_up : float
-        Share in which it rises linearly from zero.
-    final : float
-        What it falls to at the end, with half a cosine.
+    It rises linearly from zero during the share ``warm_up`` and falls to ``final`` at the
+    end, with half a cosine.
     """
     if done < warm_up:
         return done / warm_up

@@ -42,24 +42,10 @@ def carry_out(
     resume: bool,
     command: str,
 ) -> tuple[Outcome, Position]:
-    """Train.
+    """Train in a folder that is made, and locked by this process.
 
-    Parameters
-    ----------
-    folder : TrainingFolder
-        Made, and held by this process.
-    config : TrainConfig
-    writer : ProgressWriter
-    control : Control
-    resume : bool
-        Go on from the last checkpoint.
-    command : str
-        How it was asked for, for the model's card.
-
-    Raises
-    ------
-    Sd2Error
-        For what the user can mend.
+    ``resume`` goes on from the last checkpoint; ``command`` goes onto the model's card.
+    Raises Sd2Error for what the user can mend.
     """
     lower_priority(config.machine.nice)
     device = device_of(config.machine)
@@ -135,7 +121,7 @@ def carry_out(
 
 
 def order_of(config: TrainConfig, data: TrainingData) -> Order:
-    """In which order a run learns."""
+    """Order in which a run learns its segments."""
     training = config.training
     return Order(len(data.training), training.batch_size, training.seed, config.data.range_factor)
 

@@ -35,30 +35,16 @@ Watch = Callable[[Event], None]
 
 @dataclass(frozen=True)
 class Ending:
-    """Outcome of a run.
-
-    Parameters
-    ----------
-    outcome : str
-    best_epoch : int or None
-    validation_rmse, validation_mae_mps : float or None
-        Of the best epoch.
-    model : Path or None
-        The best model, where there is one.
-    interrupted : bool
-        Whether Ctrl-C ended it.
-    first : bool
-        False in the processes that Lightning starts beside the one that the user
-        started: they have nothing to say.
-    """
+    """Outcome of a run."""
 
     outcome: Literal["finished", "stopped", "cancelled"]
-    best_epoch: int | None
+    best_epoch: int | None  # None without a validated epoch, like its errors
     validation_rmse: float | None
     validation_mae_mps: float | None
-    model: Path | None
-    interrupted: bool = False
+    model: Path | None  # the best one, where there is one
+    interrupted: bool = False  # by Ctrl-C
     first: bool = True
+    """False in the processes that Lightning starts besides the user's own: these print nothing."""
 
 
 def begin(
@@ -68,13 +54,13 @@ def begin(
 
     Parameters
     ----------
-    config : TrainConfig
     out : Path
         Folder of the run; new, empty, or of a run that failed before it had learnt
         anything.
     command : str
-        How it was asked for; kept with the model.
+        Command line that is kept with the model.
     watch : callable, optional
+        Called with every event of the progress.
 
     Raises
     ------
@@ -99,15 +85,11 @@ def begin(
 
 
 def go_on(out: Path, *, command: str = "", watch: Watch | None = None) -> Ending:
-    """Go on with a run that was stopped, killed, or failed for a reason that is mended.
+    """Resume a run that was stopped, killed, or failed for a reason that is mended.
 
     On a CPU, with the same version of torch and the same number of threads, it ends with
-    the very weights that it would have had otherwise, unless time limits it.
-
-    Raises
-    ------
-    Sd2Error
-        When there is nothing to go on with.
+    the very weights that it would have had otherwise, unless time limits it. Raises
+    Sd2Error if there is nothing to resume.
     """
     folder = TrainingFolder(out)
     state = folder.state()
@@ -131,10 +113,7 @@ def go_on(out: Path, *, command: str = "", watch: Watch | None = None) -> Ending
 def check(config: TrainConfig) -> None:
     """Refuse at once what would fail when the work has begun.
 
-    Raises
-    ------
-    Sd2Error
-        For stores that are none, unknown models and their options.
+    Raises Sd2Error for paths that are no store of pairs, unknown models and their options.
     """
     from sd2core.denoise.registry import MODELS, options
     from sd2core.pairs.store import is_pair_store

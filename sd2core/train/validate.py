@@ -21,37 +21,24 @@ _BATCH = 256
 
 @dataclass(frozen=True)
 class Validation:
-    """Errors on segments.
-
-    Parameters
-    ----------
-    rmse : float
-        Of compressed values, over bins that are not nulled; what the loss is, too.
-    mae_mps : float
-        Of the peak velocity per frame, as :mod:`sd2core.denoise.metrics` defines it, in
-        frames in which something moves. They are those of segments, each of which a
-        model begins knowing nothing; `sd2 eval`, which gives it whole takes, finds less.
-    """
+    """Errors on segments."""
 
     rmse: float
+    """Of compressed values, over bins that are not nulled; equals the loss."""
     mae_mps: float
+    """Of the peak velocity per frame, as :mod:`sd2core.denoise.metrics` defines it, in frames in
+    which something moves. A model begins each segment without a state; ``sd2 eval``, which
+    gives it whole takes, finds less."""
 
 
 @dataclass(frozen=True, eq=False)
 class Exam:
-    """Segments that a model is validated on.
+    """Segments that a model is validated on."""
 
-    Parameters
-    ----------
-    inputs, targets : Tensor, shape (segments, length, bins)
-        Compressed.
-    peaks_mps : float64 array, shape (segments · length,)
-        Of the targets; NaN in frames in which nothing moves.
-    """
-
-    inputs: torch.Tensor
-    targets: torch.Tensor
+    inputs: torch.Tensor  # compressed, (segments, length, bins)
+    targets: torch.Tensor  # likewise
     peaks_mps: NDArray[np.float64]
+    """Of the targets, (segments · length,); NaN in frames in which nothing moves."""
 
     def on(self, device: torch.device) -> Exam:
         """The same on a device."""
@@ -79,18 +66,9 @@ def validate(
     counted: tuple[int, ...],
     keep_on: Callable[[], bool] = lambda: True,
 ) -> Validation | None:
-    """Measure a model.
+    """Measure a model over the bins that are ``counted`` (not nulled).
 
-    Parameters
-    ----------
-    model : Denoiser
-    exam : Exam
-    scaling : Scaling
-    axis : VelocityAxis
-    counted : tuple of int
-        Bins that are not nulled.
-    keep_on : callable
-        Asked between batches; False ends it without a result.
+    ``keep_on`` is asked between batches; if it says False there is no result (None).
     """
     training = model.training
     model.eval()
